@@ -1,0 +1,162 @@
+//! The contract of an agent: an object that lives by its own steps.
+//!
+//! In: a step length and what the agent can see of the others ([`Surroundings`]). Out: a new state and what the step took.
+//! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`crate::conformance`].
+
+use crate::{Anchor, Body, Resolution, SimSpan, SimTime, Snapshot};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// An agent's number: its place in the scene, fixed for a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct AgentId(pub u32);
+
+/// An object that runs by itself.
+///
+/// Promises, tested for every model: a step advances exactly `dt`; a refused step leaves the state bit for bit;
+/// the same calls give the same bits; nothing is allocated once the sizes settle; a state that is not finite is never written.
+pub trait Agent: Send {
+    /// The model's name as scenes write it: `tube`, `rigid`, `instrument`, `synthetic`.
+    fn model(&self) -> &'static str;
+
+    /// Advances the state by exactly `dt`.
+    ///
+    /// # Errors
+    /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
+    /// its last snapshot stands.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError>;
+
+    /// The resolution the simulation holds; `None` for a model that has none.
+    fn resolution(&self) -> Option<Resolution>;
+
+    /// Takes the nearest resolution to `wanted` that the agent can hold.
+    ///
+    /// Keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
+    fn retune(&mut self, wanted: Resolution);
+
+    /// Writes the state into `into`, all of it but `time`, which the runtime stamps.
+    fn write_snapshot(&self, into: &mut Snapshot);
+
+    /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes.
+    fn momentum(&self) -> (DVec3, DVec3);
+
+    /// Total mass in kilograms; zero for a model that has none.
+    fn mass_kg(&self) -> f64;
+}
+
+/// What a step took and what it led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepReport {
+    /// Work done, in the model's unit: a declared machine gives its price in seconds.
+    /// Tube: segments × substeps. Rigid, instrument: 1. Synthetic: its declared microseconds.
+    pub work: f64,
+    /// Into how many substeps the step was divided, ≥ 1.
+    pub substeps: u32,
+    /// Whether the agent could sleep: it has not moved for a while and nothing acts on it.
+    pub at_rest: bool,
+}
+
+/// Why a step was refused, or given up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The span was zero, or longer than the model can take. State: untouched.
+    #[error("step span is {dt_s} s; it must be above zero and at most {max_s} s")]
+    BadSpan {
+        /// The span asked for, in seconds.
+        dt_s: f64,
+        /// The longest span the model takes, in seconds.
+        max_s: f64,
+    },
+    /// The state stopped being finite. The agent must not step again; its last snapshot stands.
+    #[error("the state of this {model} is no longer finite after a step of {dt_s} s: {what}")]
+    Diverged {
+        /// The model's name.
+        model: &'static str,
+        /// The span of the failed step, in seconds.
+        dt_s: f64,
+        /// The quantity that was lost first, and where.
+        what: String,
+    },
+}
+
+/// The longest step any model takes, in seconds: past it a real-time agent has lost touch with its scene.
+pub const DT_MAX_S: f64 = 1.0;
+
+/// The length of `dt` in seconds, if a model may step by it.
+///
+/// # Errors
+/// [`StepError::BadSpan`] for zero and for more than [`DT_MAX_S`].
+pub fn check_span(dt: SimSpan) -> Result<f64, StepError> {
+    let dt_s = dt.as_secs_f64();
+    if dt_s > 0.0 && dt_s <= DT_MAX_S { Ok(dt_s) } else { Err(StepError::BadSpan { dt_s, max_s: DT_MAX_S }) }
+}
+
+/// What an agent sees while it steps.
+#[derive(Debug, Clone, Copy)]
+pub struct Surroundings<'a> {
+    /// Who is looking.
+    pub me: AgentId,
+    /// The agent's own time at the start of the step.
+    pub time: SimTime,
+    /// The newest snapshots of the agents it is linked to.
+    pub neighbours: &'a [Neighbour],
+    /// Springs of the user's hand on this agent.
+    pub hands: &'a [Pull],
+}
+
+/// The newest known state of another agent.
+#[derive(Debug, Clone)]
+pub struct Neighbour {
+    /// Who.
+    pub id: AgentId,
+    /// Its newest published state.
+    pub snapshot: Arc<Snapshot>,
+}
+
+/// A spring from a moving point of space to a material point of an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Pull {
+    /// Who pulls; `None` is the user's hand.
+    pub by: Option<AgentId>,
+    /// The material point that is pulled.
+    pub anchor: Anchor,
+    /// Where the other end of the spring is, metres.
+    pub target: DVec3,
+    /// How that end moves, m/s.
+    pub target_velocity: DVec3,
+    /// Stiffness, N/m, ≥ 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// Past this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag its catch along.
+const EXTRAPOLATION_MAX_S: f64 = 0.1;
+
+impl<'a> Surroundings<'a> {
+    /// An empty world at `time`, for tests and for agents that see nobody.
+    #[must_use]
+    pub fn alone(me: AgentId, time: SimTime) -> Self {
+        Self { me, time, neighbours: &[], hands: &[] }
+    }
+
+    /// Every spring on this agent: the user's hands, and the tools that hold it, their tips brought forward to `time`.
+    pub fn pulls(&self) -> impl Iterator<Item = Pull> + 'a {
+        let (me, time) = (self.me, self.time);
+        let held = self.neighbours.iter().filter_map(move |other| {
+            let Body::Tool(tool) = &other.snapshot.body else { return None };
+            let grasp = tool.grasp.filter(|g| g.target == me)?;
+            let age_s = time.secs_after(other.snapshot.time).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S);
+            Some(Pull {
+                by: Some(other.id),
+                anchor: grasp.anchor,
+                target: tool.tip + tool.velocity * age_s,
+                target_velocity: tool.velocity,
+                stiffness_n_m: grasp.stiffness_n_m,
+                damping_n_s_m: grasp.damping_n_s_m,
+            })
+        });
+        self.hands.iter().copied().chain(held)
+    }
+}

@@ -1,0 +1,19 @@
+//! Physics models that can live as autonomous agents.
+//!
+//! In: step lengths and what an agent sees of the others. Out: states, as [`Snapshot`]s.
+//! Never here: a clock, a thread, a file, the GPU. Theory: `docs/theory/rod.md`.
+
+mod agent;
+pub mod instrument;
+mod resolution;
+pub mod rigid;
+pub mod rod;
+pub mod shape;
+mod snapshot;
+pub mod synthetic;
+mod time;
+
+pub use agent::{Agent, AgentId, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span};
+pub use resolution::{N_MAX, Resolution, ResolutionRange};
+pub use snapshot::{Anchor, Body, CurveState, Grasp, Grip, HASH_START, RigidState, Snapshot, ToolState};
+pub use time::{SimSpan, SimTime};

@@ -1,0 +1,5 @@
+//! Shapes without physics: solids, skeleton curves, meshes and their levels.
+
+mod solid;
+
+pub use solid::{Obstacle, Solid};

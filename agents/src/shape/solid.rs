@@ -1,0 +1,64 @@
+//! Solid shapes: what a rigid body or a fixed obstacle is made of.
+
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// A solid in its own axes, metres, centred where its primitive is centred.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Solid {
+    /// A ball.
+    Ball {
+        /// Radius, > 0.
+        radius_m: f64,
+    },
+    /// A box.
+    Box {
+        /// Half of each edge, all > 0.
+        half_extents_m: DVec3,
+    },
+    /// A capsule along z.
+    Capsule {
+        /// Radius, > 0.
+        radius_m: f64,
+        /// Half the length of the straight part, > 0.
+        half_height_m: f64,
+    },
+    /// A cylinder along z.
+    Cylinder {
+        /// Radius, > 0.
+        radius_m: f64,
+        /// Half the length, > 0.
+        half_height_m: f64,
+    },
+    /// The half space below z = 0; only as a fixed obstacle.
+    Plane,
+    /// The convex hull of points.
+    Hull {
+        /// At least four points, not all in one plane.
+        points_m: Arc<[DVec3]>,
+    },
+    /// A triangle mesh; solid if it is closed.
+    Mesh {
+        /// Corners.
+        points_m: Arc<[DVec3]>,
+        /// Corner numbers of each triangle, counter-clockwise seen from outside.
+        triangles: Arc<[[u32; 3]]>,
+    },
+}
+
+/// A solid that never moves: every agent may touch it, none owns it.
+#[derive(Debug, Clone)]
+pub struct Obstacle {
+    /// The object's name in the scene.
+    pub name: String,
+    /// Its shape.
+    pub solid: Solid,
+    /// Where its axes' origin is, metres.
+    pub position: DVec3,
+    /// Rotation from its axes to the world's.
+    pub rotation: DQuat,
+    /// Coulomb friction coefficient, ≥ 0.
+    pub friction: f64,
+    /// Coefficient of restitution, 0 … 1.
+    pub restitution: f64,
+}

@@ -1,0 +1,284 @@
+//! What an agent publishes: its whole visible state at one moment of its own time.
+//!
+//! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
+//! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
+
+use crate::{AgentId, Resolution, SimTime};
+use glam::{DQuat, DVec3};
+
+/// The state an agent last published, stamped with its own time.
+#[derive(Debug, Clone, Default)]
+pub struct Snapshot {
+    /// The agent's own time, written by the runtime when it publishes.
+    pub time: SimTime,
+    /// How many steps led here.
+    pub steps: u64,
+    /// The resolution the simulation holds; `None` for a model that has none.
+    pub resolution: Option<Resolution>,
+    /// Where the agent's matter is and how it moves.
+    pub body: Body,
+    /// Mechanical energy in joules: kinetic + elastic + gravity, zero at the origin.
+    pub energy_j: f64,
+    /// The agent's estimate of its own error, in metres, ≥ 0.
+    pub residual_m: f64,
+    /// Agents this one acts on now: they must not rest meanwhile.
+    pub touches: Vec<AgentId>,
+    /// Forces by which others hold this agent.
+    pub grips: Vec<Grip>,
+}
+
+/// The state of an agent's matter; which one is fixed for an agent's life.
+#[derive(Debug, Clone, Default)]
+pub enum Body {
+    /// Nothing to see (a synthetic agent).
+    #[default]
+    Nothing,
+    /// A tube or cable: a framed curve with a radius.
+    Curve(CurveState),
+    /// A rigid body.
+    Rigid(RigidState),
+    /// A driven tool with jaws.
+    Tool(ToolState),
+}
+
+/// A framed curve of N segments between N + 1 nodes. Positions are in metres, world axes.
+#[derive(Debug, Clone, Default)]
+pub struct CurveState {
+    /// Rest arc length of each node in metres, rising from 0 to the rest length; N + 1 entries.
+    pub arc_m: Vec<f64>,
+    /// Node positions; N + 1 entries.
+    pub positions: Vec<DVec3>,
+    /// Node velocities in m/s; N + 1 entries.
+    pub velocities: Vec<DVec3>,
+    /// Section frames, one a segment: the third axis (z) is the axial director; N entries.
+    pub frames: Vec<DQuat>,
+    /// Outer radius at each node in metres; N + 1 entries.
+    pub radii_m: Vec<f64>,
+}
+
+/// The pose and motion of a rigid body, about its centre of mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidState {
+    /// Centre of mass, metres.
+    pub position: DVec3,
+    /// Rotation from the body's axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of the centre of mass, m/s.
+    pub velocity: DVec3,
+    /// Angular velocity in world axes, rad/s.
+    pub spin: DVec3,
+}
+
+/// A driven tool: the tip between its jaws, the shaft along the tool's own −z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolState {
+    /// The point between the jaws, metres.
+    pub tip: DVec3,
+    /// Rotation from the tool's axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of the tip, m/s.
+    pub velocity: DVec3,
+    /// Opening of the jaws: 0 shut … 1 wide open.
+    pub jaw: f64,
+    /// What the jaws hold.
+    pub grasp: Option<Grasp>,
+    /// Magnitude of the force that what is held exerts on the tool, newtons.
+    pub force_n: f64,
+}
+
+/// A tool's hold on a material point of another agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grasp {
+    /// Who is held.
+    pub target: AgentId,
+    /// Which material point of it.
+    pub anchor: Anchor,
+    /// Stiffness of the hold, N/m, > 0.
+    pub stiffness_n_m: f64,
+    /// Damping of the hold, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// A material point of a body: it moves with the matter, whatever the resolution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Anchor {
+    /// The point of a curve's axis at this rest arc length in metres.
+    Arc(f64),
+    /// A point of a rigid body in its own axes, metres from the centre of mass.
+    Local(DVec3),
+}
+
+/// The force by which `by` holds this agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grip {
+    /// Who holds; `None` is the user's hand.
+    pub by: Option<AgentId>,
+    /// The force on this agent, newtons, world axes.
+    pub force_n: DVec3,
+}
+
+impl Default for RigidState {
+    fn default() -> Self {
+        Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY, velocity: DVec3::ZERO, spin: DVec3::ZERO }
+    }
+}
+
+impl CurveState {
+    /// Position and velocity of the material point at rest arc length `arc_m`, clamped to the curve's ends;
+    /// `None` for a curve without nodes.
+    #[must_use]
+    pub fn point_at(&self, arc_m: f64) -> Option<(DVec3, DVec3)> {
+        let last = self.arc_m.len().checked_sub(1)?;
+        let right = self.arc_m.partition_point(|&s| s < arc_m).clamp(1.min(last), last);
+        let left = right.saturating_sub(1);
+        let length = self.arc_m[right] - self.arc_m[left];
+        let w = if length > 0.0 { ((arc_m - self.arc_m[left]) / length).clamp(0.0, 1.0) } else { 0.0 };
+        Some((
+            self.positions[left].lerp(self.positions[right], w),
+            self.velocities[left].lerp(self.velocities[right], w),
+        ))
+    }
+}
+
+impl Body {
+    /// Position and velocity of a material point; `None` where the body has no such point.
+    #[must_use]
+    pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
+        match (self, anchor) {
+            (Self::Curve(curve), Anchor::Arc(arc_m)) => curve.point_at(arc_m),
+            (Self::Rigid(body), Anchor::Local(local)) => {
+                let arm = body.rotation * local;
+                Some((body.position + arm, body.velocity + body.spin.cross(arm)))
+            }
+            (Self::Tool(tool), Anchor::Local(local)) => Some((tool.tip + tool.rotation * local, tool.velocity)),
+            _ => None,
+        }
+    }
+
+    /// The point a probe at `at` (0 start … 1 end of a curve's rest length) reports: position and velocity.
+    /// A body without length reports its centre of mass or tip.
+    #[must_use]
+    pub fn probe(&self, at: f64) -> Option<(DVec3, DVec3)> {
+        match self {
+            Self::Curve(curve) => curve.point_at(at * curve.arc_m.last()?),
+            Self::Nothing => None,
+            _ => self.point(Anchor::Local(DVec3::ZERO)),
+        }
+    }
+
+    /// Whether every number is finite. A body that is not is never published.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Curve(c) => {
+                c.positions.iter().all(|p| p.is_finite())
+                    && c.velocities.iter().all(|v| v.is_finite())
+                    && c.frames.iter().all(|q| q.is_finite())
+                    && c.radii_m.iter().all(|r| r.is_finite())
+            }
+            Self::Rigid(b) => {
+                b.position.is_finite() && b.rotation.is_finite() && b.velocity.is_finite() && b.spin.is_finite()
+            }
+            Self::Tool(t) => t.tip.is_finite() && t.rotation.is_finite() && t.velocity.is_finite() && t.jaw.is_finite(),
+        }
+    }
+
+    /// The curve to write into, keeping its storage when this is a curve already.
+    pub fn curve_mut(&mut self) -> &mut CurveState {
+        if !matches!(self, Self::Curve(_)) {
+            *self = Self::Curve(CurveState::default());
+        }
+        match self {
+            Self::Curve(curve) => curve,
+            _ => unreachable!("made a curve above"),
+        }
+    }
+}
+
+impl Snapshot {
+    /// Folds every bit of the state into `hash` (FNV-1a, 64 bits): equal hashes mean bit-identical runs.
+    #[must_use]
+    pub fn fold_hash(&self, hash: u64) -> u64 {
+        let mut fold = Fold(hash);
+        fold.word(self.time.as_nanos());
+        fold.word(self.steps);
+        match &self.body {
+            Body::Nothing => {}
+            Body::Curve(c) => {
+                c.positions.iter().chain(&c.velocities).for_each(|v| fold.vector(*v));
+                c.frames.iter().for_each(|q| fold.rotation(*q));
+                c.radii_m.iter().for_each(|r| fold.word(r.to_bits()));
+            }
+            Body::Rigid(b) => {
+                [b.position, b.velocity, b.spin].into_iter().for_each(|v| fold.vector(v));
+                fold.rotation(b.rotation);
+            }
+            Body::Tool(t) => {
+                [t.tip, t.velocity].into_iter().for_each(|v| fold.vector(v));
+                fold.rotation(t.rotation);
+                fold.word(t.jaw.to_bits());
+            }
+        }
+        fold.0
+    }
+}
+
+/// The empty hash that [`Snapshot::fold_hash`] starts from (FNV-1a offset basis).
+pub const HASH_START: u64 = 0xcbf2_9ce4_8422_2325;
+
+struct Fold(u64);
+
+impl Fold {
+    fn word(&mut self, word: u64) {
+        const FNV_PRIME: u64 = 0x0100_0000_01b3;
+        for byte in word.to_le_bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(FNV_PRIME);
+        }
+    }
+
+    fn vector(&mut self, v: DVec3) {
+        v.to_array().into_iter().for_each(|x| self.word(x.to_bits()));
+    }
+
+    fn rotation(&mut self, q: DQuat) {
+        q.to_array().into_iter().for_each(|x| self.word(x.to_bits()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line() -> CurveState {
+        CurveState {
+            arc_m: vec![0.0, 1.0, 3.0],
+            positions: vec![DVec3::ZERO, DVec3::X, DVec3::X * 3.0],
+            velocities: vec![DVec3::ZERO, DVec3::Z, DVec3::Z],
+            frames: vec![DQuat::IDENTITY; 2],
+            radii_m: vec![0.1; 3],
+        }
+    }
+
+    #[test]
+    fn a_probe_reads_the_material_point_at_its_share_of_the_rest_length() {
+        let body = Body::Curve(line());
+        assert_eq!(body.probe(0.5).unwrap().0, DVec3::X * 1.5);
+        assert_eq!(body.probe(0.0).unwrap().0, DVec3::ZERO);
+        assert_eq!(body.probe(1.0).unwrap().0, DVec3::X * 3.0);
+        assert_eq!(body.probe(9.0).unwrap().0, DVec3::X * 3.0);
+    }
+
+    #[test]
+    fn an_empty_curve_has_no_point() {
+        assert_eq!(Body::Curve(CurveState::default()).probe(0.5), None);
+    }
+
+    #[test]
+    fn one_changed_bit_changes_the_hash() {
+        let mut snapshot = Snapshot { body: Body::Curve(line()), ..Snapshot::default() };
+        let before = snapshot.fold_hash(HASH_START);
+        snapshot.body.curve_mut().positions[1].y = f64::MIN_POSITIVE;
+        assert_ne!(before, snapshot.fold_hash(HASH_START));
+    }
+}

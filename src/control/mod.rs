@@ -1,0 +1,1 @@
+//! Numbers in, demands out: the controllers of pictures and agents.

@@ -1,0 +1,10 @@
+//! metachron: a real-time physics engine in which every object keeps its own time and the frame never waits.
+//!
+//! The map of the code is `docs/ARCHITECTURE.md`. Rooms do not import each other; `frame` and `cli` join them.
+
+pub mod cli;
+pub mod compositor;
+pub mod control;
+pub mod frame;
+pub mod runtime;
+pub mod scene;

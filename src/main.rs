@@ -1,0 +1,2 @@
+//! The `metachron` command.
+fn main() {}

@@ -1,0 +1,1 @@
+//! Scene files: the only reader of files.
