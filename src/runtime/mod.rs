@@ -1,1 +1,77 @@
-//! Threads, clocks, slots and pacing: everything that makes agents run. It knows no model of physics and no picture.
+//! Threads, clocks, slots and pacing: everything that makes agents run.
+//!
+//! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and how they fare.
+//! Every executor makes the same turns of an agent and shows the same surface, [`Run`], so that there is one frame loop:
+//! [`Threads`] gives each agent a thread of its own and real time; [`Lockstep`] runs all in virtual time on a declared
+//! [`Machine`], bit-identical from run to run. Never here: a model of physics, a picture, a law of control, a file.
+
+mod account;
+mod clock;
+mod cpu;
+mod governor;
+mod handle;
+mod lockstep;
+mod machine;
+mod mailbox;
+mod pace;
+mod slot;
+mod spawn;
+mod switchboard;
+#[cfg(test)]
+mod testing;
+mod threads;
+mod turn;
+
+pub use account::{AgentState, AgentStats, Spread};
+pub use clock::{Clock, ManualClock, SystemClock};
+pub use governor::{Demand, Governor, TurnMeasure};
+pub use handle::{AgentHandle, state_hash};
+pub use lockstep::Lockstep;
+pub use machine::{DrawPrice, Machine, OTHER_STEP_US, PRESETS, StepPrice};
+pub use mailbox::{Command, SendError};
+pub use pace::{Drive, LAG_CAP, Pace, SPEED_RANGE, SharedTimeline, Start, Timeline};
+pub use slot::{LatestSlot, SlotWriter};
+pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
+pub use threads::{THREADS_MAX, Threads};
+
+use metachron_agents::{AgentId, SimTime};
+use std::time::Duration;
+
+/// Agents that run, whoever keeps the time.
+pub trait Run {
+    /// Wall time since the run began; virtual in lockstep.
+    fn now(&self) -> Duration;
+
+    /// Waits until the wall time `until`, the agents going on meanwhile; returns at once if that has passed.
+    fn wait_until(&mut self, until: Duration);
+
+    /// Lets the frame's own work of `work` pass: nothing on threads, where it really passed; in lockstep it occupies a core
+    /// of the declared machine, and takes longer where agents want the cores too.
+    fn spend(&mut self, work: Duration);
+
+    /// The timeline in force.
+    fn timeline(&self) -> Timeline;
+
+    /// Changes the timeline: pause, run, speed, single step.
+    fn drive(&mut self, drive: Drive);
+
+    /// All agents, in the order of their numbers.
+    fn agents(&self) -> &[AgentHandle];
+
+    /// Ends the run: waits for the turns under way (boundedly) and says how every agent fared.
+    /// Handles kept show the last states.
+    fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
+
+    /// Simulated time now.
+    fn sim_now(&self) -> SimTime {
+        self.timeline().sim_at(self.now())
+    }
+
+    /// Tells an agent something ([`AgentHandle::send`]).
+    ///
+    /// # Errors
+    /// [`SendError`]: nothing was delivered.
+    fn send(&self, to: AgentId, command: Command) -> Result<(), SendError> {
+        self.agents().get(to.0 as usize).ok_or(SendError::NoAgent(to))?.send(command)
+    }
+}

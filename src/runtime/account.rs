@@ -1,0 +1,291 @@
+//! What an agent's life costs and how well it keeps its time: numbers any thread reads at any moment.
+//!
+//! In: turns, from the one who makes them. Out: [`AgentStats`]. Each number is one atomic word: whole in itself, and as new as
+//! the last turn. Never here: locks on the side of the agent, printing.
+
+use super::pace::Pace;
+use hdrhistogram::Histogram;
+use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::time::Duration;
+
+/// What an agent does now.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum AgentState {
+    /// It steps.
+    Running,
+    /// It has come to rest and takes no steps until it is woken.
+    Resting,
+    /// It gave up, for this reason; its last snapshot stands.
+    Parked(String),
+}
+
+/// Two percentiles and the largest of some times, seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// Half of them are at most this, to 1 %.
+    pub p50_s: f64,
+    /// 99 in 100 are at most this, to 1 %.
+    pub p99_s: f64,
+    /// None is above this, to 1 %.
+    pub max_s: f64,
+}
+
+/// How an agent has fared so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AgentStats {
+    /// Which agent.
+    pub id: AgentId,
+    /// Its name in the scene.
+    pub name: String,
+    /// Its model.
+    pub model: &'static str,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps a simulated second over the last half second; zero at rest and when parked.
+    pub rate_hz: f64,
+    /// Steps a simulated second over its whole waking life.
+    pub mean_hz: f64,
+    /// Steps a simulated second the scene wants.
+    pub wanted_hz: f64,
+    /// The present step length.
+    pub dt: SimSpan,
+    /// The resolution of the newest state; `None` for a model that has none.
+    pub resolution: Option<Resolution>,
+    /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
+    pub work_s: f64,
+    /// CPU time of its turns so far, seconds; really measured, in lockstep too.
+    pub cpu_s: f64,
+    /// How old its newest state was when a reader used it ([`super::AgentHandle::record_age`]).
+    pub age: Spread,
+    /// How late its turns began after their release, wall time.
+    pub late: Spread,
+    /// Turns that were not published before the end of their step.
+    pub misses: u64,
+    /// Simulated time given up because it could not be made up.
+    pub dropped: SimSpan,
+    /// Simulated time at rest.
+    pub rested: SimSpan,
+    /// What it does now.
+    pub state: AgentState,
+    /// Mechanical energy of the newest state, joules.
+    pub energy_j: f64,
+    /// Estimated error of the newest state, metres.
+    pub residual_m: f64,
+}
+
+/// Times of up to [`LONGEST_US`], counted to 1 %.
+#[derive(Debug)]
+pub(super) struct Times(Histogram<u32>);
+
+/// The longest time told apart from longer ones, microseconds: ten seconds.
+const LONGEST_US: u64 = 10_000_000;
+
+impl Times {
+    pub fn new() -> Self {
+        Self(Histogram::new_with_bounds(1, LONGEST_US, 2).expect("the bounds are sound: 1 < 10⁷, two digits"))
+    }
+
+    pub fn record(&mut self, time: Duration) {
+        self.0.saturating_record(u64::try_from(time.as_micros()).unwrap_or(u64::MAX));
+    }
+
+    pub fn spread(&self) -> Spread {
+        let seconds = |us: u64| us as f64 * 1e-6;
+        Spread {
+            p50_s: seconds(self.0.value_at_quantile(0.5)),
+            p99_s: seconds(self.0.value_at_quantile(0.99)),
+            max_s: seconds(self.0.max()),
+        }
+    }
+}
+
+/// A number that one thread writes and any thread reads.
+#[derive(Debug, Default)]
+pub(super) struct Gauge(AtomicU64);
+
+impl Gauge {
+    pub fn set(&self, value: f64) {
+        self.0.store(value.to_bits(), Relaxed);
+    }
+
+    pub fn get(&self) -> f64 {
+        f64::from_bits(self.0.load(Relaxed))
+    }
+}
+
+const RUNNING: u8 = 0;
+const RESTING: u8 = 1;
+const PARKED: u8 = 2;
+
+/// The readable side of an agent's account.
+#[derive(Debug, Default)]
+pub(super) struct Gauges {
+    pub steps: AtomicU64,
+    pub misses: AtomicU64,
+    pub dt: AtomicU64,
+    pub dropped: AtomicU64,
+    pub rested: AtomicU64,
+    pub cpu_nanos: AtomicU64,
+    pub rate_hz: Gauge,
+    pub mean_hz: Gauge,
+    pub work_s: Gauge,
+    late: [Gauge; 3],
+    state: AtomicU8,
+    reason: OnceLock<String>,
+}
+
+impl Gauges {
+    pub fn state(&self) -> AgentState {
+        match self.state.load(Relaxed) {
+            RUNNING => AgentState::Running,
+            RESTING => AgentState::Resting,
+            _ => AgentState::Parked(self.reason.get().cloned().unwrap_or_default()),
+        }
+    }
+
+    pub fn is_resting(&self) -> bool {
+        self.state.load(Relaxed) == RESTING
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.state.load(Relaxed) == RUNNING
+    }
+
+    pub fn set_resting(&self, resting: bool) {
+        self.state.store(if resting { RESTING } else { RUNNING }, Relaxed);
+    }
+
+    /// Parks for good; the first reason stands.
+    pub fn park(&self, reason: String) {
+        self.reason.get_or_init(|| reason);
+        self.state.store(PARKED, Relaxed);
+    }
+
+    pub fn late(&self) -> Spread {
+        let [p50_s, p99_s, max_s] = [0, 1, 2].map(|k| self.late[k].get());
+        Spread { p50_s, p99_s, max_s }
+    }
+
+    fn set_late(&self, spread: Spread) {
+        for (gauge, value) in self.late.iter().zip([spread.p50_s, spread.p99_s, spread.max_s]) {
+            gauge.set(value);
+        }
+    }
+}
+
+/// Over how much simulated time the recent rate is counted.
+const RATE_WINDOW: SimSpan = SimSpan::from_nanos(500_000_000);
+
+/// The share of a new value in a smoothed one: about eight values count.
+pub(super) const SMOOTHING: f64 = 0.125;
+
+/// The writing side of an agent's account, kept by whoever makes its turns.
+#[derive(Debug)]
+pub(super) struct Diary {
+    steps: u64,
+    misses: u64,
+    late: Times,
+    work_s: Option<f64>,
+    window: (SimTime, u64),
+    first_window: bool,
+}
+
+/// A turn, as the diary wants it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    /// Simulated time at the turn's end.
+    pub now: SimTime,
+    /// How late it began.
+    pub late: Duration,
+    /// Whether it was published after the end of its step.
+    pub missed: bool,
+    /// What it took, seconds.
+    pub work_s: f64,
+}
+
+impl Diary {
+    pub fn new() -> Self {
+        let window = (SimTime::ZERO, 0);
+        Self { steps: 0, misses: 0, late: Times::new(), work_s: None, window, first_window: true }
+    }
+
+    /// Writes a turn down.
+    pub fn write(&mut self, gauges: &Gauges, pace: &Pace, entry: Entry) {
+        self.steps += 1;
+        self.misses += u64::from(entry.missed);
+        self.late.record(entry.late);
+        let work_s = self.work_s.map_or(entry.work_s, |old| old + SMOOTHING * (entry.work_s - old));
+        self.work_s = Some(work_s);
+        gauges.steps.store(self.steps, Relaxed);
+        gauges.misses.store(self.misses, Relaxed);
+        gauges.work_s.set(work_s);
+        self.pace(gauges, pace);
+        // the step just made covers the time up to the agent's own
+        let lived = pace.time().max(entry.now).since(SimTime::ZERO + pace.rested());
+        gauges.mean_hz.set(self.steps as f64 / lived.as_secs_f64());
+        self.count_rate(gauges, entry.now);
+    }
+
+    /// Writes down what is read off the pace.
+    pub fn pace(&self, gauges: &Gauges, pace: &Pace) {
+        gauges.dt.store(pace.dt().as_nanos(), Relaxed);
+        gauges.dropped.store(pace.dropped().as_nanos(), Relaxed);
+        gauges.rested.store(pace.rested().as_nanos(), Relaxed);
+    }
+
+    /// Starts to count the rate afresh, after a rest.
+    pub fn restart(&mut self, now: SimTime) {
+        self.window = (now, self.steps);
+    }
+
+    /// Brings the percentiles up to date: they are too dear for every turn.
+    pub fn flush(&self, gauges: &Gauges) {
+        gauges.set_late(self.late.spread());
+    }
+
+    fn count_rate(&mut self, gauges: &Gauges, now: SimTime) {
+        let (since, steps) = self.window;
+        let span = now.since(since);
+        let full = span >= RATE_WINDOW;
+        if full || (self.first_window && span > SimSpan::ZERO) {
+            gauges.rate_hz.set((self.steps - steps) as f64 / span.as_secs_f64());
+        }
+        if full {
+            self.window = (now, self.steps);
+            self.first_window = false;
+            self.flush(gauges);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn percentiles_are_right_to_a_hundredth() {
+        let mut times = Times::new();
+        (1..=1000).for_each(|us| times.record(Duration::from_micros(us * 10)));
+        let spread = times.spread();
+        assert!((spread.p50_s - 5e-3).abs() < 5e-5, "{spread:?}");
+        assert!((spread.p99_s - 9.9e-3).abs() < 9.9e-5, "{spread:?}");
+        assert!((spread.max_s - 10e-3).abs() < 1e-4, "{spread:?}");
+    }
+
+    #[test]
+    fn a_time_beyond_the_scale_counts_as_the_longest() {
+        let mut times = Times::new();
+        times.record(Duration::from_secs(1000));
+        assert!(times.spread().max_s >= 10.0);
+    }
+
+    #[test]
+    fn the_first_reason_to_park_stands() {
+        let gauges = Gauges::default();
+        gauges.park("first".into());
+        gauges.park("second".into());
+        assert_eq!(gauges.state(), AgentState::Parked("first".into()));
+    }
+}

@@ -1,0 +1,89 @@
+//! CPU time of turns, read from the thread's clock once a batch: the clock costs as much as a small step.
+//!
+//! In: the wall time of each turn of a batch. Out: which share of it the thread really computed. A turn that was interrupted
+//! took long on the wall and little of the CPU: the batch's share corrects for it. Never here: who made the turns.
+
+use cpu_time::ThreadTime;
+use std::time::{Duration, Instant};
+
+/// Turns made on one thread since the thread's clock was last read.
+#[derive(Debug, Default)]
+pub(super) struct CpuBatch {
+    opened: Option<Opened>,
+    wall: Duration,
+    turns: u32,
+}
+
+/// When a batch was opened.
+#[derive(Debug, Clone, Copy)]
+struct Opened {
+    /// On the thread's clock; `None` where the system does not tell, and wall time must do.
+    cpu: Option<Duration>,
+    wall: Instant,
+}
+
+/// A batch of so many turns is closed.
+const TURNS_MAX: u32 = 256;
+
+/// A batch of so much work is closed.
+const WORK_MAX: Duration = Duration::from_millis(20);
+
+/// A batch so old is closed, so that the account of a slow agent is no older.
+const AGE_MAX: Duration = Duration::from_millis(500);
+
+impl CpuBatch {
+    /// Opens a batch on this thread, unless one is open.
+    pub fn open(&mut self) {
+        self.opened.get_or_insert_with(|| Opened { cpu: thread_time(), wall: Instant::now() });
+    }
+
+    /// Counts a turn that took `wall`; whether the batch should be closed.
+    pub fn add(&mut self, wall: Duration) -> bool {
+        self.wall += wall;
+        self.turns += 1;
+        let old = self.opened.is_some_and(|o| o.wall.elapsed() >= AGE_MAX);
+        self.turns >= TURNS_MAX || self.wall >= WORK_MAX || old
+    }
+
+    /// Whether no turn has been counted since the last was closed.
+    pub const fn is_empty(&self) -> bool {
+        self.turns == 0
+    }
+
+    /// Closes the batch on the thread that opened it: the share of its turns' wall time that was CPU time, `0..=1`.
+    pub fn close(&mut self) -> f64 {
+        let Self { opened, wall, .. } = std::mem::take(self);
+        let Some(from) = opened.and_then(|o| o.cpu) else { return 1.0 };
+        let Some(to) = thread_time() else { return 1.0 };
+        let cpu = to.saturating_sub(from);
+        if wall.is_zero() { 1.0 } else { (cpu.as_secs_f64() / wall.as_secs_f64()).min(1.0) }
+    }
+}
+
+/// The CPU time of this thread.
+fn thread_time() -> Option<Duration> {
+    ThreadTime::try_now().ok().map(|t| t.as_duration())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_on_the_wall_without_computing_is_no_cpu_time() {
+        let mut batch = CpuBatch::default();
+        batch.open();
+        batch.add(Duration::from_secs(3600));
+        // the test itself computes far less than 36 s
+        assert!(batch.close() < 0.01);
+    }
+
+    #[test]
+    fn a_turn_never_costs_more_than_it_took() {
+        let mut batch = CpuBatch::default();
+        batch.open();
+        let busy = (0..1_000_000_u64).fold(0, |a, b| a ^ b.wrapping_mul(a | 1));
+        batch.add(Duration::from_nanos(1 + busy % 2));
+        assert_eq!(batch.close(), 1.0);
+    }
+}

@@ -1,0 +1,125 @@
+//! What the rest of the program holds of an agent that runs: its newest state, its account, its ear.
+//!
+//! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
+
+use super::account::{AgentState, AgentStats, Gauges, Times};
+use super::mailbox::{Command, Mailbox, SendError};
+use super::slot::LatestSlot;
+use super::switchboard::Switchboard;
+use metachron_agents::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// What an agent and those who watch it share.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub id: AgentId,
+    pub name: String,
+    pub model: &'static str,
+    pub wanted_hz: f64,
+    pub gauges: Gauges,
+    pub mail: Mailbox,
+    pub slot: Arc<LatestSlot<Snapshot>>,
+    pub board: Arc<Switchboard>,
+    /// Only readers touch it: the agent never waits for this lock.
+    pub ages: Mutex<Times>,
+}
+
+/// A running agent, seen from outside. Copies show the same agent; they outlive the run and then show its end.
+#[derive(Debug, Clone)]
+pub struct AgentHandle {
+    pub(super) shared: Arc<Shared>,
+}
+
+impl AgentHandle {
+    /// Its number: the place it was given at the start.
+    #[must_use]
+    pub fn id(&self) -> AgentId {
+        self.shared.id
+    }
+
+    /// Its name in the scene.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.shared.name
+    }
+
+    /// Its model.
+    #[must_use]
+    pub fn model(&self) -> &'static str {
+        self.shared.model
+    }
+
+    /// Its newest state. There is one from the start on.
+    #[must_use]
+    pub fn latest(&self) -> Arc<Snapshot> {
+        self.shared.slot.latest()
+    }
+
+    /// How far `snapshot` lies behind the simulated time `now`, seconds, ≥ 0.
+    ///
+    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it still holds.
+    #[must_use]
+    pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
+        if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.time).as_secs_f64() }
+    }
+
+    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); what is no age is not counted.
+    pub fn record_age(&self, age_s: f64) {
+        if let Ok(age) = Duration::try_from_secs_f64(age_s) {
+            self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner).record(age);
+        }
+    }
+
+    /// What it does now.
+    #[must_use]
+    pub fn state(&self) -> AgentState {
+        self.shared.gauges.state()
+    }
+
+    /// Tells the agent something; it obeys at its next turn, and wakes for it.
+    ///
+    /// # Errors
+    /// [`SendError::BadNumber`]: nothing was delivered.
+    pub fn send(&self, command: Command) -> Result<(), SendError> {
+        self.shared.mail.post(command)?;
+        self.shared.board.wake(self.shared.id);
+        Ok(())
+    }
+
+    /// How it has fared so far.
+    #[must_use]
+    pub fn stats(&self) -> AgentStats {
+        let Shared { gauges, .. } = &*self.shared;
+        let newest = self.latest();
+        let span = |nanos: &std::sync::atomic::AtomicU64| SimSpan::from_nanos(nanos.load(Relaxed));
+        AgentStats {
+            id: self.shared.id,
+            name: self.shared.name.clone(),
+            model: self.shared.model,
+            steps: gauges.steps.load(Relaxed),
+            rate_hz: if gauges.is_running() { gauges.rate_hz.get() } else { 0.0 },
+            mean_hz: gauges.mean_hz.get(),
+            wanted_hz: self.shared.wanted_hz,
+            dt: span(&gauges.dt),
+            resolution: newest.resolution,
+            work_s: gauges.work_s.get(),
+            cpu_s: gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9,
+            age: self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner).spread(),
+            late: gauges.late(),
+            misses: gauges.misses.load(Relaxed),
+            dropped: span(&gauges.dropped),
+            rested: span(&gauges.rested),
+            state: gauges.state(),
+            energy_j: newest.energy_j,
+            residual_m: newest.residual_m,
+        }
+    }
+}
+
+/// One number for the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
+#[must_use]
+pub fn state_hash(agents: &[AgentHandle]) -> u64 {
+    agents.iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
+}

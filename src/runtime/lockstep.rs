@@ -1,0 +1,234 @@
+//! One thread, virtual time, declared costs: the executor for tests, tuning, charts and replay.
+//!
+//! In: agents and a [`Machine`]. Out: the same run to the bit, every time. Events happen in the order (time, ends before
+//! starts, number): a turn sees what is published when it starts, and what it publishes is seen when its declared cost has
+//! passed, on cores that all turns and the frame loop share. Never here: a wall clock, but for the CPU time that is reported.
+
+mod cores;
+
+use super::Run;
+use super::account::AgentStats;
+use super::cpu::CpuBatch;
+use super::handle::AgentHandle;
+use super::machine::{Machine, duration};
+use super::pace::{Drive, Timeline};
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use super::switchboard::Switchboard;
+use super::turn::{Actor, Next};
+use cores::Cores;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Agents in virtual time on a declared machine.
+pub struct Lockstep {
+    machine: Machine,
+    timeline: Timeline,
+    now: Duration,
+    lives: Vec<Life>,
+    /// When the turns of waiting agents are due. Those the timeline never reaches are left out.
+    due: BinaryHeap<Reverse<(Duration, u32)>>,
+    cores: Cores,
+    handles: Vec<AgentHandle>,
+    board: Arc<Switchboard>,
+    batch: CpuBatch,
+}
+
+/// An agent and where it is in its turns.
+struct Life {
+    actor: Actor,
+    phase: Phase,
+    turns: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    Waiting,
+    /// In a turn that began at this time.
+    Busy(Duration),
+    Resting,
+    Parked,
+}
+
+/// The number of the frame loop's own job: above every agent's, so that of equal ends the agents' come first.
+const FRAME: u32 = u32::MAX;
+
+impl Lockstep {
+    /// Begins a run at virtual time zero.
+    ///
+    /// # Errors
+    /// [`RunError`] for agents that cannot run as asked.
+    pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let phase = |actor: &Actor| if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+        let lives = actors.into_iter().map(|actor| Life { phase: phase(&actor), actor, turns: 0 }).collect();
+        let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
+        let (due, batch) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default());
+        let mut run = Self { machine, timeline, now: Duration::ZERO, lives, due, cores, handles, board, batch };
+        run.schedule_all();
+        Ok(run)
+    }
+
+    /// The machine that is declared.
+    #[must_use]
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    fn schedule_all(&mut self) {
+        self.due.clear();
+        for whose in 0..self.lives.len() {
+            self.schedule(whose);
+        }
+    }
+
+    /// Notes when the next turn is due, if the agent waits for one.
+    fn schedule(&mut self, whose: usize) {
+        let life = &self.lives[whose];
+        if life.phase == Phase::Waiting
+            && let Some(due) = life.actor.pace.due(&self.timeline)
+        {
+            self.due.push(Reverse((due.max(self.now), whose as u32)));
+        }
+    }
+
+    fn wake_sleepers(&mut self) {
+        if !self.board.take_rung() {
+            return;
+        }
+        for whose in 0..self.lives.len() {
+            let life = &mut self.lives[whose];
+            if life.phase == Phase::Resting && life.actor.wakes(&self.timeline, self.now) {
+                life.phase = Phase::Waiting;
+                self.schedule(whose);
+            }
+        }
+    }
+
+    /// Goes on to what happens next; `None` if nothing does up to `limit`.
+    fn next_event(&mut self, limit: Duration) -> Option<Event> {
+        self.wake_sleepers();
+        let end = self.cores.until_end().map(|span| self.now.saturating_add(span));
+        let due = self.due.peek().map(|&Reverse((due, _))| due);
+        let at = end.into_iter().chain(due).min()?;
+        if at > limit {
+            return None;
+        }
+        self.cores.pass(at - self.now);
+        self.now = at;
+        // time went on to the end of a job or to a due turn, whichever was first
+        match self.cores.take_ended() {
+            Some(whose) => Some(Event::End(whose)),
+            None => self.due.pop().map(|Reverse((_, whose))| Event::Start(whose)),
+        }
+    }
+
+    /// Happens until `limit`, or until the frame's own job has ended.
+    fn run(&mut self, limit: Duration) {
+        while let Some(event) = self.next_event(limit) {
+            match event {
+                Event::Start(whose) => self.begin(whose as usize),
+                Event::End(FRAME) => break,
+                Event::End(whose) => self.finish(whose as usize),
+            }
+        }
+        self.settle();
+    }
+
+    fn begin(&mut self, whose: usize) {
+        self.batch.open();
+        let started = Instant::now();
+        let life = &mut self.lives[whose];
+        match life.actor.begin(&self.timeline, self.now) {
+            Some(work) => {
+                let model = life.actor.shared.model;
+                let seconds = self.machine.step_s(model, work, whose as u64, life.turns);
+                self.cores.start(whose as u32, duration(seconds));
+                life.turns += 1;
+                life.phase = Phase::Busy(self.now);
+            }
+            None => life.phase = Phase::Parked,
+        }
+        self.count_cpu(whose, started.elapsed());
+    }
+
+    fn finish(&mut self, whose: usize) {
+        self.batch.open();
+        let started = Instant::now();
+        let life = &mut self.lives[whose];
+        let Phase::Busy(since) = life.phase else { return };
+        let took = (self.now - since).as_secs_f64();
+        life.phase = match life.actor.finish(&self.timeline, self.now, took) {
+            Next::Due => Phase::Waiting,
+            Next::Rest => Phase::Resting,
+            Next::Parked => Phase::Parked,
+        };
+        self.count_cpu(whose, started.elapsed());
+        self.schedule(whose);
+    }
+
+    fn count_cpu(&mut self, whose: usize, wall: Duration) {
+        self.lives[whose].actor.unsettled += wall;
+        if self.batch.add(wall) {
+            self.settle();
+        }
+    }
+
+    fn settle(&mut self) {
+        if self.batch.is_empty() {
+            return;
+        }
+        let share = self.batch.close();
+        self.lives.iter_mut().filter(|l| !l.actor.unsettled.is_zero()).for_each(|l| l.actor.settle(share));
+    }
+}
+
+/// What happens at a moment of virtual time.
+enum Event {
+    /// An agent's turn begins.
+    Start(u32),
+    /// The job of an agent, or of the frame, has passed.
+    End(u32),
+}
+
+impl Run for Lockstep {
+    fn now(&self) -> Duration {
+        self.now
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        if until < self.now {
+            return;
+        }
+        self.run(until);
+        self.cores.pass(until - self.now);
+        self.now = until;
+    }
+
+    fn spend(&mut self, work: Duration) {
+        self.cores.start(FRAME, work);
+        self.run(Duration::MAX);
+    }
+
+    fn timeline(&self) -> Timeline {
+        self.timeline
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.timeline = self.timeline.after(self.now, drive);
+        self.schedule_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.handles
+    }
+
+    fn shutdown(self: Box<Self>) -> Vec<AgentStats> {
+        self.lives.iter().for_each(|life| life.actor.close_account());
+        self.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

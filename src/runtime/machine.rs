@@ -1,0 +1,222 @@
+//! The declared machine: what work costs where nothing is measured.
+//!
+//! In: work in each model's unit, what a frame draws. Out: seconds, with noise that is the same on every run.
+//! Never here: a clock. Lockstep charges these prices instead of measuring, so that a run is the same on every computer.
+
+use std::borrow::Cow;
+use std::time::Duration;
+
+/// A machine as lockstep believes it to be.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    /// Cores that agents and the frame loop share; at least 1 is taken.
+    pub cores: u32,
+    /// What a step of each model costs. A model that is not listed costs [`OTHER_STEP_US`] a step.
+    pub steps: Vec<StepPrice>,
+    /// What a frame costs.
+    pub draw: DrawPrice,
+    /// Relative standard deviation of every cost, `0..=1`.
+    pub noise_sd: f64,
+    /// Which noise: equal seeds give equal runs.
+    pub seed: u64,
+}
+
+/// What a step of one model costs: base + unit · work.
+#[derive(Debug, Clone, PartialEq)]
+pub struct StepPrice {
+    /// The model's name, as its agents say it.
+    pub model: Cow<'static, str>,
+    /// Microseconds a step, ≥ 0.
+    pub base_us: f64,
+    /// Microseconds a unit of the work its steps report, ≥ 0.
+    pub unit_us: f64,
+}
+
+/// What a frame costs: setup + object · objects + triangle · triangles + pixel · pixels.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct DrawPrice {
+    /// Milliseconds a frame, ≥ 0.
+    pub setup_ms: f64,
+    /// Microseconds a visible object, ≥ 0.
+    pub object_us: f64,
+    /// Microseconds a triangle, ≥ 0.
+    pub triangle_us: f64,
+    /// Nanoseconds a shaded pixel, ≥ 0.
+    pub pixel_ns: f64,
+}
+
+/// What a step of an unlisted model costs, microseconds.
+pub const OTHER_STEP_US: f64 = 10.0;
+
+/// The machines known by name.
+pub const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
+
+impl Machine {
+    /// The machine called `name`, one of [`PRESETS`].
+    #[must_use]
+    pub fn preset(name: &str) -> Option<Self> {
+        match name {
+            "two-cores-software" => Some(Self::two_cores_software()),
+            "workstation" => Some(Self::workstation()),
+            _ => None,
+        }
+    }
+
+    /// Two cores that also draw (Mesa): 1.4 ms + 0.22 µs a triangle + 6 ns a pixel.
+    #[must_use]
+    pub fn two_cores_software() -> Self {
+        Self {
+            cores: 2,
+            steps: vec![
+                price("tube", 2.0, 0.25),
+                price("rigid", 0.0, 25.0),
+                price("instrument", 0.0, 3.0),
+                price("synthetic", 0.0, 1.0),
+            ],
+            draw: DrawPrice { setup_ms: 1.4, object_us: 5.0, triangle_us: 0.22, pixel_ns: 6.0 },
+            noise_sd: 0.0,
+            seed: 1,
+        }
+    }
+
+    /// Eight cores and a graphics card that draws twenty times as fast.
+    #[must_use]
+    pub fn workstation() -> Self {
+        let base = Self::two_cores_software();
+        let DrawPrice { setup_ms, object_us, triangle_us, pixel_ns } = base.draw;
+        Self {
+            cores: 8,
+            draw: DrawPrice {
+                setup_ms: setup_ms / 20.0,
+                object_us: object_us / 20.0,
+                triangle_us: triangle_us / 20.0,
+                pixel_ns: pixel_ns / 20.0,
+            },
+            ..base
+        }
+    }
+
+    /// Seconds that a step of `model` takes which reported `work`; `stream` and `count` say which step of whom, for the noise.
+    #[must_use]
+    pub fn step_s(&self, model: &str, work: f64, stream: u64, count: u64) -> f64 {
+        let us =
+            self.steps.iter().find(|p| p.model == model).map_or(OTHER_STEP_US, |p| p.base_us + p.unit_us * sound(work));
+        us * 1e-6 * self.noise(stream, count)
+    }
+
+    /// What the frame `count` costs that draws so much.
+    #[must_use]
+    pub fn draw_time(&self, objects: u64, triangles: u64, pixels: u64, count: u64) -> Duration {
+        let price = &self.draw;
+        let seconds = price.setup_ms * 1e-3
+            + price.object_us * 1e-6 * objects as f64
+            + price.triangle_us * 1e-6 * triangles as f64
+            + price.pixel_ns * 1e-9 * pixels as f64;
+        duration(seconds * self.noise(FRAME_STREAM, count))
+    }
+
+    /// A log-normal factor of mean 1 and relative deviation `noise_sd`, the same for equal arguments.
+    #[must_use]
+    pub fn noise(&self, stream: u64, count: u64) -> f64 {
+        let sd = sound(self.noise_sd).min(1.0);
+        if sd == 0.0 {
+            return 1.0;
+        }
+        let variance = libm::log1p(sd * sd);
+        libm::exp(libm::sqrt(variance) * normal(self.seed, stream, count) - 0.5 * variance)
+    }
+}
+
+impl Default for Machine {
+    fn default() -> Self {
+        Self::two_cores_software()
+    }
+}
+
+/// The noise stream of the frame loop; agents use their numbers, which are below.
+const FRAME_STREAM: u64 = u64::MAX;
+
+const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
+    StepPrice { model: Cow::Borrowed(model), base_us, unit_us }
+}
+
+/// `x`, or zero where it is negative or no number: a price is never a debt.
+fn sound(x: f64) -> f64 {
+    if x.is_finite() { x.max(0.0) } else { 0.0 }
+}
+
+/// The duration nearest to `seconds`, to the nanosecond; zero for what is no length, an hour at most.
+pub(super) fn duration(seconds: f64) -> Duration {
+    const LONGEST_S: f64 = 3600.0;
+    Duration::from_nanos((sound(seconds).min(LONGEST_S) * 1e9).round() as u64)
+}
+
+/// A number of mean 0 and deviation 1 that depends on nothing but its arguments: twelve uniform numbers less six,
+/// close to normal out to three deviations and never beyond six.
+fn normal(seed: u64, stream: u64, count: u64) -> f64 {
+    const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
+    let mut state = mix(mix(seed ^ mix(stream)) ^ count);
+    let mut sum = -6.0;
+    for _ in 0..12 {
+        state = state.wrapping_add(GOLDEN);
+        sum += (mix(state) >> 11) as f64 / TWO_POW_53;
+    }
+    sum
+}
+
+/// 2⁶⁴ over the golden ratio: the increment of SplitMix64.
+const GOLDEN: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// The output function of SplitMix64.
+const fn mix(state: u64) -> u64 {
+    let z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tube_costs_its_segments() {
+        let machine = Machine::two_cores_software();
+        // 2 µs + 100 segments of 0.25 µs; two roundings
+        assert!((machine.step_s("tube", 100.0, 0, 0) - 27e-6).abs() < 1e-18);
+        assert!((machine.step_s("no such model", 100.0, 0, 0) - 10e-6).abs() < 1e-18);
+    }
+
+    #[test]
+    fn noise_has_the_declared_mean_and_deviation() {
+        let machine = Machine { noise_sd: 0.1, ..Machine::default() };
+        let n = 20_000;
+        let draws: Vec<f64> = (0..n).map(|k| machine.noise(3, k)).collect();
+        let mean = draws.iter().sum::<f64>() / n as f64;
+        let sd = (draws.iter().map(|x| (x - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+        // standard errors: 0.1 / sqrt(n) = 7e-4 of the mean, 0.1 / sqrt(2 n) = 5e-4 of the deviation; four of them
+        assert!((mean - 1.0).abs() < 2.8e-3, "mean {mean}");
+        assert!((sd - 0.1).abs() < 2e-3, "deviation {sd}");
+    }
+
+    #[test]
+    fn equal_seeds_give_equal_noise_and_streams_differ() {
+        let machine = Machine { noise_sd: 0.2, ..Machine::default() };
+        assert_eq!(machine.noise(1, 7).to_bits(), machine.clone().noise(1, 7).to_bits());
+        assert_ne!(machine.noise(1, 7), machine.noise(2, 7));
+        assert_ne!(machine.noise(1, 7), Machine { seed: 2, ..machine.clone() }.noise(1, 7));
+    }
+
+    #[test]
+    fn prices_that_are_no_price_cost_nothing() {
+        let mut machine = Machine::default();
+        machine.draw.setup_ms = f64::NAN;
+        assert_eq!(machine.draw_time(1, 1, 1, 0), Duration::ZERO);
+        assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);
+    }
+
+    #[test]
+    fn every_preset_has_its_machine() {
+        assert!(PRESETS.iter().all(|name| Machine::preset(name).is_some()));
+        assert_eq!(Machine::preset("abacus"), None);
+    }
+}

@@ -1,0 +1,204 @@
+//! An agent's own time against the scene's: the one place where wall time and simulated time meet.
+//!
+//! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state
+//! that is on time covers the present and pictures need no delay. An agent that is late steps again at once until it has
+//! caught up. Past the lag cap its time jumps to the present without a step: the gap is dropped and counted,
+//! so that an agent that cannot keep up runs at the rate it can reach, and never falls further behind.
+//! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
+
+mod timeline;
+
+pub use timeline::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+
+use metachron_agents::{SimSpan, SimTime};
+use std::time::Duration;
+
+/// How far an agent may lag before it gives up the gap, wall time.
+/// Shorter, a hiccup of the machine costs simulated time; longer, an overload shows as old states (MuJoCo resyncs at the same lag).
+pub const LAG_CAP: Duration = Duration::from_millis(100);
+
+/// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
+const LAG_CAP_STEPS: u64 = 2;
+
+/// An agent's own time and the length of its next step.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pace {
+    time: SimTime,
+    dt: SimSpan,
+    dropped: SimSpan,
+    rested: SimSpan,
+}
+
+/// How a turn begins.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Start {
+    /// How long after its release the turn begins, wall time; measured before time was dropped.
+    pub late: Duration,
+    /// The simulated time that was given up to come here; zero for a turn within the lag cap.
+    pub dropped: SimSpan,
+}
+
+impl Pace {
+    /// A pace from `time` in steps of `dt` (above zero).
+    #[must_use]
+    pub const fn new(time: SimTime, dt: SimSpan) -> Self {
+        Self { time, dt, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
+    }
+
+    /// The agent's own time.
+    #[must_use]
+    pub const fn time(&self) -> SimTime {
+        self.time
+    }
+
+    /// The length of its next step.
+    #[must_use]
+    pub const fn dt(&self) -> SimSpan {
+        self.dt
+    }
+
+    /// Steps by `dt` (above zero) from now on.
+    pub const fn set_dt(&mut self, dt: SimSpan) {
+        self.dt = dt;
+    }
+
+    /// Simulated time given up so far because it could not be made up.
+    #[must_use]
+    pub const fn dropped(&self) -> SimSpan {
+        self.dropped
+    }
+
+    /// Simulated time spent at rest so far: it took no steps and none are missing.
+    #[must_use]
+    pub const fn rested(&self) -> SimSpan {
+        self.rested
+    }
+
+    /// The wall time at which the next step is released; `None` while the timeline stands still before it.
+    #[must_use]
+    pub fn due(&self, timeline: &Timeline) -> Option<Duration> {
+        timeline.wall_of(self.time)
+    }
+
+    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap.
+    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Start {
+        let now = timeline.sim_at(wall);
+        let lag = now.since(self.time);
+        let late = timeline.wall_span(lag);
+        let cap =
+            LAG_CAP.max(timeline.wall_span(SimSpan::from_nanos(self.dt.as_nanos().saturating_mul(LAG_CAP_STEPS))));
+        let mut dropped = SimSpan::ZERO;
+        if late > cap {
+            dropped = lag;
+            self.dropped += lag;
+            self.time = now;
+        }
+        Start { late, dropped }
+    }
+
+    /// The step is done: the agent's time is a step further.
+    pub fn advance(&mut self) {
+        self.time += self.dt;
+    }
+
+    /// The agent wakes at wall time `wall`: the time it slept is behind it.
+    pub fn wake(&mut self, timeline: &Timeline, wall: Duration) {
+        let slept = timeline.sim_at(wall).since(self.time);
+        self.rested += slept;
+        self.time += slept;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(n: u64) -> Duration {
+        Duration::from_millis(n)
+    }
+
+    const fn span_ms(n: u64) -> SimSpan {
+        SimSpan::from_nanos(n * 1_000_000)
+    }
+
+    const fn pace(dt_ms: u64) -> Pace {
+        Pace::new(SimTime::ZERO, span_ms(dt_ms))
+    }
+
+    #[test]
+    fn a_pace_that_is_kept_is_due_every_dt_and_drops_nothing() {
+        let line = Timeline::new();
+        let mut pace = pace(4);
+        for k in 0..1000 {
+            let due = pace.due(&line).unwrap();
+            assert_eq!(due, ms(4 * k));
+            assert_eq!(pace.begin(&line, due), Start { late: Duration::ZERO, dropped: SimSpan::ZERO });
+            pace.advance();
+        }
+        assert_eq!(pace.dropped(), SimSpan::ZERO);
+    }
+
+    #[test]
+    fn a_hiccup_within_the_cap_is_made_up_step_by_step() {
+        let line = Timeline::new();
+        let mut pace = pace(4);
+        for _ in 0..20 {
+            pace.begin(&line, ms(80));
+            pace.advance();
+        }
+        assert_eq!(pace.time(), SimTime::from_nanos(80_000_000));
+        assert_eq!(pace.dropped(), SimSpan::ZERO);
+    }
+
+    #[test]
+    fn a_lag_past_the_cap_is_dropped_and_counted() {
+        let line = Timeline::new();
+        let mut pace = pace(4);
+        let start = pace.begin(&line, ms(500));
+        assert_eq!(start, Start { late: ms(500), dropped: span_ms(500) });
+        assert_eq!(pace.due(&line), Some(ms(500)));
+        assert_eq!(pace.dropped(), span_ms(500));
+    }
+
+    #[test]
+    fn overload_is_no_death_spiral() {
+        // a step of 4 ms that takes 40 ms: whatever happens, own time + dropped time is the wall's, and the lag stays capped
+        let line = Timeline::new();
+        let mut pace = pace(4);
+        let mut wall = Duration::ZERO;
+        for _ in 0..1000 {
+            let start = pace.begin(&line, wall);
+            assert!(start.late <= LAG_CAP + ms(40), "late {:?}", start.late);
+            wall += ms(40);
+            pace.advance();
+        }
+        let stepped = span_ms(4 * 1000);
+        assert_eq!(pace.time().since(SimTime::ZERO), stepped + pace.dropped());
+        assert!(wall.as_nanos() as u64 - pace.time().as_nanos() <= 140_000_000);
+    }
+
+    #[test]
+    fn a_slow_agent_is_not_late_before_two_of_its_steps() {
+        let line = Timeline::new();
+        let mut pace = pace(200);
+        assert_eq!(pace.begin(&line, ms(390)).dropped, SimSpan::ZERO);
+        assert_eq!(pace.begin(&line, ms(401)).dropped, span_ms(401));
+    }
+
+    #[test]
+    fn time_at_rest_is_not_dropped() {
+        let line = Timeline::new();
+        let mut pace = pace(4);
+        pace.wake(&line, ms(900));
+        assert_eq!((pace.rested(), pace.dropped()), (span_ms(900), SimSpan::ZERO));
+        assert_eq!(pace.due(&line), Some(ms(900)));
+    }
+
+    #[test]
+    fn waking_never_turns_an_agent_back() {
+        let line = Timeline::new();
+        let mut pace = Pace::new(SimTime::from_nanos(7_000_000), span_ms(4));
+        pace.wake(&line, ms(5));
+        assert_eq!(pace.time(), SimTime::from_nanos(7_000_000));
+    }
+}

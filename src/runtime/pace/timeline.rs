@@ -1,0 +1,231 @@
+//! The scene's common timeline: which simulated time belongs to a moment of wall time.
+//!
+//! In: pause, run, speed, single step. Out: an immutable [`Timeline`] that every thread reads without waiting.
+//! Never here: an agent's own time ([`super::Pace`] keeps it), sleeping.
+
+use arc_swap::ArcSwap;
+use metachron_agents::{SimSpan, SimTime};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// The slowest and the fastest that simulated time may run, simulated seconds a wall second.
+/// Slower is a pause; faster, no agent keeps up and every step would be late.
+pub const SPEED_RANGE: (f64, f64) = (0.001, 100.0);
+
+/// A straight piece of the timeline: from wall time `wall` on, simulated time runs from `sim` with `speed`,
+/// and stands still once it reaches `until`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Timeline {
+    wall: Duration,
+    sim: SimTime,
+    speed: f64,
+    until: Option<SimTime>,
+    piece: u64,
+}
+
+/// What a user can do to the timeline.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Drive {
+    /// Simulated time stands still.
+    Pause,
+    /// Simulated time runs on.
+    Run,
+    /// Simulated seconds a wall second; clamped to [`SPEED_RANGE`], no number changes nothing.
+    Speed(f64),
+    /// Simulated time runs on for exactly this span, then stands: a frame span for a single step.
+    /// Steps asked for while one is under way add up.
+    Step(SimSpan),
+}
+
+impl Timeline {
+    /// A timeline that runs as wall time does, both from zero.
+    #[must_use]
+    pub const fn new() -> Self {
+        Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, piece: 0 }
+    }
+
+    /// The simulated time at wall time `wall`.
+    #[must_use]
+    pub fn sim_at(&self, wall: Duration) -> SimTime {
+        let free = if wall >= self.wall {
+            self.sim + scaled(wall - self.wall, self.speed)
+        } else {
+            self.sim - scaled(self.wall - wall, self.speed)
+        };
+        self.until.map_or(free, |end| free.min(end))
+    }
+
+    /// The wall time at which simulated time reaches `sim`; `None` where it stands still before.
+    ///
+    /// A time passed before this piece began lies as far back as if this piece had always run.
+    #[must_use]
+    pub fn wall_of(&self, sim: SimTime) -> Option<Duration> {
+        if sim < self.sim {
+            return Some(self.wall.saturating_sub(self.wall_span(self.sim.since(sim))));
+        }
+        // a span that ends where time stops never begins: `until` itself is not passed
+        if self.until.is_some_and(|end| sim >= end) {
+            return None;
+        }
+        Some(self.wall.saturating_add(self.wall_span(sim.since(self.sim))))
+    }
+
+    /// How long `span` lasts on the wall at this speed.
+    #[must_use]
+    pub fn wall_span(&self, span: SimSpan) -> Duration {
+        if self.speed == 1.0 {
+            return Duration::from_nanos(span.as_nanos());
+        }
+        Duration::from_nanos((span.as_nanos() as f64 / self.speed).ceil() as u64)
+    }
+
+    /// How much simulated time passes in `span` of the wall at this speed.
+    #[must_use]
+    pub fn sim_span(&self, span: Duration) -> SimSpan {
+        scaled(span, self.speed)
+    }
+
+    /// Simulated seconds a wall second while it runs.
+    #[must_use]
+    pub const fn speed(&self) -> f64 {
+        self.speed
+    }
+
+    /// Whether simulated time runs at wall time `wall`.
+    #[must_use]
+    pub fn runs_at(&self, wall: Duration) -> bool {
+        self.until.is_none_or(|end| self.sim_at(wall) < end)
+    }
+
+    /// The number of this piece: it changes with every change to the timeline.
+    #[must_use]
+    pub const fn piece(&self) -> u64 {
+        self.piece
+    }
+
+    /// The piece that follows when `drive` is asked for at wall time `wall`.
+    #[must_use]
+    pub fn after(&self, wall: Duration, drive: Drive) -> Self {
+        let sim = self.sim_at(wall);
+        let mut next = Self { wall, sim, piece: self.piece + 1, ..*self };
+        match drive {
+            Drive::Pause => next.until = Some(sim),
+            Drive::Run => next.until = None,
+            Drive::Speed(speed) if speed.is_nan() => return *self,
+            Drive::Speed(speed) => next.speed = speed.clamp(SPEED_RANGE.0, SPEED_RANGE.1),
+            Drive::Step(span) => next.until = Some(self.until.unwrap_or(sim) + span),
+        }
+        next
+    }
+}
+
+impl Default for Timeline {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+fn scaled(span: Duration, speed: f64) -> SimSpan {
+    let nanos = u64::try_from(span.as_nanos()).unwrap_or(u64::MAX);
+    if speed == 1.0 { SimSpan::from_nanos(nanos) } else { SimSpan::from_nanos((nanos as f64 * speed) as u64) }
+}
+
+/// The timeline all agents of a run share: one writer, readers that never wait.
+#[derive(Debug)]
+pub struct SharedTimeline {
+    piece: ArcSwap<Timeline>,
+}
+
+impl SharedTimeline {
+    /// Shares a fresh timeline.
+    #[must_use]
+    pub fn new() -> Self {
+        Self { piece: ArcSwap::from_pointee(Timeline::new()) }
+    }
+
+    /// The piece in force.
+    #[must_use]
+    pub fn read(&self) -> Timeline {
+        **self.piece.load()
+    }
+
+    /// Changes the timeline at wall time `wall`. Whoever sleeps until a due time must be woken after it.
+    pub fn drive(&self, wall: Duration, drive: Drive) {
+        self.piece.store(Arc::new(self.read().after(wall, drive)));
+    }
+}
+
+impl Default for SharedTimeline {
+    fn default() -> Self {
+        Self::new()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const fn ms(n: u64) -> Duration {
+        Duration::from_millis(n)
+    }
+
+    const fn sim_ms(n: u64) -> SimTime {
+        SimTime::from_nanos(n * 1_000_000)
+    }
+
+    #[test]
+    fn pause_freezes_simulated_time_and_run_goes_on_from_there() {
+        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        assert_eq!(paused.sim_at(ms(5000)), sim_ms(100));
+        assert!(!paused.runs_at(ms(5000)));
+        let running = paused.after(ms(5000), Drive::Run);
+        assert_eq!(running.sim_at(ms(5010)), sim_ms(110));
+    }
+
+    #[test]
+    fn a_single_step_advances_by_exactly_its_span() {
+        let span = SimSpan::from_nanos(16_666_667);
+        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        let stepping = paused.after(ms(200), Drive::Step(span));
+        assert!(stepping.runs_at(ms(210)));
+        assert_eq!(stepping.sim_at(ms(9000)), sim_ms(100) + span);
+        assert!(!stepping.runs_at(ms(9000)));
+    }
+
+    #[test]
+    fn single_steps_asked_for_in_a_hurry_add_up() {
+        let span = SimSpan::from_nanos(10_000_000);
+        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        let twice = paused.after(ms(200), Drive::Step(span)).after(ms(201), Drive::Step(span));
+        assert_eq!(twice.sim_at(ms(9000)), sim_ms(120));
+    }
+
+    #[test]
+    fn a_change_of_speed_keeps_the_present() {
+        let slow = Timeline::new().after(ms(1000), Drive::Speed(0.25));
+        assert_eq!(slow.sim_at(ms(1000)), sim_ms(1000));
+        assert_eq!(slow.sim_at(ms(1400)), sim_ms(1100));
+        assert_eq!(slow.after(ms(1400), Drive::Speed(f64::NAN)), slow);
+    }
+
+    #[test]
+    fn wall_of_is_the_first_moment_that_has_reached_the_time() {
+        for speed in [0.001, 0.3, 1.0, 3.0, 7.7] {
+            let line = Timeline::new().after(ms(3), Drive::Speed(speed));
+            for nanos in [3_000_000_u64, 3_000_001, 4_567_891, 1_234_567_891] {
+                let sim = SimTime::from_nanos(nanos);
+                let wall = line.wall_of(sim).unwrap();
+                // rounding of one product and one quotient: a nanosecond of either time
+                assert!(sim.secs_after(line.sim_at(wall)) <= 1e-9, "speed {speed}, {nanos} ns");
+            }
+        }
+    }
+
+    #[test]
+    fn a_step_is_never_due_on_a_timeline_that_stands_still() {
+        let paused = Timeline::new().after(ms(100), Drive::Pause);
+        assert_eq!(paused.wall_of(sim_ms(100)), None);
+        assert_eq!(paused.wall_of(sim_ms(101)), None);
+        assert_eq!(paused.wall_of(sim_ms(90)), Some(ms(90)));
+    }
+}

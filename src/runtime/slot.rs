@@ -1,0 +1,191 @@
+//! The newest value only: one writer, any number of readers, nobody waits.
+//!
+//! In: whole values. Out: the newest of them, shared. A value that nobody read is lost, and that is meant.
+//! The writer fills values that the readers have let go of, so that nothing is allocated once there are enough of them:
+//! one published, one being filled, and one for each that a reader keeps. Never here: queues, locks.
+
+use arc_swap::ArcSwap;
+use std::sync::Arc;
+
+/// Where the newest value lies.
+#[derive(Debug)]
+pub struct LatestSlot<T> {
+    newest: ArcSwap<T>,
+}
+
+impl<T> LatestSlot<T> {
+    /// The newest value. It stays as it is for as long as it is kept; keep few of them, each is storage the writer must replace.
+    #[must_use]
+    pub fn latest(&self) -> Arc<T> {
+        self.newest.load_full()
+    }
+}
+
+/// The one who publishes into a [`LatestSlot`].
+#[derive(Debug)]
+pub struct SlotWriter<T> {
+    slot: Arc<LatestSlot<T>>,
+    spare: Vec<Arc<T>>,
+    filled: Option<Arc<T>>,
+    made: usize,
+}
+
+impl<T: Default> SlotWriter<T> {
+    /// A slot whose first value is `first`, and its writer.
+    #[must_use]
+    pub fn new(first: T) -> Self {
+        let slot = Arc::new(LatestSlot { newest: ArcSwap::from_pointee(first) });
+        Self { slot, spare: Vec::new(), filled: None, made: 1 }
+    }
+
+    /// The slot, for readers.
+    #[must_use]
+    pub fn slot(&self) -> Arc<LatestSlot<T>> {
+        Arc::clone(&self.slot)
+    }
+
+    /// Fills a value that no reader holds, to be published later. `fill` gets an old value and must overwrite all of it.
+    /// A value filled before and not yet published is filled again.
+    pub fn fill<R>(&mut self, fill: impl FnOnce(&mut T) -> R) -> R {
+        let mut free = self.filled.take().unwrap_or_else(|| self.take_spare());
+        let result = fill(Arc::get_mut(&mut free).expect("nobody else holds a spare value"));
+        self.filled = Some(free);
+        result
+    }
+
+    /// Publishes the value that was filled last; `false` if there is none.
+    pub fn publish(&mut self) -> bool {
+        let Some(value) = self.filled.take() else { return false };
+        self.spare.push(self.slot.newest.swap(value));
+        true
+    }
+
+    /// The value that is filled and not yet published.
+    #[must_use]
+    pub fn filled(&self) -> Option<&T> {
+        self.filled.as_deref()
+    }
+
+    /// How many values were ever allocated.
+    #[must_use]
+    pub const fn made(&self) -> usize {
+        self.made
+    }
+
+    fn take_spare(&mut self) -> Arc<T> {
+        match self.spare.iter_mut().position(|s| Arc::get_mut(s).is_some()) {
+            Some(at) => self.spare.swap_remove(at),
+            None => {
+                self.made += 1;
+                Arc::new(T::default())
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    fn writer() -> SlotWriter<Vec<u64>> {
+        SlotWriter::new(vec![0; 64])
+    }
+
+    fn put(writer: &mut SlotWriter<Vec<u64>>, value: u64) {
+        writer.fill(|block| {
+            block.clear();
+            block.resize(64, value);
+        });
+        writer.publish();
+    }
+
+    #[test]
+    fn the_newest_value_wins() {
+        let mut writer = writer();
+        let slot = writer.slot();
+        put(&mut writer, 1);
+        put(&mut writer, 2);
+        assert_eq!(slot.latest()[0], 2);
+    }
+
+    #[test]
+    fn a_kept_value_never_changes() {
+        let mut writer = writer();
+        let slot = writer.slot();
+        put(&mut writer, 1);
+        let kept = slot.latest();
+        for value in 2..100 {
+            put(&mut writer, value);
+        }
+        assert!(kept.iter().all(|&v| v == 1));
+    }
+
+    #[test]
+    fn a_value_filled_and_not_published_is_not_seen() {
+        let mut writer = writer();
+        let slot = writer.slot();
+        writer.fill(|block| *block = vec![9]);
+        assert_eq!(slot.latest()[0], 0);
+        assert_eq!(writer.filled().unwrap()[0], 9);
+        assert!(writer.publish());
+        assert!(!writer.publish(), "once");
+        assert_eq!(slot.latest()[0], 9);
+    }
+
+    #[test]
+    fn nothing_is_allocated_after_warm_up() {
+        let mut writer = writer();
+        let slot = writer.slot();
+        let mut kept = [slot.latest(), slot.latest(), slot.latest()];
+        for value in 0..10_000_u64 {
+            put(&mut writer, value);
+            kept[value as usize % 3] = slot.latest();
+        }
+        // one published, one being filled, three kept
+        assert!(writer.made() <= 5, "made {}", writer.made());
+    }
+
+    #[test]
+    fn a_reader_on_another_thread_sees_whole_values_that_only_rise() {
+        let mut writer: SlotWriter<Block> = SlotWriter::new(Block::default());
+        let slot = writer.slot();
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let readers: Vec<_> = (0..2)
+                .map(|_| {
+                    scope.spawn(|| {
+                        let (mut last, mut reads) = (0, 0_u64);
+                        while !done.load(Ordering::Acquire) || reads == 0 {
+                            let seen = slot.latest();
+                            assert!(seen.0.iter().all(|&v| v == seen.0[0]), "torn");
+                            assert!(seen.0[0] >= last, "fell from {last} to {}", seen.0[0]);
+                            last = seen.0[0];
+                            reads += 1;
+                        }
+                        last
+                    })
+                })
+                .collect();
+            for value in 1..=200_000 {
+                writer.fill(|block| block.0.fill(value));
+                writer.publish();
+            }
+            done.store(true, Ordering::Release);
+            for reader in readers {
+                assert!(reader.join().unwrap() <= 200_000);
+            }
+        });
+        assert_eq!(slot.latest().0[0], 200_000);
+        // each of two readers holds one value at most
+        assert!(writer.made() <= 4, "made {}", writer.made());
+    }
+
+    struct Block([u64; 64]);
+
+    impl Default for Block {
+        fn default() -> Self {
+            Self([0; 64])
+        }
+    }
+}

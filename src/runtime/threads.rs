@@ -1,0 +1,227 @@
+//! A thread for each agent, real time: the default executor.
+//!
+//! In: agents and a [`Clock`]. Out: [`Run`]. A thread sleeps until its agent is due and is woken for a command, a touch, a
+//! changed timeline and the end; one whose agent rests sleeps without a timer, one whose agent has given up ends.
+//! Never here: virtual time, declared costs.
+
+use super::Run;
+use super::account::AgentStats;
+use super::clock::Clock;
+use super::cpu::CpuBatch;
+use super::handle::AgentHandle;
+use super::pace::{Drive, SharedTimeline, Timeline};
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use super::switchboard::Switchboard;
+use super::turn::{Actor, Next};
+use metachron_agents::AgentId;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// The most agents that get a thread each; beyond, waking them costs more than they do.
+pub const THREADS_MAX: usize = 1000;
+
+/// How long the end of a run waits for turns under way. A step that takes longer hangs; its thread is left behind.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Agents on threads of their own.
+pub struct Threads {
+    clock: Arc<dyn Clock>,
+    timeline: Arc<SharedTimeline>,
+    board: Arc<Switchboard>,
+    handles: Vec<AgentHandle>,
+    threads: Vec<Option<JoinHandle<()>>>,
+    ended: Receiver<AgentId>,
+}
+
+impl Threads {
+    /// Gives every agent its thread; simulated time begins when all are there.
+    ///
+    /// # Errors
+    /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as asked, and where the system gives no thread.
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>) -> Result<Self, RunError> {
+        if spawns.len() > THREADS_MAX {
+            return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
+        }
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let timeline = Arc::new(SharedTimeline::new());
+        timeline.drive(Duration::ZERO, Drive::Pause);
+        let (sender, ended) = channel();
+        let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended };
+        for actor in actors {
+            // on an error the run so far is dropped, which ends its threads
+            let id = actor.id();
+            let thread = run.spawn(actor, sender.clone())?;
+            run.board.lives_on(id, thread.thread().clone());
+            run.threads.push(Some(thread));
+        }
+        run.drive(Drive::Run);
+        Ok(run)
+    }
+
+    fn spawn(&self, actor: Actor, ended: Sender<AgentId>) -> Result<JoinHandle<()>, RunError> {
+        let name = actor.shared.name.clone();
+        let stage =
+            Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
+        let farewell = Farewell { id: actor.id(), ended };
+        let builder = thread::Builder::new().name(format!("agent:{}", name.replace('\0', "")));
+        let body = move || {
+            let _farewell = farewell;
+            stage.live(actor);
+        };
+        builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
+    }
+
+    /// Ends all threads and waits for them, as long as it has patience.
+    fn end(&mut self) {
+        self.board.stop();
+        let deadline = Instant::now() + PATIENCE;
+        let mut missing = self.threads.iter().flatten().count();
+        while missing > 0 {
+            let Ok(id) = self.ended.recv_timeout(deadline.saturating_duration_since(Instant::now())) else { break };
+            missing -= 1;
+            if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
+                // a panic outside a turn is a bug of ours: it has been printed, and the others must still be joined
+                drop(thread.join());
+            }
+        }
+        for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
+            handle.shared.gauges.park(format!("its last step did not end within {} s", PATIENCE.as_secs()));
+        }
+        self.threads.clear();
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl Run for Threads {
+    fn now(&self) -> Duration {
+        self.clock.now()
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        loop {
+            let left = until.saturating_sub(self.clock.now());
+            if left.is_zero() {
+                return;
+            }
+            thread::sleep(left);
+        }
+    }
+
+    fn spend(&mut self, _work: Duration) {}
+
+    fn timeline(&self) -> Timeline {
+        self.timeline.read()
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.timeline.drive(self.clock.now(), drive);
+        self.board.unpark_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.handles
+    }
+
+    fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
+        self.end();
+        self.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+/// Says that a thread has ended, however it did.
+struct Farewell {
+    id: AgentId,
+    ended: Sender<AgentId>,
+}
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        // nobody listens any more after the patience of the end: then nobody needs to know
+        let _ = self.ended.send(self.id);
+    }
+}
+
+/// What an agent's thread works with.
+struct Stage {
+    clock: Arc<dyn Clock>,
+    timeline: Arc<SharedTimeline>,
+    batch: CpuBatch,
+}
+
+impl Stage {
+    /// The life of an agent: turn after turn until it is asked to end, or gives up.
+    fn live(mut self, mut actor: Actor) {
+        let board = Arc::clone(&actor.shared.board);
+        let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
+        while !board.stopping() {
+            next = match next {
+                Next::Due => self.wait_or_turn(&mut actor),
+                Next::Rest => self.doze(&mut actor),
+                Next::Parked => break,
+            };
+        }
+        self.settle(&mut actor);
+        actor.close_account();
+    }
+
+    /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which does no harm.
+    fn wait_or_turn(&mut self, actor: &mut Actor) -> Next {
+        let timeline = self.timeline.read();
+        let now = self.clock.now();
+        match actor.pace.due(&timeline) {
+            Some(due) if due <= now => self.turn(actor, &timeline, now),
+            Some(due) => {
+                thread::park_timeout(due - now);
+                Next::Due
+            }
+            None => {
+                self.settle(actor);
+                thread::park();
+                Next::Due
+            }
+        }
+    }
+
+    fn doze(&mut self, actor: &mut Actor) -> Next {
+        if actor.wakes(&self.timeline.read(), self.clock.now()) {
+            return Next::Due;
+        }
+        self.settle(actor);
+        thread::park();
+        Next::Rest
+    }
+
+    fn turn(&mut self, actor: &mut Actor, timeline: &Timeline, began: Duration) -> Next {
+        self.batch.open();
+        let started = Instant::now();
+        let next = match actor.begin(timeline, began) {
+            None => Next::Parked,
+            Some(_) => {
+                let now = self.clock.now();
+                actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64())
+            }
+        };
+        let wall = started.elapsed();
+        actor.unsettled += wall;
+        if self.batch.add(wall) {
+            self.settle(actor);
+        }
+        next
+    }
+
+    fn settle(&mut self, actor: &mut Actor) {
+        if !self.batch.is_empty() {
+            actor.settle(self.batch.close());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
