@@ -1,0 +1,220 @@
+//! The impulses of many contacts at once: accelerated projected gradient (MHNT15) on Signorini's and Coulomb's laws.
+//!
+//! In: contacts, the free velocities, and a body's answer to impulses. Out: the impulses, and the velocities after them.
+//! Each iteration costs one answer, however many contacts there are. Theory: docs/theory/contact.md, eq. 5–11.
+
+use super::Contact;
+use glam::DVec3;
+
+/// How a body answers impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
+pub trait Response {
+    /// Turns impulses, one a slot, into the changes of velocity they cause. Linear.
+    fn respond(&mut self, impulses: &mut [DVec3]);
+}
+
+impl<F: FnMut(&mut [DVec3])> Response for F {
+    fn respond(&mut self, impulses: &mut [DVec3]) {
+        self(impulses);
+    }
+}
+
+/// When the iteration stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The most answers a solve may ask for, ≥ 1. Fewer leave friction creeping and piles sinking.
+    pub iterations: u32,
+    /// The error of velocity at which a solve is done, m/s, > 0. A millionth of a metre a step is far below any drawing.
+    pub tolerance_m_s: f64,
+}
+
+/// One solve: all contacts of a body at one moment.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The contacts, by rising keys.
+    pub contacts: &'a [Contact],
+    /// The step, seconds, > 0.
+    pub h_s: f64,
+    /// A scale of each slot's inverse mass, 1/kg, or 1/(kg·m²) for a spin; ≥ 0. Only the speed of convergence depends on it.
+    pub mobilities: &'a [f64],
+    /// When the iteration stops.
+    pub settings: Settings,
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SolverReport {
+    /// Answers asked for.
+    pub iterations: u32,
+    /// The largest velocity by which a contact still fails its law, m/s.
+    pub residual_m_s: f64,
+}
+
+/// The memory of the solve: warm starts by key, and room to work in (nothing is allocated once the sizes settle).
+#[derive(Debug, Clone, Default)]
+pub struct Solver {
+    known: Vec<(u64, DVec3)>,
+    known_h: f64,
+    stiffness: f64,
+    scale: Vec<f64>,
+    free: Vec<DVec3>,
+    now: Iterate,
+    ahead: Iterate,
+    next: Iterate,
+    answer: Vec<DVec3>,
+}
+
+/// Impulses λ, and the velocities W λ they cause at the contacts.
+#[derive(Debug, Clone, Default)]
+struct Iterate {
+    lambda: Vec<DVec3>,
+    caused: Vec<DVec3>,
+}
+
+/// How far past the measured need the step bound is raised: a little, so that rounding does not ask for it again.
+const BOUND_MARGIN: f64 = 1.02;
+/// The share of the step bound that a new solve starts from: contacts come and go, a bound that only rises slows all later ones.
+const BOUND_DECAY: f64 = 0.9;
+/// The least mobility, 1/kg: a contact between held matter only has none, and any number will do.
+const MOBILITY_MIN: f64 = 1e-12;
+
+impl Solver {
+    /// Forgets every warm start: keys have lost their meaning (the body was divided anew).
+    pub fn forget(&mut self) {
+        self.known.clear();
+    }
+
+    /// The impulse of each contact of the last solve, N·s, in the order the contacts were given.
+    #[must_use]
+    pub fn impulses(&self) -> &[DVec3] {
+        &self.now.lambda
+    }
+
+    /// Finds the impulses and adds what they do to `velocities`, one entry a slot (eq. 5–8).
+    pub fn solve(&mut self, problem: &Problem<'_>, velocities: &mut [DVec3], body: &mut impl Response) -> SolverReport {
+        if problem.contacts.is_empty() {
+            self.now.lambda.clear();
+            self.forget();
+            return SolverReport::default();
+        }
+        self.prepare(problem, velocities);
+        let report = self.iterate(problem, body, velocities.len());
+        velocities.iter_mut().zip(&self.answer).for_each(|(v, dv)| *v += *dv);
+        self.remember(problem);
+        report
+    }
+
+    /// Free velocities b (eq. 6), scales (eq. 9) and warm starts of all contacts.
+    fn prepare(&mut self, problem: &Problem<'_>, velocities: &[DVec3]) {
+        let Problem { contacts, h_s: h, mobilities, .. } = *problem;
+        self.free.clear();
+        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h)));
+        self.scale.clear();
+        self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
+        let longer = if self.known_h > 0.0 { h / self.known_h } else { 0.0 };
+        let mut known = self.known.iter().peekable();
+        self.now.lambda.clear();
+        self.now.lambda.extend(contacts.iter().map(|c| {
+            while known.next_if(|(key, _)| *key < c.key).is_some() {}
+            known.next_if(|(key, _)| *key == c.key).map_or(DVec3::ZERO, |(_, lambda)| c.project(*lambda * longer))
+        }));
+        self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
+    }
+
+    fn remember(&mut self, problem: &Problem<'_>) {
+        self.known.clear();
+        self.known.extend(problem.contacts.iter().zip(&self.now.lambda).map(|(c, &lambda)| (c.key, lambda)));
+        self.known_h = problem.h_s;
+    }
+
+    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `answer`.
+    fn iterate(&mut self, problem: &Problem<'_>, body: &mut impl Response, slots: usize) -> SolverReport {
+        let Problem { contacts, settings, .. } = *problem;
+        let mut report = SolverReport::default();
+        self.answer.clear();
+        self.answer.resize(slots, DVec3::ZERO);
+        if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
+            self.now.cause(contacts, body, &mut self.answer);
+            report.iterations += 1;
+        } else {
+            self.now.caused.clear();
+            self.now.caused.resize(contacts.len(), DVec3::ZERO);
+        }
+        self.ahead.clone_from(&self.now);
+        let (mut momentum, mut taken) = (1.0, true);
+        loop {
+            self.descend(contacts);
+            report.residual_m_s = self.residual();
+            // `answer` must belong to `now`: no stop between a refused move and the next one
+            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= settings.iterations) {
+                return report;
+            }
+            self.next.cause(contacts, body, &mut self.answer);
+            report.iterations += 1;
+            taken = self.bound_holds() || report.iterations >= settings.iterations;
+            if taken {
+                momentum = self.advance(momentum);
+            }
+        }
+    }
+
+    /// next ← P(ahead − (W ahead + b) / (L d)) (eq. 10).
+    fn descend(&mut self, contacts: &[Contact]) {
+        let Self { ahead, next, free, scale, stiffness, .. } = self;
+        next.lambda.clear();
+        next.lambda.extend(contacts.iter().enumerate().map(|(i, c)| {
+            let slope = ahead.caused[i] + free[i];
+            c.project(ahead.lambda[i] - slope / (*stiffness * scale[i]))
+        }));
+    }
+
+    /// The largest move of a contact in velocity: zero exactly where every law holds.
+    fn residual(&self) -> f64 {
+        let moves = self.next.lambda.iter().zip(&self.ahead.lambda).zip(&self.scale);
+        moves.map(|((next, ahead), d)| (*next - *ahead).length() * d * self.stiffness).fold(0.0, f64::max)
+    }
+
+    /// Whether L is an upper bound along the move just made; if not it is raised to one (eq. 11).
+    fn bound_holds(&mut self) -> bool {
+        let (mut curve, mut size) = (0.0, 0.0);
+        for i in 0..self.next.lambda.len() {
+            let step = self.next.lambda[i] - self.ahead.lambda[i];
+            curve += step.dot(self.next.caused[i] - self.ahead.caused[i]);
+            size += self.scale[i] * step.length_squared();
+        }
+        let holds = curve <= self.stiffness * size * (1.0 + 1e-9);
+        if !holds {
+            self.stiffness = BOUND_MARGIN * curve / size;
+        }
+        holds
+    }
+
+    /// Takes the move and looks ahead of it; starts afresh where looking ahead went uphill.
+    fn advance(&mut self, momentum: f64) -> f64 {
+        let uphill: f64 = (0..self.next.lambda.len())
+            .map(|i| {
+                let (ahead, next, now) = (self.ahead.lambda[i], self.next.lambda[i], self.now.lambda[i]);
+                (ahead - next).dot(next - now) * self.scale[i]
+            })
+            .sum();
+        let momentum = if uphill > 0.0 { 1.0 } else { momentum };
+        let grown = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum).sqrt());
+        let beta = if uphill > 0.0 { 0.0 } else { (momentum - 1.0) / grown };
+        for i in 0..self.next.lambda.len() {
+            self.ahead.lambda[i] = self.next.lambda[i] + (self.next.lambda[i] - self.now.lambda[i]) * beta;
+            self.ahead.caused[i] = self.next.caused[i] + (self.next.caused[i] - self.now.caused[i]) * beta;
+        }
+        std::mem::swap(&mut self.now, &mut self.next);
+        grown
+    }
+}
+
+impl Iterate {
+    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards.
+    fn cause(&mut self, contacts: &[Contact], body: &mut impl Response, answer: &mut [DVec3]) {
+        answer.fill(DVec3::ZERO);
+        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.slots.scatter(*lambda, answer));
+        body.respond(answer);
+        self.caused.clear();
+        self.caused.extend(contacts.iter().map(|c| c.slots.velocity(answer)));
+    }
+}
