@@ -55,6 +55,11 @@ impl Slots {
         linear + angular
     }
 
+    /// The part of the relative velocity that comes from velocities, not spins, read by `at` from each slot.
+    pub(crate) fn linear_with(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
+        self.linear().iter().map(|&(slot, w)| at(slot as usize) * w).sum()
+    }
+
     /// Adds the impulses and angular impulses Jᵀ λ (eq. 2).
     pub fn scatter(&self, impulse: DVec3, into: &mut [DVec3]) {
         for &(slot, w) in self.linear() {

@@ -107,7 +107,7 @@ impl Solid {
     }
 
     /// Whether every length of the solid is finite and above zero, and every point finite.
-    fn check(&self) -> Result<(), ShapeError> {
+    pub(crate) fn check(&self) -> Result<(), ShapeError> {
         let length = |what, value_m: f64| {
             let good = value_m.is_finite() && value_m > 0.0;
             if good { Ok(()) } else { Err(ShapeError::BadLength { what, value_m }) }

@@ -1,0 +1,210 @@
+//! How a tube touches itself and the solids around it: finds the contacts of a substep and solves them.
+//!
+//! In: where the skin is, how it would move without contact, and the body's answer to impulses (the factor of the rod's own solve).
+//! Out: velocities that keep the skin apart. Never here: the rod's elasticity. Theory: `docs/theory/contact.md`.
+
+mod grid;
+mod pairs;
+mod walls;
+
+use crate::coupling::{Contact, Problem, Response, Settings, Slots, Solver, SolverReport};
+use crate::shape::field::Ball;
+use crate::shape::{Obstacle, ShapeError};
+use glam::DVec3;
+use pairs::{Meeting, Pairs};
+use walls::{WallTouch, Walls};
+
+/// Contacts are taken up this share of the radius before they touch: impulses of other contacts may close the rest.
+const SLACK_RADII: f64 = 0.05;
+
+/// A tube's skin at the start of a substep: balls on nodes, joined by spans.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Skin<'a> {
+    /// Node positions, metres.
+    pub positions: &'a [DVec3],
+    /// Node velocities without contact, m/s.
+    pub velocities: &'a [DVec3],
+    /// Outer radius at each node, metres.
+    pub radii_m: &'a [f64],
+    /// Rest arc length of each node, metres.
+    pub arc_m: &'a [f64],
+    /// The substep, seconds.
+    pub h_s: f64,
+}
+
+/// The place of a node's velocity in the array of slots that contacts use: nodes and segments take turns.
+pub(crate) const fn node_slot(node: usize) -> usize {
+    2 * node
+}
+
+/// The place of a segment's spin in the array of slots.
+pub(crate) const fn segment_slot(segment: usize) -> usize {
+    2 * segment + 1
+}
+
+/// The contacts of one tube, from substep to substep.
+#[derive(Debug, Clone)]
+pub(crate) struct TubeContacts {
+    pairs: Option<Pairs>,
+    walls: Walls,
+    friction: f64,
+    contacts: Vec<Contact>,
+    solver: Solver,
+}
+
+impl TubeContacts {
+    /// Contacts with `obstacles` and, if `with_itself`, of the tube with itself.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for an obstacle that has no shape.
+    pub fn new(obstacles: &[Obstacle], with_itself: bool, friction: f64) -> Result<Self, ShapeError> {
+        Ok(Self {
+            pairs: with_itself.then(Pairs::default),
+            walls: Walls::new(obstacles)?,
+            friction,
+            contacts: vec![],
+            solver: Solver::default(),
+        })
+    }
+
+    /// Forgets what it knows of nodes and segments: the tube was divided anew.
+    pub fn forget(&mut self) {
+        if let Some(pairs) = &mut self.pairs {
+            pairs.forget();
+        }
+        self.walls.forget();
+        self.solver.forget();
+    }
+
+    /// Finds the contacts of a substep; returns how many there are.
+    pub fn find(&mut self, skin: &Skin<'_>) -> usize {
+        let Self { pairs, walls, friction, contacts, .. } = self;
+        contacts.clear();
+        let slack_m = SLACK_RADII * skin.widest_m();
+        if let Some(pairs) = pairs {
+            pairs.visit(skin, slack_m, |meeting| {
+                let contact = of_meeting(&meeting, *friction);
+                let closing = closing(&contact.slots, skin.velocities, contact.normal);
+                if contact.gap_m + closing * skin.h_s <= slack_m {
+                    contacts.push(contact);
+                }
+            });
+        }
+        walls.visit(skin, slack_m, |touch| contacts.push(of_touch(&touch, *friction, skin.segments())));
+        contacts.sort_unstable_by_key(|c| c.key);
+        contacts.len()
+    }
+
+    /// The contacts found last, by rising keys.
+    pub fn contacts(&self) -> &[Contact] {
+        &self.contacts
+    }
+
+    /// The impulse of each contact, N·s.
+    pub fn impulses(&self) -> &[DVec3] {
+        self.solver.impulses()
+    }
+
+    /// Solves the contacts found last: `velocities` (slots of [`node_slot`] and [`segment_slot`]) become such that none closes.
+    pub fn solve(
+        &mut self,
+        (h_s, settings): (f64, Settings),
+        velocities: &mut [DVec3],
+        mobilities: &[f64],
+        body: &mut impl Response,
+    ) -> SolverReport {
+        let problem = Problem { contacts: &self.contacts, h_s, mobilities, settings };
+        self.solver.solve(&problem, velocities, body)
+    }
+}
+
+impl Skin<'_> {
+    fn segments(&self) -> usize {
+        self.positions.len() - 1
+    }
+
+    fn ball(&self, node: usize) -> Ball {
+        Ball { centre: self.positions[node], radius_m: self.radii_m[node] }
+    }
+
+    fn length(&self, segment: usize) -> f64 {
+        self.positions[segment].distance(self.positions[segment + 1])
+    }
+
+    fn middle(&self, segment: usize) -> DVec3 {
+        (self.positions[segment] + self.positions[segment + 1]) * 0.5
+    }
+
+    fn widest(&self, segment: usize) -> f64 {
+        self.radii_m[segment].max(self.radii_m[segment + 1])
+    }
+
+    fn taper(&self, segment: usize) -> f64 {
+        (self.radii_m[segment] - self.radii_m[segment + 1]).abs()
+    }
+
+    fn widest_m(&self) -> f64 {
+        self.radii_m.iter().copied().fold(0.0, f64::max)
+    }
+
+    /// The speed of the fastest node, m/s.
+    fn speed(&self) -> f64 {
+        self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// The speed of the fastest node against the mean of all, m/s.
+    fn relative_speed(&self) -> f64 {
+        let mean = self.velocities.iter().sum::<DVec3>() / self.velocities.len() as f64;
+        self.velocities.iter().map(|v| (*v - mean).length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    fn span_speed(&self, segment: usize) -> f64 {
+        self.velocities[segment].length().max(self.velocities[segment + 1].length())
+    }
+}
+
+/// The normal velocity of a contact from the velocities of nodes alone: a spin moves the skin across the normal only.
+fn closing(slots: &Slots, nodes: &[DVec3], normal: DVec3) -> f64 {
+    slots.linear_with(|slot| nodes[slot / 2]).dot(normal)
+}
+
+/// Self-contact: the nearest points of two segments, and arms to the middle of the gap (eq. 20).
+fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
+    let mut slots = Slots::default();
+    for (side, sign) in [(0, 1.0), (1, -1.0)] {
+        let (segment, share) = (meeting.segments[side] as usize, meeting.shares[side]);
+        slots.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
+        slots.add_linear(node_slot(segment + 1) as u32, sign * share);
+        // the arm points at the other side: against the normal for the first, along it for the second
+        let arm = meeting.normal * -sign * (meeting.radii_m[side] + 0.5 * meeting.gap_m);
+        slots.add_angular(segment_slot(segment) as u32, arm * sign);
+    }
+    let key = u64::from(meeting.segments[0]) << 20 | u64::from(meeting.segments[1]);
+    Contact { key, slots, normal: meeting.normal, gap_m: meeting.gap_m, friction }
+}
+
+/// Contact with a wall, at a node or inside a segment (eq. 21).
+fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
+    let mut slots = Slots::default();
+    let index = touch.index as usize;
+    let arm = touch.normal * -touch.radius_m;
+    if let Some(share) = touch.share {
+        slots.add_linear(node_slot(index) as u32, 1.0 - share);
+        slots.add_linear(node_slot(index + 1) as u32, share);
+        slots.add_angular(segment_slot(index) as u32, arm);
+    } else {
+        slots.add_linear(node_slot(index) as u32, 1.0);
+        // a node's skin turns with the mean of the segments beside it
+        let beside = [index.checked_sub(1), Some(index).filter(|&k| k < segments)];
+        let count = beside.iter().flatten().count() as f64;
+        for segment in beside.into_iter().flatten() {
+            slots.add_angular(segment_slot(segment) as u32, arm / count);
+        }
+    }
+    let inside = u64::from(touch.share.is_some());
+    let key = (u64::from(touch.wall) + 1) << 41 | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
+    Contact { key, slots, normal: touch.normal, gap_m: touch.gap_m, friction: (friction * touch.friction).sqrt() }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,245 @@
+//! How far a point is from a fixed solid, and along which normal: the geometry of contact with obstacles.
+//!
+//! In: an [`Obstacle`], balls and spans between balls. Out: the places where they touch it, or nearly do.
+//! Never here: velocities, forces. Theory: `docs/theory/contact.md`, eq. 12–14.
+
+use super::convert::{hull_triangles, mesh_triangles};
+use super::mesh_field::MeshField;
+use super::{Obstacle, ShapeError, Solid};
+use glam::{DQuat, DVec2, DVec3};
+
+/// A place of an obstacle's surface near a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Touch {
+    /// Unit normal of the surface there, out of the obstacle.
+    pub normal: DVec3,
+    /// Distance of the point from the surface, metres; negative inside.
+    pub distance_m: f64,
+}
+
+/// The most places at which one ball touches one obstacle: a corner of a room has three.
+pub(crate) const TOUCHES_MAX: usize = 4;
+
+/// Up to [`TOUCHES_MAX`] places, nearest first.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Touches {
+    places: [Option<Touch>; TOUCHES_MAX],
+    count: usize,
+}
+
+impl Touches {
+    /// Adds a place; a full list stays as it is.
+    pub fn push(&mut self, touch: Touch) {
+        if self.count < TOUCHES_MAX {
+            self.places[self.count] = Some(touch);
+            self.count += 1;
+        }
+    }
+
+    /// Whether no more fit.
+    pub fn is_full(&self) -> bool {
+        self.count == TOUCHES_MAX
+    }
+
+    /// The places, nearest first.
+    pub fn iter(&self) -> impl Iterator<Item = Touch> + '_ {
+        self.places.iter().flatten().copied()
+    }
+}
+
+/// A ball on a curve: a node with the curve's radius there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Ball {
+    /// Centre, metres.
+    pub centre: DVec3,
+    /// Radius, metres, ≥ 0.
+    pub radius_m: f64,
+}
+
+impl Ball {
+    /// The ball at the share `s` of the way to `other`.
+    pub fn toward(self, other: Self, s: f64) -> Self {
+        Self {
+            centre: self.centre.lerp(other.centre, s),
+            radius_m: self.radius_m + (other.radius_m - self.radius_m) * s,
+        }
+    }
+}
+
+/// A solid as a field of distances, where it stands.
+#[derive(Debug, Clone)]
+pub(crate) struct Field {
+    kind: Kind,
+    position: DVec3,
+    rotation: DQuat,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Ball(f64),
+    Box(DVec3),
+    Capsule(f64, f64),
+    Cylinder(f64, f64),
+    Plane,
+    /// Triangles, in world axes already: an obstacle never moves.
+    Mesh(std::boxed::Box<MeshField>),
+}
+
+/// Halvings of the search for the lowest point of a span: tangents meet much faster on smooth shapes.
+const SPAN_TRIES: usize = 16;
+/// How close to an end of a span its lowest point belongs to that end's own ball, as a share of the span.
+const SPAN_END_SHARE: f64 = 0.02;
+
+impl Field {
+    /// The field of an obstacle.
+    ///
+    /// # Errors
+    /// [`ShapeError`] where [`Solid::to_shared_shape`] would give one.
+    pub fn new(obstacle: &Obstacle) -> Result<Self, ShapeError> {
+        obstacle.solid.check()?;
+        let rotation = obstacle.rotation.normalize();
+        let in_world = |p: &DVec3| obstacle.position + rotation * *p;
+        let kind = match &obstacle.solid {
+            Solid::Ball { radius_m } => Kind::Ball(*radius_m),
+            Solid::Box { half_extents_m } => Kind::Box(*half_extents_m),
+            Solid::Capsule { radius_m, half_height_m } => Kind::Capsule(*radius_m, *half_height_m),
+            Solid::Cylinder { radius_m, half_height_m } => Kind::Cylinder(*radius_m, *half_height_m),
+            Solid::Plane => Kind::Plane,
+            Solid::Hull { points_m } => {
+                let mut hull = hull_triangles(points_m)?;
+                hull.points.iter_mut().for_each(|p| *p = in_world(p));
+                Kind::Mesh(MeshField::new(hull).into())
+            }
+            Solid::Mesh { points_m, triangles } => {
+                let mut mesh = mesh_triangles(points_m, triangles)?;
+                mesh.points.iter_mut().for_each(|p| *p = in_world(p));
+                Kind::Mesh(MeshField::new(mesh).into())
+            }
+        };
+        Ok(Self { kind, position: obstacle.position, rotation })
+    }
+
+    /// Where `point` is within `reach_m` of the surface, nearest place first.
+    ///
+    /// A convex primitive has one place, at any depth. A mesh or hull has one for each wall of a corner, and is felt only
+    /// to the depth `reach_m` behind its surface.
+    pub fn touches(&self, point: DVec3, reach_m: f64) -> Touches {
+        let mut found = Touches::default();
+        if let Kind::Mesh(mesh) = &self.kind {
+            mesh.touches(point, reach_m, &mut found);
+        } else {
+            let touch = self.nearest(point);
+            if touch.distance_m <= reach_m {
+                found.push(touch);
+            }
+        }
+        found
+    }
+
+    /// Whether the inside of a span can come nearer than both of its ends: never to a flat floor without end.
+    pub fn feels_spans(&self) -> bool {
+        !matches!(self.kind, Kind::Plane)
+    }
+
+    /// Whether `ball` moved by `way` stays farther than `slack_m` from this solid. A mesh says no.
+    pub fn is_missed(&self, ball: Ball, way: DVec3, slack_m: f64) -> bool {
+        if matches!(self.kind, Kind::Mesh(_)) {
+            return false;
+        }
+        let end = Ball { centre: ball.centre + way, ..ball };
+        let clear = |at: Ball| self.nearest(at.centre).distance_m - at.radius_m > slack_m;
+        clear(end) && self.lowest([ball, end], slack_m).is_none()
+    }
+
+    /// The place where the inside of a span comes nearer than its ends, and its share of the span; `None` where the ends say
+    /// it all, or the span stays farther than `reach_m` beyond its own radius.
+    pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+        let (share, touch) = match &self.kind {
+            Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m)?,
+            _ => self.lowest(ends, reach_m)?,
+        };
+        (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(&share).then_some((share, touch))
+    }
+
+    /// The lowest point of the convex function gap(s) inside a span, where tangents meet (eq. 14).
+    fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+        let along = ends[1].centre - ends[0].centre;
+        let at = |s: f64| {
+            let ball = ends[0].toward(ends[1], s);
+            let touch = self.nearest(ball.centre);
+            let slope = touch.normal.dot(along) - (ends[1].radius_m - ends[0].radius_m);
+            (s, touch.distance_m - ball.radius_m, slope, touch)
+        };
+        let (mut left, mut right) = (at(0.0), at(1.0));
+        let tolerance = 1e-6 * along.length();
+        let mut best = None;
+        for _ in 0..SPAN_TRIES {
+            if left.2 >= -tolerance || right.2 <= tolerance {
+                break;
+            }
+            let meet = (left.1 - right.1 + right.2 * right.0 - left.2 * left.0) / (right.2 - left.2);
+            let floor = left.1 + left.2 * (meet - left.0);
+            if floor > reach_m {
+                return None;
+            }
+            let middle = at(meet.clamp(left.0, right.0));
+            best = Some((middle.0, middle.3)).filter(|_| middle.1 <= reach_m);
+            if middle.1 - floor < tolerance {
+                break;
+            }
+            if middle.2 < 0.0 { left = middle } else { right = middle }
+        }
+        best
+    }
+
+    /// The nearest surface of a convex primitive, from outside or inside (eq. 12).
+    fn nearest(&self, point: DVec3) -> Touch {
+        let local = self.rotation.conjugate() * (point - self.position);
+        let (distance_m, normal) = match self.kind {
+            Kind::Ball(radius) => from_point(local, radius),
+            Kind::Box(half) => from_box(local, half),
+            Kind::Capsule(radius, half) => from_point(local - DVec3::Z * local.z.clamp(-half, half), radius),
+            Kind::Cylinder(radius, half) => from_cylinder(local, radius, half),
+            Kind::Plane | Kind::Mesh(_) => (local.z, DVec3::Z),
+        };
+        Touch { normal: self.rotation * normal, distance_m }
+    }
+}
+
+fn from_point(p: DVec3, radius: f64) -> (f64, DVec3) {
+    let length = p.length();
+    let normal = if length > 0.0 { p / length } else { DVec3::Z };
+    (length - radius, normal)
+}
+
+fn from_box(p: DVec3, half: DVec3) -> (f64, DVec3) {
+    let beyond = p.abs() - half;
+    let outside = beyond.max(DVec3::ZERO);
+    let distance = outside.length();
+    let sign = DVec3::ONE.copysign(p);
+    if distance > 0.0 {
+        return (distance, outside / distance * sign);
+    }
+    let depth = beyond.max_element();
+    let axis = if beyond.z == depth {
+        DVec3::Z
+    } else if beyond.y == depth {
+        DVec3::Y
+    } else {
+        DVec3::X
+    };
+    (depth, axis * sign)
+}
+
+fn from_cylinder(p: DVec3, radius: f64, half: f64) -> (f64, DVec3) {
+    let around = DVec2::new(p.x, p.y);
+    let out = around.length();
+    let radial = if out > 0.0 { (around / out).extend(0.0) } else { DVec3::X };
+    let axial = DVec3::Z.copysign(DVec3::splat(p.z)) * DVec3::Z;
+    let (beyond_side, beyond_end) = (out - radius, p.z.abs() - half);
+    if beyond_side > 0.0 && beyond_end > 0.0 {
+        let distance = beyond_side.hypot(beyond_end);
+        return (distance, (radial * beyond_side + axial * beyond_end) / distance);
+    }
+    if beyond_side >= beyond_end { (beyond_side, radial) } else { (beyond_end, axial) }
+}
