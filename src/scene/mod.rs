@@ -1,1 +1,102 @@
 //! Scene files: the only reader of files.
+//!
+//! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
+//! [`SceneError`] that shows every problem where it stands. Never here: running agents, drawing, the command line.
+
+mod build;
+pub mod builtin;
+mod cast;
+mod check;
+mod document;
+pub mod format;
+mod problem;
+mod schema;
+mod source;
+
+pub use cast::{Camera, Gains, Look, Machine, Member, PaceWish, Probe, Scene, Spec, Target, View};
+pub use problem::{SceneError, SceneProblem};
+pub use schema::json_schema;
+pub use source::{SCENE_BYTES_MAX, Source};
+
+use build::Objects;
+use check::{Checker, Place};
+use document::Document;
+use format::{SceneFile, WorldFile};
+use glam::DVec3;
+use problem::Problem;
+use serde::Deserialize;
+use toml::Spanned;
+use toml::de::{DeValue, ValueDeserializer};
+
+/// The only version of the format.
+const FORMAT: i64 = 1;
+/// Gravity where a scene does not say, m/s².
+const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+/// Strongest gravity, m/s².
+const GRAVITY_MAX: f64 = 1e4;
+
+/// Reads a scene. Each override is a dotted key, such as `target.frame_hz` or `object.NAME.rate_hz`, and a TOML value
+/// (what is no TOML is taken as text); of equal keys the last counts.
+///
+/// # Errors
+/// [`SceneError`] with every problem found.
+pub fn load(source: &Source, overrides: &[(String, String)]) -> Result<Scene, SceneError> {
+    let text = document::with_overrides(source.text(), overrides);
+    read(source, &text).map_err(|problems| SceneError::new(source.name(), &text, problems))
+}
+
+fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
+    let document = Document::parse(text).map_err(|problem| vec![problem])?;
+    let mut c = Checker::new(&document);
+    let file = read_stage(&mut c);
+    let gravity = gravity(&mut c, file.as_ref().and_then(|f| f.world.as_ref()));
+    let objects = build::read_objects(&mut c, document.root().get("object"), source, gravity);
+    let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
+    match (scene, c.finish()) {
+        (Some(scene), problems) if problems.is_empty() => Ok(scene),
+        (_, problems) => Err(problems),
+    }
+}
+
+/// Everything but the objects.
+fn read_stage(c: &mut Checker<'_, '_>) -> Option<SceneFile> {
+    let document = c.document();
+    let others = document.root().iter().filter(|(key, _)| key.get_ref() != "object");
+    let table = others.map(|(key, value)| (key.clone(), value.clone())).collect();
+    let value = ValueDeserializer::from(Spanned::new(document.first_line(), DeValue::Table(table)));
+    match SceneFile::deserialize(value) {
+        Ok(file) => Some(file),
+        Err(error) => {
+            c.push(Problem::from_toml(&error, document.first_line(), &[]));
+            None
+        }
+    }
+}
+
+fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
+    let place = Place::new("world", "of `[world]`");
+    let given = world.and_then(|w| w.gravity_m_s2);
+    given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
+}
+
+fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, (gravity, objects): (DVec3, Objects)) -> Scene {
+    if file.format != FORMAT {
+        let what = format!("is {}, which this program does not know", file.format);
+        c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
+    }
+    let probes = build::probes(c, &file.probe, &objects.names);
+    Scene {
+        name: source.name().to_owned(),
+        description: file.description.unwrap_or_default(),
+        executor: file.executor.unwrap_or_default(),
+        states: file.states.unwrap_or_default(),
+        gravity,
+        target: build::target(c, file.target.as_ref()),
+        camera: build::camera(c, file.camera.as_ref()),
+        machine: build::machine(c, file.machine.as_ref()),
+        agents: objects.agents,
+        obstacles: objects.obstacles,
+        obstacle_looks: objects.obstacle_looks,
+        probes,
+    }
+}

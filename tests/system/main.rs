@@ -1,1 +1,2 @@
-//! t
+//! The whole program as its users meet it; one binary, so that it links once.
+mod scene;

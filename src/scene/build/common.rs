@@ -1,0 +1,119 @@
+//! Keys that objects of every model share: time, primitive levels, appearance.
+
+use crate::scene::cast::{Look, PaceWish};
+use crate::scene::check::{Allowed, Checker, Place, allowed};
+use crate::scene::format::{CommonFile, Material, OneOrRange};
+use metachron_agents::{N_MAX, SimSpan};
+
+/// Wanted rate where a scene says neither rate nor step, hertz.
+const RATE_DEFAULT_HZ: f64 = 240.0;
+/// Primitive levels of a picture where a scene does not say.
+const N_DEFAULT: (u8, u8) = (1, 5);
+/// A rate agrees with a step when their product is 1 within this: a rate written with 5 digits is meant.
+const RATE_AGREES: f64 = 1e-4;
+
+const RATE: Allowed = allowed(1.0..=100_000.0, "Hz");
+const DT: Allowed = allowed(0.01..=1000.0, "ms");
+const IMPORTANCE: Allowed = allowed(0.001..=1000.0, "");
+
+/// Rate and step: either gives the other; both together must agree.
+pub(super) fn pace(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> PaceWish {
+    let rate = file.rate_hz.map(|rate| c.number(place, "rate_hz", rate, &RATE));
+    let Some(dt) = file.dt_ms else {
+        let rate_hz = rate.unwrap_or(RATE_DEFAULT_HZ);
+        return wish(rate_hz, 1000.0 / rate_hz, None);
+    };
+    let (least, greatest) = c.ends(place, "dt_ms", dt, &DT);
+    let rate_hz = rate.unwrap_or(1000.0 / least);
+    let wanted_ms = 1000.0 / rate_hz;
+    if least * (1.0 - RATE_AGREES) > wanted_ms || wanted_ms > greatest * (1.0 + RATE_AGREES) {
+        let what = format!("is {rate_hz}, a step of {} ms, but `dt_ms` is {}", rounded(wanted_ms), shown(dt));
+        let expected = match dt {
+            OneOrRange::One(ms) => {
+                format!("expected {} Hz, or no `rate_hz`: 1000 / `dt_ms` is its default", rounded(1000.0 / ms))
+            }
+            OneOrRange::Range(_) => {
+                format!("expected a rate from {} to {} Hz", rounded(1000.0 / greatest), rounded(1000.0 / least))
+            }
+        };
+        c.wrong(place, "rate_hz", what, expected);
+    }
+    wish(rate_hz, wanted_ms.clamp(least, greatest), Some((least, greatest)))
+}
+
+fn wish(rate_hz: f64, dt_ms: f64, range_ms: Option<(f64, f64)>) -> PaceWish {
+    let span = |ms: f64| SimSpan::from_secs_f64(ms * 1e-3).unwrap_or(SimSpan::from_nanos(1_000_000));
+    let (least, greatest) = range_ms.unwrap_or((dt_ms, dt_ms));
+    PaceWish { rate_hz, dt: span(dt_ms), dt_range: (span(least), span(greatest)) }
+}
+
+fn shown(dt: OneOrRange<f64>) -> String {
+    match dt {
+        OneOrRange::One(ms) => ms.to_string(),
+        OneOrRange::Range([least, greatest]) => format!("[{least}, {greatest}]"),
+    }
+}
+
+/// A number with at most four decimals, for messages.
+pub(super) fn rounded(value: f64) -> f64 {
+    (value * 1e4).round() / 1e4
+}
+
+/// The levels of the drawn primitive.
+pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> (u8, u8) {
+    let Some(n) = file.n else { return N_DEFAULT };
+    let (least, greatest) = n.ends();
+    if least > N_MAX || greatest > N_MAX {
+        let what = format!("has the value {}", least.max(greatest));
+        c.wrong(place, "n", what, format!("expected levels from 0 to {N_MAX}"));
+    } else if least > greatest {
+        let what = format!("runs from {least} down to {greatest}");
+        c.wrong(place, "n", what, format!("expected the lesser level first: [{greatest}, {least}]"));
+    } else {
+        return (least, greatest);
+    }
+    N_DEFAULT
+}
+
+/// Colour and material; `default` is the material of the model.
+pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
+    let material = file.material.unwrap_or(default);
+    let colour = match &file.colour {
+        None => colour_of(material),
+        Some(text) => parse_colour(text).unwrap_or_else(|| {
+            c.wrong(place, "colour", format_args!("is `{text}`"), "expected `#rrggbb`, such as `#c9776b`");
+            colour_of(material)
+        }),
+    };
+    let importance = c.number_or(place, "importance", (file.importance, 1.0), &IMPORTANCE);
+    Look { colour, material, importance }
+}
+
+fn colour_of(material: Material) -> [u8; 3] {
+    match material {
+        Material::Tissue => [0xc9, 0x77, 0x6b],
+        Material::Metal => [0xb8, 0xbc, 0xc2],
+        Material::Plastic => [0x6f, 0x8f, 0xaf],
+        Material::Skin => [0xd8, 0xa0, 0x88],
+    }
+}
+
+fn parse_colour(text: &str) -> Option<[u8; 3]> {
+    let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
+    let value = u32::from_str_radix(digits, 16).ok()?;
+    let [_, r, g, b] = value.to_be_bytes();
+    Some([r, g, b])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_colour_is_six_hexadecimal_digits_after_a_hash() {
+        assert_eq!(parse_colour("#C9776b"), Some([0xc9, 0x77, 0x6b]));
+        for bad in ["c9776b", "#c9776", "#c9776bb", "#g9776b", "#+12345", "", "#", "#ééé"] {
+            assert_eq!(parse_colour(bad), None, "{bad}");
+        }
+    }
+}

@@ -1,0 +1,19 @@
+//! From the typed file to a scene that can be run: rules, defaults, names.
+//!
+//! In: [`super::format`] types and the document they came from. Out: [`Scene`] parts, problems to the [`Checker`].
+//! Never here: text and its syntax.
+
+mod common;
+mod instrument;
+mod mesh;
+mod object;
+mod rigid;
+mod stage;
+mod synthetic;
+mod tube;
+
+pub(super) use object::{Named, Names, Objects, read_objects};
+pub(super) use stage::{camera, machine, probes, target};
+
+/// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.
+pub(super) const POSITION_MAX_M: f64 = 1e5;

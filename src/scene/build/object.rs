@@ -1,0 +1,307 @@
+//! The objects of a scene: read one by one by their model, named, linked.
+
+use super::common::{levels, look, pace};
+use super::{instrument, rigid, synthetic, tube};
+use crate::scene::cast::{Look, Member, Spec};
+use crate::scene::check::{Checker, Place};
+use crate::scene::format::{
+    COMMON_KEYS, CommonFile, InstrumentFile, MODELS, Material, RigidFile, SyntheticFile, TubeFile,
+};
+use crate::scene::problem::{Problem, did_you_mean};
+use crate::scene::source::Source;
+use glam::DVec3;
+use metachron_agents::shape::Obstacle;
+use metachron_agents::{AgentId, Resolution, ResolutionRange};
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
+
+/// Most agents of a scene: each has a thread of its own.
+const AGENTS_MAX: usize = 1000;
+/// Most fixed objects of a scene.
+const OBSTACLES_MAX: usize = 10_000;
+/// Longest name, in characters.
+const NAME_MAX: usize = 64;
+
+/// Everything that stands in a scene.
+#[derive(Debug, Default)]
+pub(in crate::scene) struct Objects {
+    pub(in crate::scene) agents: Vec<Member>,
+    pub(in crate::scene) obstacles: Arc<[Obstacle]>,
+    pub(in crate::scene) obstacle_looks: Vec<Look>,
+    /// Names of fixed objects and of agents.
+    pub(in crate::scene) names: Names,
+}
+
+/// What a model's reader is given beside its own table.
+pub(super) struct Given<'a> {
+    pub(super) place: &'a Place,
+    pub(super) source: &'a Source,
+    pub(super) gravity: DVec3,
+    pub(super) obstacles: &'a Arc<[Obstacle]>,
+    pub(super) levels: (u8, u8),
+    pub(super) sleep: bool,
+}
+
+/// Who has which name.
+#[derive(Debug, Default)]
+pub(in crate::scene) struct Names(BTreeMap<String, Named>);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::scene) enum Named {
+    /// A fixed object.
+    Fixed,
+    /// An agent that is no tube.
+    Agent(AgentId),
+    /// A tube.
+    Tube(AgentId),
+}
+
+impl Names {
+    pub(in crate::scene) fn get(&self, name: &str) -> Option<Named> {
+        self.0.get(name).copied()
+    }
+
+    pub(in crate::scene) fn agents(&self) -> impl Iterator<Item = &str> + Clone {
+        self.0.iter().filter(|(_, n)| **n != Named::Fixed).map(|(name, _)| name.as_str())
+    }
+
+    pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
+        self.0.iter().filter_map(|(name, n)| if let Named::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
+    }
+
+    pub(super) fn tube(&self, name: &str) -> Option<AgentId> {
+        if let Some(Named::Tube(id)) = self.get(name) { Some(id) } else { None }
+    }
+
+    pub(super) fn is_known(&self, name: &str) -> bool {
+        self.0.contains_key(name)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// An object as the file has it.
+struct Entry {
+    place: Place,
+    common: CommonFile,
+    model: ModelFile,
+    fixed: bool,
+}
+
+enum ModelFile {
+    Tube(TubeFile),
+    Rigid(RigidFile),
+    Instrument(InstrumentFile),
+    Synthetic(SyntheticFile),
+}
+
+/// Reads every `[[object]]`.
+pub(in crate::scene) fn read_objects(
+    c: &mut Checker<'_, '_>,
+    list: Option<&Spanned<DeValue<'_>>>,
+    source: &Source,
+    gravity: DVec3,
+) -> Objects {
+    let Some(list) = list else { return Objects::default() };
+    let DeValue::Array(items) = list.get_ref() else {
+        let found = format!("`object` is a {}", list.get_ref().type_str());
+        c.push(Problem::new(list.span(), found).expecting("expected tables under `[[object]]`"));
+        return Objects::default();
+    };
+    let mut entries: Vec<Entry> = items.iter().enumerate().filter_map(|(i, item)| read_entry(c, i, item)).collect();
+    for entry in &mut entries {
+        if let ModelFile::Rigid(file) = &entry.model {
+            entry.fixed = rigid::is_fixed(c, &entry.place, file);
+        }
+    }
+    let names = name_all(c, &entries);
+    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, source);
+    let obstacles: Arc<[Obstacle]> = obstacles.into();
+    let agents = agents(c, &entries, &names, &Stage { source, gravity, obstacles: &obstacles });
+    Objects { agents, obstacles, obstacle_looks, names }
+}
+
+fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>) -> Option<Entry> {
+    let path = format!("object.{index}");
+    let DeValue::Table(table) = item.get_ref() else {
+        let found = format!("entry {} of `object` is a {}", index + 1, item.get_ref().type_str());
+        c.push(Problem::new(item.span(), found).expecting("expected a table: `[[object]]`"));
+        return None;
+    };
+    let model = model_name(c, table, item.span())?;
+    let (mut common, mut own) = (DeTable::new(), DeTable::new());
+    for (key, value) in table {
+        let into = if COMMON_KEYS.contains(&key.get_ref().as_ref()) { &mut common } else { &mut own };
+        into.insert(key.clone(), value.clone());
+    }
+    own.remove("model");
+    let span = item.span();
+    let common = read::<CommonFile>(c, common, span.clone());
+    let own = match model {
+        "tube" => read(c, own, span).map(ModelFile::Tube),
+        "rigid" => read(c, own, span).map(ModelFile::Rigid),
+        "instrument" => read(c, own, span).map(ModelFile::Instrument),
+        _ => read(c, own, span).map(ModelFile::Synthetic),
+    };
+    let common = common?;
+    let place = Place::new(path, format!("of `{}`", common.name.chars().take(NAME_MAX).collect::<String>()));
+    Some(Entry { place, common, model: own?, fixed: false })
+}
+
+fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) -> Option<&'static str> {
+    let list = MODELS.map(|m| format!("`{m}`")).join(", ");
+    let Some(value) = table.get("model") else {
+        let problem = Problem::new(span, "the key `model` is missing".to_owned());
+        c.push(problem.expecting(format!("expected `model` in this table: one of {list}")));
+        return None;
+    };
+    let found = value.get_ref().as_str();
+    if let Some(model) = MODELS.into_iter().find(|m| Some(*m) == found) {
+        return Some(model);
+    }
+    let message = match found {
+        Some(found) => format!("`model` is `{found}`, which does not exist"),
+        None => format!("`model` is a {}", value.get_ref().type_str()),
+    };
+    let help = found.and_then(|found| did_you_mean(found, MODELS));
+    c.push(Problem::new(value.span(), message).expecting(format!("expected one of {list}")).helped(help));
+    None
+}
+
+fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: Range<usize>) -> Option<T> {
+    let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
+    T::deserialize(value).map_err(|error| c.push(Problem::from_toml(&error, span, &COMMON_KEYS))).ok()
+}
+
+/// Gives every object its name and every agent its number, in the order of the file.
+fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
+    let mut names = Names::default();
+    let mut next = 0;
+    for entry in entries {
+        let name = &entry.common.name;
+        let id = AgentId(next);
+        let named = match (&entry.model, entry.fixed) {
+            (_, true) => Named::Fixed,
+            (ModelFile::Tube(_), _) => Named::Tube(id),
+            _ => Named::Agent(id),
+        };
+        next += u32::from(!entry.fixed);
+        let length = name.chars().count();
+        if name.trim().is_empty() || length > NAME_MAX || name.chars().any(char::is_control) {
+            let expected = format!("expected 1 … {NAME_MAX} characters that can be seen");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a name", expected);
+        } else if names.0.insert(name.clone(), named).is_some() {
+            c.wrong(
+                &Place::new(entry.place.path.clone(), ""),
+                "name",
+                format_args!("`{name}` is taken"),
+                "expected a name of its own",
+            );
+        }
+    }
+    names
+}
+
+fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> (Vec<Obstacle>, Vec<Look>) {
+    let mut found = (Vec::new(), Vec::new());
+    for entry in entries.iter().filter(|e| e.fixed) {
+        let ModelFile::Rigid(file) = &entry.model else { continue };
+        // read for their own sake: a fixed object has no steps, but a wrong rate is still wrong
+        pace(c, &entry.place, &entry.common);
+        levels(c, &entry.place, &entry.common);
+        let look = look(c, &entry.place, &entry.common, Material::Plastic);
+        if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
+            found.0.push(Obstacle { name: entry.common.name.clone(), ..obstacle });
+            found.1.push(look);
+        }
+    }
+    if found.0.len() > OBSTACLES_MAX {
+        too_many(c, "fixed objects", found.0.len(), OBSTACLES_MAX);
+    }
+    found
+}
+
+fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
+    let message = format!("the scene has {count} {what}");
+    let span = c.document().locate(&format!("object.{}", most));
+    c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
+}
+
+struct Stage<'a> {
+    source: &'a Source,
+    gravity: DVec3,
+    obstacles: &'a Arc<[Obstacle]>,
+}
+
+fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Stage<'_>) -> Vec<Member> {
+    let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
+    if moving.len() > AGENTS_MAX {
+        too_many(c, "agents", moving.len(), AGENTS_MAX);
+        return Vec::new();
+    }
+    let mut members: Vec<Member> =
+        moving.iter().zip(0..).filter_map(|(entry, id)| member(c, entry, AgentId(id), (names, stage))).collect();
+    link(&mut members);
+    members
+}
+
+fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (&Names, &Stage<'_>)) -> Option<Member> {
+    let Entry { place, common, model, .. } = entry;
+    let given = Given {
+        place,
+        source: stage.source,
+        gravity: stage.gravity,
+        obstacles: stage.obstacles,
+        levels: levels(c, place, common),
+        sleep: common.sleep.unwrap_or(true),
+    };
+    let pace = pace(c, place, common);
+    let material = match model {
+        ModelFile::Tube(_) => Material::Tissue,
+        ModelFile::Instrument(_) => Material::Metal,
+        _ => Material::Plastic,
+    };
+    let look = look(c, place, common, material);
+    let levels = given.levels;
+    // a body without length has one interval: its ε is of no consequence
+    let unit = Resolution { eps_m: 1.0, n: levels.1 };
+    let flat = ResolutionRange { eps_m: (1.0, 1.0), n: levels };
+    let (spec, start, simulation, picture) = match model {
+        ModelFile::Tube(file) => {
+            let built = tube::build(c, file, &given);
+            let (start, range) = (built.spec.resolution, built.spec.range);
+            (Spec::Tube(built.spec), start, range, built.picture)
+        }
+        ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &given)?), unit, flat, flat),
+        ModelFile::Instrument(file) => (Spec::Instrument(instrument::build(c, file, &given, names)), unit, flat, flat),
+        ModelFile::Synthetic(file) => {
+            let (spec, range) = synthetic::build(c, file, &given);
+            (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
+        }
+    };
+    Some(Member { id, name: common.name.clone(), spec, pace, simulation, start, picture, links: Vec::new(), look })
+}
+
+/// Tools and the tubes that they can hold see each other.
+fn link(members: &mut [Member]) {
+    let mut pairs = Vec::new();
+    for member in members.iter() {
+        if let Spec::Instrument(tool) = &member.spec {
+            pairs.extend(tool.graspable.iter().map(|tube| (member.id, *tube)));
+        }
+    }
+    for member in members {
+        let of = |(a, b): &(AgentId, AgentId)| match member.id {
+            id if id == *a => Some(*b),
+            id if id == *b => Some(*a),
+            _ => None,
+        };
+        member.links = pairs.iter().filter_map(of).collect();
+    }
+}

@@ -1,0 +1,197 @@
+//! Target, camera, machine and probes of the file.
+
+use super::{Named, Names, POSITION_MAX_M};
+use crate::scene::cast::{Camera, Gains, Machine, Probe, Target, View};
+use crate::scene::check::{Allowed, Checker, Place, allowed};
+use crate::scene::format::{CameraFile, CameraKeyFile, MODELS, MachineFile, ProbeFile, TargetFile};
+use crate::scene::problem::{Problem, did_you_mean};
+use glam::DVec3;
+use metachron_agents::SimSpan;
+
+/// Frames per second where a scene does not say.
+const FRAME_DEFAULT_HZ: f64 = 60.0;
+/// Vertical angle of view where a scene does not say, degrees.
+const FOV_DEFAULT_DEG: f64 = 40.0;
+/// Most keyframes of a camera.
+const KEYFRAMES_MAX: usize = 10_000;
+/// Most probes.
+const PROBES_MAX: usize = 1000;
+/// The machines that a scene can name.
+const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
+/// An eye nearer than this to what it looks at has no direction, metres.
+const EYE_NEAREST_M: f64 = 1e-6;
+
+const FOV: Allowed = allowed(1.0..=150.0, "degrees");
+const TIME: Allowed = allowed(0.0..=1e6, "s");
+
+/// The frame rate wanted and how it is held.
+pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
+    let place = Place::new("target", "of `[target]`");
+    let frame_hz = file.and_then(|f| f.frame_hz);
+    let mut gain = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+    let gains = file.map_or_else(Gains::default, |f| Gains {
+        alpha: gain("alpha", f.alpha, allowed(1e-9..=1.0, "")),
+        beta: gain("beta", f.beta, allowed(1e-6..=1e3, "")),
+        kappa: gain("kappa", f.kappa, allowed(1e-3..=0.999, "")),
+        margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
+    });
+    Target {
+        frame_hz: c.number_or(&place, "frame_hz", (frame_hz, FRAME_DEFAULT_HZ), &allowed(1.0..=1000.0, "Hz")),
+        policy: file.and_then(|f| f.policy).unwrap_or_default(),
+        law: file.and_then(|f| f.law).unwrap_or_default(),
+        gains,
+    }
+}
+
+/// From where the scene is seen.
+pub(in crate::scene) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Option<Camera> {
+    let file = file?;
+    let place = Place::new("camera", "of `[camera]`");
+    let fov_deg = c.number_or(&place, "fov_deg", (file.fov_deg, FOV_DEFAULT_DEG), &FOV);
+    if let Some(keys) = &file.keyframe {
+        for (key, given) in [
+            ("eye_m", file.eye_m.is_some()),
+            ("look_at_m", file.look_at_m.is_some()),
+            ("period_s", file.period_s.is_some()),
+        ] {
+            if given {
+                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes alone");
+            }
+        }
+        return camera_path(c, &place, keys, (fov_deg, file.repeat.unwrap_or(false)));
+    }
+    if file.repeat.is_some() {
+        c.wrong(&place, "repeat", "has no path to repeat", "expected `[[camera.keyframe]]` tables beside it");
+    }
+    let Some(eye) = file.eye_m else {
+        c.wrong(&place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
+        return None;
+    };
+    let start = view(c, &place, (eye, file.look_at_m.unwrap_or_default()), fov_deg);
+    Some(match file.period_s {
+        None => Camera::Still(start),
+        Some(period_s) if (0.1..=1e5).contains(&period_s.abs()) => Camera::Orbit { start, period_s },
+        Some(period_s) => {
+            let expected = "expected 0.1 … 100000 s, or the same below zero to turn the other way";
+            c.wrong(&place, "period_s", format_args!("is {period_s}"), expected);
+            Camera::Still(start)
+        }
+    })
+}
+
+fn view(c: &mut Checker<'_, '_>, place: &Place, (eye, look_at): ([f64; 3], [f64; 3]), fov_deg: f64) -> View {
+    let eye_m = c.point(place, "eye_m", eye, POSITION_MAX_M);
+    let look_at_m = c.point(place, "look_at_m", look_at, POSITION_MAX_M);
+    if eye_m.distance(look_at_m) < EYE_NEAREST_M && eye_m.is_finite() {
+        c.wrong(place, "eye_m", "is the point that it looks at", "expected a point away from `look_at_m`");
+        return View { eye_m: look_at_m + DVec3::ONE, look_at_m, fov_deg };
+    }
+    View { eye_m, look_at_m, fov_deg }
+}
+
+fn camera_path(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    files: &[CameraKeyFile],
+    (fov_deg, repeat): (f64, bool),
+) -> Option<Camera> {
+    if !(2..=KEYFRAMES_MAX).contains(&files.len()) {
+        c.wrong(
+            place,
+            "keyframe",
+            format_args!("has {} entries", files.len()),
+            format!("expected 2 … {KEYFRAMES_MAX}"),
+        );
+        return None;
+    }
+    let mut keys: Vec<(f64, View)> = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let place = place.entry("keyframe", i);
+        let at_s = c.number(&place, "at_s", file.at_s, &TIME);
+        let fov = c.number_or(&place, "fov_deg", (file.fov_deg, fov_deg), &FOV);
+        if let Some((before, _)) = keys.last().filter(|(before, _)| *before >= at_s) {
+            let expected = format!("expected a time after the keyframe before, {before} s");
+            c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
+        }
+        keys.push((at_s, view(c, &place, (file.eye_m, file.look_at_m), fov)));
+    }
+    Some(Camera::Path { keys, repeat })
+}
+
+/// What the scene says of the declared machine.
+pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Machine {
+    let default = MachineFile::default();
+    let file = file.unwrap_or(&default);
+    let place = Place::new("machine", "of `[machine]`");
+    let preset = file.preset.clone().unwrap_or_else(|| PRESETS[0].to_owned());
+    if !PRESETS.contains(&preset.as_str()) {
+        c.reference(&place, "preset", &preset, PRESETS.into_iter());
+    }
+    let mut number = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+    let cores = number("cores", file.cores.map(f64::from), allowed(1.0..=4096.0, "")).map(|n| n as u32);
+    let draw_setup_ms = number("draw_setup_ms", file.draw_setup_ms, allowed(0.0..=1e4, "ms"));
+    let draw_object_us = number("draw_object_us", file.draw_object_us, allowed(0.0..=1e6, "µs"));
+    let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
+    let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
+    let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
+    let seed = file.seed.map(u64::from);
+    let steps = step_prices(c, &place.table("step"), file);
+    Machine { preset, cores, steps, draw_setup_ms, draw_object_us, draw_triangle_us, draw_pixel_ns, noise, seed }
+}
+
+fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {
+    let mut steps = Vec::with_capacity(file.step.len());
+    for (model, price) in &file.step {
+        if !MODELS.contains(&model.as_str()) {
+            let span = c.document().locate(&format!("machine.step.{model}"));
+            let list = MODELS.map(|m| format!("`{m}`")).join(", ");
+            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model"));
+            c.push(problem.expecting(format!("expected one of {list}")).helped(did_you_mean(model, MODELS)));
+        }
+        let place = place.table(model);
+        let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, &allowed(0.0..=1e9, "µs")));
+        steps.push((model.clone(), cost("base_us", price.base_us), cost("unit_us", price.unit_us)));
+    }
+    steps
+}
+
+/// The points whose state is reported.
+pub(in crate::scene) fn probes(c: &mut Checker<'_, '_>, files: &[ProbeFile], names: &Names) -> Vec<Probe> {
+    if files.len() > PROBES_MAX {
+        let expected = format!("expected at most {PROBES_MAX}");
+        c.wrong(&Place::new("", ""), "probe", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    files
+        .iter()
+        .enumerate()
+        .filter_map(|(i, file)| probe(c, &Place::new(format!("probe.{i}"), "of `[[probe]]`"), file, names))
+        .collect()
+}
+
+fn probe(c: &mut Checker<'_, '_>, place: &Place, file: &ProbeFile, names: &Names) -> Option<Probe> {
+    let at = c.number_or(place, "at", (file.at, 1.0), &allowed(0.0..=1.0, ""));
+    let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, &allowed(0.01..=1e6, "ms")));
+    let agent = match names.get(&file.object) {
+        Some(Named::Tube(id) | Named::Agent(id)) => id,
+        Some(Named::Fixed) => {
+            c.wrong(
+                place,
+                "object",
+                format_args!("names `{}`, which is fixed", file.object),
+                "expected an object that moves",
+            );
+            return None;
+        }
+        None => {
+            c.reference(place, "object", &file.object, names.agents());
+            return None;
+        }
+    };
+    Some(Probe {
+        agent,
+        object: file.object.clone(),
+        at,
+        every: every_ms.and_then(|ms| SimSpan::from_secs_f64(ms * 1e-3)),
+    })
+}

@@ -1,0 +1,47 @@
+//! The scenes that come with the program, embedded.
+
+use super::Source;
+
+/// A scene that comes with the program.
+#[derive(Debug, Clone, Copy)]
+pub struct BuiltIn {
+    /// Its name on the command line.
+    pub name: &'static str,
+    /// Its text.
+    pub text: &'static str,
+}
+
+/// Every built-in scene; the first is the default.
+pub const ALL: [BuiltIn; 4] = [
+    BuiltIn { name: "tube", text: include_str!("../../scenes/tube.toml") },
+    BuiltIn { name: "pendulum", text: include_str!("../../scenes/pendulum.toml") },
+    BuiltIn { name: "yard", text: include_str!("../../scenes/yard.toml") },
+    BuiltIn { name: "overload", text: include_str!("../../scenes/overload.toml") },
+];
+
+/// Files that built-in scenes name.
+const FILES: [(&str, &[u8]); 2] = [
+    ("crystal.obj", include_bytes!("../../scenes/crystal.obj")),
+    ("bracket.obj", include_bytes!("../../scenes/bracket.obj")),
+];
+
+/// The built-in scene of this name.
+#[must_use]
+pub fn find(name: &str) -> Option<&'static BuiltIn> {
+    ALL.iter().find(|scene| scene.name == name)
+}
+
+/// The embedded file of this name.
+pub(super) fn sibling(name: &str) -> Option<&'static [u8]> {
+    FILES.iter().find(|(file, _)| *file == name).map(|(_, bytes)| *bytes)
+}
+
+impl BuiltIn {
+    /// The scene as a source.
+    ///
+    /// # Errors
+    /// None that the tests of the built-in scenes would not have found.
+    pub fn source(&self) -> Result<Source, super::SceneError> {
+        Source::open(self.name)
+    }
+}

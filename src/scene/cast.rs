@@ -1,0 +1,272 @@
+//! A scene that can be run: every value checked, every default filled in, every name resolved.
+//!
+//! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
+//! Never here: the file's text, running agents.
+
+use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind};
+use glam::DVec3;
+use metachron_agents::instrument::ToolSpec;
+use metachron_agents::rigid::RigidSpec;
+use metachron_agents::rod::TubeSpec;
+use metachron_agents::shape::Obstacle;
+use metachron_agents::synthetic::SyntheticSpec;
+use metachron_agents::{AgentId, Resolution, ResolutionRange, SimSpan};
+use std::sync::Arc;
+
+/// A scene that can be run.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// The built-in scene's name, or the file's.
+    pub name: String,
+    /// One line that says what the scene shows; may be empty.
+    pub description: String,
+    /// How agents are run.
+    pub executor: ExecutorKind,
+    /// At which time states are drawn.
+    pub states: StatesKind,
+    /// Gravity, m/s².
+    pub gravity: DVec3,
+    /// The frame rate wanted and how it is held.
+    pub target: Target,
+    /// From where the scene is seen; `None` where the scene does not say.
+    pub camera: Option<Camera>,
+    /// The declared machine.
+    pub machine: Machine,
+    /// The agents; an agent's id is its place here.
+    pub agents: Vec<Member>,
+    /// The solids that never move.
+    pub obstacles: Arc<[Obstacle]>,
+    /// How each obstacle looks, in their order.
+    pub obstacle_looks: Vec<Look>,
+    /// The points whose state is reported.
+    pub probes: Vec<Probe>,
+}
+
+/// The frame rate wanted and how it is held.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Target {
+    /// Frames per second, 1 … 1000.
+    pub frame_hz: f64,
+    /// Who chooses levels.
+    pub policy: PolicyKind,
+    /// Which feedback law.
+    pub law: LawKind,
+    /// Gains of the laws.
+    pub gains: Gains,
+}
+
+/// Gains of the feedback laws; what is `None` is the law's own default.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Gains {
+    /// α of the printed law.
+    pub alpha: Option<f64>,
+    /// β of the printed law.
+    pub beta: Option<f64>,
+    /// κ of the corrected law, 0 < κ < 1.
+    pub kappa: Option<f64>,
+    /// Share of the frame that the corrected law leaves free, 0 … 0.9.
+    pub margin: Option<f64>,
+}
+
+/// From where the scene is seen.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Camera {
+    /// Always the same view.
+    Still(View),
+    /// Turns about the vertical through what it looks at.
+    Orbit {
+        /// The view at the start.
+        start: View,
+        /// Seconds of a turn; negative turns clockwise seen from above.
+        period_s: f64,
+    },
+    /// Moves along keyframes.
+    Path {
+        /// Times in seconds, rising, and views.
+        keys: Vec<(f64, View)>,
+        /// Whether it starts again.
+        repeat: bool,
+    },
+}
+
+/// One view; up is +z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Where the eye is, metres.
+    pub eye_m: DVec3,
+    /// What it looks at, metres.
+    pub look_at_m: DVec3,
+    /// Vertical angle of view, degrees, 1 … 150.
+    pub fov_deg: f64,
+}
+
+/// What a scene says of the declared machine; what is `None` is the preset's.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Machine {
+    /// The preset to start from.
+    pub preset: String,
+    /// Cores shared by agents and frames, 1 … 4096.
+    pub cores: Option<u32>,
+    /// Prices of steps by model: (model, base in µs, µs a unit of work).
+    pub steps: Vec<(String, Option<f64>, Option<f64>)>,
+    /// Milliseconds a frame.
+    pub draw_setup_ms: Option<f64>,
+    /// Microseconds an object drawn.
+    pub draw_object_us: Option<f64>,
+    /// Microseconds a triangle.
+    pub draw_triangle_us: Option<f64>,
+    /// Nanoseconds a pixel.
+    pub draw_pixel_ns: Option<f64>,
+    /// Relative standard deviation of every cost, 0 … 1.
+    pub noise: Option<f64>,
+    /// Seed of the noise.
+    pub seed: Option<u64>,
+}
+
+/// An agent of the scene.
+#[derive(Debug, Clone)]
+pub struct Member {
+    /// Its number: its place in [`Scene::agents`].
+    pub id: AgentId,
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// What it is made of.
+    pub spec: Spec,
+    /// How it keeps time.
+    pub pace: PaceWish,
+    /// Resolutions that its simulation may take.
+    pub simulation: ResolutionRange,
+    /// Resolution of its simulation at the start.
+    pub start: Resolution,
+    /// Resolutions that its picture may take.
+    pub picture: ResolutionRange,
+    /// Agents whose snapshots it sees: those that may hold it, those that it may hold.
+    pub links: Vec<AgentId>,
+    /// How it looks.
+    pub look: Look,
+}
+
+/// How an agent wants to keep time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PaceWish {
+    /// Wanted steps per second.
+    pub rate_hz: f64,
+    /// Step length at the start.
+    pub dt: SimSpan,
+    /// Shortest and longest step the controller may choose; equal where dt is fixed.
+    pub dt_range: (SimSpan, SimSpan),
+}
+
+/// What an agent is made of.
+#[derive(Debug, Clone)]
+pub enum Spec {
+    /// A soft tube.
+    Tube(TubeSpec),
+    /// A rigid body.
+    Rigid(RigidSpec),
+    /// A driven tool.
+    Instrument(ToolSpec),
+    /// Declared cost and error.
+    Synthetic(SyntheticSpec),
+}
+
+impl Spec {
+    /// The model's name as scenes write it.
+    #[must_use]
+    pub fn model(&self) -> &'static str {
+        match self {
+            Self::Tube(_) => "tube",
+            Self::Rigid(_) => "rigid",
+            Self::Instrument(_) => "instrument",
+            Self::Synthetic(_) => "synthetic",
+        }
+    }
+}
+
+/// How an object looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Red, green, blue (sRGB).
+    pub colour: [u8; 3],
+    /// What its surface looks like.
+    pub material: Material,
+    /// Weight of its picture against the others', 0.001 … 1000.
+    pub importance: f64,
+}
+
+/// A material point whose state is reported.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Probe {
+    /// Whose point it is.
+    pub agent: AgentId,
+    /// That agent's name.
+    pub object: String,
+    /// 0 start … 1 end of a tube's rest length; no meaning for other models.
+    pub at: f64,
+    /// Time between samples, where samples are wanted.
+    pub every: Option<SimSpan>,
+}
+
+impl Camera {
+    /// The view `seconds` after the start.
+    #[must_use]
+    pub fn view_at(&self, seconds: f64) -> View {
+        match self {
+            Self::Still(view) => *view,
+            Self::Orbit { start, period_s } => {
+                let (sin, cos) = libm::sincos(std::f64::consts::TAU * (seconds / period_s).fract());
+                let arm = start.eye_m - start.look_at_m;
+                let turned = DVec3::new(cos * arm.x - sin * arm.y, sin * arm.x + cos * arm.y, arm.z);
+                View { eye_m: start.look_at_m + turned, ..*start }
+            }
+            Self::Path { keys, repeat } => view_on_path(keys, *repeat, seconds),
+        }
+    }
+}
+
+/// Between two keyframes the view moves by smoothstep: it starts and stops softly at each.
+fn view_on_path(keys: &[(f64, View)], repeat: bool, seconds: f64) -> View {
+    let last = keys[keys.len() - 1];
+    let seconds = if repeat && last.0 > 0.0 { seconds.rem_euclid(last.0) } else { seconds };
+    let right = keys.partition_point(|(at, _)| *at <= seconds);
+    match (right.checked_sub(1).map(|left| keys[left]), keys.get(right)) {
+        (Some((from, a)), Some((to, b))) => {
+            let w = (seconds - from) / (to - from);
+            let w = w * w * (3.0 - 2.0 * w);
+            View {
+                eye_m: a.eye_m.lerp(b.eye_m, w),
+                look_at_m: a.look_at_m.lerp(b.look_at_m, w),
+                fov_deg: a.fov_deg + (b.fov_deg - a.fov_deg) * w,
+            }
+        }
+        (None, Some((_, first))) => *first,
+        _ => last.1,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn view(x: f64) -> View {
+        View { eye_m: DVec3::new(x, 0.0, 1.0), look_at_m: DVec3::ZERO, fov_deg: 40.0 }
+    }
+
+    #[test]
+    fn a_quarter_of_an_orbit_turns_the_eye_by_a_right_angle() {
+        let camera = Camera::Orbit { start: view(2.0), period_s: 8.0 };
+        let eye = camera.view_at(2.0).eye_m;
+        assert!(eye.distance(DVec3::new(0.0, 2.0, 1.0)) < 1e-12, "{eye}"); // a few ulp of 2
+    }
+
+    #[test]
+    fn a_path_passes_its_keyframes_and_repeats() {
+        let camera = Camera::Path { keys: vec![(0.0, view(0.0)), (1.0, view(1.0)), (3.0, view(0.0))], repeat: true };
+        assert_eq!(camera.view_at(1.0), view(1.0));
+        assert_eq!(camera.view_at(4.0), view(1.0));
+        assert_eq!(camera.view_at(2.0).eye_m.x, 0.5);
+        let once = Camera::Path { keys: vec![(1.0, view(1.0)), (3.0, view(0.0))], repeat: false };
+        assert_eq!(once.view_at(0.0), view(1.0));
+        assert_eq!(once.view_at(9.0), view(0.0));
+    }
+}

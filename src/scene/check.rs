@@ -1,0 +1,160 @@
+//! Rules on values, collected: everything that is wrong with a scene is told at once.
+//!
+//! In: values and the dotted path of the key they stand under. Out: the value where it keeps the rule, and problems.
+//! Never here: which rule a key has.
+
+use super::document::Document;
+use super::format::{OneOrRange, Point};
+use super::problem::{Problem, did_you_mean};
+use glam::DVec3;
+use std::fmt::Display;
+use std::ops::RangeInclusive;
+
+/// Collects problems of one scene.
+pub(super) struct Checker<'d, 't> {
+    document: &'d Document<'t>,
+    problems: Vec<Problem>,
+}
+
+/// The dotted path of a table, with what people call it.
+#[derive(Debug, Clone)]
+pub(super) struct Place {
+    /// Dotted path, such as `object.2`.
+    pub(super) path: String,
+    /// For messages, such as ``of `intestine` ``; may be empty.
+    pub(super) whose: String,
+}
+
+impl Place {
+    pub(super) fn new(path: impl Into<String>, whose: impl Into<String>) -> Self {
+        Self { path: path.into(), whose: whose.into() }
+    }
+
+    /// The `index`-th entry of the list under `key`.
+    pub(super) fn entry(&self, key: &str, index: usize) -> Self {
+        Self { path: format!("{}.{key}.{index}", self.path), whose: self.whose.clone() }
+    }
+
+    /// The table under `key`.
+    pub(super) fn table(&self, key: &str) -> Self {
+        Self { path: format!("{}.{key}", self.path), whose: self.whose.clone() }
+    }
+
+    fn key(&self, key: &str) -> String {
+        if self.path.is_empty() { key.to_owned() } else { format!("{}.{key}", self.path) }
+    }
+
+    fn named(&self, key: &str) -> String {
+        let key = key.split('.').next().unwrap_or(key);
+        if self.whose.is_empty() { format!("`{key}`") } else { format!("`{key}` {}", self.whose) }
+    }
+}
+
+/// A range of allowed values and its unit.
+#[derive(Debug, Clone)]
+pub(super) struct Allowed {
+    range: RangeInclusive<f64>,
+    unit: &'static str,
+}
+
+/// Allowed values from `range`, in `unit`.
+pub(super) const fn allowed(range: RangeInclusive<f64>, unit: &'static str) -> Allowed {
+    Allowed { range, unit }
+}
+
+impl Allowed {
+    pub(super) fn contains(&self, value: f64) -> bool {
+        self.range.contains(&value)
+    }
+}
+
+impl Display for Allowed {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "a number from {} to {}", self.range.start(), self.range.end())?;
+        if self.unit.is_empty() { Ok(()) } else { write!(f, " {}", self.unit) }
+    }
+}
+
+impl<'d, 't> Checker<'d, 't> {
+    pub(super) fn new(document: &'d Document<'t>) -> Self {
+        Self { document, problems: Vec::new() }
+    }
+
+    pub(super) fn document(&self) -> &'d Document<'t> {
+        self.document
+    }
+
+    pub(super) fn finish(self) -> Vec<Problem> {
+        self.problems
+    }
+
+    pub(super) fn push(&mut self, problem: Problem) {
+        self.problems.push(problem);
+    }
+
+    /// Tells that `key` is wrong: what it is, and what was expected.
+    pub(super) fn wrong(&mut self, place: &Place, key: &str, what: impl Display, expected: impl Into<String>) {
+        let span = self.document.locate(&place.key(key));
+        self.problems.push(Problem::new(span, format!("{} {what}", place.named(key))).expecting(expected));
+    }
+
+    /// A number within `allowed`. Where it is not, that is told and the nearest sound number taken.
+    pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, allowed: &Allowed) -> f64 {
+        if allowed.contains(value) {
+            return value;
+        }
+        self.wrong(place, key, format_args!("is {value}"), format!("expected {allowed}"));
+        let (least, greatest) = (*allowed.range.start(), *allowed.range.end());
+        if value.is_nan() { least } else { value.clamp(least, greatest) }
+    }
+
+    /// As [`Self::number`], for a value that may be left out: `(given, default)`.
+    pub(super) fn number_or(&mut self, place: &Place, key: &str, value: (Option<f64>, f64), allowed: &Allowed) -> f64 {
+        value.0.map_or(value.1, |given| self.number(place, key, given, allowed))
+    }
+
+    /// A point or direction, every coordinate within ± `most`.
+    pub(super) fn point(&mut self, place: &Place, key: &str, value: Point, most: f64) -> DVec3 {
+        if value.iter().all(|x| x.abs() <= most) {
+            return DVec3::from_array(value);
+        }
+        let expected = format!("expected 3 numbers from -{most} to {most}");
+        self.wrong(place, key, format_args!("is {value:?}"), expected);
+        DVec3::ZERO
+    }
+
+    /// One number or a range, both ends within `allowed` and in order.
+    pub(super) fn ends(&mut self, place: &Place, key: &str, value: OneOrRange<f64>, allowed: &Allowed) -> (f64, f64) {
+        let (least, greatest) = value.ends();
+        if !(allowed.contains(least) && allowed.contains(greatest)) {
+            let bad = if allowed.contains(least) { greatest } else { least };
+            self.wrong(place, key, format_args!("has the value {bad}"), format!("expected {allowed}"));
+        } else if least > greatest {
+            let expected = format!("expected the lesser number first: [{greatest}, {least}]");
+            self.wrong(place, key, format_args!("runs from {least} down to {greatest}"), expected);
+        } else {
+            return (least, greatest);
+        }
+        (*allowed.range.start(), *allowed.range.end())
+    }
+
+    /// Which of `known` the reference `name` means.
+    pub(super) fn reference<'n>(
+        &mut self,
+        place: &Place,
+        key: &str,
+        name: &str,
+        known: impl Iterator<Item = &'n str> + Clone,
+    ) -> bool {
+        if known.clone().any(|n| n == name) {
+            return true;
+        }
+        let span = self.document.locate(&place.key(key));
+        let list = known.clone().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+        let expected =
+            if list.is_empty() { "there is none in this scene".to_owned() } else { format!("expected one of {list}") };
+        let problem = Problem::new(span, format!("{} names `{name}`, which does not exist", place.named(key)));
+        self.problems.push(problem.expecting(expected).helped(did_you_mean(name, known)));
+        false
+    }
+}

@@ -1,0 +1,132 @@
+//! A scene's text as a tree that remembers where everything stands.
+//!
+//! In: text, and `key=value` overrides. Out: tables for serde, and for any key path its place in the text.
+//! Never here: what keys mean.
+
+use super::problem::Problem;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Name of the table that carries overrides at the end of the text; no scene may use it.
+const OVERRIDES: &str = "--set";
+
+/// Text with the overrides that were given on the command line: they stand at its end, so that errors can show them.
+#[must_use]
+pub(super) fn with_overrides(text: &str, overrides: &[(String, String)]) -> String {
+    let newest: BTreeMap<&str, &str> = overrides.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
+    if newest.is_empty() {
+        return text.to_owned();
+    }
+    let mut out = format!("{text}\n[{}]\n", quoted(OVERRIDES));
+    for (key, value) in newest {
+        let value = if DeValue::parse(value).is_ok() { value.to_owned() } else { quoted(value) };
+        out.push_str(&format!("{} = {value}\n", quoted(key)));
+    }
+    out
+}
+
+fn quoted(text: &str) -> String {
+    toml::Value::String(text.to_owned()).to_string()
+}
+
+/// The tree of a scene's text.
+pub(super) struct Document<'t> {
+    text: &'t str,
+    root: DeTable<'t>,
+}
+
+impl<'t> Document<'t> {
+    /// Parses `text` and moves its overrides to the keys that they name.
+    pub(super) fn parse(text: &'t str) -> Result<Self, Problem> {
+        let parsed = DeTable::parse(text).map_err(|e| Problem::from_toml(&e, 0..0, &[]))?;
+        let mut document = Self { text, root: parsed.into_inner() };
+        if let Some(DeValue::Table(overrides)) = document.root.remove(OVERRIDES).map(Spanned::into_inner) {
+            for (key, value) in overrides {
+                document.set(&key, value)?;
+            }
+        }
+        Ok(document)
+    }
+
+    fn set(&mut self, key: &Spanned<std::borrow::Cow<'t, str>>, value: Spanned<DeValue<'t>>) -> Result<(), Problem> {
+        let steps: Vec<&str> = key.get_ref().split('.').collect();
+        let wrong = |what: String| {
+            Problem::new(key.span(), what).expecting("a dotted key such as `target.frame_hz` or `object.NAME.rate_hz`")
+        };
+        if steps.iter().any(|s| s.trim().is_empty()) {
+            return Err(wrong(format!("`{}` is not the key of a setting", key.get_ref())));
+        }
+        let (last, path) = steps.split_last().expect("split gives at least one part");
+        let table = descend(&mut self.root, path, &key.span()).map_err(wrong)?;
+        table.insert(Spanned::new(key.span(), (*last).to_owned().into()), value);
+        Ok(())
+    }
+
+    /// The whole tree.
+    pub(super) fn root(&self) -> &DeTable<'t> {
+        &self.root
+    }
+
+    /// Where the text has no better place to show: its first line.
+    pub(super) fn first_line(&self) -> Range<usize> {
+        0..self.text.find(['\n', '\r']).unwrap_or(self.text.len())
+    }
+
+    /// Where the value at the dotted `path` stands, or else the nearest thing around it that stands in the text.
+    pub(super) fn locate(&self, path: &str) -> Range<usize> {
+        locate(&self.root, path).unwrap_or_else(|| self.first_line())
+    }
+}
+
+fn locate(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
+    let mut steps = path.split('.').filter(|s| !s.is_empty());
+    let mut here = root.get(steps.next()?)?;
+    for step in steps {
+        let next = match here.get_ref() {
+            DeValue::Table(table) => table.get(step),
+            DeValue::Array(items) => step.parse().ok().and_then(|i: usize| items.get(i)),
+            _ => None,
+        };
+        match next {
+            Some(next) => here = next,
+            None => break,
+        }
+    }
+    Some(here.span())
+}
+
+/// The table that an override's path names, made where it is missing. In a list, the next part of the path names the entry.
+fn descend<'a, 't>(
+    table: &'a mut DeTable<'t>,
+    path: &[&str],
+    span: &Range<usize>,
+) -> Result<&'a mut DeTable<'t>, String> {
+    let Some((step, rest)) = path.split_first() else { return Ok(table) };
+    if !table.contains_key(*step) {
+        let empty = Spanned::new(span.clone(), DeValue::Table(DeTable::new()));
+        table.insert(Spanned::new(span.clone(), (*step).to_owned().into()), empty);
+    }
+    let slot = table.get_mut(*step).ok_or_else(|| format!("`{step}` cannot be set"))?;
+    match slot.get_mut() {
+        DeValue::Table(inner) => descend(inner, rest, span),
+        DeValue::Array(items) => {
+            let (which, rest) =
+                rest.split_first().ok_or_else(|| format!("`{step}` is a list; name one of its entries"))?;
+            let at = entry(items, which).ok_or_else(|| format!("`{step}` has no entry `{which}`"))?;
+            match items.get_mut(at).map(Spanned::get_mut) {
+                Some(DeValue::Table(inner)) => descend(inner, rest, span),
+                _ => Err(format!("`{step}.{which}` is a value, not a table")),
+            }
+        }
+        _ => Err(format!("`{step}` is a value, not a table")),
+    }
+}
+
+/// The entry of a list of tables that has this name, or else this number.
+fn entry(items: &[Spanned<DeValue<'_>>], which: &str) -> Option<usize> {
+    let name = |item: &Spanned<DeValue<'_>>| Some(item.get_ref().as_table()?.get("name")?.get_ref().as_str()? == which);
+    let named = items.iter().position(|item| name(item) == Some(true));
+    named.or_else(|| which.parse().ok().filter(|i: &usize| *i < items.len()))
+}

@@ -1,0 +1,26 @@
+//! The scene file as it is written: serde types, one a table, and their documentation in the JSON Schema.
+//!
+//! In: TOML values. Out: the same values, typed; keys that do not exist are refused.
+//! Never here: defaults that depend on other keys, and rules between keys ([`super::build`] has them).
+
+mod common;
+mod instrument;
+mod rigid;
+mod scene;
+mod synthetic;
+mod tube;
+mod value;
+
+pub use common::{COMMON_KEYS, CommonFile, Material};
+pub use instrument::{InstrumentFile, KeyframeFile};
+pub use rigid::{RigidFile, Shape};
+pub use scene::{
+    CameraFile, CameraKeyFile, ExecutorKind, LawKind, MachineFile, ModelCostFile, PolicyKind, ProbeFile, SceneFile,
+    StatesKind, TargetFile, WorldFile,
+};
+pub use synthetic::SyntheticFile;
+pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
+pub use value::{OneOrRange, Point};
+
+/// The models an object can have, as scenes write them.
+pub const MODELS: [&str; 4] = ["tube", "rigid", "instrument", "synthetic"];

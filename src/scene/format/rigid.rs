@@ -1,0 +1,64 @@
+//! `model = "rigid"`: a rigid body, or with `fixed = true` a solid that never moves.
+
+use super::Point;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A rigid body, or a fixed solid that others touch.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RigidFile {
+    /// Its shape. `ball`: `radius_m`. `box`: `half_extents_m`. `capsule` and `cylinder` (along z): `radius_m`,
+    /// `half_height_m`. `plane`: the half space below z = 0 of its axes, always fixed. `hull` and `mesh`: `file`.
+    pub shape: Shape,
+    /// Radius of a ball, capsule or cylinder, metres, 1e-6 … 1e4.
+    pub radius_m: Option<f64>,
+    /// Half the edges of a box, metres, each 1e-6 … 1e4.
+    pub half_extents_m: Option<Point>,
+    /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
+    pub half_height_m: Option<f64>,
+    /// An OBJ file, its path relative to the scene's: the points of a hull, the triangles of a mesh.
+    pub file: Option<String>,
+    /// What the file's coordinates are multiplied by to be metres, 1e-6 … 1e6. Default 1.
+    pub scale: Option<f64>,
+    /// Where the shape's axes start, metres. Default the origin.
+    pub position_m: Option<Point>,
+    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+    /// Velocity of the centre of mass at the start, m/s, up to 1e4. Default none.
+    pub velocity_m_s: Option<Point>,
+    /// Angular velocity at the start about the world's axes, rad/s, up to 1e4. Default none.
+    pub spin_rad_s: Option<Point>,
+    /// Mass, kilograms, 1e-9 … 1e9. Contradicts `density_kg_m3`.
+    pub mass_kg: Option<f64>,
+    /// Density, kg/m³, 1e-3 … 1e6. Default 1000 where no mass is given.
+    pub density_kg_m3: Option<f64>,
+    /// Coefficient of restitution, 0 … 1. Default 0.2.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub restitution: Option<f64>,
+    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub friction: Option<f64>,
+    /// Whether it never moves. Default false; a plane is always fixed.
+    pub fixed: Option<bool>,
+}
+
+/// The shape of a rigid body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Shape {
+    /// A ball.
+    Ball,
+    /// A box.
+    Box,
+    /// A capsule along z.
+    Capsule,
+    /// A cylinder along z.
+    Cylinder,
+    /// The half space below z = 0.
+    Plane,
+    /// The convex hull of a file's points.
+    Hull,
+    /// A file's triangles.
+    Mesh,
+}

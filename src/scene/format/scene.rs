@@ -1,0 +1,196 @@
+//! The tables of a scene besides its objects.
+
+use super::Point;
+use schemars::JsonSchema;
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
+
+/// A scene file without its `[[object]]` tables, which are read one by one, each by its model.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SceneFile {
+    /// Version of this format: 1.
+    #[schemars(range(min = 1, max = 1))]
+    pub format: i64,
+    /// One line that says what the scene shows.
+    pub description: Option<String>,
+    /// How agents are run: `threads` (an OS thread each, default) or `lockstep` (one thread, virtual time, declared costs).
+    pub executor: Option<ExecutorKind>,
+    /// At which time states are drawn. Default `interpolate`.
+    pub states: Option<StatesKind>,
+    /// What surrounds the objects.
+    pub world: Option<WorldFile>,
+    /// The frame rate wanted and how it is held.
+    pub target: Option<TargetFile>,
+    /// From where the scene is seen. Default: from far enough to see all of it.
+    pub camera: Option<CameraFile>,
+    /// The declared machine: what lockstep charges instead of measuring.
+    pub machine: Option<MachineFile>,
+    /// Material points whose position and velocity are reported; at most 1000.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub probe: Vec<ProbeFile>,
+    /// Known here as a key only: each object is read by its model.
+    #[serde(default)]
+    #[schemars(skip)]
+    pub object: IgnoredAny,
+}
+
+/// `[world]`: what surrounds the objects.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct WorldFile {
+    /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
+    pub gravity_m_s2: Option<Point>,
+}
+
+/// `[target]`: the frame rate wanted and how it is held.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TargetFile {
+    /// Wanted frames per second, 1 … 1000. Default 60.
+    #[schemars(range(min = 1.0, max = 1000.0))]
+    pub frame_hz: Option<f64>,
+    /// Who chooses the level of every visible object. Default `feedback`.
+    pub policy: Option<PolicyKind>,
+    /// Which feedback law. Default `corrected`.
+    pub law: Option<LawKind>,
+    /// Gain α of the printed law, 1e-9 … 1. Default 1e-4.
+    pub alpha: Option<f64>,
+    /// Gain β of the printed law, 1e-6 … 1e3. Default 5.
+    pub beta: Option<f64>,
+    /// Gain κ of the corrected law, above 0, below 1. Default: the law's own.
+    pub kappa: Option<f64>,
+    /// Share of the frame that the corrected law leaves free, 0 … 0.9. Default: the law's own.
+    pub margin: Option<f64>,
+}
+
+/// How agents are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ExecutorKind {
+    /// One named OS thread an agent.
+    #[default]
+    Threads,
+    /// One thread, virtual time, declared costs: bit-identical on every run.
+    Lockstep,
+}
+
+/// Who chooses levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PolicyKind {
+    /// The finest of everything, whatever it costs.
+    Full,
+    /// Feedback on (ε, n) from the measured frame work.
+    #[default]
+    Feedback,
+}
+
+/// Which feedback law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum LawKind {
+    /// The logarithmic law, whose gain does not depend on the machine.
+    #[default]
+    Corrected,
+    /// The law as the paper prints it.
+    Printed,
+}
+
+/// At which time states are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum StatesKind {
+    /// Between the two newest states, a little late.
+    #[default]
+    Interpolate,
+    /// The newest state carried on to the frame's time.
+    Extrapolate,
+    /// The newest state as it is.
+    Latest,
+}
+
+/// `[camera]`: a still view; with `period_s` an orbit about `look_at_m`; with `keyframe` a path.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraFile {
+    /// Where the eye is, metres. Not with `keyframe`.
+    pub eye_m: Option<Point>,
+    /// What it looks at, metres. Default the origin.
+    pub look_at_m: Option<Point>,
+    /// Vertical angle of view, degrees, 1 … 150. Default 40.
+    pub fov_deg: Option<f64>,
+    /// Seconds of one turn about `look_at_m`, 0.1 … 1e5 in magnitude; negative turns clockwise seen from above.
+    pub period_s: Option<f64>,
+    /// A path: 2 … 10000 keyframes.
+    pub keyframe: Option<Vec<CameraKeyFile>>,
+    /// Whether the path starts again. Default false.
+    pub repeat: Option<bool>,
+}
+
+/// Where the camera is at one time.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CameraKeyFile {
+    /// Seconds from the start, 0 … 1e6, later than the keyframe before.
+    pub at_s: f64,
+    /// Where the eye is, metres.
+    pub eye_m: Point,
+    /// What it looks at, metres.
+    pub look_at_m: Point,
+    /// Vertical angle of view, degrees, 1 … 150. Default: the camera's `fov_deg`.
+    pub fov_deg: Option<f64>,
+}
+
+/// `[machine]`: a preset, and what differs from it.
+#[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MachineFile {
+    /// The machine to start from: `two-cores-software` (default) or `workstation`.
+    pub preset: Option<String>,
+    /// Cores that agents and frames share, 1 … 4096.
+    #[schemars(range(min = 1, max = 4096))]
+    pub cores: Option<u32>,
+    /// What a step of each model costs, by the model's name.
+    #[serde(default)]
+    pub step: BTreeMap<String, ModelCostFile>,
+    /// Milliseconds a frame costs before anything is drawn, 0 … 1e4.
+    pub draw_setup_ms: Option<f64>,
+    /// Microseconds an object drawn, 0 … 1e6.
+    pub draw_object_us: Option<f64>,
+    /// Microseconds a triangle, 0 … 1e4.
+    pub draw_triangle_us: Option<f64>,
+    /// Nanoseconds a pixel, 0 … 1e6.
+    pub draw_pixel_ns: Option<f64>,
+    /// Relative standard deviation of every cost, 0 … 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub noise: Option<f64>,
+    /// Seed of the noise.
+    pub seed: Option<u32>,
+}
+
+/// What a step of a model costs: base + unit · work.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ModelCostFile {
+    /// Microseconds a step, 0 … 1e9.
+    pub base_us: Option<f64>,
+    /// Microseconds a unit of work (tube: a segment and substep; synthetic: a declared microsecond; others: a step), 0 … 1e9.
+    pub unit_us: Option<f64>,
+}
+
+/// `[[probe]]`: a material point whose position and velocity are reported.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ProbeFile {
+    /// Name of the object.
+    pub object: String,
+    /// Which point of a tube: 0 start … 1 end, arc length along the rest shape. Default 1.
+    /// A rigid object reports its centre of mass, an instrument its tip.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub at: Option<f64>,
+    /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` too. Default: only the last state.
+    pub every_ms: Option<f64>,
+}

@@ -1,0 +1,115 @@
+//! `model = "tube"`: a soft tube, cable or rod.
+
+use super::{OneOrRange, Point};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A soft tube, cable or rod: a Cosserat rod with a radius.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TubeFile {
+    /// Points of the stress-free centre line in metres: 2 … 100000, no two neighbours alike.
+    /// Two points make a straight line, more a smooth curve through all of them.
+    #[schemars(length(min = 2, max = 100_000))]
+    pub path_m: Vec<Point>,
+    /// Outer radius at rest, metres, 1e-6 … 100.
+    pub radius_m: f64,
+    /// Wall thickness, metres, above 0 and at most `radius_m`. Default: `radius_m`, a solid rod.
+    pub wall_m: Option<f64>,
+    /// Young's modulus, Pa, 1 … 1e13. May be left out where `ea_n` is given.
+    pub young_pa: Option<f64>,
+    /// Poisson's ratio, above -1, at most 0.5. Default 0.45.
+    pub poisson: Option<f64>,
+    /// Density, kg/m³, 1e-3 … 1e6. May be left out where `mass_per_length_kg_m` is given.
+    pub density_kg_m3: Option<f64>,
+    /// Shear coefficient κ, above 0, at most 2. Default 27/28.
+    pub shear_factor: Option<f64>,
+    /// Stretch stiffness EA, newtons; overrides modulus and section.
+    pub ea_n: Option<f64>,
+    /// Shear stiffness κGA, newtons; overrides modulus and section.
+    pub ga_n: Option<f64>,
+    /// Bend stiffness EI, N·m²; overrides modulus and section.
+    pub ei_n_m2: Option<f64>,
+    /// Twist stiffness GJ, N·m²; overrides modulus and section.
+    pub gj_n_m2: Option<f64>,
+    /// Mass per length, kg/m; overrides density and section.
+    pub mass_per_length_kg_m: Option<f64>,
+    /// Spacing ε of the simulation along the tube, metres: one number fixes it, `[finest, coarsest]` is what the
+    /// controller may use, who starts with the finest; length / 4096 … 10 lengths. Default: length / 64, fixed.
+    pub eps_m: Option<OneOrRange<f64>>,
+    /// Number of segments of the simulation, 2 … 4096: fixes it; `eps_m` then speaks of the picture alone.
+    #[schemars(range(min = 2, max = 4096))]
+    pub segments: Option<u32>,
+    /// Spacing ε of the picture, metres, as `eps_m`. Default: `eps_m`, or `[length / 400, length / 8]` without it.
+    pub picture_eps_m: Option<OneOrRange<f64>>,
+    /// How it is integrated in time. Default `implicit-euler`.
+    pub integrator: Option<Integrator>,
+    /// Least number of substeps in a step, 1 … 1000. Default 1.
+    #[schemars(range(min = 1, max = 1000))]
+    pub substeps: Option<u32>,
+    /// Mass-proportional damping, 1/s, 0 … 1e4: dv/dt = … − damping·v. Default 0.
+    pub damping_per_s: Option<f64>,
+    /// Ends held in place and direction. Default none.
+    pub clamp: Option<Vec<End>>,
+    /// Ends held in place, free to turn. Default none.
+    pub pin: Option<Vec<End>>,
+    /// Springs between stretches of the tube and where they were at rest (a mesentery).
+    pub attach: Option<Vec<AttachFile>>,
+    /// A travelling wave of the radius.
+    pub peristalsis: Option<PeristalsisFile>,
+    /// Pressure inside above that outside, Pa, 0 … 1e7: widens the tube. Default 0.
+    pub pressure_pa: Option<f64>,
+    /// Whether the tube collides with itself. Default true.
+    pub self_contact: Option<bool>,
+    /// Coulomb friction coefficient of the skin, 0 … 10; a pair takes the geometric mean. Default 0.2.
+    pub friction: Option<f64>,
+}
+
+/// An end of a tube.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum End {
+    /// Where the path begins.
+    Start,
+    /// Where the path ends.
+    End,
+}
+
+/// How a tube is integrated in time.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Integrator {
+    /// Linearly implicit Euler with one Newton step: stable at large steps, damps fast motion.
+    ImplicitEuler,
+}
+
+/// Springs along a stretch of a tube.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AttachFile {
+    /// Where the stretch begins, as a share of the rest length, 0 … 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub from: f64,
+    /// Where it ends, above `from`, at most 1.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub to: f64,
+    /// Stiffness per length, N/m², 0 … 1e9.
+    pub stiffness_n_m2: f64,
+    /// Distance within which the spring does not act, metres, 0 … 100. Default 0.
+    pub slack_m: Option<f64>,
+    /// Damping per length, N·s/m², 0 … 1e6. Default 0.
+    pub damping_n_s_m2: Option<f64>,
+}
+
+/// A travelling wave of contraction: r = r₀ (1 − a (1 + cos(2π (s − c t)/λ))/2).
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct PeristalsisFile {
+    /// Deepest contraction a as a share of the radius, 0 … 0.95.
+    #[schemars(range(min = 0.0, max = 0.95))]
+    pub amplitude: f64,
+    /// Wave length λ, metres, 1e-4 … 100.
+    pub wavelength_m: f64,
+    /// Wave speed c, m/s, −100 … 100; negative runs from the end to the start.
+    pub speed_m_s: f64,
+}

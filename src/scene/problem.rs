@@ -1,0 +1,206 @@
+//! What is wrong with a scene, shown where it stands: file, line, column, the text underlined, what was expected.
+//!
+//! In: places in the text and what was found there. Out: [`SceneError`], for people (miette) and for programs.
+//! Never here: the rules themselves.
+
+use miette::{Diagnostic, NamedSource, SourceSpan};
+use std::ops::Range;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// More problems than this are counted, not shown.
+const SHOWN_MAX: usize = 50;
+
+/// Text longer than this is cut where a problem quotes it, in characters.
+const QUOTE_MAX: usize = 80;
+
+/// A scene that cannot be used, with everything that is wrong with it.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{}", headline(name, problems.len()))]
+pub struct SceneError {
+    /// The scene's name or file.
+    pub name: String,
+    /// What is wrong, in the order of the text; at least one.
+    #[related]
+    pub problems: Vec<SceneProblem>,
+}
+
+fn headline(name: &str, count: usize) -> String {
+    match count {
+        1 => format!("the scene {name} cannot be used"),
+        n => format!("the scene {name} cannot be used: {n} problems"),
+    }
+}
+
+/// One thing that is wrong with a scene.
+#[derive(Debug, Error, Diagnostic)]
+#[error("{message}")]
+pub struct SceneProblem {
+    /// What is wrong.
+    pub message: String,
+    /// What would have been right, under the text.
+    pub expected: String,
+    /// What may help besides.
+    #[help]
+    pub help: Option<String>,
+    /// Line of the offending text, from 1; 0 where a file could not be read at all.
+    pub line: usize,
+    /// Column of its first character, from 1; 0 where a file could not be read at all.
+    pub column: usize,
+    /// The offending text, cut after 80 characters.
+    pub text: String,
+    #[source_code]
+    source_code: Option<NamedSource<Arc<str>>>,
+    #[label("{expected}")]
+    span: Option<SourceSpan>,
+}
+
+impl SceneError {
+    /// A scene of which nothing could be read.
+    #[must_use]
+    pub fn unreadable(name: &str, message: String, help: Option<String>) -> Self {
+        let problem = SceneProblem {
+            message,
+            expected: String::new(),
+            help,
+            line: 0,
+            column: 0,
+            text: String::new(),
+            source_code: None,
+            span: None,
+        };
+        Self { name: name.to_owned(), problems: vec![problem] }
+    }
+
+    /// `problems` shown in `text`, in its order.
+    pub(super) fn new(name: &str, text: &str, mut problems: Vec<Problem>) -> Self {
+        problems.sort_by_key(|p| (p.span.start, p.span.end));
+        let hidden = problems.len().saturating_sub(SHOWN_MAX);
+        problems.truncate(SHOWN_MAX);
+        let source: Arc<str> = text.into();
+        let mut problems: Vec<_> = problems.into_iter().map(|p| p.shown(name, &source)).collect();
+        if let Some(last) = problems.last_mut().filter(|_| hidden > 0) {
+            last.help = Some(format!("and {hidden} more problems"));
+        }
+        Self { name: name.to_owned(), problems }
+    }
+}
+
+/// A problem before it is shown: a place in the text and words.
+#[derive(Debug)]
+pub(super) struct Problem {
+    span: Range<usize>,
+    message: String,
+    expected: String,
+    help: Option<String>,
+}
+
+impl Problem {
+    pub(super) fn new(span: Range<usize>, message: String) -> Self {
+        Self { span, message, expected: "here".to_owned(), help: None }
+    }
+
+    pub(super) fn expecting(mut self, expected: impl Into<String>) -> Self {
+        self.expected = expected.into();
+        self
+    }
+
+    pub(super) fn helped(mut self, help: Option<String>) -> Self {
+        self.help = help;
+        self
+    }
+
+    /// What TOML or serde found; `nearby` is where to show it when it does not say, `also` what other keys the table has.
+    pub(super) fn from_toml(error: &toml::de::Error, nearby: Range<usize>, also: &[&str]) -> Self {
+        let span = error.span().unwrap_or(nearby);
+        let message = error.message();
+        if message.starts_with("unknown field") {
+            return Self::unknown_key(span, &quoted_words(message), also);
+        }
+        let (text, expected) = plain_words(message);
+        let words = quoted_words(message);
+        let help = words.split_first().and_then(|(wrong, known)| did_you_mean(wrong, known.iter().copied()));
+        let problem = Self::new(span, text).helped(help);
+        match expected {
+            Some(expected) => problem.expecting(expected),
+            None => problem,
+        }
+    }
+
+    fn unknown_key(span: Range<usize>, words: &[&str], also: &[&str]) -> Self {
+        let Some((wrong, known)) = words.split_first() else { return Self::new(span, "unknown key".to_owned()) };
+        let mut known: Vec<&str> = also.iter().chain(known).copied().collect();
+        known.sort_unstable();
+        let near = did_you_mean(wrong, known.iter().copied());
+        let expected = near.unwrap_or_else(|| "expected one of the keys below".to_owned());
+        let problem = Self::new(span, format!("there is no key `{wrong}` in this table")).expecting(expected);
+        problem.helped(Some(format!("keys of this table: {}", known.join(", "))))
+    }
+
+    fn shown(self, name: &str, source: &Arc<str>) -> SceneProblem {
+        let start = floor_boundary(source, self.span.start);
+        let end = floor_boundary(source, self.span.end.max(start));
+        let before = &source[..start];
+        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
+        let text = &source[start..end];
+        SceneProblem {
+            message: self.message,
+            expected: self.expected,
+            help: self.help,
+            line: before.matches('\n').count() + 1,
+            column: source[line_start..start].chars().count() + 1,
+            text: text.chars().take(QUOTE_MAX).collect(),
+            source_code: Some(NamedSource::new(name, Arc::clone(source))),
+            span: Some(SourceSpan::from(start..first_line_of(text, start))),
+        }
+    }
+}
+
+/// Underlining ends with the line: a table or a long list is shown by its first line.
+fn first_line_of(text: &str, start: usize) -> usize {
+    start + text.find(['\n', '\r']).unwrap_or(text.len())
+}
+
+fn floor_boundary(text: &str, at: usize) -> usize {
+    let at = at.min(text.len());
+    (0..=at).rev().find(|i| text.is_char_boundary(*i)).unwrap_or(0)
+}
+
+/// Serde's words in the words of a scene: the message, and what was expected where it says so.
+fn plain_words(message: &str) -> (String, Option<String>) {
+    let first_line = message.lines().next().unwrap_or_default();
+    let (found, expected) = match first_line.split_once(", expected ") {
+        Some((found, expected)) => (found, Some(format!("expected {}", plain_type(expected)))),
+        None => (first_line, None),
+    };
+    if let Some(key) = found.strip_prefix("missing field ") {
+        return (format!("the key {key} is missing"), Some(format!("expected {key} in this table")));
+    }
+    (found.replace("unknown variant", "unknown value"), expected)
+}
+
+fn plain_type(expected: &str) -> String {
+    match expected {
+        "f64" => "a number".to_owned(),
+        "u8" | "u16" | "u32" | "u64" | "usize" => "a whole number, 0 or above".to_owned(),
+        "i64" => "a whole number".to_owned(),
+        "a boolean" => "true or false".to_owned(),
+        "a sequence" => "a list [ … ]".to_owned(),
+        "an array of length 3" => "3 numbers: [x, y, z]".to_owned(),
+        other if other.starts_with("struct ") => "a table".to_owned(),
+        other => other.to_owned(),
+    }
+}
+
+/// The words between backquotes.
+fn quoted_words(message: &str) -> Vec<&str> {
+    message.split('`').skip(1).step_by(2).collect()
+}
+
+/// A suggestion for `wrong` out of `known`, if one is near enough.
+pub(super) fn did_you_mean<'a>(wrong: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    const NEAR_ENOUGH: f64 = 0.75;
+    let (score, word) =
+        known.into_iter().map(|word| (strsim::jaro_winkler(wrong, word), word)).max_by(|a, b| a.0.total_cmp(&b.0))?;
+    (score >= NEAR_ENOUGH && word != wrong).then(|| format!("did you mean `{word}`?"))
+}

@@ -1,0 +1,61 @@
+//! The JSON Schema of scene files, from the types that read them.
+//!
+//! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys; a schema cannot say them all.
+
+use super::format::{CommonFile, InstrumentFile, MODELS, RigidFile, SceneFile, SyntheticFile, TubeFile};
+use schemars::{JsonSchema, SchemaGenerator};
+use serde_json::{Map, Value, json};
+
+/// The JSON Schema of a scene file.
+#[must_use]
+pub fn json_schema() -> Value {
+    let mut generator = SchemaGenerator::default();
+    let objects = [
+        object::<TubeFile>(&mut generator),
+        object::<RigidFile>(&mut generator),
+        object::<InstrumentFile>(&mut generator),
+        object::<SyntheticFile>(&mut generator),
+    ];
+    let mut root = generator.root_schema_for::<SceneFile>().to_value();
+    // made above, and the root generator forgets definitions that it does not use itself
+    let definitions = generator.take_definitions(true);
+    root["title"] = json!("metachron scene");
+    let properties = &mut root["properties"];
+    properties["object"] = json!({
+        "description": "The objects; at most 1000 that move.",
+        "type": "array",
+        "items": { "oneOf": MODELS.map(|m| json!({ "$ref": format!("#/$defs/{m}") })) },
+    });
+    for (name, definition) in definitions {
+        root["$defs"][name] = definition;
+    }
+    for (name, object) in MODELS.into_iter().zip(objects) {
+        root["$defs"][name] = with_model(object, name);
+    }
+    root
+}
+
+/// A model's table with the keys that all models share.
+fn object<T: JsonSchema>(generator: &mut SchemaGenerator) -> Value {
+    let mut own = T::json_schema(generator).to_value();
+    let mut common = CommonFile::json_schema(generator).to_value();
+    let mut properties = Map::new();
+    for table in [&mut common, &mut own] {
+        if let Value::Object(keys) = table["properties"].take() {
+            properties.extend(keys);
+        }
+    }
+    let required: Vec<Value> =
+        [&common, &own].into_iter().filter_map(|t| t.get("required")?.as_array()).flatten().cloned().collect();
+    own["properties"] = Value::Object(properties);
+    own["required"] = Value::Array(required);
+    own
+}
+
+fn with_model(mut object: Value, model: &str) -> Value {
+    object["properties"]["model"] = json!({ "const": model });
+    if let Some(required) = object["required"].as_array_mut() {
+        required.push(json!("model"));
+    }
+    object
+}

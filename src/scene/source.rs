@@ -1,0 +1,130 @@
+//! Where a scene comes from: built in, or a file; and the files beside it.
+//!
+//! In: a name or a path. Out: text and bytes. Never here: their meaning. This is the only place that reads files.
+
+use super::builtin;
+use super::problem::{SceneError, did_you_mean};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+/// Longest scene file, bytes: 100000 path points and room to spare.
+pub const SCENE_BYTES_MAX: u64 = 16 << 20;
+/// Longest file beside a scene, bytes.
+const SIBLING_BYTES_MAX: u64 = 64 << 20;
+
+/// A scene's text and where it comes from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    name: String,
+    text: String,
+    beside: Beside,
+}
+
+/// Where the files beside a scene are.
+#[derive(Debug, Clone)]
+enum Beside {
+    BuiltIn,
+    Folder(PathBuf),
+    Nowhere,
+}
+
+impl Source {
+    /// The built-in scene called `name_or_path`, or else the file there.
+    ///
+    /// # Errors
+    /// [`SceneError`] when neither exists, or the file cannot be read, is too long or no UTF-8.
+    pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
+        if let Some(scene) = builtin::find(name_or_path) {
+            let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
+            return Ok(Self { name, text, beside: Beside::BuiltIn });
+        }
+        let path = Path::new(name_or_path);
+        let bytes = read_bounded(path, SCENE_BYTES_MAX).map_err(|why| missing(name_or_path, path, &why))?;
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        Self::from_bytes(name_or_path, bytes, Beside::Folder(folder))
+    }
+
+    /// A scene out of bytes that are in memory; there are no files beside it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when they are too many or no UTF-8.
+    pub fn memory(name: &str, bytes: &[u8]) -> Result<Self, SceneError> {
+        if bytes.len() as u64 > SCENE_BYTES_MAX {
+            let message = format!("it has {} bytes, more than {SCENE_BYTES_MAX}", bytes.len());
+            return Err(SceneError::unreadable(name, message, None));
+        }
+        Self::from_bytes(name, bytes.to_vec(), Beside::Nowhere)
+    }
+
+    fn from_bytes(name: &str, bytes: Vec<u8>, beside: Beside) -> Result<Self, SceneError> {
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self { name: name.to_owned(), text, beside }),
+            Err(error) => {
+                let valid = error.utf8_error().valid_up_to();
+                let before = &error.as_bytes()[..valid];
+                let line = before.iter().filter(|b| **b == b'\n').count() + 1;
+                let column = valid - before.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1) + 1;
+                let message = format!("line {line}, byte {column} is not UTF-8 text");
+                Err(SceneError::unreadable(name, message, Some("expected a TOML file".to_owned())))
+            }
+        }
+    }
+
+    /// The scene's name: the built-in one's, or the path as it was given.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The text.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The bytes of a file beside the scene, or why there are none.
+    pub(super) fn sibling(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = Path::new(name);
+        if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
+            return Err("expected a path relative to the scene".to_owned());
+        }
+        match &self.beside {
+            Beside::BuiltIn => {
+                builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
+            }
+            Beside::Folder(folder) => read_bounded(&folder.join(path), SIBLING_BYTES_MAX),
+            Beside::Nowhere => Err("this scene has no folder".to_owned()),
+        }
+    }
+}
+
+fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    let file = File::open(path).map_err(|e| e.to_string())?;
+    let kind = file.metadata().map_err(|e| e.to_string())?;
+    if kind.is_dir() {
+        return Err("it is a folder".to_owned());
+    }
+    let mut bytes = Vec::new();
+    file.take(most + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() as u64 > most {
+        return Err(format!("it has more than {most} bytes"));
+    }
+    Ok(bytes)
+}
+
+fn missing(name: &str, path: &Path, why: &str) -> SceneError {
+    let list = builtin::ALL.iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    let looks_like_a_path = path.components().count() > 1 || path.extension().is_some();
+    let hint = did_you_mean(name, builtin::ALL.iter().map(|s| s.name)).filter(|_| !looks_like_a_path);
+    let help = match hint {
+        Some(hint) => format!("{hint} Built-in scenes: {list}; or give the path of a scene file"),
+        None => format!("built-in scenes: {list}; or give the path of a scene file"),
+    };
+    let message = if looks_like_a_path || path.exists() {
+        format!("the file cannot be read: {why}")
+    } else {
+        format!("there is no built-in scene `{name}`, and no file of that name ({why})")
+    };
+    SceneError::unreadable(name, message, Some(help))
+}

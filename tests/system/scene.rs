@@ -1,0 +1,404 @@
+//! Scenes as users write them: what loads, and what an error shows.
+
+use metachron::scene::{Scene, SceneError, Source, builtin, json_schema, load};
+use proptest::prelude::*;
+
+/// The least scene with a tube, for the tests to change.
+const TUBE: &str = r#"format = 1
+
+[[object]]
+name = "intestine"
+model = "tube"
+path_m = [[0.0, 0.0, 0.0], [0.2, 0.05, 0.0], [0.3, 0.0, 0.1]]
+radius_m = 0.015
+wall_m = 0.002
+young_pa = 5.0e4
+density_kg_m3 = 1050.0
+rate_hz = 240.0
+dt_ms = [1.0, 16.0]
+eps_m = [0.0005, 0.02]
+n = [1, 5]
+importance = 1.0
+"#;
+
+fn read(text: &str) -> Result<Scene, SceneError> {
+    load(&Source::memory("test.toml", text.as_bytes())?, &[])
+}
+
+/// The only problem of a scene: line, column, text, and message with what was expected and the help.
+fn problem(text: &str) -> (usize, usize, String, String) {
+    let error = read(text).expect_err("the scene must be refused");
+    assert_eq!(error.problems.len(), 1, "{:#?}", error.problems);
+    let p = &error.problems[0];
+    (p.line, p.column, p.text.clone(), format!("{}; {}; {}", p.message, p.expected, p.help.clone().unwrap_or_default()))
+}
+
+/// Asserts that `find` replaced by `put` is refused at `put`'s line with `text` underlined and all of `words` said.
+fn refused(find: &str, put: &str, text: &str, words: &[&str]) {
+    assert!(TUBE.contains(find), "{find}");
+    let scene = TUBE.replacen(find, put, 1);
+    let offset = scene.find(put).unwrap();
+    let (line, column, shown, said) = problem(&scene);
+    let inside = scene[offset..].find(text).map(|at| offset + at).unwrap_or(offset);
+    let expected_line = scene[..inside].matches('\n').count() + 1;
+    assert_eq!((line, shown.as_str()), (expected_line, text), "column {column}: {said}");
+    for word in words {
+        assert!(said.contains(word), "{word:?} is not said: {said}");
+    }
+}
+
+#[test]
+fn every_built_in_scene_loads_and_says_what_it_shows() {
+    for scene in &builtin::ALL {
+        let loaded = scene.source().and_then(|s| load(&s, &[])).unwrap_or_else(|e| panic!("{e:?}"));
+        assert!(!loaded.description.is_empty() && loaded.camera.is_some(), "{}", scene.name);
+    }
+}
+
+#[test]
+fn the_scene_of_the_design_loads_with_its_ranges() {
+    let scene = read(TUBE).unwrap();
+    let member = &scene.agents[0];
+    assert_eq!(member.pace.rate_hz, 240.0);
+    assert_eq!(member.pace.dt_range.0.as_nanos(), 1_000_000);
+    assert_eq!(member.pace.dt_range.1.as_nanos(), 16_000_000);
+    assert_eq!(member.simulation.eps_m, (0.0005, 0.02));
+    assert_eq!(member.picture.n, (1, 5));
+}
+
+#[test]
+fn one_step_length_gives_the_rate() {
+    let scene = read(&TUBE.replace("rate_hz = 240.0\ndt_ms = [1.0, 16.0]", "dt_ms = 10.0")).unwrap();
+    let pace = scene.agents[0].pace;
+    assert_eq!((pace.rate_hz, pace.dt.as_nanos(), pace.dt_range.0), (100.0, 10_000_000, pace.dt_range.1));
+}
+
+#[test]
+fn syntax_errors_show_their_line() {
+    refused("radius_m = 0.015", "radius_m = = 0.015", "=", &[]);
+    refused("name = \"intestine\"", "name = \"intestine", "", &[]);
+}
+
+#[test]
+fn an_unknown_key_is_underlined_with_the_nearest_known_one() {
+    refused("radius_m", "radus_m", "radus_m", &["did you mean `radius_m`?", "path_m"]);
+    refused("rate_hz = 240.0", "rate_hertz = 240.0", "rate_hertz", &["did you mean `rate_hz`?"]);
+    let (line, column, text, said) = problem("format = 1\n\n[targt]\nframe_hz = 1.0\n");
+    assert_eq!((line, column, text.as_str()), (3, 2, "targt"));
+    assert!(said.contains("did you mean `target`?"), "{said}");
+}
+
+#[test]
+fn a_wrong_type_says_which_is_right() {
+    refused("0.015", "\"thick\"", "\"thick\"", &["expected a number"]);
+    refused("[0.2, 0.05, 0.0]", "[0.2, 0.05]", "[0.2, 0.05]", &["3 numbers"]);
+    refused("n = [1, 5]", "n = [1, 2, 3]", "[1, 2, 3]", &["[least, greatest]"]);
+    refused("n = [1, 5]", "n = 1.5", "1.5", &["a whole number"]);
+}
+
+#[test]
+fn a_missing_key_is_named_at_its_table() {
+    let (line, _, text, said) = problem(&TUBE.replace("radius_m = 0.015\n", ""));
+    assert_eq!((line, text.as_str()), (3, "[[object]]"));
+    assert!(said.contains("`radius_m` is missing"), "{said}");
+    let (line, _, _, said) = problem(&TUBE.replace("format = 1", ""));
+    assert_eq!(line, 1);
+    assert!(said.contains("`format` is missing"), "{said}");
+    let (.., said) = problem(&TUBE.replace("young_pa = 5.0e4\n", ""));
+    assert!(said.contains("young_pa") && said.contains("ea_n"), "{said}");
+}
+
+#[test]
+fn values_out_of_range_are_underlined_with_their_range() {
+    for bad in ["-1.0", "0.0", "nan", "inf", "-inf", "1e300"] {
+        let said = ["`radius_m` of `intestine` is", "from 0.000001 to 100 m"];
+        refused("radius_m = 0.015", &format!("radius_m = {bad}"), bad, &said);
+    }
+    refused("[0.3, 0.0, 0.1]", "[0.3, inf, 0.1]", "[0.3, inf, 0.1]", &["3 numbers from"]);
+    refused("0.002", "0.02", "0.02", &["`wall_m`", "at most `radius_m`, 0.015 m"]);
+    refused("[1, 5]", "[1, 11]", "[1, 11]", &["levels from 0 to 10"]);
+    refused("importance = 1.0", "importance = 0", "0", &["`importance`"]);
+    refused("importance = 1.0", "poisson = 0.6", "0.6", &["`poisson`", "0.5"]);
+    refused("format = 1", "format = 2", "2", &["expected 1"]);
+}
+
+#[test]
+fn ranges_run_upwards() {
+    refused("[1.0, 16.0]", "[16.0, 1.0]", "[16.0, 1.0]", &["the lesser number first: [1, 16]"]);
+    refused("[1, 5]", "[5, 1]", "[5, 1]", &["[1, 5]"]);
+    refused("[0.0005, 0.02]", "[1e-9, 0.02]", "[1e-9, 0.02]", &["`eps_m`", "1/4096"]);
+}
+
+#[test]
+fn a_rate_that_contradicts_the_step_is_a_load_error() {
+    refused("rate_hz = 240.0\ndt_ms = [1.0, 16.0]", "rate_hz = 240.0\ndt_ms = 10.0", "240.0", &["expected 100 Hz"]);
+    refused("240.0", "20.0", "20.0", &["from 62.5 to 1000 Hz"]);
+    assert!(read(&TUBE.replace("rate_hz = 240.0\ndt_ms = [1.0, 16.0]", "rate_hz = 100\ndt_ms = 10")).is_ok());
+}
+
+#[test]
+fn paths_have_two_different_points() {
+    refused(
+        "[[0.0, 0.0, 0.0], [0.2, 0.05, 0.0], [0.3, 0.0, 0.1]]",
+        "[[0, 0, 0]]",
+        "[[0, 0, 0]]",
+        &["has 1 points", "2 …"],
+    );
+    refused("[0.2, 0.05, 0.0]", "[0.0, 0.0, 0.0]", "[0.0, 0.0, 0.0]", &["same point twice"]);
+}
+
+#[test]
+fn an_end_is_clamped_or_pinned_not_both() {
+    refused(
+        "importance = 1.0",
+        "clamp = [\"start\", \"end\"]\npin = [\"start\"]",
+        "[\"start\"]",
+        &["`clamp` holds already"],
+    );
+    refused("importance = 1.0", "clamp = [\"strat\"]", "\"strat\"", &["did you mean `start`?"]);
+}
+
+#[test]
+fn an_integrator_that_does_not_exist_names_those_that_do() {
+    refused("importance = 1.0", "integrator = \"bdf2\"", "\"bdf2\"", &["`implicit-euler`"]);
+}
+
+#[test]
+fn an_unknown_model_names_those_that_exist() {
+    refused("\"tube\"", "\"tubes\"", "\"tubes\"", &["did you mean `tube`?", "`rigid`", "`instrument`"]);
+}
+
+#[test]
+fn names_are_unique_and_not_empty() {
+    refused("\"intestine\"", "\" \"", "\" \"", &["is not a name"]);
+    let twice =
+        format!("{TUBE}\n[[object]]\nname = \"intestine\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n");
+    let (line, _, text, said) = problem(&twice);
+    assert_eq!((line, text.as_str()), (18, "\"intestine\""));
+    assert!(said.contains("is taken"), "{said}");
+}
+
+fn rigid(keys: &str) -> String {
+    format!("format = 1\n[[object]]\nname = \"a\"\nmodel = \"rigid\"\n{keys}\n")
+}
+
+#[test]
+fn a_rigid_object_takes_the_keys_of_its_shape_alone() {
+    let said = |keys: &str| problem(&rigid(keys)).3;
+    assert!(said("shape = \"ball\"").contains("`radius_m` of `a` is missing"));
+    assert!(said("shape = \"ball\"\nradius_m = 0.1\nhalf_height_m = 1.0").contains("does not belong to a ball"));
+    assert!(said("shape = \"ball\"\nradius_m = 0.1\nmass_kg = 1\ndensity_kg_m3 = 1").contains("contradicts `mass_kg`"));
+    assert!(said("shape = \"plane\"\nfixed = false").contains("a plane"));
+    assert!(said("shape = \"ball\"\nradius_m = 0.1\nfixed = true\nspin_rad_s = [0, 0, 1]").contains("fixed"));
+    assert!(said("shape = \"blob\"").contains("`capsule`"));
+    assert!(said("shape = \"mesh\"\nfile = \"a.obj\"").contains("a.obj"));
+    assert!(read(&rigid("shape = \"plane\"")).unwrap().agents.is_empty());
+    assert_eq!(read(&rigid("shape = \"ball\"\nradius_m = 0.1\nfixed = true")).unwrap().obstacles.len(), 1);
+}
+
+#[test]
+fn references_name_what_exists() {
+    let (line, _, text, said) = problem(&format!("{TUBE}\n[[probe]]\nobject = \"intestin\"\n"));
+    assert_eq!((line, text.as_str()), (18, "\"intestin\""));
+    assert!(said.contains("did you mean `intestine`?"), "{said}");
+    let tool = "\n[[object]]\nname = \"tool\"\nmodel = \"instrument\"\ngrasps = [\"liver\"]\nkeyframe = [{ tip_m = [0, 0, 0] }]\n";
+    let said = problem(&format!("{TUBE}{tool}")).3;
+    assert!(said.contains("`liver`") && said.contains("`intestine`"), "{said}");
+    let said = problem(&format!("{TUBE}{}", tool.replace("liver", "tool"))).3;
+    assert!(said.contains("which is no tube"), "{said}");
+}
+
+#[test]
+fn a_tool_and_the_tubes_it_can_hold_see_each_other() {
+    let tool = "\n[[object]]\nname = \"tool\"\nmodel = \"instrument\"\nkeyframe = [{ tip_m = [0, 0, 0] }]\n";
+    let scene = read(&format!("{TUBE}{tool}")).unwrap();
+    assert_eq!(scene.agents[0].links, [scene.agents[1].id]);
+    assert_eq!(scene.agents[1].links, [scene.agents[0].id]);
+}
+
+#[test]
+fn keyframes_follow_in_time() {
+    let tool = "format = 1\n[[object]]\nname = \"t\"\nmodel = \"instrument\"\n[[object.keyframe]]\nat_s = 1\ntip_m = [0, 0, 0]\n[[object.keyframe]]\nat_s = 1\ntip_m = [0, 0, 0]\n";
+    let (line, _, _, said) = problem(tool);
+    assert_eq!(line, 9);
+    assert!(said.contains("after the keyframe before"), "{said}");
+    let said = problem(&tool.replacen("at_s = 1\ntip_m = [0, 0, 0]\n", "tip_m = [0, 0, 0]\njaw = 2\n", 1)).3;
+    assert!(said.contains("`jaw`"), "{said}");
+}
+
+#[test]
+fn all_problems_are_told_at_once_in_the_order_of_the_text() {
+    let bad =
+        TUBE.replace("0.015", "-1.0").replace("0.002", "-2.0").replace("5.0e4", "0.0").replace("[1, 5]", "[9, 1]");
+    let error = read(&bad).unwrap_err();
+    let lines: Vec<_> = error.problems.iter().map(|p| p.line).collect();
+    assert_eq!(lines, [7, 8, 9, 14]);
+}
+
+#[test]
+fn more_agents_than_threads_can_carry_are_refused() {
+    let ball = |i| format!("[[object]]\nname = \"b{i}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n");
+    let many = |n| format!("format = 1\n{}", (0..n).map(ball).collect::<String>());
+    assert!(read(&many(1000)).is_ok());
+    assert!(problem(&many(1001)).3.contains("at most 1000"));
+}
+
+#[test]
+fn overrides_reach_any_key_and_the_last_one_counts() {
+    let source = Source::memory("test.toml", TUBE.as_bytes()).unwrap();
+    let set = |pairs: &[(&str, &str)]| {
+        load(&source, &pairs.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect::<Vec<_>>())
+    };
+    let scene = set(&[("target.frame_hz", "90"), ("target.frame_hz", "30"), ("target.policy", "full")]).unwrap();
+    assert_eq!(scene.target.frame_hz, 30.0);
+    let scene = set(&[("object.intestine.rate_hz", "120"), ("object.0.n", "[2, 3]")]).unwrap();
+    assert_eq!((scene.agents[0].pace.rate_hz, scene.agents[0].picture.n), (120.0, (2, 3)));
+    let error = set(&[("object.intestine.radius_m", "-3")]).unwrap_err();
+    assert_eq!(error.problems[0].text, "-3");
+    for bad in ["object.liver.rate_hz", "format.x", "a..b", "", "object.rate_hz", "targt.frame_hz"] {
+        assert!(set(&[(bad, "1")]).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn an_override_cannot_smuggle_in_other_keys() {
+    let source = Source::memory("test.toml", TUBE.as_bytes()).unwrap();
+    let scene = load(&source, &[("description".to_owned(), "1\n[target]\nframe_hz = 5".to_owned())]).unwrap();
+    assert_eq!((scene.description.as_str(), scene.target.frame_hz), ("1\n[target]\nframe_hz = 5", 60.0));
+}
+
+#[test]
+fn files_beside_a_scene_are_read_and_named_when_they_are_bad() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    std::fs::write(at("s.toml"), rigid("shape = \"mesh\"\nfile = \"m.obj\"")).unwrap();
+    std::fs::write(at("m.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n").unwrap();
+    let open = || load(&Source::open(at("s.toml").to_str().unwrap()).unwrap(), &[]);
+    assert_eq!(open().unwrap().agents.len(), 1);
+    std::fs::write(at("m.obj"), "f 1 2 3\n").unwrap();
+    let error = open().unwrap_err();
+    assert!(error.problems[0].message.contains("m.obj"), "{:?}", error.problems);
+}
+
+#[test]
+fn a_scene_that_does_not_exist_lists_the_built_in_ones() {
+    let error = Source::open("tubee").unwrap_err();
+    let help = error.problems[0].help.clone().unwrap();
+    assert!(help.contains("did you mean `tube`?") && help.contains("overload"), "{help}");
+}
+
+/// Whether `value` keeps the parts of JSON Schema that ours uses; says where it does not.
+fn keeps(schema: &serde_json::Value, root: &serde_json::Value, value: &serde_json::Value) -> Result<(), String> {
+    use serde_json::Value;
+    if let Some(name) = schema.get("$ref").and_then(Value::as_str) {
+        let found = root.pointer(name.trim_start_matches('#')).ok_or(format!("no {name}"))?;
+        return keeps(found, root, value);
+    }
+    for choice in ["anyOf", "oneOf"] {
+        if let Some(list) = schema.get(choice).and_then(Value::as_array) {
+            let all: Vec<_> = list.iter().map(|s| keeps(s, root, value)).collect();
+            let sound = all.iter().filter(|r| r.is_ok()).count();
+            if sound == 0 || (choice == "oneOf" && sound > 1) {
+                return Err(format!("{sound} of {choice} for {value}: {all:?}"));
+            }
+        }
+    }
+    if schema.get("const").is_some_and(|c| c != value) {
+        return Err(format!("{value} is not {}", schema["const"]));
+    }
+    if schema.get("enum").and_then(Value::as_array).is_some_and(|e| !e.contains(value)) {
+        return Err(format!("{value} is not one of {}", schema["enum"]));
+    }
+    let kinds: Vec<&str> = match schema.get("type") {
+        Some(Value::String(kind)) => vec![kind],
+        Some(Value::Array(kinds)) => kinds.iter().filter_map(Value::as_str).collect(),
+        _ => vec![],
+    };
+    let is = |kind: &&str| match *kind {
+        "object" => value.is_object(),
+        "array" => value.is_array(),
+        "string" => value.is_string(),
+        "boolean" => value.is_boolean(),
+        "integer" => value.is_i64(),
+        "number" => value.is_number(),
+        _ => value.is_null(),
+    };
+    if !kinds.is_empty() && !kinds.iter().any(is) {
+        return Err(format!("{value} is no {kinds:?}"));
+    }
+    if let Some(table) = value.as_object() {
+        let properties = schema.get("properties").and_then(Value::as_object);
+        for (key, inner) in table {
+            match properties.and_then(|p| p.get(key)) {
+                Some(schema) => keeps(schema, root, inner).map_err(|e| format!("{key}: {e}"))?,
+                None if schema["additionalProperties"] == false => return Err(format!("unknown key {key}")),
+                None => {}
+            }
+        }
+        let required = schema.get("required").and_then(Value::as_array);
+        if let Some(missing) = required.into_iter().flatten().find(|k| !table.contains_key(k.as_str().unwrap())) {
+            return Err(format!("{missing} is missing"));
+        }
+    }
+    if let (Some(items), Some(list)) = (schema.get("items"), value.as_array()) {
+        list.iter().try_for_each(|item| keeps(items, root, item))?;
+    }
+    Ok(())
+}
+
+#[test]
+fn the_schema_accepts_every_built_in_scene_and_refuses_what_the_program_refuses() {
+    let schema = json_schema();
+    for scene in &builtin::ALL {
+        let value: serde_json::Value = toml::from_str(scene.text).unwrap();
+        keeps(&schema, &schema, &value).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
+    }
+    for bad in ["radus_m = 0.1", "model = \"blob\"", "n = \"x\""] {
+        let key = bad.split(' ').next().unwrap();
+        let lines = TUBE.lines().filter(|l| !l.starts_with(&format!("{key} "))).collect::<Vec<_>>().join("\n");
+        let value: serde_json::Value = toml::from_str(&format!("{lines}\n{bad}\n")).unwrap();
+        assert!(keeps(&schema, &schema, &value).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn the_schema_explains_every_key() {
+    let schema = json_schema();
+    for model in metachron::scene::format::MODELS {
+        for (key, inner) in schema["$defs"][model]["properties"].as_object().unwrap() {
+            assert!(key == "model" || inner["description"].is_string(), "{model}.{key}");
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 500, ..ProptestConfig::default() })]
+
+    #[test]
+    fn no_bytes_make_the_loader_panic(bytes in proptest::collection::vec(any::<u8>(), 0..400)) {
+        let _ = Source::memory("bytes", &bytes).and_then(|s| load(&s, &[])).map_err(|e| format!("{:?}", miette::Report::new(e)));
+    }
+
+    #[test]
+    fn no_damaged_scene_makes_the_loader_panic(
+        scene in 0..builtin::ALL.len(),
+        cuts in proptest::collection::vec((any::<prop::sample::Index>(), 0..30_usize, "[ -~\nλ\\[\\]{}=\"'.]{0,8}"), 1..4),
+    ) {
+        let mut text: Vec<char> = builtin::ALL[scene].text.chars().collect();
+        for (at, gone, put) in cuts {
+            let at = at.index(text.len());
+            let end = (at + gone).min(text.len());
+            text.splice(at..end, put.chars());
+        }
+        let text: String = text.into_iter().collect();
+        let _ = read(&text).map_err(|e| format!("{:?}", miette::Report::new(e)));
+    }
+
+    #[test]
+    fn no_number_makes_the_loader_panic(value in any::<f64>(), key in 0..9_usize) {
+        let keys = ["radius_m", "wall_m", "young_pa", "density_kg_m3", "rate_hz", "dt_ms", "eps_m", "importance", "n"];
+        let source = Source::memory("test.toml", TUBE.as_bytes()).unwrap();
+        let shown = toml::Value::Float(value).to_string();
+        let _ = load(&source, &[(format!("object.intestine.{}", keys[key]), shown)]);
+    }
+}
