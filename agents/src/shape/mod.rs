@@ -1,14 +1,23 @@
 //! Shapes without physics: solids, skeleton curves, meshes and their levels.
 
 mod convert;
+mod curve;
 pub(crate) mod field;
+mod mesh;
 mod mesh_field;
 mod near;
+pub mod patch;
+mod primitive;
 mod solid;
+mod tool;
 
 pub use convert::ShapeError;
+pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
+pub use mesh::{creased_mesh, hull_mesh};
 pub(crate) use near::near_segments;
+pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use solid::{Obstacle, Solid};
+pub use tool::{ToolPart, ToolShape};
 
 #[cfg(test)]
 mod field_tests;
