@@ -1,1 +1,24 @@
 //! Draws the newest states (wgpu) and the panels around them (egui). It reads snapshots, never the runtime.
+//!
+//! A frame: [`Stage::see`] takes the newest snapshots, [`Stage::pose`] brings them to the frame's time,
+//! [`Stage::survey`] says what is visible and how large, [`Stage::compose`] makes the [`Picture`] at the levels asked
+//! for, [`Renderer::render`] draws it. [`Stage`] needs no GPU; [`Offscreen`] needs no window.
+
+mod compose;
+mod draw;
+mod gather;
+mod offscreen;
+mod pick;
+mod picture;
+mod pose;
+mod survey;
+mod view;
+
+pub use compose::Hand;
+pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
+pub use gather::{Actor, Form, Look, Material, Prop, Stage, States};
+pub use offscreen::{Gpu, GpuError, Lost, Offscreen, PictureFile};
+pub use pick::Hit;
+pub use picture::{Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, Style};
+pub use survey::Seen;
+pub use view::{Camera, Ray, Size};

@@ -1,0 +1,87 @@
+//! What does a frame cost to draw, over (ε, n)? Fits set-up, price a triangle and price a pixel on this machine's adapter.
+//!
+//! `cargo run --release --example drawing [-- FILE.png [EPS_M N [WIDTH HEIGHT [SAMPLES]]]]`; with a file name it draws one picture instead.
+
+#[path = "../tests/system/stage.rs"]
+mod stage;
+
+use metachron::compositor::{Colouring, Gpu, GpuError, Offscreen, RendererOptions, Size, Style};
+use std::path::Path;
+use std::time::Instant;
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let gpu = Gpu::headless()?;
+    println!("{}", gpu.describe());
+    match arguments.first() {
+        Some(path) => draw(gpu, Path::new(path), &arguments[1..]),
+        None => Ok(measure(&gpu)?),
+    }
+}
+
+fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::error::Error>> {
+    let number = |i: usize, default: f64| numbers.get(i).map_or(Ok(default), |text| text.parse());
+    let (eps_m, n) = (number(0, 0.006)?, number(1, 5.0)? as u8);
+    let size = Size { width: number(2, 1280.0)? as u32, height: number(3, 720.0)? as u32 };
+    let options = RendererOptions { samples: number(4, 4.0)? as u32, shadow_px: 2048 };
+    let style = match numbers.get(5).map(String::as_str) {
+        Some("resolution") => Style { colouring: Colouring::Resolution, wireframe: true },
+        Some("age") => Style { colouring: Colouring::Age, wireframe: false },
+        _ => Style::default(),
+    };
+    let (mut stage, camera) = stage::still_life();
+    let mut seen = Vec::new();
+    stage.survey(&camera, size, &mut seen);
+    let mut offscreen = Offscreen::new(gpu, size, options)?;
+    let times = offscreen.render(stage.compose(&camera, &stage::level(eps_m, n), style, None), &camera)?;
+    offscreen.save(path)?;
+    println!("{times:?}");
+    Ok(())
+}
+
+/// The least of 15 frames: what the work takes when nobody disturbs it, milliseconds; and its triangles.
+fn frame_ms(gpu: &Gpu, size: Size, eps_m: f64, n: u8) -> Result<(f64, u64), GpuError> {
+    let (mut stage, camera) = stage::still_life();
+    let mut seen = Vec::new();
+    let options = RendererOptions::for_adapter(&gpu.info);
+    let mut offscreen = Offscreen::new(gpu.clone(), size, options)?;
+    let levels = stage::level(eps_m, n);
+    let (mut least, mut triangles) = (f64::INFINITY, 0);
+    for _ in 0..15 {
+        let start = Instant::now();
+        stage.survey(&camera, size, &mut seen);
+        let picture = stage.compose(&camera, &levels, Style::default(), None);
+        triangles = offscreen.render(picture, &camera)?.triangles;
+        least = least.min(start.elapsed().as_secs_f64() * 1e3);
+    }
+    Ok((least, triangles))
+}
+
+fn measure(gpu: &Gpu) -> Result<(), GpuError> {
+    let hd = Size { width: 1280, height: 720 };
+    println!("{:>8} {:>3} {:>10} {:>9}", "eps_m", "n", "triangles", "frame_ms");
+    let mut points = Vec::new();
+    for (eps_m, n) in [(0.1, 0), (0.04, 1), (0.02, 2), (0.02, 3), (0.01, 3), (0.01, 4), (0.005, 4), (0.005, 5)] {
+        let (ms, triangles) = frame_ms(gpu, hd, eps_m, n)?;
+        println!("{eps_m:>8} {n:>3} {triangles:>10} {ms:>9.2}");
+        points.push((triangles as f64, ms));
+    }
+    let (base, slope) = line(&points);
+    let small = Size { width: 64, height: 36 };
+    let (few, many) = (frame_ms(gpu, small, 0.1, 0)?, frame_ms(gpu, small, 0.005, 4)?);
+    let triangle_us = (many.0 - few.0) * 1e3 / (many.1 - few.1) as f64;
+    let setup = few.0 - triangle_us * 1e-3 * few.1 as f64;
+    println!("fit at 1280 x 720: {base:.2} ms + {:.3} us a triangle", slope * 1e3);
+    println!("without pixels (64 x 36): {setup:.2} ms + {triangle_us:.3} us a triangle");
+    println!("a pixel: {:.2} ns", (base - setup) * 1e6 / hd.pixels());
+    Ok(())
+}
+
+/// Least squares: offset and slope.
+fn line(points: &[(f64, f64)]) -> (f64, f64) {
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let slope = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum::<f64>()
+        / points.iter().map(|p| (p.0 - mx).powi(2)).sum::<f64>();
+    (my - slope * mx, slope)
+}

@@ -1,0 +1,298 @@
+//! Makes the picture: every visible object at the level asked for, as flat arrays.
+//!
+//! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: which level is right, the GPU.
+//! A tube that the camera does not see stays in the picture for its shadow.
+
+use super::gather::{Form, Look, Material, PropShape, Stage, Track};
+use super::picture::{
+    Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
+    resolution_colour,
+};
+use super::view::Camera;
+use glam::{DQuat, DVec3, Vec3};
+use metachron_agents::shape::{Primitive, Rounding, SkinFrame, Solid, ToolShape};
+use metachron_agents::{AgentId, Anchor, Body, N_MAX, Resolution, ToolState};
+use std::f64::consts::TAU;
+
+/// Level at which fixed solids are drawn.
+const PROP_LEVEL: u8 = 4;
+/// Repeats of the skin's texture around a tube; the shader has the same number.
+const TEXTURE_AROUND: f64 = 2.0;
+/// Share of the distance to the target that the user's spring is thick.
+const SPRING_SHARE: f64 = 0.006;
+/// Turns of that spring, and intervals a turn.
+const SPRING_TURNS: (usize, usize) = (9, 8);
+/// Force that colours a grasp fully red, newtons.
+const FORCE_RED_N: f64 = 2.0;
+/// Past this multiple of the eye's distance an object no longer widens the light.
+const FOCUS_REACH: f64 = 4.0;
+
+/// The user's spring on an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Hand {
+    /// Whom it pulls.
+    pub object: AgentId,
+    /// At which material point.
+    pub anchor: Anchor,
+    /// Where the other end is, metres.
+    pub target: DVec3,
+}
+
+/// Lists that are filled anew every frame.
+#[derive(Debug, Default)]
+pub(super) struct Scratch {
+    solids: Vec<(MeshKey, SolidInstance)>,
+    tubes: Vec<(u8, usize)>,
+}
+
+impl Stage {
+    /// The picture of the last composition.
+    #[must_use]
+    pub fn picture(&self) -> &Picture {
+        &self.picture
+    }
+
+    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)).
+    pub fn compose(&mut self, camera: &Camera, levels: &[Resolution], style: Style, hand: Option<Hand>) -> &Picture {
+        let mut picture = std::mem::take(&mut self.picture);
+        let mut scratch = std::mem::take(&mut self.scratch);
+        picture.clear();
+        picture.style = style;
+        picture.origin = camera.target_m.round();
+        scratch.solids.clear();
+        self.find_focus(camera, &mut picture);
+        self.add_tubes(levels, &mut picture, &mut scratch);
+        for (number, track) in self.tracks.iter().enumerate() {
+            add_solid(track, level(levels, number), &picture, &mut scratch.solids);
+        }
+        self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
+        self.add_grasps(&picture, &mut scratch.solids);
+        if let Some((from, to)) = hand.and_then(|hand| Some((self.place(hand.object, hand.anchor)?, hand.target))) {
+            add_spring(from, to, SPRING_SHARE * camera.distance_m, &mut picture);
+        }
+        sort_solids(&mut scratch.solids, &mut picture);
+        self.picture = picture;
+        self.scratch = scratch;
+        &self.picture
+    }
+
+    /// Where a material point of an agent is shown, metres.
+    #[must_use]
+    pub fn place(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
+        let track = self.tracks.iter().find(|track| track.actor.id == id)?;
+        track.pose.point(anchor).map(|(position, _)| position)
+    }
+
+    /// The ball that light and shadow are fitted to: all that is near what the camera looks at.
+    fn find_focus(&self, camera: &Camera, picture: &mut Picture) {
+        let reach = FOCUS_REACH * camera.distance_m;
+        let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
+        let balls = moving.map(|t| (t.bounds.centre, t.bounds.radius_m));
+        let balls = balls.chain(self.props.iter().map(|p| (p.position, p.body.radius_m)));
+        let near = balls.filter(|(c, r)| *r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach);
+        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        for (centre, radius) in near {
+            low = low.min(centre - radius);
+            high = high.max(centre + radius);
+        }
+        let found = low.is_finite() && high.is_finite();
+        picture.focus_m = if found { 0.5 * (low + high) } else { camera.target_m };
+        let radius = if found { 0.5 * low.distance(high) } else { camera.distance_m };
+        // in steps of a tenth, so that shadows do not crawl with every move
+        picture.focus_radius_m = 1.1_f64.powf((radius.max(1e-3).ln() / 1.1_f64.ln()).ceil());
+    }
+
+    /// Cuts every tube into its intervals, tubes of one level side by side.
+    fn add_tubes(&mut self, levels: &[Resolution], picture: &mut Picture, scratch: &mut Scratch) {
+        scratch.tubes.clear();
+        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| matches!(t.actor.form, Form::Tube));
+        scratch.tubes.extend(tubes.map(|(number, _)| (level(levels, number).n, number)));
+        scratch.tubes.sort_unstable();
+        for &(n, number) in &scratch.tubes {
+            let track = &mut self.tracks[number];
+            let Body::Curve(curve) = &track.pose else { continue };
+            let at = level(levels, number);
+            let frames = track.skeleton.rebuild(curve, at.eps_m);
+            let Some(last) = frames.len().checked_sub(1) else { continue };
+            let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+            let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
+            let texture_per_m = TEXTURE_AROUND / (TAU * mean.max(1e-6));
+            let (first, origin) = (picture.samples.len() as u32, picture.origin);
+            picture.samples.extend(frames.iter().map(|f| sample(f, origin, texture_per_m as f32, paint)));
+            let tissue = track.actor.look.material == Material::Tissue;
+            picture.tubes.push(TubeRun { first, intervals: last as u32, n, tissue, shown: track.seen });
+            for end in [&frames[0], &frames[last]] {
+                let size = Rounding { extents: Vec3::ZERO, radius_m: end.radius_m as f32 };
+                let ball = instance(end.position - origin, DQuat::IDENTITY, size, paint);
+                scratch.solids.push((MeshKey::Primitive(Primitive::Ball, n), ball));
+            }
+        }
+    }
+
+    /// A small ball at every point that is held, from white to red by the force.
+    fn add_grasps(&self, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+        for track in &self.tracks {
+            let (Body::Tool(tool), Form::Tool(shape)) = (&track.pose, &track.actor.form) else { continue };
+            let Some(grasp) = tool.grasp else { continue };
+            let Some(point) = self.place(grasp.target, grasp.anchor) else { continue };
+            let heat = (tool.force_n / FORCE_RED_N).clamp(0.0, 1.0);
+            let cool = (235.0 * (1.0 - heat)) as u8;
+            let colour = [235, cool, (f64::from(cool) * 0.8) as u8];
+            let size = Rounding { extents: Vec3::ZERO, radius_m: (0.9 * shape.shaft_radius_m) as f32 };
+            let paint = Paint { colour, material: Material::Plastic, tint: [colour[0], colour[1], colour[2], 200] };
+            let ball = instance(point - picture.origin, DQuat::IDENTITY, size, paint);
+            solids.push((MeshKey::Primitive(Primitive::Ball, 2), ball));
+        }
+    }
+}
+
+/// Colour, material and tint of an object.
+#[derive(Debug, Clone, Copy)]
+struct Paint {
+    colour: [u8; 3],
+    material: Material,
+    tint: [u8; 4],
+}
+
+impl Paint {
+    fn of(look: Look, tint: [u8; 4]) -> Self {
+        Self { colour: look.colour, material: look.material, tint }
+    }
+
+    fn packed(self) -> [u8; 4] {
+        let [r, g, b] = self.colour;
+        [r, g, b, self.material as u8]
+    }
+}
+
+/// The level asked for an actor, made safe.
+fn level(levels: &[Resolution], number: usize) -> Resolution {
+    let asked = levels.get(number).copied().unwrap_or(Resolution { eps_m: 0.01, n: 3 });
+    Resolution { eps_m: asked.eps_m, n: asked.n.min(N_MAX) }
+}
+
+fn tint(style: Style, at: Resolution, age_s: f64) -> [u8; 4] {
+    let with = |[r, g, b]: [u8; 3], share: u8| [r, g, b, share];
+    match style.colouring {
+        Colouring::Material => [0; 4],
+        Colouring::Resolution => with(resolution_colour(at), 220),
+        Colouring::Age => with(age_colour(age_s), 190),
+    }
+}
+
+fn sample(f: &SkinFrame, origin: DVec3, texture_per_m: f32, paint: Paint) -> SkinSample {
+    SkinSample {
+        position: (f.position - origin).as_vec3().to_array(),
+        radius_m: f.radius_m as f32,
+        slope: f.slope.as_vec3().to_array(),
+        radius_slope: f.radius_slope as f32,
+        normal: f.normal.as_vec3().to_array(),
+        twist_rad: f.twist_rad as f32,
+        arc_m: f.arc_m as f32,
+        texture_per_m,
+        colour: paint.packed(),
+        tint: paint.tint,
+    }
+}
+
+fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: Paint) -> SolidInstance {
+    SolidInstance {
+        rotation: rotation.as_quat().to_array(),
+        position: position.as_vec3().to_array(),
+        radius_m: size.radius_m,
+        extents: size.extents.to_array(),
+        pad: 0.0,
+        colour: paint.packed(),
+        tint: paint.tint,
+        pad2: [0; 2],
+    }
+}
+
+/// The mesh and size of a solid at level `n`; `None` for one that is not drawn so.
+fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Rounding)> {
+    if let Some(number) = given {
+        return Some((MeshKey::Given(number), Rounding { extents: Vec3::ONE, radius_m: 0.0 }));
+    }
+    Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
+}
+
+fn add_solid(track: &Track, at: Resolution, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+    let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+    match (&track.actor.form, &track.pose) {
+        (Form::Solid(solid), Body::Rigid(rigid)) => {
+            let Some((mesh, size)) = mesh_of(solid, track.body.given, at.n) else { return };
+            solids.push((mesh, instance(rigid.position - picture.origin, rigid.rotation, size, paint)));
+        }
+        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at.n, paint, picture.origin), solids),
+        _ => {}
+    }
+}
+
+fn add_tool(
+    shape: &ToolShape,
+    tool: &ToolState,
+    (n, paint, origin): (u8, Paint, DVec3),
+    solids: &mut Vec<(MeshKey, SolidInstance)>,
+) {
+    for part in shape.parts(tool.jaw) {
+        let position = tool.tip + tool.rotation * part.position - origin;
+        let mesh = MeshKey::Primitive(part.primitive, n);
+        solids.push((mesh, instance(position, tool.rotation * part.rotation, part.size, paint)));
+    }
+}
+
+fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+    if matches!(prop.solid, Solid::Plane) {
+        let point = prop.position - picture.origin;
+        let floor = FloorDraw { point, normal: prop.rotation * DVec3::Z, colour: prop.look.colour };
+        picture.floor.get_or_insert(floor);
+        return;
+    }
+    let Some((mesh, size)) = mesh_of(&prop.solid, prop.body.given, PROP_LEVEL) else { return };
+    let paint = Paint::of(prop.look, [0; 4]);
+    solids.push((mesh, instance(prop.position - picture.origin, prop.rotation, size, paint)));
+}
+
+/// The user's spring as a coil of wire between two points.
+fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
+    let axis = to - from;
+    let Some(along) = axis.try_normalize() else { return };
+    let (x, count) = (along.any_orthonormal_vector(), SPRING_TURNS.0 * SPRING_TURNS.1);
+    let y = along.cross(x);
+    let paint = Paint { colour: [250, 190, 60], material: Material::Metal, tint: [255, 190, 60, 120] };
+    let first = picture.samples.len() as u32;
+    for i in 0..=count {
+        let t = i as f64 / count as f64;
+        // straight at both ends, so that it leaves one point and reaches the other
+        let swell = (t * (1.0 - t) * 12.0).min(1.0);
+        let rate = if swell < 1.0 { 12.0 * (1.0 - 2.0 * t) } else { 0.0 };
+        let (sin, cos) = (TAU * t * SPRING_TURNS.0 as f64).sin_cos();
+        let (out, side) = (x * cos + y * sin, y * cos - x * sin);
+        let turn = TAU * SPRING_TURNS.0 as f64;
+        let frame = SkinFrame {
+            arc_m: t,
+            position: from + axis * t + out * (radius_m * swell),
+            slope: axis + out * (radius_m * rate) + side * (radius_m * swell * turn),
+            normal: out,
+            twist_rad: 0.0,
+            radius_m: 0.16 * radius_m,
+            radius_slope: 0.0,
+        };
+        picture.samples.push(sample(&frame, picture.origin, 0.0, paint));
+    }
+    picture.tubes.push(TubeRun { first, intervals: count as u32, n: 1, tissue: false, shown: true });
+}
+
+/// Sorts solids by mesh and cuts them into runs.
+fn sort_solids(solids: &mut [(MeshKey, SolidInstance)], picture: &mut Picture) {
+    // the order among equals does not show, so the sort need not allocate to keep it
+    solids.sort_unstable_by_key(|(mesh, _)| *mesh);
+    for (mesh, solid) in solids.iter() {
+        let first = picture.instances.len() as u32;
+        picture.instances.push(*solid);
+        match picture.solids.last_mut() {
+            Some(run) if run.mesh == *mesh => run.count += 1,
+            _ => picture.solids.push(SolidRun { mesh: *mesh, first, count: 1 }),
+        }
+    }
+}

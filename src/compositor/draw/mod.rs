@@ -1,0 +1,318 @@
+//! Draws a [`Picture`] with wgpu: tubes skinned on the GPU, solids by instances, one shadow map, one pass of light.
+//!
+//! In: a picture, a camera, a target. Out: pixels and what they took. Never here: snapshots, levels, windows.
+//! A renderer can be dropped and made anew with another device at any time; it holds nothing that a picture does not give.
+
+mod buffers;
+mod globals;
+mod meshes;
+mod pipelines;
+mod timing;
+mod tissue;
+
+use super::offscreen::Lost;
+use super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
+use super::view::{Camera, Size};
+use buffers::{Growing, Targets};
+use globals::Globals;
+use meshes::{Mesh, Meshes};
+use pipelines::{Bindings, Pipelines};
+use std::time::{Duration, Instant};
+use timing::Timing;
+
+/// How a renderer spends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct RendererOptions {
+    /// Samples a pixel: 1 or 4. Four smooth every edge and cost about twice the pixels' time.
+    pub samples: u32,
+    /// Width and height of the shadow map, 64 … 8192.
+    pub shadow_px: u32,
+}
+
+impl RendererOptions {
+    /// What suits an adapter: a processor that draws gets one sample a pixel and a smaller shadow map.
+    #[must_use]
+    pub fn for_adapter(info: &wgpu::AdapterInfo) -> Self {
+        match info.device_type {
+            wgpu::DeviceType::Cpu => Self { samples: 1, shadow_px: 1024 },
+            _ => Self { samples: 4, shadow_px: 2048 },
+        }
+    }
+}
+
+/// Where a picture is drawn.
+#[derive(Debug, Clone, Copy)]
+pub struct Target<'a> {
+    /// A view of a texture in the renderer's format.
+    pub view: &'a wgpu::TextureView,
+    /// The texture's size.
+    pub size: Size,
+}
+
+/// What drawing a picture took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct DrawTimes {
+    /// Time of this thread: uploading, encoding, submitting.
+    pub cpu: Duration,
+    /// Time of the GPU on the newest frame whose time stamps are back; `None` where the adapter has none.
+    pub gpu: Option<Duration>,
+    /// Triangles drawn, without those of the shadow map.
+    pub triangles: u64,
+    /// Draw calls, with those of the shadow map.
+    pub draws: u32,
+}
+
+/// Why a picture could not be drawn.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum DrawError {
+    /// The target is larger than the device's textures. Nothing was drawn; a smaller one will do.
+    #[error("a picture of {width} × {height} pixels is too large for this adapter; its limit is {max}")]
+    TooLarge {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// The largest width and height.
+        max: u32,
+    },
+    /// The device is gone. Make a new device and a new renderer; pictures stay valid.
+    #[error("the graphics device was lost: {reason}")]
+    DeviceLost {
+        /// What the driver says.
+        reason: String,
+    },
+    /// wgpu refused what was asked: a bug of ours, or a device out of memory. The picture is undefined.
+    #[error("the graphics device refused: {message}")]
+    Refused {
+        /// What wgpu says.
+        message: String,
+    },
+}
+
+/// Draws pictures on one device.
+#[derive(Debug)]
+pub struct Renderer {
+    device: wgpu::Device,
+    queue: wgpu::Queue,
+    options: RendererOptions,
+    format: wgpu::TextureFormat,
+    lost: Lost,
+    pipelines: Pipelines,
+    bindings: Bindings,
+    meshes: Meshes,
+    samples: Growing,
+    instances: Growing,
+    targets: Option<Targets>,
+    timing: Option<Timing>,
+}
+
+impl Renderer {
+    /// A renderer for targets of `format`. Sets the device's callback for its loss ([`Renderer::lost`]).
+    ///
+    /// # Errors
+    /// [`DrawError::Refused`] where the device cannot do what the shaders need.
+    pub fn new(
+        device: &wgpu::Device,
+        queue: &wgpu::Queue,
+        format: wgpu::TextureFormat,
+        options: RendererOptions,
+    ) -> Result<Self, DrawError> {
+        let lost = Lost::watch(device);
+        let options = RendererOptions {
+            samples: if options.samples > 1 { 4 } else { 1 },
+            shadow_px: options.shadow_px.clamp(64, 8192).min(device.limits().max_texture_dimension_2d),
+        };
+        let scope = device.push_error_scope(wgpu::ErrorFilter::Validation);
+        let layouts = pipelines::Layouts::new(device);
+        let pipelines = Pipelines::new(device, &layouts, format, options.samples);
+        let bindings = Bindings::new(device, queue, &layouts, options.shadow_px);
+        let renderer = Self {
+            device: device.clone(),
+            queue: queue.clone(),
+            options,
+            format,
+            lost,
+            pipelines,
+            bindings,
+            meshes: Meshes::default(),
+            samples: Growing::new("tube samples", size_of::<SkinSample>()),
+            instances: Growing::new("solid instances", size_of::<SolidInstance>()),
+            targets: None,
+            timing: Timing::new(device, queue),
+        };
+        refusal(scope)?;
+        Ok(renderer)
+    }
+
+    /// Whether and why the device was lost.
+    #[must_use]
+    pub fn lost(&self) -> &Lost {
+        &self.lost
+    }
+
+    /// The options in use.
+    #[must_use]
+    pub fn options(&self) -> RendererOptions {
+        self.options
+    }
+
+    /// Draws `picture` as `camera` sees it and submits the work; it does not wait for the GPU.
+    ///
+    /// A target without pixels is left alone.
+    ///
+    /// # Errors
+    /// See [`DrawError`]; the renderer stays usable unless the device was lost.
+    pub fn render(&mut self, picture: &Picture, camera: &Camera, target: Target<'_>) -> Result<DrawTimes, DrawError> {
+        let start = Instant::now();
+        self.check(target.size)?;
+        if target.size.is_empty() {
+            return Ok(DrawTimes::default());
+        }
+        let scope = self.device.push_error_scope(wgpu::ErrorFilter::Validation);
+        self.upload(picture, camera, target.size);
+        let mut encoder = self.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("frame") });
+        let shadows = self.draw_shadows(&mut encoder, picture);
+        let draws = shadows + self.draw_picture(&mut encoder, picture, target);
+        if let Some(timing) = &mut self.timing {
+            timing.resolve(&mut encoder);
+        }
+        self.queue.submit([encoder.finish()]);
+        if let Some(timing) = &mut self.timing {
+            timing.request();
+        }
+        refusal(scope)?;
+        Ok(DrawTimes { cpu: start.elapsed(), gpu: self.gpu_time(), triangles: picture.triangles(), draws })
+    }
+
+    /// GPU time of the newest frame whose time stamps are back.
+    pub fn gpu_time(&mut self) -> Option<Duration> {
+        self.timing.as_mut().and_then(Timing::newest)
+    }
+
+    fn check(&self, size: Size) -> Result<(), DrawError> {
+        if let Some(reason) = self.lost.reason() {
+            return Err(DrawError::DeviceLost { reason });
+        }
+        let max = self.device.limits().max_texture_dimension_2d;
+        if size.width > max || size.height > max {
+            return Err(DrawError::TooLarge { width: size.width, height: size.height, max });
+        }
+        Ok(())
+    }
+
+    fn upload(&mut self, picture: &Picture, camera: &Camera, size: Size) {
+        let globals = Globals::new(picture, camera, size, self.options.shadow_px);
+        self.queue.write_buffer(&self.bindings.globals, 0, bytemuck::bytes_of(&globals));
+        self.samples.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.samples));
+        self.instances.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.instances));
+        self.meshes.prepare(&self.device, picture);
+        if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
+            self.targets = Some(Targets::new(&self.device, self.format, size, self.options.samples));
+        }
+    }
+
+    /// The depths of everything as the light sees it; the number of draws.
+    fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, picture: &Picture) -> u32 {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadow"),
+            depth_stencil_attachment: Some(depth(&self.bindings.shadow, 1.0, wgpu::StoreOp::Store)),
+            timestamp_writes: self.timing.as_ref().map(Timing::first_pass),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.bindings.light, &[]);
+        let mut draws = 0;
+        pass.set_pipeline(&self.pipelines.skin_shadow);
+        for tube in &picture.tubes {
+            let mesh = self.meshes.patch(tube.n.min(SHADOW_LEVEL));
+            draws += self.draw_tube(&mut pass, tube, mesh, false);
+        }
+        pass.set_pipeline(&self.pipelines.solid_shadow);
+        for run in &picture.solids {
+            draws += self.draw_solids(&mut pass, run, false);
+        }
+        draws
+    }
+
+    /// The picture itself, nearest kinds first so that hidden pixels are not lit; the number of draws.
+    fn draw_picture(&self, encoder: &mut wgpu::CommandEncoder, picture: &Picture, target: Target<'_>) -> u32 {
+        let Some(targets) = &self.targets else { return 0 };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(targets.colour(target.view))],
+            depth_stencil_attachment: Some(depth(&targets.depth, 0.0, wgpu::StoreOp::Discard)),
+            timestamp_writes: self.timing.as_ref().map(Timing::last_pass),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.bindings.picture, &[]);
+        let mut draws = 0;
+        for tissue in [true, false] {
+            pass.set_pipeline(if tissue { &self.pipelines.tissue } else { &self.pipelines.skin });
+            for tube in picture.tubes.iter().filter(|t| t.tissue == tissue && t.shown) {
+                draws += self.draw_tube(&mut pass, tube, self.meshes.patch(tube.n), false);
+            }
+        }
+        pass.set_pipeline(&self.pipelines.solid);
+        for run in &picture.solids {
+            draws += self.draw_solids(&mut pass, run, false);
+        }
+        if picture.style.wireframe {
+            draws += self.draw_edges(&mut pass, picture);
+        }
+        if picture.floor.is_some() {
+            pass.set_pipeline(&self.pipelines.floor);
+            pass.draw(0..4, 0..1);
+            draws += 1;
+        }
+        pass.set_pipeline(&self.pipelines.room);
+        pass.draw(0..3, 0..1);
+        draws + 1
+    }
+
+    fn draw_edges(&self, pass: &mut wgpu::RenderPass<'_>, picture: &Picture) -> u32 {
+        let mut draws = 0;
+        pass.set_pipeline(&self.pipelines.skin_edges);
+        for tube in picture.tubes.iter().filter(|t| t.shown) {
+            draws += self.draw_tube(pass, tube, self.meshes.patch(tube.n), true);
+        }
+        pass.set_pipeline(&self.pipelines.solid_edges);
+        for run in &picture.solids {
+            draws += self.draw_solids(pass, run, true);
+        }
+        draws
+    }
+
+    /// One tube: the patch once an interval, between each sample and the next of the one buffer of all tubes.
+    fn draw_tube(&self, pass: &mut wgpu::RenderPass<'_>, tube: &TubeRun, mesh: Option<&Mesh>, edges: bool) -> u32 {
+        let (Some(mesh), Some(samples)) = (mesh, self.samples.buffer()) else { return 0 };
+        let stride = size_of::<SkinSample>() as u64;
+        let (from, count) = (u64::from(tube.first) * stride, u64::from(tube.intervals) * stride);
+        pass.set_vertex_buffer(1, samples.slice(from..from + count));
+        pass.set_vertex_buffer(2, samples.slice(from + stride..from + stride + count));
+        mesh.draw(pass, edges, tube.intervals)
+    }
+
+    fn draw_solids(&self, pass: &mut wgpu::RenderPass<'_>, run: &SolidRun, edges: bool) -> u32 {
+        let (Some(mesh), Some(instances)) = (self.meshes.solid(run.mesh), self.instances.buffer()) else { return 0 };
+        let stride = size_of::<SolidInstance>() as u64;
+        let from = u64::from(run.first) * stride;
+        pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
+        mesh.draw(pass, edges, run.count)
+    }
+}
+
+/// Shadows need no finer patches than this: the shadow map's texels are coarser.
+const SHADOW_LEVEL: u8 = 2;
+
+fn depth(view: &wgpu::TextureView, clear: f32, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store };
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops: Some(ops), stencil_ops: None }
+}
+
+/// What wgpu refused while `scope` was open.
+fn refusal(scope: wgpu::ErrorScopeGuard) -> Result<(), DrawError> {
+    match pollster::block_on(scope.pop()) {
+        None => Ok(()),
+        Some(error) => Err(DrawError::Refused { message: error.to_string() }),
+    }
+}

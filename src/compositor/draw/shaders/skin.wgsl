@@ -1,0 +1,106 @@
+// The skin of a tube: a cylinder patch bent between the frames at the two ends of an interval.
+// Hermite's cubic through both ends, the normal turned least between them, the radius likewise: a C¹ surface.
+
+struct Patch {
+    @location(0) at: vec4f, // u along, turn around, its cosine and sine
+    @location(1) place_a: vec4f,
+    @location(2) slope_a: vec4f,
+    @location(3) normal_a: vec4f,
+    @location(4) arc_a: vec2f,
+    @location(5) colour: vec4f,
+    @location(6) tint: vec4f,
+    @location(7) place_b: vec4f,
+    @location(8) slope_b: vec4f,
+    @location(9) normal_b: vec4f,
+    @location(10) arc_b: vec2f,
+    @builtin(instance_index) interval: u32,
+}
+
+struct Skin {
+    @builtin(position) clip: vec4f,
+    @location(0) p: vec3f,
+    @location(1) n: vec3f,
+    @location(2) t: vec3f,
+    @location(3) uv: vec2f,
+    @location(4) @interpolate(flat) colour: vec4f,
+    @location(5) @interpolate(flat) tint: vec4f,
+}
+
+struct Bent {
+    p: vec3f,
+    n: vec3f,
+    t: vec3f,
+}
+
+fn bend(in: Patch) -> Bent {
+    let u = in.at.x;
+    let v = 1.0 - u;
+    let h = max(in.arc_b.x - in.arc_a.x, 1e-9);
+    let w = vec4f(v * v * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u), u * v * v * h, -u * u * v * h);
+    let d = vec4f(-6.0 * u * v / h, 6.0 * u * v / h, v * (1.0 - 3.0 * u), u * (3.0 * u - 2.0));
+    // position and radius together: the radius is the fourth coordinate
+    let place = in.place_a * w.x + in.place_b * w.y + in.slope_a * w.z + in.slope_b * w.w;
+    let slope = in.place_a * d.x + in.place_b * d.y + in.slope_a * d.z + in.slope_b * d.w;
+    let speed = max(length(slope.xyz), 1e-9);
+    let t = slope.xyz / speed;
+    let across = mix(in.normal_a.xyz, in.normal_b.xyz, u);
+    let n = normalize(across - t * dot(across, t));
+    let out = n * in.at.z + cross(t, n) * in.at.w;
+    var b: Bent;
+    b.p = place.xyz + out * max(place.w, 0.0);
+    b.n = normalize(out - t * (slope.w / speed));
+    b.t = t;
+    return b;
+}
+
+@vertex
+fn vs_skin(in: Patch) -> Skin {
+    let b = bend(in);
+    let u = in.at.x;
+    let twist = mix(in.normal_a.w, in.normal_b.w, u);
+    var out: Skin;
+    out.clip = clip(b.p);
+    out.p = b.p;
+    out.n = b.n;
+    out.t = b.t;
+    out.uv = vec2f(mix(in.arc_a.x, in.arc_b.x, u) * in.arc_a.y, 2.0 * (in.at.y - twist * 0.15915494));
+    out.colour = vec4f(linear(in.colour.rgb), round(in.colour.a * 255.0));
+    let stripe = select(1.0, 0.62, g.viewport.z > 0.5 && (in.interval & 1u) == 1u);
+    out.tint = vec4f(linear(in.tint.rgb) * stripe, in.tint.a);
+    return out;
+}
+
+@vertex
+fn vs_skin_shadow(in: Patch) -> @builtin(position) vec4f {
+    let at = g.light_projection * vec4f(bend(in).p, 1.0);
+    return vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, at.z, 1.0);
+}
+
+// Wet tissue: mottled, veined, with a film of water over small folds.
+@fragment
+fn fs_tissue(in: Skin) -> @location(0) vec4f {
+    let tissue = textureSample(tissue_map, tissue_sampler, in.uv);
+    let plain = 1.0 - in.tint.a;
+    let base = in.colour.rgb;
+    var albedo = base * (0.70 + 0.60 * tissue.r);
+    let vein = tissue.g * plain;
+    albedo = mix(albedo, base * vec3f(0.62, 0.16, 0.20), 0.72 * vein);
+    let n0 = normalize(in.n);
+    let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
+    let n = normalize(n0 - in.t * fold.x - cross(in.t, n0) * fold.y);
+    albedo = mix(albedo, in.tint.rgb, in.tint.a);
+    return finish(shade(Surface(in.p, n, n0, albedo, u32(in.colour.a), 0.55 + 0.45 * plain)));
+}
+
+// A tube of anything else: cable, wire.
+@fragment
+fn fs_skin(in: Skin) -> @location(0) vec4f {
+    let n = normalize(in.n);
+    let albedo = mix(in.colour.rgb, in.tint.rgb, in.tint.a);
+    return finish(shade(Surface(in.p, n, n, albedo, u32(in.colour.a), 1.0)));
+}
+
+@fragment
+fn fs_edge(in: Skin) -> @location(0) vec4f {
+    return finish(mix(vec3f(0.85, 0.95, 1.0), in.tint.rgb * 2.2, in.tint.a * 0.7));
+}

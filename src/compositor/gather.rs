@@ -1,0 +1,283 @@
+//! From published snapshots to the states a frame shows.
+//!
+//! In: the newest snapshot of each agent and the frame's time. Out: one pose an object, at a time as near the frame's as the
+//! choice of [`States`] allows, and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
+
+use super::picture::Picture;
+use super::pose;
+use glam::{DQuat, DVec3};
+use metachron_agents::shape::{Obstacle, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh};
+use metachron_agents::{AgentId, Body, SimTime, Snapshot};
+use std::sync::Arc;
+
+/// Which states a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum States {
+    /// Between the two newest: smooth, one step of the agent late.
+    #[default]
+    Interpolate,
+    /// The newest carried on by its velocities to the frame's time: on time, wrong where forces act.
+    Extrapolate,
+    /// The newest as it is: on time to one step, not smooth where steps are longer than frames.
+    Latest,
+}
+
+/// What a surface is made of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Material {
+    /// Wet tissue with a texture of its own.
+    Tissue,
+    /// Brushed metal.
+    Metal,
+    /// Satin plastic.
+    #[default]
+    Plastic,
+    /// Matt, soft skin.
+    Skin,
+}
+
+/// How an object looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Colour, sRGB.
+    pub colour: [u8; 3],
+    /// Material.
+    pub material: Material,
+}
+
+/// What an agent's matter looks like in space.
+#[derive(Debug, Clone)]
+pub enum Form {
+    /// Nothing to see.
+    Unseen,
+    /// A skin over a framed curve.
+    Tube,
+    /// A solid that moves as one.
+    Solid(Solid),
+    /// A grasping tool.
+    Tool(ToolShape),
+}
+
+/// An agent as the picture knows it.
+#[derive(Debug, Clone)]
+pub struct Actor {
+    /// Which agent.
+    pub id: AgentId,
+    /// What it looks like in space.
+    pub form: Form,
+    /// Its colour and material.
+    pub look: Look,
+}
+
+/// Something fixed that is seen. The first plane among the props is the floor.
+#[derive(Debug, Clone)]
+pub struct Prop {
+    /// What and where.
+    pub obstacle: Obstacle,
+    /// Its colour and material.
+    pub look: Look,
+}
+
+/// Everything that can be seen, and its states at the time of a frame.
+#[derive(Debug, Default)]
+pub struct Stage {
+    pub(super) tracks: Vec<Track>,
+    pub(super) props: Vec<PropShape>,
+    pub(super) picture: Picture,
+    pub(super) scratch: super::compose::Scratch,
+}
+
+/// One agent over time.
+#[derive(Debug)]
+pub(super) struct Track {
+    pub actor: Actor,
+    pub body: BodyShape,
+    before: Option<Arc<Snapshot>>,
+    newest: Option<Arc<Snapshot>>,
+    awake: bool,
+    /// The state that is shown.
+    pub pose: Body,
+    pub shown: SimTime,
+    pub age_s: f64,
+    pub bounds: Bounds,
+    pub seen: bool,
+    pub skeleton: Skeleton,
+}
+
+/// A fixed solid with what drawing needs to know of it.
+#[derive(Debug)]
+pub(super) struct PropShape {
+    pub solid: Solid,
+    pub look: Look,
+    pub position: DVec3,
+    pub rotation: DQuat,
+    pub body: BodyShape,
+}
+
+/// The mesh of a solid that is not made of primitives, and the size of any.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BodyShape {
+    /// Number among the given meshes.
+    pub given: Option<u32>,
+    /// Radius of a ball about its origin that holds it, metres.
+    pub radius_m: f64,
+    /// A quarter of its surface, m²: the mean area it covers seen from any side (Cauchy), exact for convex bodies.
+    pub mean_area_m2: f64,
+}
+
+/// A ball that holds an object.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Bounds {
+    pub centre: DVec3,
+    pub radius_m: f64,
+}
+
+impl Stage {
+    /// A stage with these actors and props on it.
+    #[must_use]
+    pub fn new(actors: Vec<Actor>, props: Vec<Prop>) -> Self {
+        let mut meshes = Vec::new();
+        let props = props.into_iter().map(|prop| PropShape::new(prop, &mut meshes)).collect();
+        let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes)).collect();
+        let picture = Picture { meshes: meshes.into(), ..Picture::default() };
+        Self { tracks, props, picture, scratch: Default::default() }
+    }
+
+    /// Takes the newest snapshot of an agent; `awake` tells whether it goes on stepping.
+    /// One that was seen already changes nothing, one of an earlier time starts its history anew (a reset).
+    pub fn see(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
+        if let Some(track) = self.tracks.iter_mut().find(|track| track.actor.id == id) {
+            track.see(newest, awake);
+        }
+    }
+
+    /// Brings every object to the frame's time as `states` asks.
+    pub fn pose(&mut self, time: SimTime, states: States) {
+        for track in &mut self.tracks {
+            track.pose_at(time, states);
+        }
+    }
+
+    /// Age in seconds of the newest state of an agent when the frame was posed; zero for one at rest.
+    #[must_use]
+    pub fn age_s(&self, id: AgentId) -> Option<f64> {
+        self.tracks.iter().find(|track| track.actor.id == id).map(|track| track.age_s)
+    }
+
+    /// The state of an agent that the frame shows and its time.
+    #[must_use]
+    pub fn shown(&self, id: AgentId) -> Option<(&Body, SimTime)> {
+        self.tracks.iter().find(|track| track.actor.id == id).map(|track| (&track.pose, track.shown))
+    }
+}
+
+impl Track {
+    fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+        let body = match &actor.form {
+            Form::Solid(solid) => BodyShape::of(solid, meshes),
+            Form::Tool(tool) => {
+                let radius_m = tool.shaft_length_m + 12.0 * tool.shaft_radius_m;
+                let side = 2.0 * tool.shaft_radius_m * tool.shaft_length_m;
+                BodyShape { given: None, radius_m, mean_area_m2: side }
+            }
+            Form::Tube | Form::Unseen => BodyShape::default(),
+        };
+        Self {
+            actor,
+            body,
+            before: None,
+            newest: None,
+            awake: true,
+            pose: Body::Nothing,
+            shown: SimTime::ZERO,
+            age_s: 0.0,
+            bounds: Bounds::default(),
+            seen: true,
+            skeleton: Skeleton::default(),
+        }
+    }
+
+    fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
+        self.awake = awake;
+        match &self.newest {
+            Some(known) if known.time == newest.time && known.steps == newest.steps => {}
+            Some(known) if known.time < newest.time => {
+                self.before = self.newest.replace(Arc::clone(newest));
+            }
+            _ => {
+                self.before = None;
+                self.newest = Some(Arc::clone(newest));
+            }
+        }
+    }
+
+    fn pose_at(&mut self, time: SimTime, states: States) {
+        let Some(newest) = &self.newest else { return };
+        self.age_s = if self.awake { time.secs_after(newest.time).max(0.0) } else { 0.0 };
+        self.shown = match (states, &self.before) {
+            (States::Interpolate, Some(before)) => pose::between(before, newest, time, &mut self.pose),
+            (States::Extrapolate, _) if self.awake => pose::beyond(newest, time, &mut self.pose),
+            _ => {
+                pose::copy(&newest.body, &mut self.pose);
+                newest.time
+            }
+        };
+        self.bounds = self.find_bounds();
+    }
+
+    fn find_bounds(&self) -> Bounds {
+        match &self.pose {
+            Body::Nothing => Bounds::default(),
+            Body::Rigid(rigid) => Bounds { centre: rigid.position, radius_m: self.body.radius_m },
+            Body::Tool(tool) => {
+                let half = 0.5 * self.body.radius_m;
+                Bounds { centre: tool.tip - tool.rotation * DVec3::Z * half, radius_m: 1.2 * half }
+            }
+            Body::Curve(curve) => {
+                let bound = |pick: fn(DVec3, DVec3) -> DVec3| curve.positions.iter().copied().reduce(pick);
+                let (Some(low), Some(high)) = (bound(DVec3::min), bound(DVec3::max)) else { return Bounds::default() };
+                let skin = curve.radii_m.iter().copied().fold(0.0, f64::max);
+                Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) + skin }
+            }
+        }
+    }
+}
+
+impl PropShape {
+    fn new(prop: Prop, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+        let Obstacle { solid, position, rotation, .. } = prop.obstacle;
+        let body = BodyShape::of(&solid, meshes);
+        Self { solid, look: prop.look, position, rotation, body }
+    }
+}
+
+impl BodyShape {
+    fn of(solid: &Solid, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+        use std::f64::consts::PI;
+        let given = |mesh: PrimitiveMesh, meshes: &mut Vec<PrimitiveMesh>| {
+            let far = mesh.vertices.iter().map(|v| v.core.as_dvec3().length()).fold(0.0, f64::max);
+            let area: f64 = mesh
+                .triangles
+                .iter()
+                .map(|t| {
+                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize].core.as_dvec3());
+                    0.5 * (b - a).cross(c - a).length()
+                })
+                .sum();
+            meshes.push(mesh);
+            Self { given: Some(meshes.len() as u32 - 1), radius_m: far, mean_area_m2: 0.25 * area }
+        };
+        let plain = |radius_m: f64, area: f64| Self { given: None, radius_m, mean_area_m2: 0.25 * area };
+        match solid {
+            Solid::Ball { radius_m: r } => plain(*r, 4.0 * PI * r * r),
+            Solid::Box { half_extents_m: h } => plain(h.length(), 8.0 * (h.x * h.y + h.y * h.z + h.z * h.x)),
+            Solid::Capsule { radius_m: r, half_height_m: h } => plain(r + h, 4.0 * PI * r * (r + h)),
+            Solid::Cylinder { radius_m: r, half_height_m: h } => {
+                plain((r * r + h * h).sqrt(), 2.0 * PI * r * (r + 2.0 * h))
+            }
+            Solid::Plane => Self::default(),
+            Solid::Hull { points_m } => hull_mesh(points_m).map_or_else(Self::default, |mesh| given(mesh, meshes)),
+            Solid::Mesh { points_m, triangles } => given(creased_mesh(points_m, triangles), meshes),
+        }
+    }
+}

@@ -1,0 +1,228 @@
+//! A picture before it is drawn: flat arrays that a renderer uploads as they are.
+//!
+//! In: what [`super::Stage`] composes. Out: what [`super::Renderer`] draws. Never here: snapshots, the GPU.
+//! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its bits.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+use metachron_agents::Resolution;
+use metachron_agents::shape::{Primitive, PrimitiveMesh, patch};
+use std::sync::Arc;
+
+/// What colours mean.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Colouring {
+    /// The objects' own materials.
+    #[default]
+    Material,
+    /// The resolution (ε, n) they are drawn at: the hue is n, stripes are the intervals ε.
+    Resolution,
+    /// The age of what is shown: from blue (now) to red (0.1 s and older).
+    Age,
+}
+
+/// How a picture is drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Style {
+    /// What colours mean.
+    pub colouring: Colouring,
+    /// Whether every edge is drawn as a line.
+    pub wireframe: bool,
+}
+
+/// One end of an interval of a tube, as the GPU reads it: 64 bytes.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct SkinSample {
+    /// Position.
+    pub position: [f32; 3],
+    /// Outer radius, metres.
+    pub radius_m: f32,
+    /// Derivative of the position by arc length.
+    pub slope: [f32; 3],
+    /// Derivative of the radius by arc length.
+    pub radius_slope: f32,
+    /// Unit vector across the curve.
+    pub normal: [f32; 3],
+    /// Angle of the matter past the normal, radians.
+    pub twist_rad: f32,
+    /// Rest arc length, metres.
+    pub arc_m: f32,
+    /// Repeats of the skin's texture a metre.
+    pub texture_per_m: f32,
+    /// Colour, sRGB, and material number.
+    pub colour: [u8; 4],
+    /// Tint laid over everything, and how much of it.
+    pub tint: [u8; 4],
+}
+
+/// One solid, as the GPU reads it: 64 bytes.
+#[derive(Debug, Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub struct SolidInstance {
+    /// Rotation, a unit quaternion (x, y, z, w).
+    pub rotation: [f32; 4],
+    /// Position.
+    pub position: [f32; 3],
+    /// Radius of the ball swept over the core, metres.
+    pub radius_m: f32,
+    /// Half extents of the core, metres.
+    pub extents: [f32; 3],
+    /// Free.
+    pub pad: f32,
+    /// Colour, sRGB, and material number.
+    pub colour: [u8; 4],
+    /// Tint laid over everything, and how much of it.
+    pub tint: [u8; 4],
+    /// Free.
+    pub pad2: [u32; 2],
+}
+
+/// Which mesh a run of solids uses.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum MeshKey {
+    /// A primitive at a level n.
+    Primitive(Primitive, u8),
+    /// Number of a mesh in [`Picture::meshes`].
+    Given(u32),
+}
+
+/// Intervals of one tube: samples `first ..= first + intervals`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct TubeRun {
+    /// Its first sample.
+    pub first: u32,
+    /// How many intervals.
+    pub intervals: u32,
+    /// Level of the patch.
+    pub n: u8,
+    /// Whether the skin is tissue, with a texture.
+    pub tissue: bool,
+    /// Whether the camera sees it; what it does not see is drawn into the shadow only.
+    pub shown: bool,
+}
+
+/// Solids of one mesh: instances `first .. first + count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SolidRun {
+    /// Their mesh.
+    pub mesh: MeshKey,
+    /// The first instance.
+    pub first: u32,
+    /// How many.
+    pub count: u32,
+}
+
+/// The floor: a plane that fades out around the scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FloorDraw {
+    /// A point of it, metres, relative to the picture's origin.
+    pub point: DVec3,
+    /// Its unit normal.
+    pub normal: DVec3,
+    /// Colour, sRGB.
+    pub colour: [u8; 3],
+}
+
+/// Everything a renderer needs for one frame; storage is used again.
+#[derive(Debug, Clone)]
+pub struct Picture {
+    /// What positions are relative to, metres.
+    pub origin: DVec3,
+    /// Centre of what the light falls on, metres, world axes.
+    pub focus_m: DVec3,
+    /// Radius of what the light falls on, metres.
+    pub focus_radius_m: f64,
+    /// How it is drawn.
+    pub style: Style,
+    /// All tubes' samples.
+    pub samples: Vec<SkinSample>,
+    /// The tubes, sorted by level.
+    pub tubes: Vec<TubeRun>,
+    /// All solids.
+    pub instances: Vec<SolidInstance>,
+    /// The solids by mesh.
+    pub solids: Vec<SolidRun>,
+    /// The floor, if there is one.
+    pub floor: Option<FloorDraw>,
+    /// Meshes that are no primitives.
+    pub meshes: Arc<[PrimitiveMesh]>,
+}
+
+impl Default for Picture {
+    fn default() -> Self {
+        Self {
+            origin: DVec3::ZERO,
+            focus_m: DVec3::ZERO,
+            focus_radius_m: 1.0,
+            style: Style::default(),
+            samples: Vec::new(),
+            tubes: Vec::new(),
+            instances: Vec::new(),
+            solids: Vec::new(),
+            floor: None,
+            meshes: Arc::from([]),
+        }
+    }
+}
+
+impl Picture {
+    /// Empties the picture, keeping its storage.
+    pub(super) fn clear(&mut self) {
+        self.samples.clear();
+        self.tubes.clear();
+        self.instances.clear();
+        self.solids.clear();
+        self.floor = None;
+    }
+
+    /// Triangles of the picture, without those of its shadows.
+    #[must_use]
+    pub fn triangles(&self) -> u64 {
+        let tubes =
+            self.tubes.iter().filter(|t| t.shown).map(|t| u64::from(t.intervals) * u64::from(patch::triangles(t.n)));
+        let solids = self.solids.iter().map(|s| u64::from(s.count) * self.mesh_triangles(s.mesh));
+        tubes.sum::<u64>() + solids.sum::<u64>() + if self.floor.is_some() { 2 } else { 0 }
+    }
+
+    pub(super) fn mesh_triangles(&self, key: MeshKey) -> u64 {
+        match key {
+            MeshKey::Primitive(primitive, n) => u64::from(primitive.triangles(n)),
+            MeshKey::Given(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
+        }
+    }
+}
+
+/// The colour of a resolution: its hue steps with n from violet (0) over green to yellow (6 and finer).
+#[must_use]
+pub fn resolution_colour(at: Resolution) -> [u8; 3] {
+    const HUES: [[u8; 3]; 7] =
+        [[84, 39, 128], [64, 82, 150], [44, 120, 152], [32, 158, 140], [88, 192, 100], [172, 214, 60], [250, 226, 60]];
+    HUES[usize::from(at.n).min(HUES.len() - 1)]
+}
+
+/// Past this age what is shown is as red as it gets, seconds.
+const AGE_RED_S: f64 = 0.1;
+
+/// The colour of an age: blue is now, red is 0.1 s and older.
+#[must_use]
+pub fn age_colour(age_s: f64) -> [u8; 3] {
+    const HEAT: [[f64; 3]; 4] = [[48.0, 96.0, 208.0], [56.0, 176.0, 136.0], [240.0, 196.0, 64.0], [214.0, 48.0, 40.0]];
+    let age_s = if age_s.is_nan() { AGE_RED_S } else { age_s };
+    let heat = (age_s / AGE_RED_S).clamp(0.0, 1.0) * (HEAT.len() - 1) as f64;
+    let left = (heat as usize).min(HEAT.len() - 2);
+    let w = heat - left as f64;
+    std::array::from_fn(|i| (HEAT[left][i] * (1.0 - w) + HEAT[left + 1][i] * w) as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn age_runs_from_blue_to_red_and_takes_any_number() {
+        assert_eq!(age_colour(0.0), [48, 96, 208]);
+        assert_eq!(age_colour(5.0), [214, 48, 40]);
+        assert_eq!(age_colour(f64::NAN), [214, 48, 40]);
+    }
+}

@@ -1,0 +1,226 @@
+//! States between and beyond snapshots.
+//!
+//! In: one or two snapshots and a time. Out: a body at a time, written into storage that is used again.
+//! Never here: which snapshots an object has. Curves that were divided anew in between are matched by rest arc length.
+
+use glam::{DQuat, DVec3};
+use metachron_agents::{Body, CurveState, RigidState, SimTime, Snapshot, ToolState};
+
+/// Past this age states are no longer carried on, seconds: an agent that stopped must not fly apart.
+const BEYOND_MAX_S: f64 = 0.1;
+
+/// Writes the state between two snapshots that belongs to the frame at `time`, one step of the agent earlier; its time.
+///
+/// A state one step old lies between two published ones as long as the agent keeps its rate.
+pub fn between(before: &Snapshot, newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
+    let span = newest.time.secs_after(before.time);
+    let step = span / newest.steps.saturating_sub(before.steps).max(1) as f64;
+    let w = ((time.secs_after(before.time) - step) / span).clamp(0.0, 1.0);
+    if !(w < 1.0 && blend(&before.body, &newest.body, w, into)) {
+        copy(&newest.body, into);
+        return newest.time;
+    }
+    let late = std::time::Duration::from_secs_f64(span * w);
+    SimTime::from_nanos(before.time.as_nanos() + u64::try_from(late.as_nanos()).unwrap_or(0))
+}
+
+/// Writes the newest state carried on by its velocities to the frame at `time`; its time.
+pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
+    let age_s = time.secs_after(newest.time).clamp(0.0, BEYOND_MAX_S);
+    copy(&newest.body, into);
+    match into {
+        Body::Nothing => {}
+        Body::Curve(curve) => {
+            for (position, velocity) in curve.positions.iter_mut().zip(&curve.velocities) {
+                *position += *velocity * age_s;
+            }
+        }
+        Body::Rigid(rigid) => {
+            rigid.position += rigid.velocity * age_s;
+            rigid.rotation = DQuat::from_scaled_axis(rigid.spin * age_s) * rigid.rotation;
+        }
+        Body::Tool(tool) => tool.tip += tool.velocity * age_s,
+    }
+    let ahead = (age_s * 1e9) as u64;
+    SimTime::from_nanos(newest.time.as_nanos() + ahead)
+}
+
+/// Copies a body into storage that is used again.
+pub fn copy(from: &Body, into: &mut Body) {
+    match from {
+        Body::Curve(curve) => {
+            let to = into.curve_mut();
+            to.arc_m.clone_from(&curve.arc_m);
+            to.positions.clone_from(&curve.positions);
+            to.velocities.clone_from(&curve.velocities);
+            to.frames.clone_from(&curve.frames);
+            to.radii_m.clone_from(&curve.radii_m);
+        }
+        other => into.clone_from(other),
+    }
+}
+
+/// Writes the body at the share `w` of the way from `a` to `b`; `false` where they are not of one kind.
+fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
+    match (a, b) {
+        (Body::Curve(a), Body::Curve(b)) if !a.arc_m.is_empty() => blend_curves(a, b, w, into.curve_mut()),
+        (Body::Rigid(a), Body::Rigid(b)) => {
+            *into = Body::Rigid(RigidState {
+                position: a.position.lerp(b.position, w),
+                rotation: turn(a.rotation, b.rotation, w),
+                velocity: a.velocity.lerp(b.velocity, w),
+                spin: a.spin.lerp(b.spin, w),
+            });
+        }
+        (Body::Tool(a), Body::Tool(b)) => {
+            *into = Body::Tool(ToolState {
+                tip: a.tip.lerp(b.tip, w),
+                rotation: turn(a.rotation, b.rotation, w),
+                velocity: a.velocity.lerp(b.velocity, w),
+                jaw: a.jaw + (b.jaw - a.jaw) * w,
+                grasp: b.grasp,
+                force_n: a.force_n + (b.force_n - a.force_n) * w,
+            });
+        }
+        _ => return false,
+    }
+    true
+}
+
+/// Turns from `a` to `b` the short way round.
+fn turn(a: DQuat, b: DQuat, w: f64) -> DQuat {
+    a.slerp(if a.dot(b) < 0.0 { -b } else { b }, w)
+}
+
+/// Nodes of `b`, each between where its matter was in `a` and where it is in `b`.
+fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
+    into.arc_m.clone_from(&b.arc_m);
+    into.positions.clear();
+    into.velocities.clear();
+    into.frames.clear();
+    into.radii_m.clear();
+    let mut walk = Walk { curve: a, left: 0 };
+    for (i, &arc_m) in b.arc_m.iter().enumerate() {
+        let (position, velocity, radius) = walk.node(arc_m);
+        into.positions.push(position.lerp(b.positions[i], w));
+        into.velocities.push(velocity.lerp(b.velocities[i], w));
+        into.radii_m.push(radius + (b.radii_m[i] - radius) * w);
+    }
+    walk.left = 0;
+    for (i, &frame) in b.frames.iter().enumerate() {
+        let was = walk.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
+        into.frames.push(was.lerp(frame, w)); // normalised, the short way: frames of one step lie close
+    }
+}
+
+/// Reads a curve at rising arc lengths in one pass.
+struct Walk<'a> {
+    curve: &'a CurveState,
+    left: usize,
+}
+
+impl Walk<'_> {
+    fn seek(&mut self, arc_m: f64) {
+        let last = self.curve.arc_m.len().saturating_sub(2);
+        while self.left < last && self.curve.arc_m[self.left + 1] <= arc_m {
+            self.left += 1;
+        }
+    }
+
+    fn node(&mut self, arc_m: f64) -> (DVec3, DVec3, f64) {
+        self.seek(arc_m);
+        let (curve, left) = (self.curve, self.left);
+        let right = (left + 1).min(curve.arc_m.len() - 1);
+        let h = curve.arc_m[right] - curve.arc_m[left];
+        let w = if h > 0.0 { ((arc_m - curve.arc_m[left]) / h).clamp(0.0, 1.0) } else { 0.0 };
+        let r = &curve.radii_m;
+        (
+            curve.positions[left].lerp(curve.positions[right], w),
+            curve.velocities[left].lerp(curve.velocities[right], w),
+            r[left] + (r[right] - r[left]) * w,
+        )
+    }
+
+    fn frame(&mut self, arc_m: f64) -> Option<DQuat> {
+        self.seek(arc_m);
+        self.curve.frames.get(self.left).copied()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn at(ms: u64, steps: u64, body: Body) -> Snapshot {
+        Snapshot { time: SimTime::from_nanos(ms * 1_000_000), steps, body, ..Snapshot::default() }
+    }
+
+    /// A straight curve 1 m long with `n` segments that moves along z at 2 m/s, at `t` seconds.
+    fn moving(n: usize, t: f64) -> Body {
+        let arc_m: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
+        Body::Curve(CurveState {
+            positions: arc_m.iter().map(|&s| DVec3::new(s, 0.0, 2.0 * t)).collect(),
+            velocities: vec![DVec3::new(0.0, 0.0, 2.0); n + 1],
+            frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); n],
+            radii_m: vec![0.01; n + 1],
+            arc_m,
+        })
+    }
+
+    fn heights(body: &Body) -> Vec<f64> {
+        let Body::Curve(curve) = body else { panic!("not a curve") };
+        curve.positions.iter().map(|p| p.z).collect()
+    }
+
+    #[test]
+    fn linear_motion_is_interpolated_exactly_one_step_late() {
+        let (before, newest) = (at(100, 10, moving(8, 0.1)), at(140, 12, moving(8, 0.14)));
+        let mut body = Body::Nothing;
+        // two steps of 20 ms in between: the frame at 150 ms shows 130 ms
+        let shown = between(&before, &newest, SimTime::from_nanos(150_000_000), &mut body);
+        assert_eq!(shown.as_nanos() / 1000, 130_000);
+        assert!(heights(&body).iter().all(|z| (z - 0.26).abs() < 1e-15));
+    }
+
+    #[test]
+    fn linear_motion_is_extrapolated_exactly_and_not_for_ever() {
+        let newest = at(100, 10, moving(8, 0.1));
+        let mut body = Body::Nothing;
+        beyond(&newest, SimTime::from_nanos(150_000_000), &mut body);
+        assert!(heights(&body).iter().all(|z| (z - 0.3).abs() < 1e-15));
+        beyond(&newest, SimTime::from_nanos(9_000_000_000), &mut body);
+        assert!(heights(&body).iter().all(|z| (z - 0.4).abs() < 1e-15));
+    }
+
+    #[test]
+    fn a_curve_that_was_divided_anew_is_matched_by_its_matter() {
+        let (before, newest) = (at(0, 0, moving(5, 0.0)), at(40, 1, moving(12, 0.04)));
+        let mut body = Body::Nothing;
+        between(&before, &newest, SimTime::from_nanos(50_000_000), &mut body);
+        let Body::Curve(curve) = &body else { panic!("not a curve") };
+        assert_eq!(curve.positions.len(), 13);
+        for (p, s) in curve.positions.iter().zip(&curve.arc_m) {
+            assert!((*p - DVec3::new(*s, 0.0, 0.02)).length() < 1e-15, "{p}");
+        }
+    }
+
+    #[test]
+    fn a_turn_is_interpolated_at_constant_speed() {
+        let rigid =
+            |angle: f64| Body::Rigid(RigidState { rotation: DQuat::from_rotation_z(angle), ..RigidState::default() });
+        let (before, newest) = (at(0, 0, rigid(0.0)), at(100, 1, rigid(2.0)));
+        let mut body = Body::Nothing;
+        between(&before, &newest, SimTime::from_nanos(125_000_000), &mut body);
+        let Body::Rigid(state) = body else { panic!("not rigid") };
+        assert!(state.rotation.angle_between(DQuat::from_rotation_z(0.5)) < 1e-7); // acos near 1 keeps half the digits
+    }
+
+    #[test]
+    fn an_agent_that_is_late_is_held_at_its_newest_state() {
+        let (before, newest) = (at(0, 0, moving(4, 0.0)), at(10, 1, moving(4, 0.01)));
+        let mut body = Body::Nothing;
+        let shown = between(&before, &newest, SimTime::from_nanos(900_000_000), &mut body);
+        assert_eq!(shown, newest.time);
+        assert!(heights(&body).iter().all(|z| (z - 0.02).abs() < 1e-15));
+    }
+}

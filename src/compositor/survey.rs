@@ -1,0 +1,139 @@
+//! What of the stage is seen, how large and how fast on the screen: what a policy needs to share out a budget.
+//!
+//! In: posed objects and a camera. Out: one [`Seen`] an actor. Never here: levels.
+
+use super::gather::{Form, Stage, Track};
+use super::view::{Camera, Size};
+use glam::DVec3;
+use metachron_agents::{AgentId, Body, CurveState};
+
+/// An actor as the camera sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// Which agent.
+    pub id: AgentId,
+    /// Whether any of it may be in the picture.
+    pub visible: bool,
+    /// Area it covers, pixels, ≥ 0, hidden parts included; at most the picture's.
+    pub pixels: f64,
+    /// Distance of its centre from the eye, metres.
+    pub distance_m: f64,
+    /// How fast it moves across the picture, pixels a second of simulated time: the root mean square over its points.
+    pub speed_px_s: f64,
+    /// Rest length and mean radius of a tube, metres.
+    pub tube_m: Option<(f64, f64)>,
+    /// Centre of a ball that holds it, metres.
+    pub centre_m: DVec3,
+    /// Radius of that ball, metres.
+    pub radius_m: f64,
+}
+
+impl Stage {
+    /// Finds what the camera sees, one entry an actor in their order. Keeps for [`Stage::compose`] who is visible.
+    pub fn survey(&mut self, camera: &Camera, size: Size, seen: &mut Vec<Seen>) {
+        seen.clear();
+        for track in &mut self.tracks {
+            let view = look(track, camera, size);
+            track.seen = view.visible;
+            seen.push(view);
+        }
+    }
+}
+
+fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
+    let bounds = track.bounds;
+    let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
+    let visible = !unseen && camera.sees(bounds.centre, bounds.radius_m, size);
+    let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
+    let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
+    let (area, speed_m_s, tube_m) = match &track.pose {
+        Body::Curve(curve) => {
+            let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
+            let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
+            (curve_pixels(curve, camera, size), speed, tube_measures(curve))
+        }
+        Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
+        Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
+        Body::Nothing => (0.0, 0.0, None),
+    };
+    Seen {
+        id: track.actor.id,
+        visible,
+        pixels: if visible { area.clamp(0.0, size.pixels()) } else { 0.0 },
+        distance_m: bounds.centre.distance(camera.eye()),
+        speed_px_s: speed_m_s * scale,
+        tube_m,
+        centre_m: bounds.centre,
+        radius_m: bounds.radius_m,
+    }
+}
+
+/// Area of a tube on the screen: of each segment its projected length times its projected width.
+fn curve_pixels(curve: &CurveState, camera: &Camera, size: Size) -> f64 {
+    let (eye, forward) = (camera.eye(), camera.forward());
+    let segment = |i: usize| {
+        let (a, b) = (curve.positions[i], curve.positions[i + 1]);
+        let middle = 0.5 * (a + b) - eye;
+        let depth = middle.dot(forward);
+        let radius = curve.radii_m[i];
+        if depth < camera.near_m() || !camera.sees(middle + eye, radius, size) {
+            return 0.0;
+        }
+        let (chord, sight) = (b - a, middle.normalize());
+        let width = 2.0 * radius;
+        let length = (chord - sight * chord.dot(sight)).length();
+        let scale = camera.pixels_per_metre(depth, size);
+        length * width * scale * scale
+    };
+    (0..curve.positions.len().saturating_sub(1)).map(segment).sum()
+}
+
+fn tube_measures(curve: &CurveState) -> Option<(f64, f64)> {
+    let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
+    curve.arc_m.last().map(|&length| (length, mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::gather::{Actor, Look, Material, States};
+    use super::*;
+    use metachron_agents::shape::Solid;
+    use metachron_agents::{RigidState, SimTime, Snapshot};
+    use std::sync::Arc;
+
+    const SIZE: Size = Size { width: 800, height: 600 };
+
+    fn ball_at(position: DVec3, velocity: DVec3) -> Seen {
+        let look = Look { colour: [200; 3], material: Material::Plastic };
+        let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
+        let mut stage = Stage::new(vec![Actor { id: AgentId(0), form, look }], vec![]);
+        let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
+        stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+        stage.pose(SimTime::ZERO, States::Latest);
+        let mut seen = Vec::new();
+        stage.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE, &mut seen);
+        seen[0]
+    }
+
+    #[test]
+    fn a_ball_covers_the_circle_it_projects_to() {
+        let near = ball_at(DVec3::ZERO, DVec3::ZERO);
+        let radius_px = 0.1 * 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        assert!((near.pixels / (std::f64::consts::PI * radius_px * radius_px) - 1.0).abs() < 1e-12);
+        let far = ball_at(DVec3::new(-4.0, 0.0, 0.0), DVec3::ZERO);
+        assert!((near.pixels / far.pixels - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn speed_counts_across_the_view_only() {
+        let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        assert!((ball_at(DVec3::ZERO, DVec3::Y).speed_px_s - scale).abs() < 1e-9);
+        assert!(ball_at(DVec3::ZERO, DVec3::X).speed_px_s < 1e-9);
+    }
+
+    #[test]
+    fn what_is_out_of_sight_covers_nothing() {
+        let behind = ball_at(DVec3::new(9.0, 0.0, 0.0), DVec3::ZERO);
+        assert!(!behind.visible && behind.pixels == 0.0);
+    }
+}

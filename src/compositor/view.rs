@@ -1,0 +1,268 @@
+//! The camera: an orbit about a target with z up, its projection, rays and frustum.
+//!
+//! In: drags and keys as numbers. Out: matrices, rays, pixels. Never here: the GPU, input devices, scenes.
+//! Depth is reversed and without a far plane: near things get the bits.
+
+use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
+
+/// A picture's size in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Size {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+}
+
+impl Size {
+    /// Whether there is nothing to draw on.
+    #[must_use]
+    pub fn is_empty(self) -> bool {
+        self.width == 0 || self.height == 0
+    }
+
+    /// Number of pixels.
+    #[must_use]
+    pub fn pixels(self) -> f64 {
+        f64::from(self.width) * f64::from(self.height)
+    }
+
+    fn aspect(self) -> f64 {
+        f64::from(self.width.max(1)) / f64::from(self.height.max(1))
+    }
+}
+
+/// A half line in space.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ray {
+    /// Where it starts, metres.
+    pub origin: DVec3,
+    /// Unit direction.
+    pub direction: DVec3,
+}
+
+/// An eye on a sphere about what it looks at; z is up.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Camera {
+    /// What the eye looks at, metres.
+    pub target_m: DVec3,
+    /// Distance of the eye from it, metres; kept within [`DISTANCE_M`].
+    pub distance_m: f64,
+    /// Direction of the eye from the target, about z from x, radians.
+    pub yaw_rad: f64,
+    /// Height of the eye above the horizon, radians; kept within ±[`PITCH_MAX_RAD`].
+    pub pitch_rad: f64,
+    /// Vertical field of view, radians, 0.01 … 3.
+    pub fov_y_rad: f64,
+}
+
+/// How near and how far the eye may be from its target, metres.
+pub const DISTANCE_M: (f64, f64) = (0.01, 1e4);
+/// The steepest view: straight up or down has no horizon to keep level.
+pub const PITCH_MAX_RAD: f64 = 1.553;
+/// The nearest thing drawn, as a share of the distance to the target.
+const NEAR_SHARE: f64 = 0.01;
+
+impl Camera {
+    /// A camera at `eye_m` that looks at `target_m`; `fov_y_rad` is the vertical field of view.
+    /// An eye at its target looks at it from 1 m along x.
+    #[must_use]
+    pub fn looking(eye_m: DVec3, target_m: DVec3, fov_y_rad: f64) -> Self {
+        let arm = eye_m - target_m;
+        let distance = arm.length();
+        let arm = if distance > 0.0 && distance.is_finite() { arm / distance } else { DVec3::X };
+        Self {
+            target_m,
+            distance_m: if distance > 0.0 { distance.clamp(DISTANCE_M.0, DISTANCE_M.1) } else { 1.0 },
+            yaw_rad: arm.y.atan2(arm.x),
+            pitch_rad: arm.z.asin().clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
+            fov_y_rad: fov_y_rad.clamp(0.01, 3.0),
+        }
+    }
+
+    /// From the target to the eye, a unit vector.
+    fn arm(&self) -> DVec3 {
+        let (sin, cos) = self.pitch_rad.sin_cos();
+        DVec3::new(cos * self.yaw_rad.cos(), cos * self.yaw_rad.sin(), sin)
+    }
+
+    /// Where the eye is, metres.
+    #[must_use]
+    pub fn eye(&self) -> DVec3 {
+        self.target_m + self.arm() * self.distance_m
+    }
+
+    /// The direction of view, a unit vector.
+    #[must_use]
+    pub fn forward(&self) -> DVec3 {
+        -self.arm()
+    }
+
+    /// To the right of the picture, a unit vector.
+    #[must_use]
+    pub fn right(&self) -> DVec3 {
+        DVec3::new(-self.yaw_rad.sin(), self.yaw_rad.cos(), 0.0)
+    }
+
+    /// To the top of the picture, a unit vector.
+    #[must_use]
+    pub fn up(&self) -> DVec3 {
+        self.right().cross(self.forward())
+    }
+
+    /// Distance of the nearest thing drawn, metres.
+    #[must_use]
+    pub fn near_m(&self) -> f64 {
+        (self.distance_m * NEAR_SHARE).min(0.1)
+    }
+
+    /// Turns the eye about the target as a drag by `pixels` over a picture of `size` asks: its height is half a turn.
+    pub fn orbit(&mut self, pixels: DVec2, size: Size) {
+        let turn = std::f64::consts::PI / f64::from(size.height.max(1));
+        self.yaw_rad = (self.yaw_rad - pixels.x * turn).rem_euclid(std::f64::consts::TAU);
+        self.pitch_rad = (self.pitch_rad + pixels.y * turn).clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD);
+    }
+
+    /// Moves eye and target so that the point under the pointer stays under it, at the target's distance.
+    pub fn pan(&mut self, pixels: DVec2, size: Size) {
+        let scale = 1.0 / self.pixels_per_metre(self.distance_m, size);
+        self.target_m += (self.up() * pixels.y - self.right() * pixels.x) * scale;
+    }
+
+    /// Brings the eye nearer (`factor` < 1) or takes it away (> 1). A factor that is not above zero is ignored.
+    pub fn zoom(&mut self, factor: f64) {
+        if factor > 0.0 && factor.is_finite() {
+            self.distance_m = (self.distance_m * factor).clamp(DISTANCE_M.0, DISTANCE_M.1);
+        }
+    }
+
+    /// Moves eye and target by `step_m`: x to the right, y forward, z up the picture, metres.
+    pub fn fly(&mut self, step_m: DVec3) {
+        self.target_m += self.right() * step_m.x + self.forward() * step_m.y + self.up() * step_m.z;
+    }
+
+    /// Looks at a ball of `radius_m` about `centre_m` so that it fills the picture.
+    pub fn show(&mut self, centre_m: DVec3, radius_m: f64, size: Size) {
+        let half = 0.5 * self.fov_y_rad;
+        let half = half.min((half.tan() * size.aspect()).atan());
+        self.target_m = centre_m;
+        self.distance_m = (radius_m / half.sin()).clamp(DISTANCE_M.0, DISTANCE_M.1);
+    }
+
+    /// Pixels that a metre across the view takes at `depth_m` in front of the eye.
+    #[must_use]
+    pub fn pixels_per_metre(&self, depth_m: f64, size: Size) -> f64 {
+        f64::from(size.height) / (2.0 * (0.5 * self.fov_y_rad).tan() * depth_m.max(self.near_m()))
+    }
+
+    /// From world axes relative to `origin` to clip space, depth reversed.
+    #[must_use]
+    pub fn view_projection(&self, size: Size, origin: DVec3) -> Mat4 {
+        self.matrix(size, origin).as_mat4()
+    }
+
+    fn matrix(&self, size: Size, origin: DVec3) -> DMat4 {
+        let eye = self.eye() - origin;
+        let view = glam::dcamera::rh::view::look_to_mat4(eye, self.forward(), self.up());
+        glam::dcamera::rh::proj::directx::perspective_infinite_reverse(self.fov_y_rad, size.aspect(), self.near_m())
+            * view
+    }
+
+    /// The pixel where a point is seen, from the picture's upper left corner, and its depth in metres; `None` behind the eye.
+    #[must_use]
+    pub fn project(&self, point_m: DVec3, size: Size) -> Option<(DVec2, f64)> {
+        let depth = (point_m - self.eye()).dot(self.forward());
+        if depth < self.near_m() {
+            return None;
+        }
+        let clip: DVec4 = self.matrix(size, DVec3::ZERO) * point_m.extend(1.0);
+        let ndc = clip.truncate() / clip.w;
+        let half = DVec2::new(f64::from(size.width), f64::from(size.height)) * 0.5;
+        Some((DVec2::new(1.0 + ndc.x, 1.0 - ndc.y) * half, depth))
+    }
+
+    /// The ray from the eye through a pixel, counted from the picture's upper left corner.
+    #[must_use]
+    pub fn ray(&self, pixel: DVec2, size: Size) -> Ray {
+        let half = DVec2::new(f64::from(size.width.max(1)), f64::from(size.height.max(1))) * 0.5;
+        let tan = (0.5 * self.fov_y_rad).tan();
+        let (x, y) = ((pixel.x / half.x - 1.0) * tan * size.aspect(), (1.0 - pixel.y / half.y) * tan);
+        let direction = (self.forward() + self.right() * x + self.up() * y).normalize();
+        Ray { origin: self.eye(), direction }
+    }
+
+    /// Whether a ball may be seen: it is not wholly outside any side of the view.
+    #[must_use]
+    pub fn sees(&self, centre_m: DVec3, radius_m: f64, size: Size) -> bool {
+        let from_eye = centre_m - self.eye();
+        let (tan_y, aspect) = ((0.5 * self.fov_y_rad).tan(), size.aspect());
+        let depth = from_eye.dot(self.forward());
+        let beside = |off: f64, tan: f64| (off.abs() - depth * tan) / (1.0 + tan * tan).sqrt() > radius_m;
+        depth + radius_m > self.near_m()
+            && !beside(from_eye.dot(self.right()), tan_y * aspect)
+            && !beside(from_eye.dot(self.up()), tan_y)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const SIZE: Size = Size { width: 1280, height: 720 };
+
+    fn camera() -> Camera {
+        Camera::looking(DVec3::new(1.0, -2.0, 1.5), DVec3::new(0.1, 0.2, 0.3), 0.8)
+    }
+
+    #[test]
+    fn camera_looks_from_its_eye_at_its_target() {
+        let camera = camera();
+        assert!((camera.eye() - DVec3::new(1.0, -2.0, 1.5)).length() < 1e-12);
+        let (pixel, depth) = camera.project(camera.target_m, SIZE).unwrap();
+        assert!((pixel - DVec2::new(640.0, 360.0)).length() < 1e-9);
+        assert!((depth - camera.distance_m).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_ray_through_a_projected_point_passes_through_the_point() {
+        let camera = camera();
+        let point = DVec3::new(0.4, 0.1, -0.2);
+        let ray = camera.ray(camera.project(point, SIZE).unwrap().0, SIZE);
+        let off = (point - ray.origin).cross(ray.direction).length();
+        assert!(off < 1e-12, "{off}");
+    }
+
+    #[test]
+    fn panning_keeps_the_point_under_the_pointer() {
+        let mut camera = camera();
+        let (point, drag) = (camera.target_m, DVec2::new(50.0, -20.0));
+        camera.pan(drag, SIZE);
+        let moved = camera.project(point, SIZE).unwrap().0 - DVec2::new(640.0, 360.0);
+        assert!((moved - drag).length() < 1e-9, "{moved}");
+    }
+
+    #[test]
+    fn what_is_framed_is_seen_and_what_lies_behind_is_not() {
+        let mut camera = camera();
+        camera.show(DVec3::ZERO, 0.5, SIZE);
+        assert!(camera.sees(DVec3::ZERO, 0.5, SIZE));
+        let side = camera.right() * (3.0 * camera.distance_m);
+        assert!(!camera.sees(side, 0.5, SIZE) && camera.sees(side, 4.0 * camera.distance_m, SIZE));
+        assert!(!camera.sees(camera.eye() - camera.forward(), 0.5, SIZE));
+        let top = camera.project(camera.up() * 0.5, SIZE).unwrap().0;
+        assert!(top.y > 0.0 && top.y < 60.0, "{top}");
+    }
+
+    #[test]
+    fn no_drag_or_zoom_makes_a_camera_without_numbers() {
+        let mut camera = camera();
+        for pixels in [1e9, -1e9, 0.0] {
+            camera.orbit(DVec2::splat(pixels), SIZE);
+            camera.zoom(pixels);
+            camera.orbit(DVec2::ONE, Size { width: 0, height: 0 });
+        }
+        assert!(
+            camera.eye().is_finite() && camera.view_projection(Size { width: 0, height: 0 }, DVec3::ZERO).is_finite()
+        );
+    }
+}
