@@ -6,8 +6,8 @@
 use super::pace::Pace;
 use hdrhistogram::Histogram;
 use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
-use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
 /// What an agent does now.
@@ -38,7 +38,7 @@ pub struct AgentStats {
     /// Which agent.
     pub id: AgentId,
     /// Its name in the scene.
-    pub name: String,
+    pub name: Arc<str>,
     /// Its model.
     pub model: &'static str,
     /// Steps taken.

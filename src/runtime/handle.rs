@@ -15,7 +15,7 @@ use std::time::Duration;
 #[derive(Debug)]
 pub(super) struct Shared {
     pub id: AgentId,
-    pub name: String,
+    pub name: Arc<str>,
     pub model: &'static str,
     pub wanted_hz: f64,
     pub gauges: Gauges,
@@ -88,7 +88,7 @@ impl AgentHandle {
         Ok(())
     }
 
-    /// How it has fared so far.
+    /// How it has fared so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
     #[must_use]
     pub fn stats(&self) -> AgentStats {
         let Shared { gauges, .. } = &*self.shared;
@@ -96,7 +96,7 @@ impl AgentHandle {
         let span = |nanos: &std::sync::atomic::AtomicU64| SimSpan::from_nanos(nanos.load(Relaxed));
         AgentStats {
             id: self.shared.id,
-            name: self.shared.name.clone(),
+            name: Arc::clone(&self.shared.name),
             model: self.shared.model,
             steps: gauges.steps.load(Relaxed),
             rate_hz: if gauges.is_running() { gauges.rate_hz.get() } else { 0.0 },

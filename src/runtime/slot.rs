@@ -138,10 +138,16 @@ mod tests {
         let mut writer = writer();
         let slot = writer.slot();
         let mut kept = [slot.latest(), slot.latest(), slot.latest()];
-        for value in 0..10_000_u64 {
-            put(&mut writer, value);
-            kept[value as usize % 3] = slot.latest();
-        }
+        let mut rounds = |values: std::ops::Range<u64>| {
+            for value in values {
+                put(&mut writer, value);
+                kept[value as usize % 3] = slot.latest();
+            }
+        };
+        let warm_up = allocation_counter::measure(|| rounds(0..10));
+        let after = allocation_counter::measure(|| rounds(10..10_000));
+        assert!(warm_up.count_total > 0, "the counter counts");
+        assert_eq!(after.count_total, 0, "{after:?}");
         // one published, one being filled, three kept
         assert!(writer.made() <= 5, "made {}", writer.made());
     }

@@ -134,7 +134,7 @@ fn actor(id: AgentId, spawn: AgentSpawn, board: &Arc<Switchboard>) -> Actor {
     let writer = SlotWriter::new(Snapshot::default());
     let shared = Shared {
         id,
-        name: spawn.name,
+        name: spawn.name.into(),
         model: spawn.agent.model(),
         wanted_hz: spawn.rate_hz,
         gauges: Gauges::default(),

@@ -61,7 +61,7 @@ impl Threads {
     }
 
     fn spawn(&self, actor: Actor, ended: Sender<AgentId>) -> Result<JoinHandle<()>, RunError> {
-        let name = actor.shared.name.clone();
+        let name = actor.shared.name.to_string();
         let stage =
             Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
         let farewell = Farewell { id: actor.id(), ended };

@@ -317,3 +317,24 @@ fn ages_that_were_used_are_reported() {
     // 1 % of resolution, one rank in a hundred
     assert!((age.p50_s - 0.0495).abs() < 1.5e-3 && (age.p99_s - 0.098).abs() < 2e-3, "{age:?}");
 }
+
+#[test]
+fn nothing_is_allocated_once_a_run_has_warmed_up() {
+    let mut spawns: Vec<_> = [1000.0, 240.0, 60.0].map(|hz| Dummy::new(200.0).at(hz)).into();
+    spawns.push(Dummy::new(40_000.0).at(240.0));
+    spawns.iter_mut().for_each(|s| s.links = (0..4).map(AgentId).collect());
+    let mut run = Box::new(Lockstep::start(spawns, noisy(2)).unwrap());
+    let frames = |run: &mut Lockstep, frames: std::ops::Range<u64>| {
+        for frame in frames {
+            run.wait_until(ms(frame * 17));
+            for agent in run.agents() {
+                agent.record_age(agent.age_s(&agent.latest(), run.sim_now()));
+            }
+            run.spend(ms(2));
+        }
+    };
+    let warm_up = allocation_counter::measure(|| frames(&mut run, 1..60));
+    assert!(warm_up.count_total > 0, "the counter counts");
+    let count = allocation_counter::measure(|| frames(&mut run, 60..600));
+    assert_eq!(count.count_total, 0, "{count:?}");
+}
