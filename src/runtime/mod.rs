@@ -38,7 +38,7 @@ use metachron_agents::{AgentId, SimTime};
 use std::time::Duration;
 
 /// Agents that run, whoever keeps the time.
-pub trait Run {
+pub trait Run: Send {
     /// Wall time since the run began; virtual in lockstep.
     fn now(&self) -> Duration;
 

@@ -177,6 +177,29 @@ mod tests {
         assert!(wall.as_nanos() as u64 - pace.time().as_nanos() <= 140_000_000);
     }
 
+    proptest::proptest! {
+        #[test]
+        fn whatever_turns_cost_the_lag_stays_capped_and_every_nanosecond_is_stepped_or_dropped(
+            dt_us in 500_u64..200_000,
+            costs_us in proptest::collection::vec(0_u64..500_000, 1..200),
+        ) {
+            let line = Timeline::new();
+            let dt = SimSpan::from_nanos(dt_us * 1000);
+            let mut pace = Pace::new(SimTime::ZERO, dt);
+            let cap = LAG_CAP.max(Duration::from_micros(2 * dt_us));
+            let (mut wall, mut steps) = (Duration::ZERO, 0);
+            for cost in costs_us.iter().copied().map(Duration::from_micros) {
+                wall = wall.max(pace.due(&line).unwrap());
+                let start = pace.begin(&line, wall);
+                assert!(start.late - Duration::from_nanos(start.dropped.as_nanos()) <= cap);
+                wall += cost;
+                pace.advance();
+                steps += 1;
+            }
+            assert_eq!(pace.time().as_nanos(), steps * dt.as_nanos() + pace.dropped().as_nanos());
+        }
+    }
+
     #[test]
     fn a_slow_agent_is_not_late_before_two_of_its_steps() {
         let line = Timeline::new();

@@ -1,7 +1,7 @@
 //! One turn of an agent: what every executor does, whoever keeps the time.
 //!
 //! begin   take commands, give up lag, look around, step, write the snapshot
-//! finish  publish, touch, account, ask the governor, rest or go on
+//! finish  account, publish, touch, ask the governor, rest or go on
 //!
 //! Between the two an executor lets the turn's time pass: it did on a thread, lockstep charges it. A turn that fails, by an
 //! error of the model, a state that is not finite or a panic (a bug of ours), parks the agent with the reason; nothing of it is
@@ -119,15 +119,19 @@ impl Actor {
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
         let Some(open) = self.open.take() else { return Next::Parked };
         let now = timeline.sim_at(wall);
-        self.publish(now);
         let missed = now > self.pace.time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
+        // first the account: who sees a state finds it accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
+        let published = self.writer.publish();
+        self.touch(now);
         if let Err(reason) = contained(|| self.consult(timeline, &open, work_s)) {
             self.park(reason);
             return Next::Parked;
         }
-        if open.report.at_rest && self.hands.is_empty() && self.lie_down(now) { Next::Rest } else { Next::Due }
+        // a state nobody could see is no state to rest in
+        let at_rest = open.report.at_rest && published && self.hands.is_empty();
+        if at_rest && self.lie_down(now) { Next::Rest } else { Next::Due }
     }
 
     /// Whether somebody has woken the agent from its rest; it is on its feet then, at the timeline's present.
@@ -209,15 +213,10 @@ impl Actor {
         }
     }
 
-    fn publish(&mut self, now: SimTime) {
-        if let Some(snapshot) = self.writer.filled() {
-            snapshot
-                .touches
-                .iter()
-                .filter(|id| **id != self.shared.id)
-                .for_each(|id| self.shared.board.touch(*id, now));
-        }
-        self.writer.publish();
+    /// Tells those this agent acts on, once they can see how.
+    fn touch(&self, now: SimTime) {
+        let newest = self.shared.slot.latest();
+        newest.touches.iter().filter(|id| **id != self.shared.id).for_each(|id| self.shared.board.touch(*id, now));
     }
 
     fn consult(&mut self, timeline: &Timeline, open: &Open, work_s: f64) -> Result<(), String> {
@@ -250,13 +249,10 @@ impl Actor {
     }
 
     fn lie_down(&mut self, now: SimTime) -> bool {
-        // seen as resting before a waker can end it
-        self.shared.gauges.set_resting(true);
         let rests = self.shared.board.try_rest(self.id(), now);
         if rests {
-            self.diary.flush(&self.shared.gauges)
-        } else {
-            self.shared.gauges.set_resting(false)
+            self.diary.flush(&self.shared.gauges);
+            self.shared.gauges.set_resting(true);
         }
         rests
     }
