@@ -91,7 +91,7 @@ impl TubeContacts {
             });
         }
         walls.visit(skin, slack_m, |touch| contacts.push(of_touch(&touch, *friction, skin.segments())));
-        contacts.sort_unstable_by_key(|c| c.key);
+        debug_assert!(contacts.is_sorted_by_key(|c| c.key), "pairs and walls are visited by rising keys");
         contacts.len()
     }
 
@@ -150,12 +150,6 @@ impl Skin<'_> {
     /// The speed of the fastest node, m/s.
     fn speed(&self) -> f64 {
         self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
-    }
-
-    /// The speed of the fastest node against the mean of all, m/s.
-    fn relative_speed(&self) -> f64 {
-        let mean = self.velocities.iter().sum::<DVec3>() / self.velocities.len() as f64;
-        self.velocities.iter().map(|v| (*v - mean).length_squared()).fold(0.0, f64::max).sqrt()
     }
 
     fn span_speed(&self, segment: usize) -> f64 {

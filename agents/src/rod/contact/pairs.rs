@@ -8,10 +8,22 @@ use crate::shape::near_segments;
 use glam::DVec3;
 use std::f64::consts::PI;
 
-/// How far past touching a pair is listed, as a share of the radius: wider lists last longer and cost more to read.
-const LIST_RADII: f64 = 0.5;
-/// For how many steps of the present motion a list should last.
-const LIST_STEPS: f64 = 8.0;
+/// How far past touching a pair is listed: this share of the radius and this many margins (eq. 17).
+/// Wider lists last longer, but their making and reading grows with the square of the reach in a packed tube.
+const LIST_RADII: f64 = 0.3;
+/// See [`LIST_RADII`].
+const LIST_MARGINS: f64 = 2.0;
+
+/// A segment as the grid sees it.
+#[derive(Debug, Clone, Copy)]
+struct Capsule {
+    middle: DVec3,
+    /// Radius of the ball that holds it.
+    ball_m: f64,
+    /// Rest arc length of its middle, and how far along the tube its neighbourhood reaches from there (eq. 15).
+    arc_m: f64,
+    neighbourhood_m: f64,
+}
 
 /// Two segments and the last gap measured between them.
 #[derive(Debug, Clone, Copy)]
@@ -19,8 +31,17 @@ struct Pair {
     first: u32,
     second: u32,
     gap_m: f64,
-    /// [`Pairs::travel_m`] when the gap was measured.
+    /// The sum of both segments' [`Motion::travel_m`] when the gap was measured.
     measured_at_m: f64,
+}
+
+/// How a segment moves against the mean of all nodes.
+#[derive(Debug, Clone, Copy, Default)]
+struct Motion {
+    /// The way of its faster end since the list was made, and any widening, metres; it only grows.
+    travel_m: f64,
+    /// How far its faster end goes within the step, metres.
+    ahead_m: f64,
 }
 
 /// Where two segments are nearest.
@@ -42,12 +63,12 @@ pub(super) struct Meeting {
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pairs {
     grid: Grid,
-    list: Vec<Pair>,
+    capsules: Vec<Capsule>,
     keys: Vec<u64>,
-    /// How far nodes have moved against each other's mean since the list was made; it only grows.
-    travel_m: f64,
-    /// The list holds up to this travel.
-    list_lasts_m: f64,
+    list: Vec<Pair>,
+    motions: Vec<Motion>,
+    /// How far past touching the list reaches.
+    reach_m: f64,
     last: Vec<DVec3>,
     last_radius_m: f64,
 }
@@ -60,80 +81,105 @@ impl Pairs {
 
     /// Visits every pair whose surfaces may come within `slack_m` of each other during the step, by rising numbers (eq. 17).
     pub fn visit(&mut self, skin: &Skin<'_>, slack_m: f64, mut visit: impl FnMut(Meeting)) {
-        // two nodes close in on each other by at most twice the motion against the mean
-        let margin_m = slack_m + 2.0 * skin.relative_speed() * skin.h_s;
         self.follow(skin);
-        if self.travel_m + 0.5 * margin_m > self.list_lasts_m {
-            self.rebuild(skin, margin_m);
+        let most = |of: fn(&Motion) -> f64| self.motions.iter().map(of).fold(0.0, f64::max);
+        if slack_m + 2.0 * most(|m| m.travel_m + m.ahead_m) > self.reach_m {
+            let margin_m = slack_m + 2.0 * most(|m| m.ahead_m);
+            self.rebuild(skin, LIST_RADII * skin.widest_m() + LIST_MARGINS * margin_m);
         }
-        let travel_m = self.travel_m;
-        for k in 0..self.list.len() {
-            let pair = self.list[k];
-            if pair.gap_m - 2.0 * (travel_m - pair.measured_at_m) > margin_m {
+        for pair in &mut self.list {
+            let [a, b] = [pair.first, pair.second].map(|k| self.motions[k as usize]);
+            let margin_m = slack_m + a.ahead_m + b.ahead_m;
+            let travel_m = a.travel_m + b.travel_m;
+            if pair.gap_m - (travel_m - pair.measured_at_m) > margin_m {
                 continue;
             }
             let meeting = meet(skin, [pair.first, pair.second]);
-            self.list[k] = Pair { gap_m: meeting.gap_m, measured_at_m: travel_m, ..pair };
+            (pair.gap_m, pair.measured_at_m) = (meeting.gap_m, travel_m);
             if meeting.gap_m <= margin_m && !is_told_by_next(skin, &meeting) {
                 visit(meeting);
             }
         }
     }
 
-    /// Adds up how far nodes have moved against their mean, and how much the tube has widened.
+    /// Adds up how far segments have moved against the mean, and how much the tube has widened.
     fn follow(&mut self, skin: &Skin<'_>) {
         let nodes = skin.positions;
-        let widest = skin.widest_m();
-        if self.last.len() == nodes.len() {
-            let moves = || nodes.iter().zip(&self.last).map(|(now, last)| *now - *last);
-            let mean = moves().sum::<DVec3>() / nodes.len() as f64;
-            let most = moves().map(|m| (m - mean).length_squared()).fold(0.0, f64::max).sqrt();
-            self.travel_m += most + (widest - self.last_radius_m).max(0.0);
-        } else {
-            self.list_lasts_m = f64::NEG_INFINITY;
+        let (widest, count) = (skin.widest_m(), nodes.len() as f64);
+        self.motions.resize(skin.segments(), Motion::default());
+        let known = self.last.len() == nodes.len();
+        if !known {
+            self.reach_m = f64::NEG_INFINITY;
+            self.last.clear();
+            self.last.extend_from_slice(nodes);
         }
-        self.last.clear();
-        self.last.extend_from_slice(nodes);
+        let mean_way = nodes.iter().zip(&self.last).map(|(now, last)| *now - *last).sum::<DVec3>() / count;
+        let mean_speed = skin.velocities.iter().sum::<DVec3>() / count;
+        let node = |i: usize| {
+            let way = nodes[i] - self.last[i] - mean_way;
+            (way.length_squared(), (skin.velocities[i] - mean_speed).length_squared())
+        };
+        let widened = if known { (widest - self.last_radius_m).max(0.0) } else { 0.0 };
+        let mut left = node(0);
+        for (k, motion) in self.motions.iter_mut().enumerate() {
+            let right = node(k + 1);
+            motion.travel_m += left.0.max(right.0).sqrt() + widened;
+            motion.ahead_m = left.1.max(right.1).sqrt() * skin.h_s;
+            left = right;
+        }
+        self.last.copy_from_slice(nodes);
         self.last_radius_m = widest;
     }
 
     /// Lists the pairs within reach (eq. 16).
-    fn rebuild(&mut self, skin: &Skin<'_>, margin_m: f64) {
-        let reach_m = LIST_RADII * skin.widest_m() + margin_m * LIST_STEPS;
-        self.travel_m = 0.0;
-        self.list_lasts_m = 0.5 * reach_m;
-        let keys = &mut self.keys;
+    fn rebuild(&mut self, skin: &Skin<'_>, reach_m: f64) {
+        self.motions.iter_mut().for_each(|m| m.travel_m = 0.0);
+        self.reach_m = reach_m;
+        let Self { grid, capsules, keys, list, .. } = self;
+        capsules.clear();
+        capsules.extend((0..skin.segments()).map(|k| Capsule::new(skin, k)));
+        let widest = capsules.iter().map(|c| c.ball_m).fold(0.0, f64::max);
+        grid.fill(capsules.iter().map(|c| c.middle), 2.0 * widest + reach_m);
         keys.clear();
-        let longest = (0..skin.segments()).map(|k| skin.length(k)).fold(0.0, f64::max);
-        let cell_m = longest + 2.0 * skin.widest_m() + reach_m;
-        self.grid.fill((0..skin.segments()).map(|k| skin.middle(k)), cell_m);
-        self.grid.near_pairs(|i, j| {
-            let (i, j) = (i.min(j), i.max(j));
-            let [a, b] = [i, j].map(|k| k as usize);
-            let between = skin.middle(a).distance_squared(skin.middle(b));
-            let within = 0.5 * (skin.length(a) + skin.length(b)) + skin.widest(a) + skin.widest(b) + reach_m;
-            if between < within * within && !is_neighbour(skin, a, b) {
-                keys.push(u64::from(i) << 32 | u64::from(j));
+        grid.near_pairs(|i, j| {
+            let (a, b) = (&capsules[i as usize], &capsules[j as usize]);
+            let within = a.ball_m + b.ball_m + reach_m;
+            if !a.is_neighbour(b) && a.middle.distance_squared(b.middle) < within * within {
+                keys.push(u64::from(i.min(j)) << 32 | u64::from(i.max(j)));
             }
         });
         keys.sort_unstable();
-        self.list.clear();
-        self.list.extend(keys.iter().map(|key| Pair {
-            first: (key >> 32) as u32,
-            second: *key as u32,
-            gap_m: f64::NEG_INFINITY,
-            measured_at_m: 0.0,
+        list.clear();
+        list.extend(keys.iter().filter_map(|key| {
+            let (first, second) = ((key >> 32) as u32, *key as u32);
+            let gap_m = meet(skin, [first, second]).gap_m;
+            let apart = first.abs_diff(second) > 1;
+            (apart && gap_m <= reach_m).then_some(Pair { first, second, gap_m, measured_at_m: 0.0 })
         }));
+    }
+}
+
+impl Capsule {
+    fn new(skin: &Skin<'_>, k: usize) -> Self {
+        let rest = skin.arc_m[k + 1] - skin.arc_m[k];
+        let radius = skin.widest(k);
+        Self {
+            middle: skin.middle(k),
+            ball_m: 0.5 * skin.length(k) + radius,
+            arc_m: 0.5 * (skin.arc_m[k] + skin.arc_m[k + 1]),
+            neighbourhood_m: 0.5 * rest + 0.5 * PI * radius,
+        }
+    }
+
+    fn is_neighbour(&self, other: &Self) -> bool {
+        (self.arc_m - other.arc_m).abs() < self.neighbourhood_m + other.neighbourhood_m
     }
 }
 
 /// Whether two segments are so near along the tube that they touch through its own thickness (eq. 15): a tube bent as sharply
 /// as it can be, to the radius of its own skin, comes back to itself after π r.
 pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
-    let arc = |k: usize| 0.5 * (skin.arc_m[k] + skin.arc_m[k + 1]);
-    let rest = |k: usize| skin.arc_m[k + 1] - skin.arc_m[k];
-    let apart = (arc(j) - arc(i)).abs() - 0.5 * (rest(i) + rest(j));
-    i.abs_diff(j) <= 1 || apart < 0.5 * PI * (skin.widest(i) + skin.widest(j))
+    i.abs_diff(j) <= 1 || Capsule::new(skin, i).is_neighbour(&Capsule::new(skin, j))
 }
 
 /// Whether the next segment along the tube meets the same point: each end is told once.

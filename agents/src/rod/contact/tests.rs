@@ -85,12 +85,13 @@ fn the_grid_finds_every_pair_that_trying_all_finds() {
         let skin = chain.skin();
         let mut met = Vec::new();
         Pairs::default().visit(&skin, 0.001, |m| met.push((m.segments, m.gap_m)));
-        let margin_m = 0.001 + 2.0 * skin.relative_speed() * STEP;
+        let mean = chain.velocities.iter().sum::<DVec3>() / chain.velocities.len() as f64;
+        let ahead = |k: usize| STEP * chain.velocities[k].distance(mean).max(chain.velocities[k + 1].distance(mean));
         let mut all = Vec::new();
         for i in 0..skin.segments() {
             for j in i + 1..skin.segments() {
                 let meeting = pairs::meet(&skin, [i as u32, j as u32]);
-                let near = meeting.gap_m <= margin_m && !pairs::is_neighbour(&skin, i, j);
+                let near = meeting.gap_m <= 0.001 + ahead(i) + ahead(j) && !pairs::is_neighbour(&skin, i, j);
                 if near && !pairs::is_told_by_next(&skin, &meeting) {
                     all.push((meeting.segments, meeting.gap_m));
                 }
