@@ -174,7 +174,7 @@ pub(crate) fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result
 }
 
 /// Whether every edge has a triangle on both sides, running opposite ways. Corners at the same place are one.
-fn is_closed(mesh: &Triangles) -> bool {
+pub(crate) fn is_closed(mesh: &Triangles) -> bool {
     let mut first_at = HashMap::new();
     let same: Vec<u32> = (0u32..)
         .zip(&mesh.points)

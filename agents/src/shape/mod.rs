@@ -12,6 +12,7 @@ mod solid;
 mod tool;
 
 pub use convert::ShapeError;
+pub(crate) use convert::{Triangles, hull_triangles, is_closed, mesh_triangles};
 pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
 pub use mesh::{creased_mesh, hull_mesh};
 pub(crate) use near::near_segments;

@@ -1,0 +1,181 @@
+//! Springs that pull a rigid body: linearly implicit, stable at any stiffness.
+//!
+//! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring.
+//! Never here: contacts; positions stay.
+//!
+//! With the generalised velocity u = (v, ω), the point Jacobian G = (1, −r×) and the spring's force at the *end* of the step,
+//! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The turning of r under
+//! a force f adds the stiffness max(r·f, 0)(1 − r̂ r̂ᵀ) against turning, taken at the force of a first pass. A stiff spring
+//! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
+
+use super::mass::Spread;
+use super::motion::Motion;
+use crate::{Anchor, Grip, Pull};
+use glam::DVec3;
+
+/// A spring on this body: only an anchor in the body's own axes is a point of it.
+fn arm(pull: &Pull, motion: &Motion) -> Option<DVec3> {
+    match pull.anchor {
+        Anchor::Local(local) => Some(motion.rotation * local),
+        Anchor::Arc(_) => None,
+    }
+}
+
+/// Changes the velocities by gravity and the springs over `h` seconds and writes each spring's force.
+///
+/// Nothing is written and `false` returned where no spring holds a point of this body.
+pub(super) fn pull(
+    motion: &mut Motion,
+    body: &Spread,
+    around: (&[Pull], DVec3),
+    h: f64,
+    grips: &mut Vec<Grip>,
+) -> bool {
+    let (pulls, gravity) = around;
+    if !pulls.iter().any(|p| arm(p, motion).is_some()) {
+        return false;
+    }
+    let spin = motion.spin(body);
+    let mut change = [0.0; 6];
+    for pass in 0..2 {
+        let mut system = System::mass(motion, body, gravity * h);
+        for pull in pulls {
+            let Some(r) = arm(pull, motion) else { continue };
+            let point_velocity = motion.velocity + spin.cross(r);
+            let spring = Spring::new(pull, motion.position + r, point_velocity, h);
+            system.add_spring(r, spring.resistance, spring.impulse);
+            if pass > 0 {
+                let force = (spring.impulse - spring.resistance * point(change, r)) / h;
+                let stiffness = r.dot(force).max(0.0);
+                system.add_turning(r, h * h * stiffness, spin);
+            }
+        }
+        change = system.solve();
+    }
+    grips.clear();
+    for pull in pulls {
+        let Some(r) = arm(pull, motion) else { continue };
+        let spring = Spring::new(pull, motion.position + r, motion.velocity + spin.cross(r), h);
+        let force_n = (spring.impulse - spring.resistance * point(change, r)) / h;
+        grips.push(Grip { by: pull.by, force_n });
+    }
+    motion.velocity += DVec3::new(change[0], change[1], change[2]);
+    let spin_change = DVec3::new(change[3], change[4], change[5]);
+    motion.angular += motion.inertia_times(body, spin_change);
+    true
+}
+
+/// A spring over one step: impulse = `impulse` − `resistance` × change of the point's velocity.
+struct Spring {
+    impulse: DVec3,
+    resistance: f64,
+}
+
+impl Spring {
+    fn new(pull: &Pull, point: DVec3, velocity: DVec3, h: f64) -> Self {
+        let (k, c) = (pull.stiffness_n_m, pull.damping_n_s_m);
+        let slip = pull.target_velocity - velocity;
+        Self { impulse: h * (k * (pull.target + h * slip - point) + c * slip), resistance: h * (h * k + c) }
+    }
+}
+
+/// The change of a point's velocity.
+fn point(change: [f64; 6], r: DVec3) -> DVec3 {
+    DVec3::new(change[0], change[1], change[2]) + DVec3::new(change[3], change[4], change[5]).cross(r)
+}
+
+/// A symmetric positive system for the change of (v, ω).
+struct System {
+    matrix: [[f64; 6]; 6],
+    right: [f64; 6],
+}
+
+impl System {
+    fn mass(motion: &Motion, body: &Spread, fall: DVec3) -> Self {
+        let mut matrix = [[0.0; 6]; 6];
+        for i in 0..3 {
+            matrix[i][i] = body.mass_kg;
+            let column = motion.inertia_times(body, DVec3::AXES[i]);
+            (0..3).for_each(|j| matrix[3 + j][3 + i] = column[j]);
+        }
+        let p = fall * body.mass_kg;
+        Self { matrix, right: [p.x, p.y, p.z, 0.0, 0.0, 0.0] }
+    }
+
+    fn add_spring(&mut self, r: DVec3, resistance: f64, impulse: DVec3) {
+        // the rows of Gᵀ: forces pass as they are, torques as r ×
+        let rows: [[f64; 3]; 6] = std::array::from_fn(|i| match i {
+            0..3 => DVec3::AXES[i].to_array(),
+            _ => DVec3::AXES[i - 3].cross(r).to_array(),
+        });
+        for i in 0..6 {
+            for j in 0..6 {
+                self.matrix[i][j] += resistance * (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
+            }
+            self.right[i] += (0..3).map(|k| rows[i][k] * impulse[k]).sum::<f64>();
+        }
+    }
+
+    /// Stiffness (times h²) against turning across r.
+    fn add_turning(&mut self, r: DVec3, stiffness: f64, spin: DVec3) {
+        let axis = r.normalize_or_zero();
+        let resist = stiffness * (spin - axis * axis.dot(spin));
+        for i in 0..3 {
+            for j in 0..3 {
+                let unit = if i == j { 1.0 } else { 0.0 };
+                self.matrix[3 + i][3 + j] += stiffness * (unit - axis[i] * axis[j]);
+            }
+            self.right[3 + i] -= resist[i];
+        }
+    }
+
+    /// Solves by LDLᵀ without pivots: the matrix is positive definite.
+    fn solve(mut self) -> [f64; 6] {
+        let a = &mut self.matrix;
+        for j in 0..6 {
+            let d = a[j][j] - (0..j).map(|k| a[j][k] * a[j][k] * a[k][k]).sum::<f64>();
+            a[j][j] = d;
+            for i in j + 1..6 {
+                let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k] * a[k][k]).sum();
+                a[i][j] = (a[i][j] - sum) / d;
+            }
+        }
+        let mut x = self.right;
+        for i in 0..6 {
+            x[i] -= (0..i).map(|k| a[i][k] * x[k]).sum::<f64>();
+        }
+        for i in (0..6).rev() {
+            x[i] = x[i] / a[i][i] - (i + 1..6).map(|k| a[k][i] * x[k]).sum::<f64>();
+        }
+        x
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_solves_its_system() {
+        let body =
+            Spread { mass_kg: 2.0, com: DVec3::ZERO, moments: DVec3::new(0.1, 0.2, 0.3), axes: glam::DQuat::IDENTITY };
+        let motion = Motion {
+            position: DVec3::ONE,
+            rotation: glam::DQuat::from_rotation_x(0.4),
+            velocity: DVec3::X,
+            angular: DVec3::Y,
+        };
+        let build = || {
+            let mut system = System::mass(&motion, &body, DVec3::Z);
+            system.add_spring(DVec3::new(0.1, -0.2, 0.3), 40.0, DVec3::new(1.0, 2.0, 3.0));
+            system.add_turning(DVec3::new(0.1, -0.2, 0.3), 0.5, DVec3::ONE);
+            system
+        };
+        let x = build().solve();
+        let System { matrix, right } = build();
+        for i in 0..6 {
+            let left: f64 = (0..6).map(|j| matrix[i][j] * x[j]).sum();
+            assert!((left - right[i]).abs() < 1e-12, "row {i}: {left} is not {}", right[i]); // rounding of numbers near 10
+        }
+    }
+}
