@@ -13,6 +13,7 @@ mod picture;
 mod pose;
 mod survey;
 mod view;
+pub mod viewer;
 
 pub use compose::Hand;
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};

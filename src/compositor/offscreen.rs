@@ -9,7 +9,6 @@ use super::view::{Camera, Size};
 use image::RgbaImage;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
-use std::time::{Duration, Instant};
 
 /// Whether and why a device was lost.
 #[derive(Debug, Clone, Default)]
@@ -115,13 +114,7 @@ impl Gpu {
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor { backends, ..descriptor });
         let adapter = pollster::block_on(choose(&instance, backends))?;
         let info = adapter.get_info();
-        let stamps = adapter.features() & wgpu::Features::TIMESTAMP_QUERY;
-        let descriptor = wgpu::DeviceDescriptor {
-            label: Some("metachron"),
-            required_features: stamps,
-            required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
-            ..Default::default()
-        };
+        let descriptor = device_descriptor(&adapter);
         let opened = pollster::block_on(adapter.request_device(&descriptor));
         let (device, queue) =
             opened.map_err(|error| GpuError::NoDevice { adapter: info.name.clone(), detail: error.to_string() })?;
@@ -132,6 +125,16 @@ impl Gpu {
     #[must_use]
     pub fn describe(&self) -> String {
         format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver)
+    }
+}
+
+/// What is asked of an adapter, with a window or without: its texture sizes, and time stamps where it has them.
+pub(super) fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    wgpu::DeviceDescriptor {
+        label: Some("metachron"),
+        required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+        required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
+        ..Default::default()
     }
 }
 
@@ -215,18 +218,8 @@ impl Offscreen {
         let Some(texture) = &self.texture else { return Ok(DrawTimes::default()) };
         let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
         let times = self.renderer.render(picture, camera, Target { view: &view, size: self.size })?;
-        self.wait()?;
+        wait(&self.gpu.device, self.renderer.lost())?;
         Ok(DrawTimes { gpu: self.renderer.gpu_time(), ..times })
-    }
-
-    fn wait(&self) -> Result<Duration, GpuError> {
-        let start = Instant::now();
-        let polled = self.gpu.device.poll(wgpu::PollType::wait_indefinitely());
-        if let Some(reason) = self.renderer.lost().reason() {
-            return Err(DrawError::DeviceLost { reason }.into());
-        }
-        polled.map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
-        Ok(start.elapsed())
     }
 
     /// The pixels of the last picture, sRGB.
@@ -234,36 +227,10 @@ impl Offscreen {
     /// # Errors
     /// [`GpuError::ReadBack`] where the device would not give them.
     pub fn read_back(&self) -> Result<PictureFile, GpuError> {
-        let Some(texture) = &self.texture else { return Ok(RgbaImage::new(0, 0)) };
-        let Size { width, height } = self.size;
-        let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
-        let buffer = self.gpu.device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("read back"),
-            size: u64::from(pitch) * u64::from(height),
-            usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
-            mapped_at_creation: false,
-        });
-        let mut encoder = self.gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
-        let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: None };
-        encoder.copy_texture_to_buffer(
-            texture.as_image_copy(),
-            wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
-            wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
-        );
-        self.gpu.queue.submit([encoder.finish()]);
-        let failed = Arc::new(OnceLock::new());
-        let cell = Arc::clone(&failed);
-        buffer.map_async(wgpu::MapMode::Read, .., move |result| {
-            let _ = cell.set(result.err().map(|error| error.to_string()));
-        });
-        self.wait()?;
-        if let Some(Some(detail)) = failed.get() {
-            return Err(GpuError::ReadBack { detail: detail.clone() });
+        match &self.texture {
+            None => Ok(RgbaImage::new(0, 0)),
+            Some(texture) => read_back(&self.gpu, texture, self.renderer.lost()),
         }
-        let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
-        let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
-        let image = RgbaImage::from_raw(width, height, rows.copied().collect());
-        image.ok_or_else(|| GpuError::ReadBack { detail: "fewer bytes than pixels".into() })
     }
 
     /// Writes the last picture to a PNG file.
@@ -271,8 +238,54 @@ impl Offscreen {
     /// # Errors
     /// [`GpuError::ReadBack`], or [`GpuError::File`] naming the path.
     pub fn save(&self, path: &Path) -> Result<(), GpuError> {
-        let image = self.read_back()?;
-        let saved = image.save_with_format(path, image::ImageFormat::Png);
-        saved.map_err(|source| GpuError::File { path: path.to_path_buf(), source })
+        write_png(&self.read_back()?, path)
     }
+}
+
+/// Waits until all submitted work is done.
+pub(super) fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
+    let polled = device.poll(wgpu::PollType::wait_indefinitely());
+    if let Some(reason) = lost.reason() {
+        return Err(DrawError::DeviceLost { reason }.into());
+    }
+    polled.map(|_| ()).map_err(|error| GpuError::ReadBack { detail: error.to_string() })
+}
+
+/// The pixels of a texture of four bytes a pixel, after all submitted work.
+pub(super) fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<PictureFile, GpuError> {
+    let (width, height) = (texture.width(), texture.height());
+    let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read back"),
+        size: u64::from(pitch) * u64::from(height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: None };
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    let failed = Arc::new(OnceLock::new());
+    let cell = Arc::clone(&failed);
+    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        let _ = cell.set(result.err().map(|error| error.to_string()));
+    });
+    wait(&gpu.device, lost)?;
+    if let Some(Some(detail)) = failed.get() {
+        return Err(GpuError::ReadBack { detail: detail.clone() });
+    }
+    let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
+    let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
+    let image = RgbaImage::from_raw(width, height, rows.copied().collect());
+    image.ok_or_else(|| GpuError::ReadBack { detail: "fewer bytes than pixels".into() })
+}
+
+/// Writes a picture as PNG.
+pub(super) fn write_png(image: &PictureFile, path: &Path) -> Result<(), GpuError> {
+    let saved = image.save_with_format(path, image::ImageFormat::Png);
+    saved.map_err(|source| GpuError::File { path: path.to_path_buf(), source })
 }

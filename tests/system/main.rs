@@ -1,2 +1,3 @@
 //! The whole program as its users meet it; one binary, so that it links once.
 mod scene;
+mod viewer;

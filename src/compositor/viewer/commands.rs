@@ -1,0 +1,229 @@
+//! What the keys do: one table drives the handler, the help, the palette and the tooltips.
+//!
+//! In: egui's input. Out: [`Command`]s in the order they were pressed.
+//! Never here: what a command changes ([`super::Viewer`] decides).
+
+use egui::{Key, KeyboardShortcut, Modifiers};
+
+/// Something that one key press can ask for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Command {
+    /// Let time pass, or hold it.
+    PauseOrRun,
+    /// Advance by one frame.
+    Step,
+    /// Start the scene again.
+    Reset,
+    /// Read the scene file again.
+    Reload,
+    /// Next higher speed.
+    Faster,
+    /// Next lower speed.
+    Slower,
+    /// Real time.
+    RealTime,
+    /// Look at the selected object, or at everything.
+    Frame,
+    /// Keep the selected object in the middle.
+    Track,
+    /// Leave an overlay, a selection, the scene's camera.
+    Free,
+    /// Look through the scene's own camera.
+    SceneCamera,
+    /// Show resolutions as colours.
+    Colours,
+    /// Show edges.
+    Wireframe,
+    /// Show ages as colours.
+    Ages,
+    /// Only the picture.
+    HideUi,
+    /// Write the picture to a file.
+    Screenshot,
+    /// Keys and mouse.
+    Help,
+    /// Numbers of the run.
+    Info,
+    /// Cost and rate of each agent.
+    Costs,
+    /// Histories of the selected agent.
+    Histories,
+    /// Every command by name.
+    Palette,
+    /// End the run.
+    Quit,
+}
+
+/// Where the help lists a command.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Group {
+    /// Time and scene.
+    Time,
+    /// Camera.
+    Camera,
+    /// Picture and panels.
+    Picture,
+}
+
+/// A command and its keys.
+#[derive(Debug, Clone, Copy)]
+pub struct Shortcut {
+    /// What it asks for.
+    pub command: Command,
+    /// Any of these presses.
+    pub keys: &'static [KeyboardShortcut],
+    /// What it does, for a person.
+    pub does: &'static str,
+    /// Where the help lists it.
+    pub group: Group,
+}
+
+const fn key(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::NONE, key)
+}
+
+const fn ctrl(key: Key) -> KeyboardShortcut {
+    KeyboardShortcut::new(Modifiers::COMMAND, key)
+}
+
+const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static str, group: Group) -> Shortcut {
+    Shortcut { command, keys, does, group }
+}
+
+/// Every key of the window.
+pub const SHORTCUTS: [Shortcut; 22] = [
+    row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
+    row(Command::Step, &[key(Key::ArrowRight)], "Step one frame", Group::Time),
+    row(Command::Reset, &[key(Key::Backspace)], "Reset the scene", Group::Time),
+    row(Command::Reload, &[ctrl(Key::L)], "Reload the scene file", Group::Time),
+    row(Command::Faster, &[key(Key::Equals), key(Key::Plus)], "Faster", Group::Time),
+    row(Command::Slower, &[key(Key::Minus)], "Slower", Group::Time),
+    row(Command::RealTime, &[key(Key::Num1)], "Real time", Group::Time),
+    row(Command::Quit, &[ctrl(Key::Q)], "Quit", Group::Time),
+    row(Command::Frame, &[key(Key::F)], "Frame the selected object, or all", Group::Camera),
+    row(Command::Track, &[key(Key::T)], "Track the selected object", Group::Camera),
+    row(Command::SceneCamera, &[key(Key::V)], "View of the scene's camera", Group::Camera),
+    row(Command::Free, &[key(Key::Escape)], "Close, deselect, free camera", Group::Camera),
+    row(Command::Colours, &[key(Key::C)], "Colour by resolution", Group::Picture),
+    row(Command::Wireframe, &[key(Key::W)], "Wireframe", Group::Picture),
+    row(Command::Ages, &[key(Key::A)], "Colour by age", Group::Picture),
+    row(Command::HideUi, &[key(Key::H)], "Hide the panels", Group::Picture),
+    row(Command::Screenshot, &[key(Key::F12)], "Screenshot", Group::Picture),
+    row(Command::Help, &[key(Key::F1), key(Key::Questionmark)], "Help", Group::Picture),
+    row(Command::Info, &[key(Key::F2)], "Run information", Group::Picture),
+    row(Command::Costs, &[key(Key::F3)], "Cost and rate of every agent", Group::Picture),
+    row(Command::Histories, &[key(Key::F4)], "Histories of the selected agent", Group::Picture),
+    row(Command::Palette, &[ctrl(Key::P)], "Command palette", Group::Picture),
+];
+
+/// What the mouse does over the picture, for the help.
+pub const MOUSE: [(&str, &str); 7] = [
+    ("Left drag on an object", "Pull it with a spring; the wheel moves the hand in depth"),
+    ("Left drag beside objects, or with Alt", "Orbit"),
+    ("Right or middle drag", "Pan"),
+    ("Wheel", "Zoom"),
+    ("Right button and W A S D Q E", "Fly"),
+    ("Click", "Select"),
+    ("Double click", "Select and frame"),
+];
+
+/// The speeds that the keys step through, simulated seconds for each second.
+pub const SPEEDS: [f64; 10] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0];
+
+/// The next speed of [`SPEEDS`] above (`up`) or below `speed`; the end of the table past it.
+#[must_use]
+pub fn next_speed(speed: f64, up: bool) -> f64 {
+    const SLACK: f64 = 1e-9; // a speed that came through a file or a factor still counts as its table entry
+    let above = SPEEDS.into_iter().find(|&s| s > speed * (1.0 + SLACK));
+    let below = SPEEDS.into_iter().rev().find(|&s| s < speed * (1.0 - SLACK));
+    if up { above.unwrap_or(SPEEDS[SPEEDS.len() - 1]) } else { below.unwrap_or(SPEEDS[0]) }
+}
+
+/// Takes the commands pressed in this frame out of the input.
+///
+/// While a text is typed only keys with Ctrl and function keys count; while a widget is focused, neither do Space and arrows.
+#[must_use]
+pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
+    let typing = ctx.text_edit_focused();
+    let focused = ctx.memory(|memory| memory.focused().is_some());
+    // WASD fly while the right button is down, and are no toggles then
+    let flying = ctx.input(|input| input.pointer.secondary_down());
+    let mut found = Vec::new();
+    for shortcut in &SHORTCUTS {
+        for keys in shortcut.keys.iter().filter(|keys| listens(keys, typing, focused, flying)) {
+            if ctx.input_mut(|input| input.consume_shortcut(keys)) {
+                found.push(shortcut.command);
+            }
+        }
+    }
+    found
+}
+
+fn listens(keys: &KeyboardShortcut, typing: bool, focused: bool, flying: bool) -> bool {
+    if keys.modifiers.any() || is_function(keys.logical_key) || keys.logical_key == Key::Escape {
+        return true;
+    }
+    let widget_key = matches!(keys.logical_key, Key::Space | Key::ArrowRight | Key::Backspace);
+    let fly_key = matches!(keys.logical_key, Key::W | Key::A);
+    let taken = typing || (focused && widget_key) || (flying && fly_key);
+    !taken
+}
+
+fn is_function(key: Key) -> bool {
+    matches!(key, Key::F1 | Key::F2 | Key::F3 | Key::F4 | Key::F12)
+}
+
+/// The keys of `command` as a person reads them, such as `Ctrl+L` or `= or +`.
+#[must_use]
+pub fn keys_text(ctx: &egui::Context, command: Command) -> String {
+    let shortcut = SHORTCUTS.iter().find(|row| row.command == command);
+    let names: Vec<String> = shortcut.map_or_else(Vec::new, |row| row.keys.iter().map(|k| name(ctx, k)).collect());
+    names.join(" or ")
+}
+
+fn name(ctx: &egui::Context, keys: &KeyboardShortcut) -> String {
+    let modifiers = ctx.format_modifiers(keys.modifiers);
+    let key = match keys.logical_key {
+        Key::ArrowRight => "Right",
+        Key::Equals => "=",
+        Key::Plus => "+",
+        Key::Minus => "-",
+        Key::Questionmark => "?",
+        Key::Escape => "Esc",
+        other => other.name(),
+    };
+    if modifiers.is_empty() { key.to_owned() } else { format!("{modifiers}+{key}") }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn no_two_commands_share_a_key() {
+        let mut seen = HashSet::new();
+        for shortcut in &SHORTCUTS {
+            for keys in shortcut.keys {
+                assert!(seen.insert((keys.modifiers, keys.logical_key)), "{:?} twice", keys.logical_key);
+            }
+        }
+    }
+
+    #[test]
+    fn every_command_has_one_row_and_a_key() {
+        let commands: HashSet<_> = SHORTCUTS.iter().map(|row| row.command).collect();
+        assert_eq!(commands.len(), SHORTCUTS.len());
+        assert!(SHORTCUTS.iter().all(|row| !row.keys.is_empty() && !row.does.is_empty()));
+    }
+
+    #[test]
+    fn speeds_step_through_the_table_and_stop_at_its_ends() {
+        assert_eq!(next_speed(1.0, true), 2.0);
+        assert_eq!(next_speed(1.0, false), 0.5);
+        assert_eq!(next_speed(0.7, true), 1.0);
+        assert_eq!(next_speed(10.0, true), 10.0);
+        assert_eq!(next_speed(0.01, false), 0.01);
+        assert_eq!(next_speed(f64::NAN, true), 10.0);
+    }
+}

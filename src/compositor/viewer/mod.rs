@@ -1,0 +1,296 @@
+//! The window: panels around the picture, keys and mouse, and the shell that survives a lost device.
+//!
+//! In: a [`Show`] (what to draw, numbers, hits). Out: [`Action`]s. Never here: the runtime, scenes, controllers.
+//! [`Viewer`] is the whole user interface without a window, so that tests drive it; [`run_window`] puts it into one.
+
+mod bar;
+mod blit;
+mod commands;
+mod history;
+mod icons;
+mod mouse;
+mod overlays;
+mod plots;
+mod screen;
+mod shell;
+mod show;
+mod side;
+mod table;
+mod text;
+mod theme;
+
+pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
+pub use history::{FrameSummary, History};
+pub use shell::{WindowEnd, WindowError, WindowOptions, run_window};
+pub use show::{
+    Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, Message, Show, Skip, Status, ViewRequest, Weight,
+};
+
+use super::{Colouring, Size, Style};
+use egui::{Frame, Margin, Panel, Rect, Sense, Ui};
+use mouse::Hand;
+use overlays::Finder;
+use std::time::{Duration, Instant};
+
+/// Where a frame's picture comes from: the window's device, or a test.
+pub trait Screen {
+    /// Draws what `show` composes for this request, or gives the last picture again when the next is not due.
+    /// The shape shows it in `over`.
+    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<egui::Shape>;
+
+    /// The adapter's name, for the information panel.
+    fn adapter(&self) -> &str;
+}
+
+/// What the window itself must do after a frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Wishes {
+    /// Write the picture to a file.
+    pub screenshot: bool,
+    /// Close the window.
+    pub quit: bool,
+}
+
+/// How the picture is drawn, as it is kept between runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Looks {
+    /// Colour objects by their resolution.
+    pub colours: bool,
+    /// Colour objects by the age of their state; not together with `colours`.
+    pub ages: bool,
+    /// Draw the edges of triangles.
+    pub wireframe: bool,
+}
+
+impl Looks {
+    fn style(self) -> Style {
+        let colouring = match self {
+            Self { colours: true, .. } => Colouring::Resolution,
+            Self { ages: true, .. } => Colouring::Age,
+            _ => Colouring::Material,
+        };
+        Style { colouring, wireframe: self.wireframe }
+    }
+}
+
+/// What of the layout outlives a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
+#[serde(default)]
+pub struct Layout {
+    /// How the picture is shown.
+    pub looks: Looks,
+    /// Whether the panels are shown.
+    pub panels: bool,
+    /// Whether the run's numbers lie over the picture.
+    pub info: bool,
+    /// Whether costs and rates are open.
+    pub costs: bool,
+    /// Whether histories are open.
+    pub histories: bool,
+}
+
+impl Default for Layout {
+    fn default() -> Self {
+        Self { looks: Looks::default(), panels: true, info: false, costs: false, histories: false }
+    }
+}
+
+/// The user interface: everything but the window and the device.
+#[derive(Debug)]
+pub struct Viewer {
+    /// What of the layout outlives a run.
+    pub layout: Layout,
+    hand: Hand,
+    history: History,
+    help: bool,
+    finder: Option<Finder>,
+    size: Size,
+    /// What the window has to say besides the show's own messages.
+    notes: Vec<(f64, Message)>,
+}
+
+/// How long the window's own messages stay, seconds.
+const NOTE_S: f64 = 6.0;
+
+impl Default for Viewer {
+    fn default() -> Self {
+        Self {
+            layout: Layout::default(),
+            hand: Hand::default(),
+            history: History::default(),
+            help: false,
+            finder: None,
+            size: Size { width: 1, height: 1 },
+            notes: Vec::new(),
+        }
+    }
+}
+
+impl Viewer {
+    /// Gives egui its look. To be called once for a context.
+    pub fn install(ctx: &egui::Context) {
+        theme::install(ctx);
+    }
+
+    /// Draws one frame of the interface and applies what the user did in it.
+    ///
+    /// Gives what the window must do, and how long `screen` took of it.
+    pub fn ui(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> (Wishes, Duration) {
+        let now = ui.ctx().time();
+        self.history.sample(now, show.status());
+        self.notes.retain(|(until, _)| now < *until);
+        let mut commands = commands::pressed(ui.ctx());
+        let mut actions = dropped_scenes(ui);
+        if self.layout.panels {
+            self.panels(ui, show, &mut commands, &mut actions);
+        }
+        self.overlays(ui, show, &mut commands);
+        let mut wishes = Wishes::default();
+        for command in commands {
+            self.execute(command, show, &mut actions, &mut wishes);
+        }
+        actions.drain(..).for_each(|action| show.apply(action));
+        let drawing = self.stage(ui, show, screen);
+        (wishes, drawing)
+    }
+
+    /// Takes the times of a finished frame for the plots.
+    pub fn measured(&mut self, times: &FrameTimes) {
+        self.history.push_frame(times);
+    }
+
+    /// Shows a message of the window's own for a few seconds; `now_s` is egui's time.
+    pub fn note(&mut self, now_s: f64, message: Message) {
+        self.notes.push((now_s + NOTE_S, message));
+    }
+
+    fn panels(&mut self, ui: &mut Ui, show: &dyn Show, commands: &mut Vec<Command>, actions: &mut Vec<Action>) {
+        let status = show.status();
+        let summary = self.history.summary(status.target_hz);
+        // the window is cleared to the panels' colour, so they need not be filled again
+        let frame = |x, y| Frame::new().inner_margin(Margin::symmetric(x, y));
+        Panel::top("bar").exact_size(44.0).frame(frame(14, 0)).show(ui, |ui| {
+            commands.extend(bar::show(ui, status, &summary));
+        });
+        Panel::bottom("agents").resizable(true).default_size(156.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
+            match table::show(ui, status) {
+                Some(table::Press::Select(id)) => actions.push(Action::Select(Some(id))),
+                Some(table::Press::Frame(id)) => {
+                    actions.push(Action::Select(Some(id)));
+                    self.frame_object(show, Some(id));
+                }
+                None => {}
+            }
+        });
+        Panel::right("side").default_size(318.0).size_range(280.0..=460.0).frame(frame(14, 6)).show(ui, |ui| {
+            actions.extend(side::show(ui, status, &self.history, &mut self.layout.looks));
+        });
+    }
+
+    fn overlays(&mut self, ui: &Ui, show: &dyn Show, commands: &mut Vec<Command>) {
+        let ctx = ui.ctx();
+        if self.help {
+            self.help = overlays::help(ctx);
+        }
+        if let Some(finder) = &mut self.finder {
+            let (chosen, open) = overlays::finder(ctx, finder);
+            commands.extend(chosen);
+            if !open {
+                self.finder = None;
+            }
+        }
+        let status = show.status();
+        let right = ui.ctx().content_rect().right() - if self.layout.panels { 340.0 } else { 16.0 };
+        let window = |title: &'static str| {
+            let place = egui::pos2(right, 60.0);
+            egui::Window::new(title)
+                .resizable(false)
+                .collapsible(false)
+                .pivot(egui::Align2::RIGHT_TOP)
+                .default_pos(place)
+        };
+        window("Cost and rate").open(&mut self.layout.costs).show(ctx, |ui| plots::costs(ui, status));
+        let histories = window("Histories").open(&mut self.layout.histories);
+        histories.show(ctx, |ui| plots::histories(ui, status, &self.history));
+    }
+
+    fn stage(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> Duration {
+        egui::CentralPanel::no_frame().show(ui, |ui| self.picture(ui, show, screen)).inner
+    }
+
+    fn picture(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> Duration {
+        let rect = ui.max_rect();
+        let response = ui.allocate_rect(rect, Sense::click_and_drag());
+        response.widget_info(|| egui::WidgetInfo::labeled(egui::Role::Image, true, "Picture"));
+        for action in self.hand.input(ui, &response, show) {
+            show.apply(action);
+        }
+        let size = mouse::size_of(rect, ui.ctx().pixels_per_point());
+        self.size = size;
+        let view = ViewRequest { size, camera: self.hand.camera(show), style: self.layout.looks.style() };
+        let start = Instant::now();
+        let shape = screen.draw(show, &view, rect);
+        let drawing = start.elapsed();
+        let nothing = || egui::Shape::rect_filled(rect, 0.0, theme::palette(ui).ground);
+        ui.painter().add(shape.unwrap_or_else(nothing));
+        self.hand.draw(ui, &response, show);
+        let status = show.status();
+        if self.layout.info {
+            overlays::info(ui, rect, status, &self.history.summary(status.target_hz), screen.adapter());
+        }
+        let notes = self.notes.iter().map(|(_, note)| note.clone());
+        let messages: Vec<Message> = status.messages.iter().cloned().chain(notes).collect();
+        overlays::messages(ui, rect, &messages);
+        drawing
+    }
+
+    fn execute(&mut self, command: Command, show: &dyn Show, actions: &mut Vec<Action>, wishes: &mut Wishes) {
+        let status = show.status();
+        let looks = &mut self.layout.looks;
+        match command {
+            Command::PauseOrRun => actions.push(if status.running { Action::Pause } else { Action::Run }),
+            Command::Step => actions.push(Action::SingleStep),
+            Command::Reset => actions.push(Action::Reset),
+            Command::Reload => actions.push(Action::Reload),
+            Command::Faster => actions.push(Action::Speed(commands::next_speed(status.speed, true))),
+            Command::Slower => actions.push(Action::Speed(commands::next_speed(status.speed, false))),
+            Command::RealTime => actions.push(Action::Speed(1.0)),
+            Command::Frame => self.frame_object(show, status.selected),
+            Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
+            Command::SceneCamera => self.hand.follow_scene(),
+            Command::Free => self.leave(show, actions),
+            Command::Colours => (looks.colours, looks.ages) = (!looks.colours, false),
+            Command::Wireframe => looks.wireframe = !looks.wireframe,
+            Command::Ages => (looks.ages, looks.colours) = (!looks.ages, false),
+            Command::HideUi => self.layout.panels = !self.layout.panels,
+            Command::Screenshot => wishes.screenshot = true,
+            Command::Help => self.help = !self.help,
+            Command::Info => self.layout.info = !self.layout.info,
+            Command::Costs => self.layout.costs = !self.layout.costs,
+            Command::Histories => self.layout.histories = !self.layout.histories,
+            Command::Palette => self.finder = if self.finder.is_some() { None } else { Some(Finder::default()) },
+            Command::Quit => wishes.quit = true,
+        }
+    }
+
+    fn leave(&mut self, show: &dyn Show, actions: &mut Vec<Action>) {
+        if self.help || self.finder.is_some() {
+            (self.help, self.finder) = (false, None);
+        } else {
+            actions.push(Action::Select(None));
+            self.hand.free(show);
+        }
+    }
+
+    fn frame_object(&mut self, show: &dyn Show, object: Option<metachron_agents::AgentId>) {
+        if let Some(bounds) = show.bounds(object) {
+            self.hand.frame(show, &bounds, self.size);
+        }
+    }
+}
+
+fn dropped_scenes(ui: &Ui) -> Vec<Action> {
+    let dropped = ui.input(|input| input.raw.dropped_files.clone());
+    dropped.into_iter().map(|file| Action::OpenScene(file.path().to_path_buf())).collect()
+}

@@ -1,0 +1,198 @@
+//! The picture on the window's device: a texture that the renderer draws into and egui shows.
+//!
+//! In: a composed picture. Out: a texture's id and where the time went. Never here: pacing, panels.
+//! The picture is waited for, so that its measured work is whole; egui draws after it on the same queue.
+
+use super::super::offscreen::{self, Gpu};
+use super::super::{DrawError, Lost, Renderer, RendererOptions, Size, Target};
+use super::Screen;
+use super::blit::{Blit, Shown};
+use super::show::{Show, ViewRequest};
+use egui::{Rect, Shape};
+use egui_wgpu::{RenderState, wgpu};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+
+/// Where the time of one picture went.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct DrawnTimes {
+    /// Gathering and choosing.
+    pub compose: Duration,
+    /// Drawing, until the device was done.
+    pub draw: Duration,
+    /// What of it the device measured itself.
+    pub gpu: Option<Duration>,
+    /// Whether the picture has another size than the one before.
+    pub resized: bool,
+}
+
+/// The picture's texture.
+struct Canvas {
+    texture: wgpu::Texture,
+    view: wgpu::TextureView,
+    shown: Arc<Shown>,
+}
+
+/// The window's device as a [`Screen`].
+pub struct GpuScreen {
+    gpu: Gpu,
+    target_format: wgpu::TextureFormat,
+    adapter: String,
+    renderer: Renderer,
+    blit: Blit,
+    canvas: Option<Canvas>,
+    times: Option<DrawnTimes>,
+    failure: Option<DrawError>,
+    due: bool,
+    pictures: u64,
+    lose_after: Option<u64>,
+}
+
+impl GpuScreen {
+    /// A screen on the device that eframe opened; `lose_after` destroys it after so many pictures.
+    ///
+    /// # Errors
+    /// [`DrawError::Refused`] where the device cannot do what the shaders need.
+    pub fn new(state: &RenderState, lose_after: Option<u64>) -> Result<Self, DrawError> {
+        let info = state.adapter.get_info();
+        let options = RendererOptions::for_adapter(&info);
+        let gpu = Gpu { info, device: state.device.clone(), queue: state.queue.clone() };
+        let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, options)?;
+        Ok(Self {
+            target_format: state.target_format,
+            adapter: gpu.describe(),
+            renderer,
+            blit: Blit::new(&gpu.device, state.target_format),
+            canvas: None,
+            times: None,
+            failure: None,
+            due: true,
+            pictures: 0,
+            lose_after,
+            gpu,
+        })
+    }
+
+    /// Whether the device was lost: nothing can be drawn until there is another.
+    pub fn lost(&self) -> &Lost {
+        self.renderer.lost()
+    }
+
+    /// Whether the next call of [`Screen::draw`] makes a new picture.
+    pub fn set_due(&mut self, due: bool) {
+        self.due = due;
+    }
+
+    /// The times of the newest picture, once.
+    pub fn take_times(&mut self) -> Option<DrawnTimes> {
+        self.times.take()
+    }
+
+    /// Why the newest picture could not be drawn, once.
+    pub fn take_failure(&mut self) -> Option<DrawError> {
+        self.failure.take()
+    }
+
+    /// Writes the newest picture, without panels, into `folder`; gives the file or what to tell the user.
+    ///
+    /// # Errors
+    /// A sentence that names the file and the cause.
+    pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf, String> {
+        let Some(canvas) = &self.canvas else { return Err("There is no picture yet.".to_owned()) };
+        let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
+        let path = folder.join(format!("metachron-{}-{}.png", file_name(scene), now.as_millis()));
+        let image = offscreen::read_back(&self.gpu, &canvas.texture, self.lost());
+        let written = image.and_then(|image| offscreen::write_png(&image, &path));
+        written.map(|()| path).map_err(|error| error.to_string())
+    }
+
+    fn render(&mut self, show: &mut dyn Show, view: &ViewRequest) -> Result<DrawnTimes, DrawError> {
+        let start = Instant::now();
+        let picture = show.compose(view);
+        let composed = Instant::now();
+        let max = self.gpu.device.limits().max_texture_dimension_2d;
+        let size = Size { width: view.size.width.clamp(1, max), height: view.size.height.clamp(1, max) };
+        let resized = self.resize(size);
+        let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
+        let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
+        // a device that fails here is lost, and that is noticed before the next frame
+        let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
+        let gpu = self.renderer.gpu_time().or(times.gpu);
+        Ok(DrawnTimes { compose: composed - start, draw: composed.elapsed(), gpu, resized })
+    }
+
+    /// Makes the texture of this size, if it is not there already. Gives whether it was made.
+    fn resize(&mut self, Size { width, height }: Size) -> bool {
+        if self.canvas.as_ref().is_some_and(|c| (c.texture.width(), c.texture.height()) == (width, height)) {
+            return false;
+        }
+        let device = &self.gpu.device;
+        let texture = device.create_texture(&wgpu::TextureDescriptor {
+            label: Some("picture"),
+            size: wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+            mip_level_count: 1,
+            sample_count: 1,
+            dimension: wgpu::TextureDimension::D2,
+            format: FORMAT,
+            usage: wgpu::TextureUsages::RENDER_ATTACHMENT
+                | wgpu::TextureUsages::TEXTURE_BINDING
+                | wgpu::TextureUsages::COPY_SRC,
+            view_formats: &[FORMAT, FORMAT.remove_srgb_suffix()],
+        });
+        // egui's targets mostly hold encoded bytes as they are, so those are read without decoding
+        let encoded = !self.target_format.is_srgb();
+        let shown = texture.create_view(&wgpu::TextureViewDescriptor {
+            format: Some(if encoded { FORMAT.remove_srgb_suffix() } else { FORMAT }),
+            ..wgpu::TextureViewDescriptor::default()
+        });
+        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+        self.canvas = Some(Canvas { texture, view, shown: self.blit.show(device, &shown) });
+        true
+    }
+}
+
+/// Colours are stored as sRGB, which is what the renderer's linear light is encoded to.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+
+/// A scene's name as part of a file's name.
+fn file_name(scene: &str) -> String {
+    let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
+    scene.chars().take(60).map(plain).collect()
+}
+
+impl Screen for GpuScreen {
+    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<Shape> {
+        if self.lost().reason().is_some() {
+            return None;
+        }
+        if self.due || self.canvas.is_none() {
+            match self.render(show, view) {
+                Ok(times) => self.times = Some(times),
+                Err(error) => self.failure = Some(error),
+            }
+            self.due = false;
+            self.pictures += 1;
+            if self.lose_after == Some(self.pictures) {
+                self.gpu.device.destroy();
+                let _ = self.gpu.device.poll(wgpu::PollType::Poll);
+            }
+        }
+        self.canvas.as_ref().map(|canvas| canvas.shown.shape(over))
+    }
+
+    fn adapter(&self) -> &str {
+        &self.adapter
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_with_any_name_gives_a_file_name_without_folders() {
+        assert_eq!(file_name("tube-2"), "tube-2");
+        assert_eq!(file_name("../a b/ü.toml"), "___a_b___toml");
+    }
+}

@@ -1,0 +1,327 @@
+//! The window itself: eframe around the [`Viewer`], paced at the target rate, started again when its device is lost.
+//!
+//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: what is in the window.
+//! eframe reconfigures an outdated surface and makes a lost one anew by itself; a lost device it does not notice, so
+//! [`run_window`] hears of it from wgpu, closes the window and opens it again on a new device. The show runs on meanwhile.
+
+use super::super::Lost;
+use super::screen::GpuScreen;
+use super::show::{FrameTimes, Message, Show, Skip, Weight};
+use super::{Layout, Viewer, Wishes};
+use eframe::{CreationContext, NativeOptions, egui_wgpu};
+use std::cell::{Cell, OnceCell};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::time::{Duration, Instant};
+
+/// How a window starts.
+#[derive(Debug, Clone)]
+pub struct WindowOptions {
+    /// Where screenshots go: a folder that exists.
+    pub screenshots: PathBuf,
+    /// Destroys the device after this many pictures, once: shows that the window comes back. Never set by users.
+    pub lose_device_after: Option<u64>,
+}
+
+/// Why a window is gone.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WindowEnd {
+    /// The user closed it.
+    Closed,
+    /// The show asked for it ([`Show::wants_close`]).
+    Finished,
+}
+
+/// Why there is no window.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WindowError {
+    /// There is no display to open a window on; the run can go on without one.
+    #[error("there is no display: {0}")]
+    NoDisplay(String),
+    /// No adapter can draw into a window.
+    #[error("no graphics adapter can draw into a window: {0}; on Debian and Ubuntu install mesa-vulkan-drivers")]
+    NoAdapter(String),
+    /// The device was lost as often as this within a second of being made.
+    #[error("the graphics device was lost {0} times within a second of being made")]
+    DeviceUnstable(u32),
+    /// The window could not be made for another reason.
+    #[error("the window could not be opened: {0}")]
+    Failed(String),
+}
+
+/// A device that is lost sooner than this after it was made counts against [`LOSSES_MAX`].
+const YOUNG: Duration = Duration::from_secs(1);
+/// Lost young devices after which the window gives up.
+const LOSSES_MAX: u32 = 5;
+/// While the window is hidden the show is asked this often whether it has ended.
+const HIDDEN_POLL: Duration = Duration::from_millis(200);
+/// Pictures of a new device that say nothing: shaders are compiled, buffers grow.
+const WARM_UP: u64 = 3;
+/// A picture this much before its time is drawn rather than waited for.
+const EARLY: Duration = Duration::from_micros(500);
+
+/// Opens the window and shows `show` in it until the user or the show closes it.
+///
+/// To be called on the main thread. A lost device is replaced; the show is not told and need not care.
+///
+/// # Errors
+/// [`WindowError::NoDisplay`] where a run should go on without a window, the others where graphics fail.
+/// The show is left as it is.
+pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
+    find_display()?;
+    let mut viewer = Viewer::default();
+    let mut options = options.clone();
+    let (mut losses, mut first) = (0, true);
+    loop {
+        let opened = Instant::now();
+        match open(show, &mut viewer, &options, first)? {
+            Fate::Open | Fate::Closed => return Ok(WindowEnd::Closed),
+            Fate::Finished => return Ok(WindowEnd::Finished),
+            Fate::DeviceLost => {}
+        }
+        losses = if opened.elapsed() < YOUNG { losses + 1 } else { 0 };
+        if losses >= LOSSES_MAX {
+            return Err(WindowError::DeviceUnstable(losses));
+        }
+        (options.lose_device_after, first) = (None, false);
+        let text = "The graphics device was lost and made anew.".to_owned();
+        viewer.note(0.0, Message { weight: Weight::Warning, text });
+    }
+}
+
+/// Whether this system names a display at all: without one, winit's own error is hard to read.
+fn find_display() -> Result<(), WindowError> {
+    let unix_desktop = cfg!(unix) && !cfg!(target_os = "macos");
+    let named = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"]
+        .into_iter()
+        .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+    if unix_desktop && !named {
+        return Err(WindowError::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".to_owned()));
+    }
+    Ok(())
+}
+
+/// What became of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Open,
+    Closed,
+    Finished,
+    DeviceLost,
+}
+
+/// One window on one device, until either is gone.
+fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
+    let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
+    let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
+    let native = native_options(&show.status().scene);
+    let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
+        Viewer::install(&cc.egui_ctx);
+        if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
+            viewer.layout = layout;
+        }
+        let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
+        let screen = GpuScreen::new(state, options.lose_device_after)?;
+        let _ = watched.set(screen.lost().clone());
+        Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
+    };
+    let run = || eframe::run_native("metachron", native, Box::new(creator));
+    let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
+    // egui panics where a device is lost between its own calls; nothing of the show or the viewer is under change there
+    match panic::catch_unwind(AssertUnwindSafe(run)) {
+        Ok(ended) => ended.map_err(named_error)?,
+        Err(_) if lost() => return Ok(Fate::DeviceLost),
+        Err(bug) => panic::resume_unwind(bug),
+    }
+    Ok(fate.get())
+}
+
+const LAYOUT: &str = "metachron layout";
+
+fn named_error(error: eframe::Error) -> WindowError {
+    match error {
+        eframe::Error::Winit(error) => WindowError::NoDisplay(error.to_string()),
+        eframe::Error::WinitEventLoop(error) => WindowError::NoDisplay(error.to_string()),
+        eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
+        other => WindowError::Failed(other.to_string()),
+    }
+}
+
+fn native_options(scene: &str) -> NativeOptions {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title(format!("metachron – {scene}"))
+        .with_app_id("metachron")
+        .with_inner_size([1440.0, 900.0])
+        .with_min_inner_size([640.0, 420.0])
+        .with_drag_and_drop(true)
+        .with_icon(super::icons::window_icon());
+    let mut wgpu_options = egui_wgpu::WgpuConfiguration::default();
+    if let egui_wgpu::WgpuSetup::CreateNew(setup) = &mut wgpu_options.wgpu_setup {
+        setup.device_descriptor = std::sync::Arc::new(super::super::offscreen::device_descriptor);
+    }
+    NativeOptions { viewport, wgpu_options, renderer: eframe::Renderer::Wgpu, ..NativeOptions::default() }
+}
+
+/// The application inside eframe.
+struct Shell<'a> {
+    show: &'a mut dyn Show,
+    viewer: &'a mut Viewer,
+    screen: GpuScreen,
+    fate: Rc<Cell<Fate>>,
+    screenshots: PathBuf,
+    pace: Pace,
+    /// Time that [`Viewer::ui`] spent on the picture in the frame before.
+    drawing: Duration,
+    hidden: bool,
+}
+
+/// When pictures are due.
+struct Pace {
+    due: Instant,
+    started: Option<Instant>,
+    pictures: u64,
+}
+
+impl Pace {
+    fn is_due(&self, now: Instant) -> bool {
+        now + EARLY >= self.due
+    }
+
+    /// Counts a picture that starts now; gives the time since the one before.
+    fn start(&mut self, now: Instant, period: Duration) -> Duration {
+        // a late picture keeps the beat if it can, and starts a new one if it is a whole period late
+        self.due = if self.due + period > now { self.due + period } else { now + period };
+        self.pictures += 1;
+        let before = self.started.replace(now);
+        before.map_or(period, |before| now - before)
+    }
+}
+
+impl<'a> Shell<'a> {
+    fn new(
+        show: &'a mut dyn Show,
+        viewer: &'a mut Viewer,
+        screen: GpuScreen,
+        (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
+    ) -> Self {
+        let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
+        Self { show, viewer, screen, fate, screenshots, pace, drawing: Duration::ZERO, hidden: false }
+    }
+
+    fn close(&self, ctx: &egui::Context, fate: Fate) {
+        self.fate.set(fate);
+        ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+    }
+
+    /// Puts together where the time of the picture just drawn went, and tells the show and the plots.
+    fn account(&mut self, interval: Duration, panels: Duration) {
+        let Some(drawn) = self.screen.take_times() else { return };
+        let skip = if self.pace.pictures <= WARM_UP {
+            Some(Skip::WarmUp)
+        } else if std::mem::take(&mut self.hidden) {
+            Some(Skip::Hidden)
+        } else if drawn.resized {
+            Some(Skip::Resized)
+        } else {
+            None
+        };
+        let times = FrameTimes {
+            compose: drawn.compose,
+            draw: drawn.draw,
+            draw_gpu: drawn.gpu,
+            panels,
+            work: drawn.compose + drawn.draw + panels,
+            interval,
+            skip,
+        };
+        self.show.measured(&times);
+        self.viewer.measured(&times);
+    }
+
+    fn fulfil(&mut self, ctx: &egui::Context, wishes: Wishes) {
+        if wishes.quit {
+            self.close(ctx, Fate::Closed);
+        }
+        if wishes.screenshot {
+            let scene = self.show.status().scene.clone();
+            let message = match self.screen.save(&self.screenshots, &scene) {
+                Ok(path) => Message { weight: Weight::Note, text: format!("Picture written to {}", path.display()) },
+                Err(text) => Message { weight: Weight::Failure, text },
+            };
+            self.viewer.note(ctx.time(), message);
+        }
+    }
+}
+
+impl eframe::App for Shell<'_> {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        if self.fate.get() != Fate::Open {
+            return;
+        }
+        if self.screen.lost().reason().is_some() {
+            self.close(ctx, Fate::DeviceLost);
+        } else if self.show.wants_close() {
+            self.close(ctx, Fate::Finished);
+        }
+        if ctx.input(|input| input.viewport().visible()) == Some(false) {
+            self.hidden = true;
+            ctx.request_repaint_after(HIDDEN_POLL);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        if self.fate.get() != Fate::Open {
+            return;
+        }
+        let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
+        let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
+        let panels = panels.saturating_sub(self.drawing);
+        let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
+        let due = first_pass && self.pace.is_due(now);
+        let interval = if due { self.pace.start(now, period) } else { Duration::ZERO };
+        self.screen.set_due(due);
+        let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
+        self.drawing = if first_pass { drawing } else { self.drawing + drawing };
+        self.account(interval, panels);
+        if let Some(error) = self.screen.take_failure() {
+            let text = format!("The picture could not be drawn: {error}");
+            self.viewer.note(ui.ctx().time(), Message { weight: Weight::Failure, text });
+        }
+        self.fulfil(ui.ctx(), wishes);
+        if self.screen.lost().reason().is_some() {
+            // egui must not draw on a device that is gone: it would find no room for its vertices, and panic
+            ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
+        }
+        ui.ctx().request_repaint_after(self.pace.due.saturating_duration_since(Instant::now()));
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, LAYOUT, &self.viewer.layout);
+    }
+
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pictures_keep_their_beat_and_a_stall_starts_a_new_one() {
+        let begin = Instant::now();
+        let period = Duration::from_millis(20);
+        let mut pace = Pace { due: begin, started: None, pictures: 0 };
+        assert_eq!(pace.start(begin, period), period);
+        let late = begin + Duration::from_millis(23);
+        assert!(pace.is_due(late) && !pace.is_due(begin + Duration::from_millis(19)));
+        assert_eq!(pace.start(late, period), Duration::from_millis(23));
+        assert_eq!(pace.due, begin + 2 * period);
+        let stalled = begin + Duration::from_millis(500);
+        pace.start(stalled, period);
+        assert_eq!(pace.due, stalled + period);
+    }
+}

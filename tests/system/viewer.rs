@@ -1,0 +1,428 @@
+//! The window's interface driven as a user would: by label, by key, by mouse; what it asks for is what was meant.
+
+use egui::accesskit::Toggled;
+use egui::{Key, Modifiers, Pos2, Rect, Shape, pos2};
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use glam::DVec3;
+use metachron::compositor::viewer::{
+    Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, MOUSE, Message, SHORTCUTS, Screen, Show, Status,
+    ViewRequest, Viewer, Weight, Wishes, keys_text,
+};
+use metachron::compositor::{Camera, Colouring, Hit, Picture, Ray, Size};
+use metachron_agents::{AgentId, Anchor, Resolution, SimTime};
+use std::time::Duration;
+
+/// A show of three agents around the origin that writes down what it is asked for.
+struct Fake {
+    status: Status,
+    asked: Vec<Action>,
+    picture: Picture,
+}
+
+const BALL: AgentId = AgentId(1);
+
+impl Fake {
+    fn new() -> Self {
+        let mut tube = AgentRow::new(AgentId(0), "intestine", "tube");
+        (tube.wanted_hz, tube.rate_hz, tube.dt_s, tube.step_s, tube.age_s) = (240.0, 239.4, 4.17e-3, 310e-6, 2.1e-3);
+        tube.simulation = Some(Resolution { eps_m: 0.0125, n: 0 });
+        tube.picture = Some(Resolution { eps_m: 0.0081, n: 3 });
+        let mut ball = AgentRow::new(BALL, "stone", "rigid");
+        ball.state = AgentState::Resting;
+        let mut tool = AgentRow::new(AgentId(2), "grasper", "instrument");
+        tool.state = AgentState::Parked("the path left the world".to_owned());
+        let status = Status {
+            scene: "tube".to_owned(),
+            sim_time: SimTime::from_nanos(12_345_000_000),
+            running: true,
+            speed: 1.0,
+            real_time_factor: 0.99,
+            target_hz: 30.0,
+            policy: "feedback".to_owned(),
+            policies: vec!["full".to_owned(), "feedback".to_owned()],
+            law: Some(Law::Corrected { kappa: 0.3, margin: 0.1 }),
+            law_default: Some(Law::Corrected { kappa: 0.5, margin: 0.1 }),
+            agents: vec![tube, ball, tool],
+            ..Status::default()
+        };
+        Self { status, asked: Vec::new(), picture: Picture::default() }
+    }
+}
+
+impl Show for Fake {
+    fn apply(&mut self, action: Action) {
+        match &action {
+            Action::Pause => self.status.running = false,
+            Action::Run => self.status.running = true,
+            Action::Select(id) => self.status.selected = *id,
+            Action::Law(law) => self.status.law = Some(*law),
+            Action::TargetFps(hz) => self.status.target_hz = *hz,
+            Action::Speed(speed) => self.status.speed = *speed,
+            Action::DragStart(hit) => {
+                self.status.held = Some(Held { target: hit.point_m, force_n: 0.0 });
+            }
+            Action::DragEnd => self.status.held = None,
+            _ => {}
+        }
+        self.asked.push(action);
+    }
+
+    fn compose(&mut self, _view: &ViewRequest) -> &Picture {
+        &self.picture
+    }
+
+    fn measured(&mut self, _times: &FrameTimes) {}
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn scene_camera(&self) -> Camera {
+        Camera::looking(DVec3::new(1.0, -1.0, 0.8), DVec3::ZERO, 0.8)
+    }
+
+    /// A ball of 0.1 m at the origin.
+    fn pick(&self, ray: Ray) -> Option<Hit> {
+        let along = -ray.origin.dot(ray.direction);
+        let nearest = ray.origin + ray.direction * along;
+        let hit = Hit { object: BALL, anchor: Anchor::Local(nearest), point_m: nearest, distance_m: along };
+        (nearest.length() < 0.1).then_some(hit)
+    }
+
+    fn bounds(&self, of: Option<AgentId>) -> Option<Bounds> {
+        let radius_m = if of.is_some() { 0.1 } else { 1.0 };
+        Some(Bounds { centre: DVec3::ZERO, radius_m })
+    }
+}
+
+/// A screen without a device that keeps what it was asked to draw.
+#[derive(Default)]
+struct Blank {
+    views: Vec<ViewRequest>,
+}
+
+impl Screen for Blank {
+    fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, _over: Rect) -> Option<Shape> {
+        show.compose(view);
+        self.views.push(view.clone());
+        None
+    }
+
+    fn adapter(&self) -> &str {
+        "no adapter"
+    }
+}
+
+struct World {
+    viewer: Viewer,
+    show: Fake,
+    screen: Blank,
+    wishes: Wishes,
+    /// What the harness gives the interface to draw on: its window without a margin.
+    inner: Size,
+}
+
+fn window() -> Harness<'static, World> {
+    window_of(Fake::new())
+}
+
+fn window_of(show: Fake) -> Harness<'static, World> {
+    let world = World {
+        viewer: Viewer::default(),
+        show,
+        screen: Blank::default(),
+        wishes: Wishes::default(),
+        inner: Size { width: 0, height: 0 },
+    };
+    let draw = |ui: &mut egui::Ui, world: &mut World| {
+        let room = ui.max_rect().size();
+        world.inner = Size { width: room.x.round() as u32, height: room.y.round() as u32 };
+        let (wishes, _) = world.viewer.ui(ui, &mut world.show, &mut world.screen);
+        world.wishes.screenshot |= wishes.screenshot;
+        world.wishes.quit |= wishes.quit;
+    };
+    let mut harness = Harness::builder()
+        .with_size(egui::vec2(1280.0, 800.0))
+        .with_os(egui::os::OperatingSystem::Nix)
+        .with_context_setup(Viewer::install)
+        .build_ui_state(draw, world);
+    harness.run_steps(2);
+    harness
+}
+
+fn asked(harness: &mut Harness<'static, World>) -> Vec<Action> {
+    harness.run_steps(2);
+    std::mem::take(&mut harness.state_mut().show.asked)
+}
+
+fn press(harness: &mut Harness<'static, World>, key: Key) -> Vec<Action> {
+    harness.key_press(key);
+    asked(harness)
+}
+
+fn last_view(harness: &Harness<'static, World>) -> ViewRequest {
+    harness.state().screen.views.last().unwrap().clone()
+}
+
+/// The middle of the picture, where the fake ball is seen.
+fn middle(harness: &Harness<'static, World>) -> Pos2 {
+    harness.get_by_label("Picture").rect().center()
+}
+
+#[test]
+fn transport_buttons_ask_for_what_they_say() {
+    let mut harness = window();
+    for (label, action) in [
+        ("Pause", Action::Pause),
+        ("Run", Action::Run),
+        ("Step", Action::SingleStep),
+        ("Reset", Action::Reset),
+        ("Faster", Action::Speed(2.0)),
+        ("Slower", Action::Speed(1.0)),
+    ] {
+        harness.get_by_label(label).click();
+        assert_eq!(asked(&mut harness), [action], "{label}");
+    }
+}
+
+#[test]
+fn keys_ask_for_what_the_help_says() {
+    let mut harness = window();
+    assert_eq!(press(&mut harness, Key::Space), [Action::Pause]);
+    assert_eq!(press(&mut harness, Key::Space), [Action::Run]);
+    assert_eq!(press(&mut harness, Key::ArrowRight), [Action::SingleStep]);
+    assert_eq!(press(&mut harness, Key::Backspace), [Action::Reset]);
+    assert_eq!(press(&mut harness, Key::Equals), [Action::Speed(2.0)]);
+    assert_eq!(press(&mut harness, Key::Minus), [Action::Speed(1.0)]);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::L);
+    assert_eq!(asked(&mut harness), [Action::Reload]);
+    press(&mut harness, Key::F12);
+    assert!(harness.state().wishes.screenshot);
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::Q);
+    asked(&mut harness);
+    assert!(harness.state().wishes.quit);
+}
+
+#[test]
+fn toggles_change_how_the_next_picture_is_drawn() {
+    let mut harness = window();
+    assert_eq!(last_view(&harness).style.colouring, Colouring::Material);
+    harness.get_by_label("Colour by resolution").click();
+    asked(&mut harness);
+    assert_eq!(last_view(&harness).style.colouring, Colouring::Resolution);
+    press(&mut harness, Key::A);
+    assert_eq!(last_view(&harness).style.colouring, Colouring::Age);
+    let resolution = harness.get_by_label("Colour by resolution");
+    assert_eq!(resolution.accesskit_node().toggled(), Some(Toggled::False));
+    press(&mut harness, Key::W);
+    assert!(last_view(&harness).style.wireframe);
+    harness.get_by_label("Wireframe").click();
+    asked(&mut harness);
+    assert!(!last_view(&harness).style.wireframe);
+}
+
+#[test]
+fn sliders_move_the_target_and_the_gains() {
+    let mut harness = window();
+    harness.get_by_role_and_label(egui::Role::Slider, "Target rate").set_value_accesskit(60.0);
+    assert_eq!(asked(&mut harness), [Action::TargetFps(60.0)]);
+    harness.get_by_role_and_label(egui::Role::Slider, "Gain κ").set_value_accesskit(0.8);
+    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.8, margin: 0.1 })]);
+    harness.get_by_label("Reset to default").click();
+    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.5, margin: 0.1 })]);
+    harness.get_by_label("As printed").click();
+    assert_eq!(asked(&mut harness), [Action::Law(Law::Printed { alpha: 1e-4, beta: 5.0 })]);
+    assert!(harness.query_by_role_and_label(egui::Role::Slider, "Gain β").is_some());
+}
+
+#[test]
+fn a_window_left_alone_asks_for_nothing() {
+    let mut harness = window();
+    harness.run_steps(30);
+    assert_eq!(asked(&mut harness), []);
+}
+
+#[test]
+fn the_policy_is_chosen_by_name() {
+    let mut harness = window();
+    harness.get_by_label("Policy").click();
+    harness.run_steps(3);
+    harness.get_by_label("full").click();
+    assert_eq!(asked(&mut harness), [Action::Policy("full".to_owned())]);
+}
+
+#[test]
+fn help_lists_every_key_and_both_keys_open_and_close_it() {
+    let mut harness = window();
+    for key in [Key::F1, Key::Questionmark] {
+        press(&mut harness, key);
+        for shortcut in &SHORTCUTS {
+            let keys = keys_text(&harness.ctx, shortcut.command);
+            assert!(harness.query_all_by_label(&keys).next().is_some(), "{keys} is not shown");
+            assert!(harness.query_all_by_label(shortcut.does).next().is_some(), "{} is not shown", shortcut.does);
+        }
+        for (hand, _) in MOUSE {
+            assert!(harness.query_by_label(hand).is_some(), "{hand} is not shown");
+        }
+        press(&mut harness, key);
+        assert!(harness.query_by_label("Keys and mouse").is_none());
+    }
+}
+
+#[test]
+fn every_agent_has_a_row_and_a_press_selects_it() {
+    let mut harness = window();
+    assert!(harness.query_by_label_contains("intestine, tube, 239 / 240 Hz").is_some());
+    assert!(harness.query_by_label_contains("parked: the path left the world").is_some());
+    harness.get_by_label_contains("stone, rigid").click();
+    assert_eq!(asked(&mut harness), [Action::Select(Some(BALL))]);
+    assert_eq!(press(&mut harness, Key::Escape), [Action::Select(None)]);
+}
+
+#[test]
+fn a_drag_on_an_object_pulls_it_and_the_camera_stays() {
+    let mut harness = window();
+    let camera = last_view(&harness).camera;
+    let at = middle(&harness);
+    harness.drag_at(at);
+    harness.run_steps(1);
+    harness.hover_at(at + egui::vec2(60.0, 10.0));
+    harness.run_steps(1);
+    harness.hover_at(at + egui::vec2(120.0, 30.0));
+    harness.run_steps(1);
+    harness.drop_at(at + egui::vec2(120.0, 30.0));
+    let asked = asked(&mut harness);
+    assert!(matches!(asked[0], Action::Select(Some(BALL))), "{asked:?}");
+    assert!(matches!(asked[1], Action::DragStart(Hit { object: BALL, .. })), "{asked:?}");
+    let Some(Action::DragMove(target)) = asked.iter().rev().find(|a| matches!(a, Action::DragMove(_))) else {
+        panic!("the hand never moved: {asked:?}");
+    };
+    assert!(target.dot(camera.right()) > 0.05, "{target} is not to the right");
+    assert_eq!(asked.last(), Some(&Action::DragEnd));
+    assert_eq!(last_view(&harness).camera, camera);
+}
+
+#[test]
+fn a_drag_beside_objects_orbits_and_asks_for_nothing() {
+    let mut harness = window();
+    let camera = last_view(&harness).camera;
+    let at = pos2(60.0, 90.0);
+    harness.drag_at(at);
+    harness.run_steps(1);
+    harness.hover_at(at + egui::vec2(80.0, 0.0));
+    harness.run_steps(1);
+    harness.drop_at(at + egui::vec2(80.0, 0.0));
+    assert_eq!(asked(&mut harness), []);
+    let turned = last_view(&harness).camera;
+    assert_ne!(turned.yaw_rad, camera.yaw_rad);
+    assert_eq!(turned.target_m, camera.target_m);
+}
+
+#[test]
+fn framing_brings_the_selected_object_near() {
+    let mut harness = window();
+    press(&mut harness, Key::F);
+    let far = last_view(&harness).camera.distance_m;
+    harness.get_by_label_contains("stone, rigid").click();
+    asked(&mut harness);
+    press(&mut harness, Key::F);
+    let near = last_view(&harness).camera.distance_m;
+    assert!((near * 10.0 - far).abs() < 1e-6 * far, "{near} m, {far} m"); // the balls are 0.1 m and 1 m
+    press(&mut harness, Key::V);
+    assert_eq!(last_view(&harness).camera, harness.state().show.scene_camera());
+}
+
+#[test]
+fn hiding_the_panels_gives_the_picture_the_whole_window() {
+    let mut harness = window();
+    let whole = harness.state().inner;
+    assert!(last_view(&harness).size.width < whole.width);
+    press(&mut harness, Key::H);
+    assert_eq!(last_view(&harness).size, whole);
+    press(&mut harness, Key::H);
+    assert!(harness.query_by_label("Pause").is_some());
+}
+
+#[test]
+fn overlays_open_by_their_keys() {
+    let mut harness = window();
+    press(&mut harness, Key::F2);
+    assert!(harness.query_by_label("Adapter").is_some());
+    assert!(harness.query_by_label("no adapter").is_some());
+    press(&mut harness, Key::F3);
+    assert!(harness.query_by_label_contains("of a core in 3 agents").is_some());
+    press(&mut harness, Key::F4);
+    assert!(harness.query_by_label("Select an object to see its histories.").is_some());
+    harness.get_by_label_contains("intestine, tube").click();
+    asked(&mut harness);
+    assert!(harness.query_by_label("ε, mm").is_some());
+}
+
+#[test]
+fn the_palette_runs_the_command_that_was_typed() {
+    let mut harness = window();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    harness.get_by_label("Command").type_text("reset");
+    harness.run_steps(2);
+    assert_eq!(press(&mut harness, Key::Enter), [Action::Reset]);
+    assert!(harness.query_by_label("Command").is_none());
+}
+
+#[test]
+fn letters_typed_into_a_field_toggle_nothing() {
+    let mut harness = window();
+    harness.key_press_modifiers(Modifiers::COMMAND, Key::P);
+    harness.run_steps(3);
+    press(&mut harness, Key::W);
+    assert_eq!(press(&mut harness, Key::Space), []);
+    assert!(!last_view(&harness).style.wireframe);
+}
+
+#[test]
+fn an_overloaded_scene_leaves_the_interface_alive() {
+    let mut show = Fake::new();
+    show.status.real_time_factor = 0.1;
+    show.status.clamp = Some("rests on the coarsest resolution".to_owned());
+    show.status
+        .messages
+        .push(Message { weight: Weight::Warning, text: "the scene needs more than it gets".to_owned() });
+    let mut harness = window_of(show);
+    for frame in 0..100 {
+        let times = FrameTimes {
+            work: Duration::from_millis(900),
+            interval: Duration::from_millis(1000 + frame),
+            ..FrameTimes::default()
+        };
+        harness.state_mut().viewer.measured(&times);
+    }
+    harness.run_steps(3);
+    assert!(harness.query_by_label("rests on the coarsest resolution").is_some());
+    assert!(harness.query_by_label("the scene needs more than it gets").is_some());
+    assert!(harness.query_by_label("1.0 of 30 fps").is_some());
+    harness.get_by_label("Pause").click();
+    assert_eq!(asked(&mut harness), [Action::Pause]);
+}
+
+#[test]
+fn thousands_of_agents_do_not_hold_the_interface_up() {
+    let mut show = Fake::new();
+    show.status.agents = (0..5000).map(|i| AgentRow::new(AgentId(i), format!("object {i}"), "rigid")).collect();
+    let mut harness = window_of(show);
+    harness.run_steps(3);
+    let rows = harness.query_all_by_label_contains("object ").count();
+    assert!((1..40).contains(&rows), "{rows} rows were laid out"); // only what fits into the table
+}
+
+#[test]
+fn the_layout_comes_back_from_its_stored_form() {
+    let mut harness = window();
+    press(&mut harness, Key::H);
+    press(&mut harness, Key::C);
+    let layout = harness.state().viewer.layout;
+    let stored = serde_json::to_string(&layout).unwrap();
+    assert_eq!(serde_json::from_str::<metachron::compositor::viewer::Layout>(&stored).unwrap(), layout);
+    let older: metachron::compositor::viewer::Layout = serde_json::from_str("{}").unwrap();
+    assert!(older.panels);
+}
