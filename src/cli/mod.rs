@@ -1,1 +1,70 @@
-//! The command line.
+//! The command line: arguments in, exit code out.
+//!
+//! In: arguments and environment. Out: data on standard output, messages on standard error, files that were asked for.
+//! Never here: physics, drawing, the format of scenes.
+
+mod args;
+mod check;
+mod describe;
+mod output;
+mod progress;
+pub mod report;
+pub mod run;
+
+use args::{Cli, Command};
+use clap::{CommandFactory, FromArgMatches};
+use std::process::ExitCode;
+
+/// How a command ends: the exit codes that scripts can rely on.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Exit {
+    /// All went well.
+    Ok,
+    /// The run failed.
+    Failed,
+    /// The input or the usage was wrong.
+    BadInput,
+    /// A goal given with `--fail-on` was missed.
+    GoalMissed,
+    /// Ctrl-C; what there was has been written.
+    Interrupted,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(match exit {
+            Exit::Ok => 0,
+            Exit::Failed => 1,
+            Exit::BadInput => 2,
+            Exit::GoalMissed => 4,
+            Exit::Interrupted => 130,
+        })
+    }
+}
+
+/// Runs the command that the arguments ask for; `player` plays scenes.
+#[must_use]
+pub fn main(player: run::Player) -> ExitCode {
+    let mut arguments: Vec<_> = std::env::args_os().collect();
+    if arguments.len() < 2 {
+        arguments.truncate(1);
+        arguments.push("run".into());
+    }
+    let matches = Cli::command().get_matches_from(arguments);
+    let done = match Cli::from_arg_matches(&matches) {
+        Ok(cli) => dispatch(cli, &matches, player),
+        Err(error) => error.exit(),
+    };
+    done.unwrap_or_else(|error| output::tell(&error)).into()
+}
+
+fn dispatch(cli: Cli, matches: &clap::ArgMatches, player: run::Player) -> anyhow::Result<Exit> {
+    match cli.command {
+        Command::Run(args) => run::command(&args, matches.subcommand_matches("run"), player),
+        Command::Check(args) => check::command(&args),
+        Command::Schema => describe::schema(),
+        Command::List(args) => describe::list(&args),
+        Command::Completions { shell } => describe::completions(shell),
+        Command::Man { command } => describe::man(command.as_deref()),
+    }
+}

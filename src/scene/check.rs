@@ -88,6 +88,11 @@ impl<'d, 't> Checker<'d, 't> {
         self.problems
     }
 
+    /// How many problems there are so far.
+    pub(super) fn count(&self) -> usize {
+        self.problems.len()
+    }
+
     pub(super) fn push(&mut self, problem: Problem) {
         self.problems.push(problem);
     }

@@ -32,7 +32,32 @@ pub fn json_schema() -> Value {
     for (name, object) in MODELS.into_iter().zip(objects) {
         root["$defs"][name] = with_model(object, name);
     }
+    drop_null(&mut root);
     root
+}
+
+/// Takes `null` out of every choice: what is optional in Rust is left out in TOML, which has no null.
+fn drop_null(schema: &mut Value) {
+    let is_null = |v: &Value| *v == json!("null") || *v == json!({ "type": "null" });
+    if let Value::Object(table) = schema {
+        if let Some(Value::Array(kinds)) = table.get_mut("type") {
+            kinds.retain(|kind| !is_null(kind));
+            if let [kind] = kinds.as_slice() {
+                table["type"] = kind.clone();
+            }
+        }
+        if let Some(Value::Array(choices)) = table.get_mut("anyOf") {
+            choices.retain(|choice| !is_null(choice));
+            if let [Value::Object(only)] = choices.as_slice() {
+                let only = only.clone();
+                table.remove("anyOf");
+                table.extend(only);
+            }
+        }
+        table.values_mut().for_each(drop_null);
+    } else if let Value::Array(list) = schema {
+        list.iter_mut().for_each(drop_null);
+    }
 }
 
 /// A model's table with the keys that all models share.

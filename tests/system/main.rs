@@ -1,3 +1,4 @@
 //! The whole program as its users meet it; one binary, so that it links once.
+mod cli;
 mod scene;
 mod viewer;

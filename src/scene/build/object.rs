@@ -176,7 +176,9 @@ fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) 
 
 fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: Range<usize>) -> Option<T> {
     let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
-    T::deserialize(value).map_err(|error| c.push(Problem::from_toml(&error, span, &COMMON_KEYS))).ok()
+    T::deserialize(value)
+        .map_err(|error| c.push(Problem::from_toml(&error, span, &[&COMMON_KEYS[..], &["model"]].concat())))
+        .ok()
 }
 
 /// Gives every object its name and every agent its number, in the order of the file.

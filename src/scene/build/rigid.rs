@@ -55,8 +55,10 @@ pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile,
 /// Reads a moving object.
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>) -> Option<RigidSpec> {
     let place = given.place;
+    let before = c.count();
     let solid = solid(c, place, file, given.source)?;
-    let mass_kg = mass(c, place, file, &solid);
+    // the mass of a wrong shape is wrong too: one problem is told, not two
+    let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
     Some(RigidSpec {

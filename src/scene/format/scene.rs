@@ -194,3 +194,48 @@ pub struct ProbeFile {
     /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` too. Default: only the last state.
     pub every_ms: Option<f64>,
 }
+
+impl ExecutorKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Threads => "threads",
+            Self::Lockstep => "lockstep",
+        }
+    }
+}
+
+impl PolicyKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Feedback => "feedback",
+        }
+    }
+}
+
+impl LawKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Printed => "printed",
+        }
+    }
+}
+
+impl StatesKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Interpolate => "interpolate",
+            Self::Extrapolate => "extrapolate",
+            Self::Latest => "latest",
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! The arguments, and the help that teaches them.
+
+use super::report::Goal;
+use clap::builder::PossibleValuesParser;
+use clap::{Args, Parser, Subcommand, ValueHint};
+use std::path::PathBuf;
+
+const EXAMPLES: &str = "\
+Examples:
+  metachron                                    the tube demo (a window, or without a display ten headless seconds)
+  metachron list                               the built-in scenes
+  metachron run yard                           another one
+  metachron run my.toml                        a scene of your own
+  metachron check my.toml                      what is wrong with it, line by line
+  metachron schema > metachron.schema.json     for completion in an editor
+
+Exit codes: 0 ok, 1 failed run, 2 bad input or usage, 4 a goal of --fail-on was missed, 130 interrupted.";
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  metachron run                                        the tube demo
+  metachron run tube --headless --seconds 10 --report report.json --png last.png
+  metachron run tube --headless --target-fps 30 --fail-on 'missed_share>0.01'
+  metachron run pendulum --executor lockstep --frames 300 --headless --report -
+  metachron run yard --set object.hose.young_pa=5e5 --set target.frame_hz=30
+  METACHRON_EXECUTOR=lockstep metachron run overload --headless
+
+Flags go before --set, --set before the environment (METACHRON_…), that before the scene, and the scene before defaults.
+Data goes to standard output, messages to standard error.";
+
+const CHECK_EXAMPLES: &str = "\
+Examples:
+  metachron check my.toml other.toml
+  metachron check --json my.toml | jq '.[].problems'";
+
+/// A real-time physics engine in which every object keeps its own time and the frame never waits.
+///
+/// A scene is a TOML file of objects: soft tubes, rigid bodies, instruments. Each runs as an agent on its own clock, with its
+/// own step and resolution; the picture takes their newest states inside a frame budget.
+#[derive(Debug, Parser)]
+#[command(name = "metachron", version, after_help = EXAMPLES, max_term_width = 120)]
+pub struct Cli {
+    /// What to do; nothing at all runs the tube demo.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+/// The commands.
+#[derive(Debug, Subcommand)]
+pub enum Command {
+    /// Run a scene: in a window where there is a display, otherwise headless
+    #[command(after_help = RUN_EXAMPLES, allow_negative_numbers = true)]
+    Run(Box<RunArgs>),
+    /// Validate scenes; every problem is shown where it stands
+    #[command(after_help = CHECK_EXAMPLES)]
+    Check(CheckArgs),
+    /// Print the JSON Schema of scene files
+    Schema,
+    /// List the built-in scenes
+    List(ListArgs),
+    /// Print the completions for a shell
+    Completions {
+        /// The shell
+        shell: clap_complete::Shell,
+    },
+    /// Print the manual page, of the program or of one of its commands
+    Man {
+        /// A command, such as `run`
+        command: Option<String>,
+    },
+}
+
+/// `run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// A built-in scene (see `metachron list`) or the path of a scene file
+    #[arg(default_value = "tube", value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// Open no window
+    #[arg(long, env = "METACHRON_HEADLESS")]
+    pub headless: bool,
+    /// End after so many frames
+    #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u64).range(1..))]
+    pub frames: Option<u64>,
+    /// End after so many simulated seconds; headless runs take 10 where neither this nor --frames is given
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Frames a second to hold, 1 to 1000
+    #[arg(long, value_name = "F", env = "METACHRON_TARGET_FPS", value_parser = target_fps)]
+    pub target_fps: Option<f64>,
+    /// Who chooses the level of every visible object
+    #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(["full", "feedback"]))]
+    pub policy: Option<String>,
+    /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
+    #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
+    pub law: Option<String>,
+    /// How agents run: a thread each, or one thread in virtual time with declared costs (the same bits on every run)
+    #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["threads", "lockstep"]))]
+    pub executor: Option<String>,
+    /// Size of the picture in pixels, each 1 to 8192
+    #[arg(long, value_name = "WxH", default_value = "1280x720", env = "METACHRON_SIZE", value_parser = size)]
+    pub size: [u32; 2],
+    /// Seed of the declared machine's noise
+    #[arg(long, value_name = "N", env = "METACHRON_SEED")]
+    pub seed: Option<u32>,
+    /// Change a key of the scene, such as target.frame_hz=60 or object.NAME.rate_hz=120; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Write the last frame's picture here (PNG)
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub png: Option<PathBuf>,
+    /// Write the report here (JSON); - is standard output
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub report: Option<PathBuf>,
+    /// Write one row a frame here (CSV)
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub frames_csv: Option<PathBuf>,
+    /// End with code 4 where this holds of the report, such as missed_share>0.01 or frame_ms.p99>40; may be repeated
+    #[arg(long, value_name = "CONDITION", value_parser = goal)]
+    pub fail_on: Vec<Goal>,
+    /// Print the report as JSON on standard output, instead of the summary
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no summary
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Built-in scenes or paths of scene files
+    #[arg(required = true, value_name = "SCENE", value_hint = ValueHint::FilePath)]
+    pub scenes: Vec<String>,
+    /// Change a key before the check; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Print the result as JSON on standard output
+    #[arg(long)]
+    pub json: bool,
+    /// Say nothing of scenes that are sound
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `list`.
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    /// Print the list as JSON
+    #[arg(long)]
+    pub json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    bounded(text, 1e-3, 1e7, "seconds")
+}
+
+fn target_fps(text: &str) -> Result<f64, String> {
+    bounded(text, 1.0, 1000.0, "frames a second")
+}
+
+fn bounded(text: &str, least: f64, greatest: f64, unit: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v| (least..=greatest).contains(v));
+    value.ok_or_else(|| format!("expected {least} to {greatest} {unit}"))
+}
+
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let expected = || "expected WIDTHxHEIGHT, each 1 to 8192, such as 1280x720".to_owned();
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(expected)?;
+    let side = |s: &str| s.parse().ok().filter(|n| (1..=8192).contains(n)).ok_or_else(expected);
+    Ok([side(width)?, side(height)?])
+}
+
+fn assignment(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err("expected KEY=VALUE, such as target.frame_hz=60".to_owned()),
+    }
+}
+
+fn goal(text: &str) -> Result<Goal, String> {
+    text.parse().map_err(|e: super::report::GoalError| e.to_string())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_sound() {
+        Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn sizes_are_two_numbers_of_pixels() {
+        assert_eq!(size("640x360"), Ok([640, 360]));
+        for bad in ["640", "0x360", "640x", "640x9000", "-1x2", "axb", "1x2x3"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn an_assignment_keeps_what_follows_the_first_equals_sign() {
+        assert_eq!(assignment("a.b=c=d"), Ok(("a.b".to_owned(), "c=d".to_owned())));
+        assert!(assignment("a.b").is_err());
+        assert!(assignment("=1").is_err());
+    }
+
+    #[test]
+    fn numbers_of_seconds_are_finite_and_above_zero() {
+        for bad in ["nan", "inf", "-1", "0", "1e300", "", "x"] {
+            assert!(seconds(bad).is_err(), "{bad}");
+        }
+    }
+}

@@ -1,0 +1,93 @@
+//! `check`: validates scenes.
+
+use super::Exit;
+use super::args::CheckArgs;
+use super::output::{data, message, pictured};
+use crate::scene::{Scene, SceneError, SceneProblem, Source, load};
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct Row<'a> {
+    scene: &'a str,
+    ok: bool,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    content: Option<Content>,
+    problems: Vec<ProblemRow<'a>>,
+}
+
+#[derive(Serialize)]
+struct Content {
+    agents: usize,
+    fixed: usize,
+    probes: usize,
+}
+
+#[derive(Serialize)]
+struct ProblemRow<'a> {
+    line: usize,
+    column: usize,
+    text: &'a str,
+    message: &'a str,
+    expected: &'a str,
+    help: Option<&'a str>,
+}
+
+/// Checks every scene; one that is bad makes the whole command end with code 2.
+pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
+    let results: Vec<(&str, Result<Scene, SceneError>)> = args
+        .scenes
+        .iter()
+        .map(|name| (name.as_str(), Source::open(name).and_then(|source| load(&source, &args.set))))
+        .collect();
+    if args.json {
+        let rows: Vec<_> = results.iter().map(|(name, result)| row(name, result)).collect();
+        data(&format!("{}\n", serde_json::to_string_pretty(&rows)?))?;
+    } else {
+        for (name, result) in &results {
+            tell(name, result, args.quiet)?;
+        }
+    }
+    Ok(if results.iter().all(|(_, result)| result.is_ok()) { Exit::Ok } else { Exit::BadInput })
+}
+
+fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::Result<()> {
+    match result {
+        Err(error) => message(&pictured(error)),
+        Ok(_) if quiet => {}
+        Ok(scene) => {
+            let Content { agents, fixed, probes } = content(scene);
+            let list = [(agents, "agent"), (fixed, "fixed object"), (probes, "probe")].map(counted).join(", ");
+            data(&format!("{name}: ok ({list})\n"))?;
+        }
+    }
+    Ok(())
+}
+
+fn counted((count, what): (usize, &str)) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}
+
+fn content(scene: &Scene) -> Content {
+    Content { agents: scene.agents.len(), fixed: scene.obstacles.len(), probes: scene.probes.len() }
+}
+
+fn row<'a>(name: &'a str, result: &'a Result<Scene, SceneError>) -> Row<'a> {
+    match result {
+        Ok(scene) => Row { scene: name, ok: true, content: Some(content(scene)), problems: Vec::new() },
+        Err(error) => {
+            Row { scene: name, ok: false, content: None, problems: error.problems.iter().map(problem).collect() }
+        }
+    }
+}
+
+fn problem(problem: &SceneProblem) -> ProblemRow<'_> {
+    ProblemRow {
+        line: problem.line,
+        column: problem.column,
+        text: &problem.text,
+        message: &problem.message,
+        expected: &problem.expected,
+        help: problem.help.as_deref(),
+    }
+}

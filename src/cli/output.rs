@@ -1,0 +1,51 @@
+//! Where words go: data to standard output, messages to standard error.
+
+use super::Exit;
+use crate::scene::SceneError;
+use std::io::{ErrorKind, Write};
+
+/// Writes data to standard output. A reader that has gone away (`| head`) is no error.
+pub(super) fn data(text: &str) -> anyhow::Result<()> {
+    let mut out = std::io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
+        other => Ok(other?),
+    }
+}
+
+/// A message for people. Where nobody can read it, it is lost.
+pub(super) fn message(text: &str) {
+    let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// Tells an error, and with which code the program ends.
+pub(super) fn tell(error: &anyhow::Error) -> Exit {
+    if let Some(bad) = error.downcast_ref::<SceneError>() {
+        message(&pictured(bad));
+        return Exit::BadInput;
+    }
+    message(&format!("error: {error:#}"));
+    if error.is::<BadInput>() { Exit::BadInput } else { Exit::Failed }
+}
+
+/// What is wrong with a scene, with the lines underlined; colours and width follow the terminal.
+pub(super) fn pictured(error: &SceneError) -> String {
+    let handler = miette::MietteHandlerOpts::new().build();
+    format!("{:?}", Shown { error, handler: &handler })
+}
+
+struct Shown<'a> {
+    error: &'a SceneError,
+    handler: &'a miette::MietteHandler,
+}
+
+impl std::fmt::Debug for Shown<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        miette::ReportHandler::debug(self.handler, self.error, f)
+    }
+}
+
+/// An input that cannot be used, found after the arguments were read.
+#[derive(Debug, thiserror::Error)]
+#[error("{0}")]
+pub(super) struct BadInput(pub(super) String);

@@ -1,0 +1,33 @@
+//! The progress of a headless run, on standard error; hidden where that is no terminal.
+
+use indicatif::{ProgressBar, ProgressStyle};
+
+/// Steps of the bar: finer than any terminal is wide.
+const STEPS: u64 = 1000;
+
+/// A bar that knows when it is not wanted.
+pub(super) struct Bar(ProgressBar);
+
+impl Bar {
+    /// A bar for the scene `name`; nothing is shown where `quiet`.
+    pub(super) fn new(name: &str, quiet: bool) -> Self {
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS) };
+        if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:30} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        bar.set_prefix(name.to_owned());
+        Self(bar)
+    }
+
+    /// Shows how far the run is: the share that is done, and the last frame.
+    pub(super) fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
+        self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
+        self.0.set_message(format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
+    }
+}

@@ -1,0 +1,246 @@
+//! What a run tells about itself: the report, the frames, and goals on the report's numbers.
+//!
+//! In: measured numbers. Out: JSON, CSV rows, verdicts. Never here: measuring (the frame loop does), and where files go.
+
+mod frames;
+mod goal;
+mod summary;
+
+pub use frames::{FrameRow, FrameSummary, Spread, summarise};
+pub use goal::{Goal, GoalError, Verdict};
+
+use serde::Serialize;
+
+/// The report of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The scene's name.
+    pub scene: String,
+    /// Who chose levels.
+    pub policy: String,
+    /// Which feedback law.
+    pub law: String,
+    /// How agents were run.
+    pub executor: String,
+    /// The adapter that drew; `None` where nothing was drawn.
+    pub adapter: Option<String>,
+    /// Frames made.
+    pub frames: u64,
+    /// Simulated seconds.
+    pub sim_s: f64,
+    /// Seconds on the wall; in lockstep, of the virtual clock.
+    pub wall_s: f64,
+    /// CPU seconds of the agents' turns alone, really measured.
+    pub cpu_s: f64,
+    /// Hash of every agent's last state, 16 hexadecimal digits: equal hashes mean equal bits.
+    pub state_hash: String,
+    /// Milliseconds that a frame should take.
+    pub target_ms: f64,
+    /// Work, intervals and misses of the frames.
+    #[serde(flatten)]
+    pub summary: FrameSummary,
+    /// The agents, in the scene's order.
+    pub agents: Vec<AgentReport>,
+    /// What agents did to each other.
+    pub couplings: Vec<CouplingReport>,
+    /// How the frame budget was spent.
+    pub budget: BudgetReport,
+    /// The scene's probes.
+    pub probes: Vec<ProbeReport>,
+}
+
+/// One agent of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct AgentReport {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its model.
+    pub model: String,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps a simulated second while it was awake.
+    pub rate_hz: f64,
+    /// Steps a second it wanted.
+    pub wanted_hz: f64,
+    /// Last step length, milliseconds.
+    pub dt_ms: f64,
+    /// Last spacing of its simulation, metres; `None` for a model without one.
+    pub eps_m: Option<f64>,
+    /// Last level of its primitive; `None` for a model without one.
+    pub n: Option<u8>,
+    /// CPU seconds of its turns, really measured.
+    pub cpu_s: f64,
+    /// Age of its state where it was drawn.
+    pub age_ms: Quantiles,
+    /// Simulated milliseconds that could not be made up.
+    pub dropped_ms: f64,
+    /// Whether it was taken out of the run after a failed step.
+    pub parked: bool,
+    /// Why it was parked.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parked_reason: Option<String>,
+    /// Mechanical energy, joules, gravity included, zero at the origin.
+    pub energy_j: f64,
+    /// Its own estimate of its error, metres.
+    pub residual_m: f64,
+}
+
+/// The middle and the tail of a measured time, milliseconds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+/// What two agents did to each other.
+#[derive(Debug, Clone, Serialize)]
+pub struct CouplingReport {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name.
+    pub b: String,
+    /// How they were coupled: `grasp`.
+    pub kind: String,
+    /// Contacts or holds at the end of the run.
+    pub contacts: u64,
+    /// Force at the end of the run, newtons.
+    pub force_n: f64,
+    /// Greatest force of the run, newtons.
+    pub force_max_n: f64,
+}
+
+/// How the frame budget was spent.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct BudgetReport {
+    /// Mean frame work as a share of the target; `None` without frames.
+    pub spent_share: Option<f64>,
+    /// On which limit the control rested at the end, in words; `None` where it did not.
+    pub clamped: Option<String>,
+}
+
+/// Where a probe was.
+#[derive(Debug, Clone, Serialize)]
+pub struct ProbeReport {
+    /// Name of the object.
+    pub object: String,
+    /// 0 start … 1 end of a tube's rest length.
+    pub at: f64,
+    /// Last position, metres.
+    pub position_m: [f64; 3],
+    /// Last velocity, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// `[t, x, y, z]` in seconds and metres, where the scene wants samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Vec<[f64; 4]>>,
+}
+
+impl Report {
+    /// A report with one of everything, to tell names that exist from names that do not.
+    #[must_use]
+    fn template() -> Self {
+        let summary = summarise(&[FrameRow::default()], 1.0);
+        let name = String::new;
+        let agent = AgentReport {
+            name: name(),
+            model: name(),
+            steps: 0,
+            rate_hz: 0.0,
+            wanted_hz: 0.0,
+            dt_ms: 0.0,
+            eps_m: None,
+            n: None,
+            cpu_s: 0.0,
+            age_ms: Quantiles::default(),
+            dropped_ms: 0.0,
+            parked: false,
+            parked_reason: None,
+            energy_j: 0.0,
+            residual_m: 0.0,
+        };
+        let coupling =
+            CouplingReport { a: name(), b: name(), kind: name(), contacts: 0, force_n: 0.0, force_max_n: 0.0 };
+        let probe =
+            ProbeReport { object: name(), at: 0.0, position_m: [0.0; 3], velocity_m_s: [0.0; 3], samples: None };
+        Self {
+            scene: name(),
+            policy: name(),
+            law: name(),
+            executor: name(),
+            adapter: None,
+            frames: 0,
+            sim_s: 0.0,
+            wall_s: 0.0,
+            cpu_s: 0.0,
+            state_hash: name(),
+            target_ms: 0.0,
+            summary,
+            agents: vec![agent],
+            couplings: vec![coupling],
+            budget: BudgetReport::default(),
+            probes: vec![probe],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_report_has_the_names_of_the_design() {
+        let json = serde_json::to_value(Report::template()).unwrap();
+        for path in [
+            "/scene",
+            "/policy",
+            "/executor",
+            "/adapter",
+            "/frames",
+            "/sim_s",
+            "/wall_s",
+            "/cpu_s",
+            "/state_hash",
+            "/target_ms",
+            "/frame_ms/mean",
+            "/frame_ms/stddev",
+            "/frame_ms/min",
+            "/frame_ms/p50",
+            "/frame_ms/p95",
+            "/frame_ms/p99",
+            "/frame_ms/max",
+            "/interval_ms/p99",
+            "/binding_stddev",
+            "/avg_err",
+            "/missed_share",
+            "/settle_frames",
+            "/agents/0/name",
+            "/agents/0/model",
+            "/agents/0/steps",
+            "/agents/0/rate_hz",
+            "/agents/0/wanted_hz",
+            "/agents/0/dt_ms",
+            "/agents/0/eps_m",
+            "/agents/0/n",
+            "/agents/0/cpu_s",
+            "/agents/0/age_ms/p50",
+            "/agents/0/age_ms/p99",
+            "/agents/0/dropped_ms",
+            "/agents/0/parked",
+            "/agents/0/energy_j",
+            "/agents/0/residual_m",
+            "/couplings/0/a",
+            "/couplings/0/b",
+            "/couplings/0/kind",
+            "/couplings/0/contacts",
+            "/couplings/0/force_n",
+            "/budget/spent_share",
+            "/probes/0/object",
+            "/probes/0/at",
+            "/probes/0/position_m",
+            "/probes/0/velocity_m_s",
+        ] {
+            assert!(json.pointer(path).is_some(), "{path} is missing");
+        }
+    }
+}

@@ -1,0 +1,255 @@
+//! `run`: plays a scene and tells how it went.
+//!
+//! In: arguments, and a [`Player`] that knows the frame loop. Out: a picture, a report, rows of frames, verdicts on goals.
+//! Never here: the loop itself.
+
+use super::Exit;
+use super::args::RunArgs;
+use super::output::{BadInput, data, message};
+use super::progress::Bar;
+use super::report::{FrameRow, Report, Verdict};
+use crate::scene::{Scene, Source, load};
+use anyhow::Context;
+use clap::ArgMatches;
+use clap::parser::ValueSource;
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Seconds of a headless run that is given no end.
+const HEADLESS_S: f64 = 10.0;
+
+/// What a run is asked for.
+#[derive(Debug, Clone)]
+pub struct Request {
+    /// The scene, with everything that flags, overrides and environment changed in it.
+    pub scene: Scene,
+    /// Whether a window is wanted; where none can be opened the run goes headless.
+    pub window: bool,
+    /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
+    pub end: Option<RunLength>,
+    /// Width and height of the picture in pixels, each 1 … 8192.
+    pub size: [u32; 2],
+    /// Where to write the last picture as PNG.
+    pub png: Option<PathBuf>,
+    /// Where to write it when a window was wanted and none could be opened, and `png` says nothing.
+    pub png_without_window: PathBuf,
+}
+
+/// When a run ends by itself.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RunLength {
+    /// After so many frames, at least 1.
+    Frames(u64),
+    /// After so many simulated seconds, above 0.
+    Seconds(f64),
+}
+
+/// What a run gives back.
+#[derive(Debug, Clone)]
+pub struct Played {
+    /// Its numbers.
+    pub report: Report,
+    /// Its frames.
+    pub frames: Vec<FrameRow>,
+    /// Why there was no window though one was wanted.
+    pub no_window: Option<String>,
+    /// The picture that was written.
+    pub picture: Option<PathBuf>,
+    /// Whether it was interrupted.
+    pub interrupted: bool,
+}
+
+/// How far a headless run is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Share that is done, 0 … 1.
+    pub done: f64,
+    /// Simulated seconds.
+    pub sim_s: f64,
+    /// Work of the last frame, milliseconds.
+    pub frame_ms: f64,
+}
+
+/// Plays a scene. It is told a function that is called after every headless frame and answers whether to go on.
+pub type Player = fn(&Request, &mut dyn FnMut(Step) -> bool) -> anyhow::Result<Played>;
+
+impl Request {
+    /// When a headless run ends.
+    #[must_use]
+    pub fn headless_end(&self) -> RunLength {
+        self.end.unwrap_or(RunLength::Seconds(HEADLESS_S))
+    }
+}
+
+/// Runs a scene.
+pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>, player: Player) -> anyhow::Result<Exit> {
+    check_outputs(args)?;
+    let request = request(args, matches)?;
+    let bar = Bar::new(&request.scene.name, args.quiet);
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let played = player(&request, &mut |step| {
+        bar.show(step.done, step.sim_s, step.frame_ms);
+        !stopped.load(Ordering::Relaxed)
+    })?;
+    drop(bar);
+    write_all(args, &played)?;
+    judge(args, &played)
+}
+
+/// The request that the arguments make. Precedence: flags, `--set`, environment, scene, defaults.
+fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Request> {
+    let flags = [
+        ("target_fps", "target.frame_hz", args.target_fps.map(|f| f.to_string())),
+        ("policy", "target.policy", args.policy.as_deref().map(quoted)),
+        ("law", "target.law", args.law.as_deref().map(quoted)),
+        ("executor", "executor", args.executor.as_deref().map(quoted)),
+        ("seed", "machine.seed", args.seed.map(|n| n.to_string())),
+    ];
+    let from_environment =
+        |id: &str| matches.and_then(|m| m.value_source(id)).is_some_and(|s| s == ValueSource::EnvVariable);
+    let given = |environment: bool| {
+        let of_this_kind = flags.iter().filter(move |(id, ..)| from_environment(id) == environment);
+        of_this_kind.filter_map(|(_, key, value)| Some(((*key).to_owned(), value.clone()?)))
+    };
+    let overrides: Vec<_> = given(true).chain(args.set.iter().cloned()).chain(given(false)).collect();
+    let source = Source::open(&args.scene)?;
+    let scene = load(&source, &overrides)?;
+    let end = args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds));
+    let png_without_window = format!("metachron-{}.png", stem(&scene.name)).into();
+    Ok(Request { scene, window: !args.headless, end, size: args.size, png: args.png.clone(), png_without_window })
+}
+
+fn quoted(text: &str) -> String {
+    format!("\"{text}\"")
+}
+
+/// The scene's name as a part of a file's name.
+fn stem(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Two outputs on standard output would be neither; a folder that is not there is better known before the run.
+fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
+    if args.json && args.report.as_deref() == Some(Path::new("-")) {
+        return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
+    }
+    for path in [&args.png, &args.report, &args.frames_csv].into_iter().flatten() {
+        let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+        if folder.is_some_and(|f| !f.is_dir()) {
+            return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
+        }
+        if path.is_dir() {
+            return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
+        }
+    }
+    Ok(())
+}
+
+fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
+    let report = serde_json::to_string_pretty(&played.report)? + "\n";
+    // a demo without a display still shows what it did
+    let fallback = played.no_window.as_ref().map(|_| format!("metachron-{}.json", stem(&played.report.scene)).into());
+    match args.report.as_ref().or(fallback.as_ref()) {
+        Some(path) if path == Path::new("-") => data(&report)?,
+        Some(path) => {
+            std::fs::write(path, &report)
+                .with_context(|| format!("the report {} cannot be written", path.display()))?;
+            message(&format!("report: {}", path.display()));
+        }
+        None => {}
+    }
+    if let Some(path) = &args.frames_csv {
+        write_frames(path, &played.frames)
+            .with_context(|| format!("the frames {} cannot be written", path.display()))?;
+    }
+    if let Some(why) = played.no_window.as_ref().filter(|_| !args.quiet) {
+        message(&format!("ran without a window: {why}"));
+    }
+    if let Some(path) = &played.picture {
+        message(&format!("picture: {}", path.display()));
+    }
+    if args.json {
+        data(&report)?;
+    } else if !args.quiet && args.report.as_deref() != Some(Path::new("-")) {
+        data(&played.report.summary_text())?;
+    }
+    Ok(())
+}
+
+fn write_frames(path: &Path, frames: &[FrameRow]) -> anyhow::Result<()> {
+    let mut rows = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
+    for frame in frames {
+        rows.serialize(frame)?;
+    }
+    rows.into_inner().map_err(|e| e.into_error())?.flush()?;
+    Ok(())
+}
+
+fn judge(args: &RunArgs, played: &Played) -> anyhow::Result<Exit> {
+    let mut missed = false;
+    for goal in &args.fail_on {
+        match goal.judge(&played.report).map_err(|e| BadInput(e.to_string()))? {
+            Verdict::Kept => {}
+            Verdict::Missed(value) => {
+                message(&format!("goal missed: {goal} holds, the value is {value}"));
+                missed = true;
+            }
+            Verdict::NotMeasured => {
+                message(&format!("goal missed: {goal} cannot be judged, the value was not measured in this run"));
+                missed = true;
+            }
+        }
+    }
+    Ok(match (played.interrupted, missed) {
+        (true, _) => Exit::Interrupted,
+        (false, true) => Exit::GoalMissed,
+        (false, false) => Exit::Ok,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::args::{Cli, Command};
+    use clap::{CommandFactory, FromArgMatches};
+
+    fn requested(arguments: &[&str]) -> Request {
+        let all = ["metachron", "run"].iter().chain(arguments);
+        let matches = Cli::command().get_matches_from(all);
+        let Command::Run(args) = Cli::from_arg_matches(&matches).unwrap().command else { panic!("run was asked for") };
+        request(&args, matches.subcommand_matches("run")).unwrap()
+    }
+
+    #[test]
+    fn flags_go_before_set_and_set_before_the_scene() {
+        let hz = |arguments: &[&str]| requested(arguments).scene.target.frame_hz;
+        assert_eq!(hz(&["tube"]), 30.0);
+        assert_eq!(hz(&["tube", "--set", "target.frame_hz=45"]), 45.0);
+        assert_eq!(hz(&["tube", "--target-fps", "50", "--set", "target.frame_hz=45"]), 50.0);
+    }
+
+    #[test]
+    fn a_run_takes_what_its_flags_say() {
+        let request = requested(&[
+            "pendulum",
+            "--headless",
+            "--frames",
+            "7",
+            "--size",
+            "64x32",
+            "--executor",
+            "lockstep",
+            "--seed",
+            "9",
+        ]);
+        assert_eq!(request.scene.executor.name(), "lockstep");
+        assert_eq!(request.scene.machine.seed, Some(9));
+        assert_eq!((request.headless_end(), request.size, request.window), (RunLength::Frames(7), [64, 32], false));
+        assert_eq!(requested(&[]).headless_end(), RunLength::Seconds(10.0));
+    }
+}

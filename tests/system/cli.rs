@@ -1,0 +1,158 @@
+//! The command line as a user drives it.
+
+use assert_cmd::Command;
+use std::process::Output;
+
+fn metachron(arguments: &[&str]) -> Output {
+    // what a user's shell says of colours or of METACHRON_ must not reach the tests
+    let mut command = Command::cargo_bin("metachron").unwrap();
+    command.env_clear().args(arguments).output().unwrap()
+}
+
+fn code(output: &Output) -> i32 {
+    output.status.code().expect("the program ends by itself")
+}
+
+fn out(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).unwrap()
+}
+
+fn err(output: &Output) -> String {
+    String::from_utf8(output.stderr.clone()).unwrap()
+}
+
+#[test]
+fn help_teaches_by_examples_and_exit_codes() {
+    let help = metachron(&["--help"]);
+    assert_eq!(code(&help), 0);
+    for word in ["metachron run yard", "check", "schema", "list", "Exit codes", "4 a goal"] {
+        assert!(out(&help).contains(word), "{word}");
+    }
+    let help = out(&metachron(&["run", "--help"]));
+    let flags = "--headless --frames --seconds --target-fps --policy --law --executor --size --png --report --frames-csv --seed \
+                 --fail-on --set --json --quiet METACHRON_TARGET_FPS";
+    for flag in flags.split_whitespace() {
+        assert!(help.contains(flag), "{flag}");
+    }
+}
+
+#[test]
+fn list_names_every_built_in_scene_with_what_it_shows() {
+    let list = metachron(&["list"]);
+    assert_eq!((code(&list), out(&list).lines().count()), (0, 4));
+    assert!(out(&list).starts_with("tube       a soft tube"), "{}", out(&list));
+    let rows: serde_json::Value = serde_json::from_slice(&metachron(&["list", "--json"]).stdout).unwrap();
+    assert_eq!(rows[3]["name"], "overload");
+}
+
+#[test]
+fn the_schema_is_json_with_every_model() {
+    let schema = metachron(&["schema"]);
+    let json: serde_json::Value = serde_json::from_slice(&schema.stdout).unwrap();
+    assert_eq!(code(&schema), 0);
+    for model in ["tube", "rigid", "instrument", "synthetic"] {
+        assert!(json["$defs"][model]["properties"]["name"].is_object(), "{model}");
+    }
+}
+
+#[test]
+fn completions_and_manual_pages_are_printed() {
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let done = metachron(&["completions", shell]);
+        assert!(code(&done) == 0 && out(&done).contains("fail-on"), "{shell}");
+    }
+    assert!(out(&metachron(&["man"])).contains(".TH metachron"));
+    assert!(out(&metachron(&["man", "run"])).contains("fail"));
+    let unknown = metachron(&["man", "fly"]);
+    assert_eq!(code(&unknown), 2);
+    assert!(err(&unknown).contains("fly"));
+}
+
+#[test]
+fn check_accepts_the_built_in_scenes() {
+    let check = metachron(&["check", "tube", "pendulum", "yard", "overload"]);
+    assert_eq!((code(&check), out(&check).lines().count()), (0, 4), "{}", err(&check));
+    assert!(metachron(&["check", "-q", "tube"]).stdout.is_empty());
+}
+
+fn written(text: &str) -> (tempfile::TempDir, String) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("my.toml");
+    std::fs::write(&path, text).unwrap();
+    let path = path.to_str().unwrap().to_owned();
+    (folder, path)
+}
+
+const BAD: &str = "format = 1\n\n[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = -0.05\n";
+
+#[test]
+fn check_shows_file_line_column_text_and_what_was_expected() {
+    let (_folder, path) = written(BAD);
+    let check = metachron(&["check", &path]);
+    assert_eq!(code(&check), 2);
+    assert!(out(&check).is_empty());
+    let said = err(&check);
+    for word in ["my.toml:7:12", "radius_m = -0.05", "`radius_m` of `ball` is -0.05", "expected a number from 0.000001"]
+    {
+        assert!(said.contains(word), "{word} is not in:\n{said}");
+    }
+}
+
+#[test]
+fn check_as_json_says_the_same_to_programs() {
+    let (_folder, path) = written(BAD);
+    let check = metachron(&["check", "--json", "tube", &path]);
+    let rows: serde_json::Value = serde_json::from_slice(&check.stdout).unwrap();
+    assert_eq!((code(&check), rows[0]["ok"].as_bool(), rows[1]["ok"].as_bool()), (2, Some(true), Some(false)));
+    let problem = &rows[1]["problems"][0];
+    assert_eq!(
+        (problem["line"].as_u64(), problem["column"].as_u64(), problem["text"].as_str()),
+        (Some(7), Some(12), Some("-0.05"))
+    );
+    assert!(check.stderr.is_empty());
+}
+
+#[test]
+fn a_scene_that_does_not_exist_is_bad_input_with_a_suggestion() {
+    for arguments in [&["check", "tubee"][..], &["run", "tubee", "--headless"]] {
+        let done = metachron(arguments);
+        assert_eq!(code(&done), 2);
+        assert!(err(&done).contains("did you mean `tube`?"), "{}", err(&done));
+    }
+    let done = metachron(&["run", "no/such.toml", "--headless"]);
+    assert_eq!(code(&done), 2);
+    assert!(err(&done).contains("no/such.toml") && err(&done).contains("pendulum"), "{}", err(&done));
+}
+
+#[test]
+fn wrong_usage_ends_with_two_and_says_what_is_right() {
+    for (arguments, word) in [
+        (&["fly"][..], "fly"),
+        (&["run", "--policy", "best"], "feedback"),
+        (&["run", "--executor", "pool"], "lockstep"),
+        (&["run", "--size", "big"], "1280x720"),
+        (&["run", "--frames", "0"], "0"),
+        (&["run", "--seconds", "-1"], "seconds"),
+        (&["run", "--frames", "1", "--seconds", "1"], "--seconds"),
+        (&["run", "--target-fps", "nan"], "1000"),
+        (&["run", "--fail-on", "mised_share>1"], "did you mean `missed_share`?"),
+        (&["run", "--fail-on", "missed_share"], "missed_share>0.01"),
+        (&["run", "--set", "nothing"], "KEY=VALUE"),
+        (&["run", "--headless", "--report", "no/such/folder.json"], "does not exist"),
+        (&["run", "--headless", "--json", "--report", "-"], "choose one"),
+        (&["check"], "SCENE"),
+    ] {
+        let done = metachron(arguments);
+        assert_eq!(code(&done), 2, "{arguments:?}: {}", err(&done));
+        assert!(err(&done).contains(word), "{arguments:?}: {word} is not in\n{}", err(&done));
+    }
+}
+
+#[test]
+fn an_override_that_is_wrong_is_shown_like_a_line_of_the_scene() {
+    let done = metachron(&["run", "pendulum", "--headless", "--set", "object.ball.radius_m=-1"]);
+    assert_eq!(code(&done), 2);
+    assert!(err(&done).contains("object.ball.radius_m\" = -1"), "{}", err(&done));
+    let done = metachron(&["check", "pendulum", "--set", "object.bell.radius_m=1"]);
+    assert!(err(&done).contains("`object` has no entry `bell`"), "{}", err(&done));
+}
