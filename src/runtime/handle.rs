@@ -6,6 +6,7 @@ use super::account::{AgentState, AgentStats, Gauges, Times};
 use super::mailbox::{Command, Mailbox, SendError};
 use super::slot::LatestSlot;
 use super::switchboard::Switchboard;
+use super::watch::{Sample, Trace};
 use metachron_agents::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -24,6 +25,8 @@ pub(super) struct Shared {
     pub board: Arc<Switchboard>,
     /// Only readers touch it: the agent never waits for this lock.
     pub ages: Mutex<Times>,
+    /// Empty for most agents. The agent alone writes, so that it never waits while it runs; readers look at the end.
+    pub traces: Mutex<Vec<Trace>>,
 }
 
 /// A running agent, seen from outside. Copies show the same agent; they outlive the run and then show its end.
@@ -86,6 +89,14 @@ impl AgentHandle {
         self.shared.mail.post(command)?;
         self.shared.board.wake(self.shared.id);
         Ok(())
+    }
+
+    /// What was written down of the point watched as number `watch`; empty where there is none. To be read when the run has
+    /// ended: until then it may hold up the agent.
+    #[must_use]
+    pub fn samples(&self, watch: usize) -> Vec<Sample> {
+        let traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        traces.get(watch).map_or_else(Vec::new, |trace| trace.samples().to_vec())
     }
 
     /// How it has fared so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.

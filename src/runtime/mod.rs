@@ -21,6 +21,7 @@ mod switchboard;
 mod testing;
 mod threads;
 mod turn;
+mod watch;
 
 pub use account::{AgentState, AgentStats, Spread};
 pub use clock::{Clock, ManualClock, SystemClock};
@@ -33,6 +34,7 @@ pub use pace::{Drive, LAG_CAP, Pace, SPEED_RANGE, SharedTimeline, Start, Timelin
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{THREADS_MAX, Threads};
+pub use watch::{SAMPLES_MAX, Sample, Watch};
 
 use metachron_agents::{AgentId, SimTime};
 use std::time::Duration;

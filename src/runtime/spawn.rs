@@ -11,6 +11,7 @@ use super::pace::Pace;
 use super::slot::SlotWriter;
 use super::switchboard::Switchboard;
 use super::turn::{Actor, Rhythm};
+use super::watch::{Trace, Watch};
 use metachron_agents::{Agent, AgentId, DT_MAX_S, Neighbour, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -31,6 +32,8 @@ pub struct AgentSpawn {
     pub range: Option<ResolutionRange>,
     /// Whose newest states it sees. Its own number and repeats are left out.
     pub links: Vec<AgentId>,
+    /// Points of it that are written down ([`AgentHandle::samples`]).
+    pub watches: Vec<Watch>,
     /// Who steers its rate; `None` for an agent that keeps what it has.
     pub governor: Option<Box<dyn Governor>>,
 }
@@ -142,6 +145,7 @@ fn actor(id: AgentId, spawn: AgentSpawn, board: &Arc<Switchboard>) -> Actor {
         slot: writer.slot(),
         board: Arc::clone(board),
         ages: Mutex::new(Times::new()),
+        traces: Mutex::new(spawn.watches.into_iter().map(Trace::new).collect()),
     };
     Actor {
         shared: Arc::new(shared),

@@ -52,6 +52,7 @@ impl Dummy {
             dt_range: (dt, dt),
             range: Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) }),
             links: Vec::new(),
+            watches: Vec::new(),
             governor: None,
         }
     }

@@ -16,8 +16,8 @@ use metachron_agents::{
     Agent, AgentId, Neighbour, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 /// An agent and all it needs to live.
@@ -207,10 +207,18 @@ impl Actor {
         });
         let model = self.shared.model;
         if finite {
+            self.note_watched();
             Ok(())
         } else {
             Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
         }
+    }
+
+    /// Writes down the points that are watched.
+    fn note_watched(&self) {
+        let Some(state) = self.writer.filled() else { return };
+        let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        traces.iter_mut().for_each(|trace| trace.look(state));
     }
 
     /// Tells those this agent acts on, once they can see how.
