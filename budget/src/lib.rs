@@ -1,2 +1,36 @@
-//! x
+//! Control laws and the sharing of a budget, as numbers: a time goes in, a coarseness comes out.
+//!
+//! In: measured times or rates, ranges, weights. Out: ε, n, shares of a budget.
+//! Never here: clocks, objects, engine types, allocation. Theory: `docs/theory/control.md`, after (GDC04).
+//!
+//! ```
+//! use metachron_budget::log_law::{Gains, LogLaw};
+//!
+//! // a plant on some machine: 1.4 ms and 22 ms/ε a frame, to be held at 30 ms
+//! let mut law = LogLaw::new(Gains::default(), (-3.0, 3.0), 0.0);
+//! for _ in 0..30 {
+//!     let took_ms = 1.4 + 22.0 / law.value().exp();
+//!     law.observe(took_ms / 30.0, None);
+//! }
+//! assert!(((1.4 + 22.0 / law.value().exp()) / 30.0 - 1.0).abs() < 0.05);
+//! ```
 #![no_std]
+
+pub mod grisoni;
+pub mod hysteresis;
+pub mod log_law;
+pub mod share;
+
+/// An end of a range of resolutions.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub enum Bound {
+    /// As fine as is allowed: there is time left that nothing may use.
+    Finest,
+    /// As coarse as is allowed: the time wanted cannot be reached.
+    Coarsest,
+}
+
+/// `x` inside `lo..=hi`; `hi` where `x` is no number. Never panics, unlike `f64::clamp`.
+pub(crate) fn within(x: f64, (lo, hi): (f64, f64)) -> f64 {
+    if x.is_nan() { hi } else { x.max(lo).min(hi) }
+}

@@ -1,0 +1,160 @@
+//! The corrected law: ln ε ← ln ε + κ ln(t / T), a gain that no machine changes.
+//!
+//! In: measured time over wanted time. Out: ln ε, inside its range, and whether it rests there.
+//! Never here: what ε is, or where the time was measured. Theory: `docs/theory/control.md`, eq. 7 and 10 … 12.
+
+use crate::{Bound, within};
+
+/// The most that one lesson counts, |ln(t/T)|: a frame four times too slow. At κ = ½ it halves the work at most.
+pub const LESSON_MAX: f64 = 2.0 * core::f64::consts::LN_2;
+
+/// The most that a *surprise* counts, ln 1.5: an error larger than this counts in full only if the one before was as large, on
+/// the same side. So a single frame of five times its time costs e^(−κ ln 1.5) = 18 % of the polygons, and a load that stays
+/// is believed one frame later.
+pub const SURPRISE_MAX: f64 = 0.405_465_108_108_164_4;
+
+/// The gain and the dead zone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gains {
+    /// κ, 0.01 … 0.99: the share of an error (of logarithms) that one lesson removes where all time is work that ε scales.
+    /// From 1 on, the loop rings when a measurement comes one frame late (control.md, eq. 8).
+    pub kappa: f64,
+    /// ln(T/t) above which a frame was early enough to refine; ≥ 0.
+    pub early: f64,
+    /// ln(t/T) above which a frame was late enough to coarsen; ≥ 0.
+    pub late: f64,
+}
+
+impl Default for Gains {
+    /// κ = ½, dead within 2 % to either side: settles from ε four times wrong within 20 frames
+    /// wherever a third of the wanted time is work that ε scales (control.md, table 1).
+    fn default() -> Self {
+        Self { kappa: 0.5, early: 0.02, late: 0.02 }
+    }
+}
+
+impl Gains {
+    fn sound(self) -> Self {
+        let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 0.99)) } else { Self::default().kappa };
+        let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
+        Self { kappa, early: width(self.early), late: width(self.late) }
+    }
+}
+
+/// What the law did with its last lesson.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Rest {
+    /// It moved.
+    Moving,
+    /// The time was as wanted, within the dead zone.
+    Settled,
+    /// It wants to go past this end of its range and stays there.
+    Clamped(Bound),
+    /// There is time left, but not enough for the next finer level that the picture has.
+    BetweenLevels,
+}
+
+/// The state of the corrected law: the logarithm of a coarseness.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LogLaw {
+    gains: Gains,
+    range: (f64, f64),
+    value: f64,
+    /// The error before this one; 0 before the first, which is no surprise.
+    before: Option<f64>,
+    rest: Rest,
+}
+
+impl LogLaw {
+    /// A law for ln ε inside `range` (finest, coarsest; finite), starting at `start` or the end nearest to it.
+    #[must_use]
+    pub fn new(gains: Gains, range: (f64, f64), start: f64) -> Self {
+        Self { gains: gains.sound(), range, value: within(start, range), before: None, rest: Rest::Moving }
+    }
+
+    /// Learns that work took `ratio` = t/T of the time it should (control.md, eq. 7), and says what came of it.
+    ///
+    /// `granted` is ln ε as the picture really had it, where levels are coarser than what was asked (control.md, eq. 12);
+    /// `None` where the picture follows exactly. A ratio that is not above zero and finite teaches nothing.
+    pub fn observe(&mut self, ratio: f64, granted: Option<f64>) -> Rest {
+        if !(ratio.is_finite() && ratio > 0.0) {
+            return self.rest;
+        }
+        let error = self.believed(libm::log(ratio));
+        let granted = granted.filter(|g| g.is_finite());
+        self.rest = if error > self.gains.late {
+            self.coarsen_by(self.gains.kappa * (error - self.gains.late), granted)
+        } else if error < -self.gains.early {
+            self.refine(error, granted)
+        } else {
+            Rest::Settled
+        };
+        self.rest
+    }
+
+    /// The error as far as it is believed (control.md, eq. 10).
+    fn believed(&mut self, error: f64) -> f64 {
+        let seen_before = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > SURPRISE_MAX);
+        self.before = Some(error);
+        let most = if seen_before { LESSON_MAX } else { SURPRISE_MAX };
+        within(error, (-most, most))
+    }
+
+    fn coarsen_by(&mut self, step: f64, granted: Option<f64>) -> Rest {
+        let from = granted.map_or(self.value, |g| g.max(self.value));
+        self.value = within(from + step, self.range);
+        if from + step > self.range.1 { Rest::Clamped(Bound::Coarsest) } else { Rest::Moving }
+    }
+
+    fn refine(&mut self, error: f64, granted: Option<f64>) -> Rest {
+        let wish = self.value + self.gains.kappa * (error + self.gains.early);
+        // were all of the time work that ε scales, finer than this would be late
+        let soonest = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
+        self.value = within(wish.max(soonest), self.range);
+        match (wish < self.range.0, wish < soonest) {
+            (true, _) if self.value == self.range.0 => Rest::Clamped(Bound::Finest),
+            (_, true) => Rest::BetweenLevels,
+            _ => Rest::Moving,
+        }
+    }
+
+    /// ln ε, always inside the range.
+    #[must_use]
+    pub fn value(&self) -> f64 {
+        self.value
+    }
+
+    /// What came of the last lesson.
+    #[must_use]
+    pub fn rest(&self) -> Rest {
+        self.rest
+    }
+
+    /// The range of ln ε: (finest, coarsest).
+    #[must_use]
+    pub fn range(&self) -> (f64, f64) {
+        self.range
+    }
+
+    /// Takes another range (finest, coarsest; finite); the value moves inside it.
+    pub fn set_range(&mut self, range: (f64, f64)) {
+        self.range = range;
+        self.value = within(self.value, range);
+    }
+
+    /// Goes to `value`, or the end of the range nearest to it: a start, or a disturbance from outside.
+    pub fn set_value(&mut self, value: f64) {
+        self.value = within(value, self.range);
+    }
+
+    /// Takes other gains from the next lesson on; the value stays. κ is brought inside 0.01 … 0.99.
+    pub fn set_gains(&mut self, gains: Gains) {
+        self.gains = gains.sound();
+    }
+
+    /// The gains in use.
+    #[must_use]
+    pub fn gains(&self) -> Gains {
+        self.gains
+    }
+}
