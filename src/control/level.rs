@@ -1,0 +1,246 @@
+//! How one object spends its share of the polygons: the pair (ε, n) that is nearest to square quads, and does not chatter.
+//!
+//! In: a wanted number of polygons. Out: (ε, n), and the polygons it really makes.
+//! Never here: how much there is to share. Theory: `docs/theory/control.md`, eq. 8, 13 and 14.
+
+use super::view::{Kind, ObjectView};
+use metachron_agents::{N_MAX, Resolution, ResolutionRange};
+use metachron_budget::hysteresis::{self, BAND};
+use std::f64::consts::PI;
+
+/// How many levels n a primitive has: `0..=N_MAX`.
+pub const PRIMITIVE_LEVELS: usize = N_MAX as usize + 1;
+
+/// Triangles of a tube's patch at level 0; level n has 2ⁿ times as many (6·2^⌈n/2⌉ sides, 2^⌊n/2⌋ rings of quads).
+const PATCH_TRIANGLES: f64 = 12.0;
+
+/// A picture is cut anew only when its wish moved by this much, |Δ ln polygons|: less than the law's dead zone is wide (0.04),
+/// so that there is always a picture at which the loop rests.
+const HOLD: f64 = 0.03;
+
+/// Ranges of ε narrower than this factor leave no room between two switches of n (a level and the band at both its ends).
+const NARROW: f64 = 2.83;
+
+/// Shares are met to 1e-9: a wish this near to an end of its range, in proportion, is that end.
+const AT_AN_END: f64 = 1e-6;
+
+/// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
+const SPEED_NEWS: f64 = 0.2;
+
+/// How many polygons an object can have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Span {
+    /// At its coarsest.
+    pub least: f64,
+    /// At its finest, or one a pixel where that is fewer.
+    pub most: f64,
+    /// At its finest.
+    pub full: f64,
+}
+
+impl Span {
+    pub fn of(view: &ObjectView) -> Self {
+        let (eps, n) = (view.range.eps_m, view.range.n);
+        let (least, full) = match view.kind {
+            Kind::Tube { length_m, .. } => (count(length_m, eps.1, n.0), count(length_m, eps.0, n.1)),
+            Kind::Primitive { triangles, .. } => (f64::from(triangles[level(n.0)]), f64::from(triangles[level(n.1)])),
+        };
+        let full = full.max(least);
+        let most = if view.pixels.is_nan() { full } else { full.min(view.pixels).max(least) };
+        Self { least, most, full }
+    }
+}
+
+/// What an object was last drawn with.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Held {
+    /// The polygons wished for when it was last cut, and the level n that was chosen; `None` while it is out of sight.
+    cut: Option<(f64, u8)>,
+    /// Speed on the screen, pixels a second, smoothed.
+    speed_px_s: Option<f64>,
+}
+
+impl Held {
+    /// The object with its speed smoothed over the last frames.
+    pub fn steady(&mut self, mut view: ObjectView) -> ObjectView {
+        let now = if view.speed_px_s.is_finite() { view.speed_px_s.max(0.0) } else { 0.0 };
+        let smooth = self.speed_px_s.map_or(now, |before| before + SPEED_NEWS * (now - before));
+        self.speed_px_s = Some(smooth);
+        view.speed_px_s = smooth;
+        view
+    }
+
+    /// The object went out of sight: what it was drawn with says nothing any more.
+    pub fn forget(&mut self) {
+        *self = Self::default();
+    }
+
+    /// The pair (ε, n) for about `wish` polygons.
+    pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> Resolution {
+        let end = if wish <= span.least * (1.0 + AT_AN_END) {
+            Some(Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 })
+        } else if wish >= span.full * (1.0 - AT_AN_END) {
+            Some(Resolution { eps_m: view.range.eps_m.0, n: view.range.n.1 })
+        } else {
+            None
+        };
+        if let Some(end) = end {
+            self.cut = Some((wish, end.n));
+            return end;
+        }
+        let polygons = match self.cut {
+            Some((held, _)) if libm::log(wish / held).abs() <= HOLD => held,
+            _ => wish,
+        };
+        let before = self.cut.map(|(_, n)| n);
+        let n = match view.kind {
+            Kind::Tube { length_m, radius_m } => tube_level(polygons, (length_m, radius_m), view.range, before),
+            Kind::Primitive { ref triangles, .. } => primitive_level(polygons, triangles, view.range.n, before),
+        };
+        let n = n.clamp(view.range.n.0, view.range.n.1);
+        self.cut = Some((polygons, n));
+        view.range.clamp(Resolution { eps_m: spacing_m(view, polygons, n), n })
+    }
+}
+
+/// ε at which an object of level `n` has about `polygons` (control.md, eq. 8); a primitive has none and gives its coarsest.
+fn spacing_m(view: &ObjectView, polygons: f64, n: u8) -> f64 {
+    match view.kind {
+        Kind::Tube { length_m, .. } => PATCH_TRIANGLES * two_to(n) * length_m / polygons,
+        Kind::Primitive { .. } => view.range.eps_m.1,
+    }
+}
+
+/// Triangles an object really has at `at`.
+pub(super) fn polygons(view: &ObjectView, at: Resolution) -> f64 {
+    match view.kind {
+        Kind::Tube { length_m, .. } => count(length_m, at.eps_m, at.n),
+        Kind::Primitive { triangles, .. } => f64::from(triangles[level(at.n)]),
+    }
+}
+
+/// ⌈L/ε⌉ patches of level n.
+fn count(length_m: f64, eps_m: f64, n: u8) -> f64 {
+    let patches = libm::ceil(length_m / eps_m);
+    PATCH_TRIANGLES * two_to(n) * if patches.is_finite() { patches.max(1.0) } else { 1.0 }
+}
+
+fn two_to(n: u8) -> f64 {
+    f64::from(1_u32 << n.min(N_MAX))
+}
+
+fn level(n: u8) -> usize {
+    usize::from(n.min(N_MAX))
+}
+
+/// The level at which a tube's quads are nearest to square: ⌊ρ⌋ with a band (control.md, eq. 13), where ε stays in its range.
+fn tube_level(polygons: f64, (length_m, radius_m): (f64, f64), range: ResolutionRange, before: Option<u8>) -> u8 {
+    // ε at level n is 2ⁿ / per_m
+    let per_m = polygons / (PATCH_TRIANGLES * length_m);
+    let (finest, coarsest) = range.eps_m;
+    let rho = if coarsest < NARROW * finest {
+        libm::log2(coarsest * per_m)
+    } else {
+        let square = libm::log2(PI * radius_m * polygons / (36.0 * length_m));
+        square.max(libm::log2(finest * per_m) + 1.0 + BAND).min(libm::log2(coarsest * per_m) - BAND)
+    };
+    hysteresis::floor(before, rho)
+}
+
+/// The highest level whose triangles fit, a quarter of an octave of room before it goes up and of patience before it goes down.
+fn primitive_level(wish: f64, triangles: &[u32; PRIMITIVE_LEVELS], range: (u8, u8), before: Option<u8>) -> u8 {
+    let band = if before.is_some() { libm::exp2(BAND) } else { 1.0 };
+    let at = |n: u8| f64::from(triangles[level(n)]);
+    let mut n = before.unwrap_or(range.0).clamp(range.0, range.1);
+    while n > range.0 && at(n) > wish * band {
+        n -= 1;
+    }
+    while n < range.1 && (at(n + 1) * band <= wish || at(n + 1) <= at(n)) {
+        n += 1;
+    }
+    n
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_agents::AgentId;
+
+    fn tube(eps_m: (f64, f64), n: (u8, u8)) -> ObjectView {
+        let range = ResolutionRange { eps_m, n };
+        let kind = Kind::Tube { length_m: 1.5, radius_m: 0.015 };
+        let (pixels, distance_m, speed_px_s) = (1e9, 0.5, 0.0);
+        ObjectView { id: AgentId(0), kind, range, pixels, distance_m, speed_px_s, importance: 1.0, visible: true }
+    }
+
+    /// Length of a ring over length of a side.
+    fn aspect(at: Resolution) -> f64 {
+        let (rings, sides) = (two_to(at.n / 2), 6.0 * two_to(at.n.div_ceil(2)));
+        (at.eps_m / rings) / (2.0 * PI * 0.015 / sides)
+    }
+
+    #[test]
+    fn a_switch_of_n_keeps_the_polygons_and_the_quads_near_square() {
+        let view = tube((1e-4, 0.5), (0, 10));
+        let (span, mut held) = (Span::of(&view), Held::default());
+        let mut levels = Vec::new();
+        let mut wish = 1300.0;
+        while wish < 4e5 {
+            let at = held.choose(&view, span, wish);
+            // the hold, and one interval of rounding in the 45 or more that there are
+            assert!((polygons(&view, at) / wish).ln().abs() <= HOLD + 1.0 / 45.0, "{wish}: {at:?}");
+            // half an octave to either side of the level, and the band
+            assert!(libm::log2(aspect(at)).abs() <= 1.0 + BAND + 0.05, "{wish}: {at:?} aspect {}", aspect(at));
+            levels.push(at.n);
+            wish *= 1.01;
+        }
+        assert!(levels.is_sorted() && levels[0] == 0 && *levels.last().unwrap() == 8, "{levels:?}");
+    }
+
+    #[test]
+    fn a_wish_that_trembles_switches_n_at_most_once() {
+        let view = tube((5e-4, 0.02), (1, 5));
+        let span = Span::of(&view);
+        for start in 0..200 {
+            let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), Held::default());
+            let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, √2 wide
+            let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).n).collect();
+            levels.dedup();
+            assert!(levels.len() <= 2, "{middle}: {levels:?}");
+        }
+    }
+
+    #[test]
+    fn the_ends_of_the_range_are_reached() {
+        for (eps_m, n) in
+            [((5e-4, 0.02), (1, 5)), ((0.01, 0.01), (0, 6)), ((1e-3, 0.05), (3, 3)), ((0.01, 0.02), (1, 4))]
+        {
+            let view = tube(eps_m, n);
+            let (span, mut held) = (Span::of(&view), Held::default());
+            let mut ends = |wish| held.choose(&view, span, wish);
+            assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
+            assert_eq!(ends(span.full), Resolution { eps_m: eps_m.0, n: n.1 });
+            assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
+        }
+    }
+
+    #[test]
+    fn a_tube_of_one_spacing_climbs_by_levels() {
+        let view = tube((0.01, 0.01), (0, 6));
+        let (span, mut held) = (Span::of(&view), Held::default());
+        let levels: Vec<_> = (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).n).collect();
+        assert!(levels.is_sorted() && levels[0] == 0 && *levels.last().unwrap() == 6, "{levels:?}");
+    }
+
+    #[test]
+    fn a_primitive_takes_the_level_that_fits_and_keeps_it_for_half_an_octave() {
+        let triangles: [u32; PRIMITIVE_LEVELS] = std::array::from_fn(|n| 48 << n);
+        assert_eq!(primitive_level(400.0, &triangles, (0, 6), None), 3); // 384 of 400
+        assert_eq!(primitive_level(800.0, &triangles, (0, 6), Some(3)), 3); // 768 fits, but not by a quarter of an octave
+        assert_eq!(primitive_level(920.0, &triangles, (0, 6), Some(3)), 4);
+        assert_eq!(primitive_level(650.0, &triangles, (0, 6), Some(4)), 4);
+        assert_eq!(primitive_level(640.0, &triangles, (0, 6), Some(4)), 3);
+        assert_eq!(primitive_level(1.0, &triangles, (2, 6), Some(4)), 2);
+        assert_eq!(primitive_level(12.0, &[12; PRIMITIVE_LEVELS], (1, 6), None), 6, "levels that cost the same");
+    }
+}

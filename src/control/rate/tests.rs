@@ -1,0 +1,169 @@
+//! An agent's controller against declared agents: a step takes base + c/ε.
+
+use super::*;
+
+const PERIOD_S: f64 = 1.0 / 240.0;
+
+fn limits() -> RateLimits {
+    RateLimits { dt_wanted_s: PERIOD_S, dt_max_s: 0.016, eps_m: Some((0.005, 0.02)), share: 0.5 }
+}
+
+/// The dead zone of the load is 0.8 … 1.05; a demand that is not worth it leaves the rest.
+/// An agent alone on a core: a turn of `full_s` at the finest ε, and periods that its work makes longer.
+struct Agent {
+    control: RateControl,
+    full_s: f64,
+    now: RateDemand,
+    time_s: f64,
+    demands: Vec<(f64, RateDemand)>,
+}
+
+impl Agent {
+    fn new(full_s: f64) -> Self {
+        let now = RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) };
+        Self { control: RateControl::new(limits(), now.eps_m), full_s, now, time_s: 0.0, demands: Vec::new() }
+    }
+
+    fn work_s(&self) -> f64 {
+        self.full_s * 0.005 / self.now.eps_m.unwrap()
+    }
+
+    fn run(&mut self, seconds: f64) {
+        let end = self.time_s + seconds;
+        while self.time_s < end {
+            let (work_s, dt_s) = (self.work_s(), self.now.dt_s);
+            let real_period_s = work_s.max(dt_s);
+            self.time_s += real_period_s;
+            let turn = TurnMeasure { work_s, wanted_period_s: PERIOD_S, real_period_s, dt_s };
+            if let Some(demand) = self.control.after_turn(&turn) {
+                self.now = demand;
+                self.demands.push((self.time_s, demand));
+            }
+        }
+    }
+
+    fn load(&self) -> f64 {
+        self.work_s() / (0.5 * self.now.dt_s)
+    }
+}
+
+#[test]
+fn an_agent_with_time_to_spare_is_left_as_fine_as_it_is() {
+    let mut agent = Agent::new(0.1 * PERIOD_S);
+    agent.run(20.0);
+    assert!(agent.demands.is_empty() && agent.control.rest() == Some(Bound::Finest));
+}
+
+#[test]
+fn a_late_agent_coarsens_before_it_slows_down() {
+    // at the coarsest ε the work is half the period, all of its share
+    let mut agent = Agent::new(1.9 * PERIOD_S);
+    agent.run(10.0);
+    assert_eq!(agent.now.dt_s, PERIOD_S, "{:?}", agent.demands);
+    assert!(agent.now.eps_m.unwrap() > 0.01 && (0.8..=1.06).contains(&agent.load()), "load {}", agent.load());
+}
+
+#[test]
+fn an_agent_ten_times_too_slow_slows_down_last_and_comes_back_in_the_reverse_order() {
+    let mut agent = Agent::new(6.0 * PERIOD_S);
+    agent.run(20.0);
+    assert_eq!(agent.now.eps_m, Some(0.02));
+    assert!(agent.now.dt_s > 2.0 * PERIOD_S && (0.8..=1.06).contains(&agent.load()), "{:?}", agent.now);
+    let first_slow = agent.demands.iter().position(|(_, d)| d.dt_s > PERIOD_S).unwrap();
+    assert!(agent.demands[..first_slow].iter().all(|(_, d)| d.eps_m < Some(0.02)), "{:?}", agent.demands);
+    agent.demands.clear();
+    agent.full_s = 0.1 * PERIOD_S;
+    agent.run(120.0);
+    assert_eq!(agent.now, RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) });
+    let finer = agent.demands.iter().position(|(_, d)| d.eps_m < Some(0.02)).unwrap();
+    assert!(agent.demands[finer..].iter().all(|(_, d)| d.dt_s == PERIOD_S), "{:?}", agent.demands);
+}
+
+#[test]
+fn retunes_stop_once_the_load_is_right() {
+    for full in [0.7, 1.0, 1.7, 3.0, 6.0] {
+        let mut agent = Agent::new(full * PERIOD_S);
+        agent.run(20.0);
+        agent.demands.clear();
+        agent.run(60.0);
+        assert!(agent.demands.is_empty(), "{full}: {:?}", agent.demands);
+    }
+}
+
+#[test]
+fn an_agent_kept_late_by_others_tries_again_ever_more_rarely() {
+    let mut control = RateControl::new(limits(), Some(0.005));
+    let (mut now, mut time_s, mut retunes) = (control.demand(), 0.0, Vec::new());
+    while time_s < 240.0 {
+        // others leave it a core's time only while it is coarse: its own work is small all along
+        let real_period_s = if now.eps_m < Some(0.009) { 1.3 * now.dt_s } else { now.dt_s };
+        time_s += real_period_s;
+        let turn = TurnMeasure { work_s: 0.05 * PERIOD_S, wanted_period_s: PERIOD_S, real_period_s, dt_s: now.dt_s };
+        if let Some(demand) = control.after_turn(&turn) {
+            now = demand;
+            retunes.push(time_s);
+        }
+    }
+    // one retune finer and one back, every 128 windows of a quarter of a second
+    let late_ones = retunes.iter().filter(|t| **t > 120.0).count();
+    assert!(late_ones <= 2 * (120 / 32 + 1), "{retunes:?}");
+}
+
+#[test]
+fn one_hiccup_of_the_scheduler_changes_nothing() {
+    let mut control = RateControl::new(limits(), Some(0.005));
+    for turn in 0..5000 {
+        let work_s = if turn == 2500 { 0.05 } else { 0.45 * PERIOD_S };
+        let measure = TurnMeasure { work_s, wanted_period_s: PERIOD_S, real_period_s: PERIOD_S, dt_s: PERIOD_S };
+        assert_eq!(control.after_turn(&measure), None, "turn {turn}");
+    }
+}
+
+#[test]
+fn fixed_values_switch_it_off() {
+    let fixed = RateLimits { dt_max_s: PERIOD_S, eps_m: Some((0.01, 0.01)), ..limits() };
+    for limits in [fixed, RateLimits { eps_m: None, ..fixed }] {
+        let mut control = RateControl::new(limits, Some(0.01));
+        let turn = TurnMeasure { work_s: 1.0, wanted_period_s: PERIOD_S, real_period_s: 1.0, dt_s: PERIOD_S };
+        assert!(!control.steers() && (0..100).all(|_| control.after_turn(&turn).is_none()));
+    }
+}
+
+#[test]
+fn a_model_without_eps_slows_down() {
+    let mut control = RateControl::new(RateLimits { eps_m: None, ..limits() }, None);
+    let mut dt_s = PERIOD_S;
+    for _ in 0..5000 {
+        let turn = TurnMeasure { work_s: PERIOD_S, wanted_period_s: PERIOD_S, real_period_s: dt_s, dt_s };
+        dt_s = control.after_turn(&turn).map_or(dt_s, |d| d.dt_s);
+    }
+    assert!((PERIOD_S / (0.5 * dt_s)).ln().abs() <= 0.23, "{dt_s}"); // inside the dead zone
+}
+
+#[test]
+fn turns_that_are_none_are_left_out() {
+    let mut control = RateControl::new(limits(), Some(0.005));
+    for bad in [f64::NAN, f64::INFINITY, 0.0, -1.0] {
+        for at in 0..4 {
+            let mut x = [PERIOD_S; 4];
+            x[at] = bad;
+            let turn = TurnMeasure { work_s: x[0], wanted_period_s: x[1], real_period_s: x[2], dt_s: x[3] };
+            assert!((0..500).all(|_| control.after_turn(&turn).is_none()));
+        }
+    }
+    assert_eq!(control.demand(), RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) });
+}
+
+#[test]
+fn demands_stay_in_their_ranges_whatever_is_measured() {
+    let mut control = RateControl::new(limits(), Some(0.005));
+    let mut seed = 1_u64;
+    for _ in 0..100_000 {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        let x = [0, 8, 16, 24].map(|shift| 10.0_f64.powf(f64::from((seed >> (shift + 16)) as u8) / 25.0 - 6.0));
+        let turn = TurnMeasure { work_s: x[0], wanted_period_s: x[1], real_period_s: x[2], dt_s: x[3] };
+        if let Some(RateDemand { dt_s, eps_m }) = control.after_turn(&turn) {
+            assert!((PERIOD_S..=0.016).contains(&dt_s) && (0.005..=0.02).contains(&eps_m.unwrap()));
+        }
+    }
+}

@@ -1,0 +1,63 @@
+//! What a controller says of itself: whether it moves, rests, or is stopped at an end of what it may do.
+//!
+//! In: the laws' own words. Out: [`Status`], and its sentence for the viewer and the report. Never here: state.
+
+use metachron_budget::Bound;
+use metachron_budget::log_law::Rest;
+use std::fmt;
+
+/// What the picture's controller is doing.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Status {
+    /// No frame has taught it anything yet.
+    #[default]
+    Waiting,
+    /// It moves (ε, n) towards the wanted time.
+    Moving,
+    /// The work is as wanted.
+    Settled,
+    /// It is stopped at this end of what the objects in view allow.
+    Clamped(Bound),
+    /// There is time left, but the next finer level would be late.
+    BetweenLevels,
+    /// Nothing in view can be drawn in more than one way.
+    Fixed,
+    /// The policy asks for the finest and does not look at the time.
+    Full,
+}
+
+impl From<Rest> for Status {
+    fn from(rest: Rest) -> Self {
+        match rest {
+            Rest::Moving => Self::Moving,
+            Rest::Settled => Self::Settled,
+            Rest::Clamped(bound) => Self::Clamped(bound),
+            Rest::BetweenLevels => Self::BetweenLevels,
+        }
+    }
+}
+
+impl Status {
+    /// The end at which it is stopped.
+    #[must_use]
+    pub fn clamped(self) -> Option<Bound> {
+        if let Self::Clamped(bound) = self { Some(bound) } else { None }
+    }
+}
+
+impl fmt::Display for Status {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Waiting => "waiting for a first measured frame",
+            Self::Moving => "moving towards the target",
+            Self::Settled => "on target",
+            Self::Clamped(Bound::Finest) => {
+                "at its finest: everything in view is as fine as it may be, and there is time left"
+            }
+            Self::Clamped(Bound::Coarsest) => "at its coarsest: even so frames take longer than they should",
+            Self::BetweenLevels => "between levels: there is time left, but the next finer level would be late",
+            Self::Fixed => "fixed: nothing in view has a range to choose from",
+            Self::Full => "full detail: the time is not looked at",
+        })
+    }
+}
