@@ -1,0 +1,202 @@
+//! The tube's linear system: symmetric, 3×3 blocks, each row coupled to the two before it; factor, solve, inverse blocks.
+//!
+//! In: [`Row`]s in the interleaved order x₀, φ₀, x₁, φ₁, … x_N ("slots": node k is slot 2k, segment k slot 2k + 1).
+//! Pairs (φ_k, x_{k+1}) of it are the 6×6 blocks of a block-tridiagonal matrix.
+//! Out: L D Lᵀ without square roots in O(N), one answer A⁻¹ r in O(N), the blocks of A⁻¹ inside the band in O(N).
+//! Never here: what the numbers mean, allocation once the sizes settle. Theory: docs/theory/rod.md, eq. 15–18.
+
+use super::sym3::Sym3;
+use glam::{DMat3, DVec3};
+
+/// One block row of the system's lower half.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Row {
+    /// The block on the diagonal.
+    pub diag: Sym3,
+    /// The block that couples this slot (rows) to the one before it (columns).
+    pub near: DMat3,
+    /// The block that couples this slot to the one two before it: node to node, segment to segment, hence symmetric.
+    pub far: Sym3,
+}
+
+/// One block row of the factor.
+#[derive(Debug, Clone, Copy, Default)]
+struct Factored {
+    /// Inverse of the pivot D_i.
+    inverse: Sym3,
+    /// L(i, i − 1).
+    near: DMat3,
+    /// L(i, i − 2).
+    far: DMat3,
+}
+
+/// The factor of A. It answers impulses with velocities: this is the seam at which contacts work ([`crate::rod`]).
+#[derive(Debug, Clone, Default)]
+pub struct Factor {
+    rows: Vec<Factored>,
+}
+
+/// The blocks of A⁻¹ inside the band.
+#[derive(Debug, Clone, Default)]
+pub struct InverseBlocks {
+    /// A⁻¹(i, i).
+    pub diag: Vec<Sym3>,
+    /// A⁻¹(i + 1, i); one entry fewer.
+    pub near: Vec<DMat3>,
+    /// A⁻¹(i + 2, i); two entries fewer.
+    pub far: Vec<DMat3>,
+}
+
+impl Factor {
+    /// Factors the matrix; returns the first slot whose pivot is not positive definite, where there is one (eq. 16).
+    pub fn factor(&mut self, rows: &[Row]) -> Result<(), usize> {
+        self.rows.resize(rows.len(), Factored::default());
+        let (mut before, mut last) = (Sym3::default(), Sym3::default()); // pivots' inverses of rows i − 2, i − 1
+        let mut last_near = DMat3::ZERO; // A(i − 1, i − 2) after elimination
+        for (i, (row, out)) in rows.iter().zip(&mut self.rows).enumerate() {
+            let far = row.far.times(&before);
+            let changed = row.near - far * last_near.transpose();
+            let near = last.after(&changed);
+            let pivot = row.diag.minus_product(&far, &row.far.full()).minus_product(&near, &changed);
+            let inverse = pivot.inverse().ok_or(i)?;
+            *out = Factored { inverse, near, far };
+            (before, last, last_near) = (last, inverse, changed);
+        }
+        Ok(())
+    }
+
+    /// Turns the right side r into A⁻¹ r, in place (eq. 17): impulses, one a slot, into the velocities they cause.
+    pub fn solve(&self, r: &mut [DVec3]) {
+        let (mut before, mut last) = (DVec3::ZERO, DVec3::ZERO);
+        for (row, r) in self.rows.iter().zip(r.iter_mut()) {
+            let y = *r - row.near * last - row.far * before;
+            *r = row.inverse * y;
+            (before, last) = (last, y);
+        }
+        let (mut after, mut next) = (DVec3::ZERO, DVec3::ZERO); // rows' answers i + 2, i + 1 …
+        let (mut near, mut far, mut far_next) = (DMat3::ZERO, DMat3::ZERO, DMat3::ZERO); // … and their L
+        for (row, r) in self.rows.iter().zip(r.iter_mut()).rev() {
+            let y = *r - transposed(&near, next) - transposed(&far, after);
+            *r = y;
+            (after, next) = (next, y);
+            (near, far, far_next) = (row.near, far_next, row.far);
+        }
+    }
+
+    #[cfg_attr(not(test), expect(dead_code, reason = "contacts, which call it, land after it"))]
+    /// The blocks of A⁻¹ inside the band, in one sweep from the last row (eq. 18).
+    pub fn inverse_blocks(&self, into: &mut InverseBlocks) {
+        let n = self.rows.len();
+        into.diag.resize(n, Sym3::default());
+        into.near.resize(n.saturating_sub(1), DMat3::ZERO);
+        into.far.resize(n.saturating_sub(2), DMat3::ZERO);
+        for j in (0..n).rev() {
+            let mut diag = self.rows[j].inverse;
+            if j + 1 < n {
+                let l1 = self.rows[j + 1].near;
+                let mut z1 = -(into.diag[j + 1].full() * l1);
+                if j + 2 < n {
+                    let l2 = self.rows[j + 2].far;
+                    z1 -= into.near[j + 1].transpose() * l2;
+                    let z2 = -(into.near[j + 1] * l1) - into.diag[j + 2].full() * l2;
+                    into.far[j] = z2;
+                    diag = diag.minus_product(&l2.transpose(), &z2.transpose());
+                }
+                into.near[j] = z1;
+                diag = diag.minus_product(&l1.transpose(), &z1.transpose());
+            }
+            into.diag[j] = diag;
+        }
+    }
+}
+
+#[inline]
+fn transposed(m: &DMat3, v: DVec3) -> DVec3 {
+    DVec3::new(m.x_axis.dot(v), m.y_axis.dot(v), m.z_axis.dot(v))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A positive definite band matrix of `n` rows with entries of about one, from a fixed sequence.
+    fn example(n: usize) -> Vec<Row> {
+        let mut seed = 1_u64;
+        let mut next = move || {
+            seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
+        };
+        let mut vector = move || DVec3::new(next(), next(), next());
+        (0..n)
+            .map(|i| {
+                let mut row = Row { diag: Sym3::diagonal(DVec3::splat(6.0)), ..Row::default() };
+                row.diag += Sym3::outer(vector(), 1.0);
+                row.near = if i > 0 { DMat3::from_cols(vector(), vector(), vector()) } else { DMat3::ZERO };
+                row.far = if i > 1 { Sym3::outer(vector(), 1.0) } else { Sym3::default() };
+                row
+            })
+            .collect()
+    }
+
+    fn multiply(rows: &[Row], v: &[DVec3]) -> Vec<DVec3> {
+        let mut out = vec![DVec3::ZERO; rows.len()];
+        for (i, row) in rows.iter().enumerate() {
+            out[i] += row.diag * v[i];
+            if i > 0 {
+                out[i] += row.near * v[i - 1];
+                out[i - 1] += row.near.transpose() * v[i];
+            }
+            if i > 1 {
+                out[i] += row.far * v[i - 2];
+                out[i - 2] += row.far * v[i];
+            }
+        }
+        out
+    }
+
+    #[test]
+    fn a_solve_undoes_the_matrix() {
+        let rows = example(17);
+        let mut factor = Factor::default();
+        factor.factor(&rows).unwrap();
+        let x: Vec<_> = (0..17).map(|i| DVec3::new(i as f64, 1.0, -0.5 * i as f64)).collect();
+        let mut r = multiply(&rows, &x);
+        factor.solve(&mut r);
+        for (got, want) in r.iter().zip(&x) {
+            assert!((*got - *want).length() < 1e-12, "{got} is not {want}"); // 17 of 3e-16, condition below 100
+        }
+    }
+
+    #[test]
+    fn the_inverse_blocks_are_those_of_the_columns() {
+        let rows = example(9);
+        let mut factor = Factor::default();
+        factor.factor(&rows).unwrap();
+        let mut blocks = InverseBlocks::default();
+        factor.inverse_blocks(&mut blocks);
+        for i in 0..9 {
+            for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+                let mut column = vec![DVec3::ZERO; 9];
+                column[i] = axis;
+                factor.solve(&mut column);
+                let close = |got: DVec3, at: usize| assert!((got - column[at]).length() < 1e-14, "{i} {at}");
+                close(blocks.diag[i] * axis, i);
+                if i + 1 < 9 {
+                    close(blocks.near[i] * axis, i + 1);
+                }
+                if i + 2 < 9 {
+                    close(blocks.far[i] * axis, i + 2);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn a_matrix_that_is_not_positive_is_refused_at_its_slot() {
+        let mut rows = example(5);
+        rows[3].diag = Sym3::diagonal(DVec3::new(1.0, -1.0, 1.0));
+        assert_eq!(Factor::default().factor(&rows), Err(3));
+        rows[3].diag = Sym3::diagonal(DVec3::NAN);
+        assert_eq!(Factor::default().factor(&rows), Err(3));
+    }
+}

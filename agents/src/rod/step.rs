@@ -1,0 +1,200 @@
+//! One step of the tube: linearly implicit Euler, divided into substeps where that is not enough.
+//!
+//! In: a state, a span, what holds and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
+//! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
+
+use super::band::{Factor, Row};
+use super::calm;
+use super::config::{Config, Matter};
+use super::division::Division;
+use super::holds::{NodeSpring, Tie};
+use super::system::{Iterate, Scene, assemble};
+use super::turn::{exp, unit};
+use glam::DVec3;
+
+/// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
+pub const TURN_MAX_RAD: f64 = 0.25;
+/// A substep is halved at most ten times, into 1024: the last five for energy that rises, not for what merely turns fast.
+const HALVINGS: u32 = 10;
+/// Substeps of fewer ticks than this may turn further than [`TURN_MAX_RAD`]: a step is at most 32 substeps for that.
+const TURN_TICKS: u64 = 1 << (HALVINGS - 5);
+/// Newton iterations of a substep whose energy rose, beyond the first: each squares what the linear move left over.
+const ITERATIONS_MORE: u32 = 2;
+/// A rise of energy below this share of the energies at work is rounding.
+const ENERGY_SLACK: f64 = 1e-9;
+
+/// What a step needs besides the state.
+pub struct Setting<'a> {
+    /// The material.
+    pub matter: &'a Matter,
+    /// The division.
+    pub division: &'a Division,
+    /// Attachments.
+    pub springs: &'a [NodeSpring],
+    /// The span of the step, seconds.
+    pub dt: f64,
+    /// The least number of substeps.
+    pub substeps: u32,
+}
+
+/// The state stopped being finite: which slot gave out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lost {
+    /// The slot whose pivot failed; `None` where the state itself did.
+    pub slot: Option<usize>,
+}
+
+/// Room for the linear system and the next state; nothing is allocated once the sizes settle.
+#[derive(Debug, Clone, Default)]
+pub struct Stepper {
+    rows: Vec<Row>,
+    factor: Factor,
+    rhs: Vec<DVec3>,
+    next: Config,
+    energy_j: f64,
+}
+
+/// What became of a trial substep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Verdict {
+    /// The next state stands.
+    Good,
+    /// Something turned too far, or energy rose: smaller substeps are wanted.
+    TooFar,
+}
+
+impl Stepper {
+    /// Advances `now`, whose strains are up to date, by the span; returns the number of substeps.
+    ///
+    /// # Errors
+    /// [`Lost`] where the next state is not finite; `now` is then the last state that was.
+    pub fn step(&mut self, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
+        let ticks = u64::from(setting.substeps) << HALVINGS;
+        let tick = setting.dt / ticks as f64;
+        let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
+        self.energy_j = self.energy(now, setting);
+        while gone < ticks {
+            let scene = Scene {
+                matter: setting.matter,
+                division: setting.division,
+                springs: setting.springs,
+                ties,
+                h: tick * size as f64,
+                until: tick * (gone + size) as f64,
+            };
+            if self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
+                size /= 2;
+                continue;
+            }
+            self.accept(now, setting, ties, (tick * size as f64, tick * (gone + size) as f64));
+            (gone, taken) = (gone + size, taken + 1);
+            // twice as long again, where that ends on the grid of the longer substep
+            if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
+                size *= 2;
+            }
+        }
+        Ok(taken)
+    }
+
+    /// One trial substep, from `now` into `next` (eq. 11–20); `bound` if turns are, `divide` if it can be smaller.
+    fn attempt(&mut self, now: &Config, scene: &Scene<'_>, (bound, divide): (bool, bool)) -> Result<Verdict, Lost> {
+        if let Err(lost) = self.solve(now, scene, true) {
+            return if divide { Ok(Verdict::TooFar) } else { Err(lost) };
+        }
+        if bound && self.widest_turn() * scene.h > TURN_MAX_RAD {
+            return Ok(Verdict::TooFar);
+        }
+        self.advance(now, scene, true);
+        let mut rise = self.energy_rise(now, scene);
+        for _ in 0..ITERATIONS_MORE {
+            // a state far out may have no next iterate: then the best so far is judged as it is
+            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, scene, false).is_err() {
+                break;
+            }
+            self.advance(now, scene, false);
+            rise = self.energy_rise(now, scene);
+        }
+        let finite = self.next.is_finite();
+        if divide && (rise > 0.0 || !finite) {
+            return Ok(Verdict::TooFar);
+        }
+        if rise > 0.0 {
+            calm::take(rise, &mut self.next, scene.matter, scene.division);
+        }
+        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Lost { slot: None }) }
+    }
+
+    /// Builds and solves the system about the iterate; the change of velocities is left in `rhs` (eq. 11).
+    fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
+        let at = if first { now } else { &self.next };
+        assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
+        self.factor.solve(&mut self.rhs);
+        Ok(())
+    }
+
+    /// The fastest spin in `rhs`, rad/s.
+    fn widest_turn(&self) -> f64 {
+        self.rhs.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
+    fn advance(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+        let Self { next, rhs, .. } = self;
+        let (h, count) = (scene.h, now.q.len());
+        next.resize(count);
+        for k in 0..=count {
+            let v = if first { rhs[2 * k] } else { next.u[2 * k] + rhs[2 * k] };
+            next.u[2 * k] = v;
+            next.x[k] = now.x[k] + v * h;
+        }
+        for k in 0..count {
+            let turn = rhs[2 * k + 1];
+            let (spin, from) = if first { (turn, now.q[k]) } else { (next.u[2 * k + 1] + turn, next.q[k]) };
+            next.u[2 * k + 1] = spin;
+            next.q[k] = unit(exp(turn * h) * from);
+        }
+        next.strain(scene.matter, scene.division);
+    }
+
+    /// By how much the energy of `next` exceeds what `now` had and the pulls gave, less the rounding, J (eq. 27).
+    fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
+        let kinetic = self.next.kinetic_j(scene.matter, scene.division);
+        let after = kinetic + stored(&self.next, scene.springs);
+        let (mut work, mut effort) = (0.0, 0.0);
+        for tie in scene.ties {
+            let (a, b) = (tie.segment, tie.segment + 1);
+            let x = tie.mix(self.next.x[a], self.next.x[b]);
+            let v = tie.mix(self.next.u[2 * a], self.next.u[2 * b]);
+            let done = tie.force(x, v, scene.until).dot(x - tie.mix(now.x[a], now.x[b]));
+            work += done;
+            effort += done.abs();
+        }
+        let lifted = (self.next.gravity_j - now.gravity_j).abs();
+        let at_work = kinetic + self.next.elastic_j + now.elastic_j + lifted + effort;
+        // the sums themselves round at their own size
+        let rounding = f64::EPSILON * 64.0 * (self.energy_j.abs() + after.abs() + now.gravity_j.abs());
+        after - self.energy_j - work - ENERGY_SLACK * at_work - rounding
+    }
+
+    /// Makes `next` the state and books what the pulls gave.
+    fn accept(&mut self, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie], (h, until): (f64, f64)) {
+        std::mem::swap(now, &mut self.next);
+        for tie in ties {
+            let (a, b) = (tie.segment, tie.segment + 1);
+            let (x, v) = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));
+            tie.impulse += tie.force(x, v, until) * h;
+        }
+        self.energy_j = self.energy(now, setting);
+    }
+
+    fn energy(&self, state: &Config, setting: &Setting<'_>) -> f64 {
+        state.kinetic_j(setting.matter, setting.division) + stored(state, setting.springs)
+    }
+}
+
+/// Elastic energy, gravity's and that of the attachments, J (eq. 10).
+pub fn stored(state: &Config, springs: &[NodeSpring]) -> f64 {
+    let held: f64 = springs.iter().map(|s| s.energy_j(state.x[s.node])).sum();
+    state.elastic_j + state.gravity_j + held
+}

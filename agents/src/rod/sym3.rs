@@ -1,0 +1,131 @@
+//! Symmetric 3×3 matrices: six numbers, and the few products that the band solver needs.
+//!
+//! Never here: anything but arithmetic.
+
+use glam::{DMat3, DVec3};
+use std::ops::{Add, AddAssign, Mul};
+
+/// A symmetric 3×3 matrix.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Sym3 {
+    /// The diagonal: xx, yy, zz.
+    pub d: DVec3,
+    /// Beside the diagonal: yz, xz, xy.
+    pub o: DVec3,
+}
+
+impl Sym3 {
+    /// The matrix with this diagonal.
+    #[inline]
+    pub fn diagonal(d: DVec3) -> Self {
+        Self { d, o: DVec3::ZERO }
+    }
+
+    /// `scale` times the identity.
+    #[inline]
+    pub fn identity(scale: f64) -> Self {
+        Self::diagonal(DVec3::splat(scale))
+    }
+
+    /// scale · v vᵀ.
+    #[inline]
+    pub fn outer(v: DVec3, scale: f64) -> Self {
+        let w = v * scale;
+        Self { d: w * v, o: DVec3::new(w.y * v.z, w.x * v.z, w.x * v.y) }
+    }
+
+    /// The same matrix with nine numbers.
+    #[inline]
+    pub fn full(&self) -> DMat3 {
+        let Self { d, o } = *self;
+        DMat3::from_cols(DVec3::new(d.x, o.z, o.y), DVec3::new(o.z, d.y, o.x), DVec3::new(o.y, o.x, d.z))
+    }
+
+    /// self · other.
+    #[inline]
+    pub fn times(&self, other: &Self) -> DMat3 {
+        other.after(&self.full())
+    }
+
+    /// m · self.
+    #[inline]
+    pub fn after(&self, m: &DMat3) -> DMat3 {
+        let Self { d, o } = *self;
+        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
+        DMat3::from_cols(x * d.x + y * o.z + z * o.y, x * o.z + y * d.y + z * o.x, x * o.y + y * o.x + z * d.z)
+    }
+
+    /// self − a bᵀ, for an a bᵀ that is known to be symmetric.
+    #[inline]
+    pub fn minus_product(&self, a: &DMat3, b: &DMat3) -> Self {
+        let (ax, ay, az) = (a.x_axis, a.y_axis, a.z_axis);
+        let (bx, by, bz) = (b.x_axis, b.y_axis, b.z_axis);
+        let d = self.d - (ax * bx + ay * by + az * bz);
+        let entry = |i: usize, j: usize| ax[i] * bx[j] + ay[i] * by[j] + az[i] * bz[j];
+        Self { d, o: self.o - DVec3::new(entry(1, 2), entry(0, 2), entry(0, 1)) }
+    }
+
+    /// The inverse, by cofactors; `None` where the matrix is not positive definite or not finite.
+    #[inline]
+    pub fn inverse(&self) -> Option<Self> {
+        let Self { d, o } = *self;
+        let c = DVec3::new(d.y * d.z - o.x * o.x, d.x * d.z - o.y * o.y, d.x * d.y - o.z * o.z);
+        let e = DVec3::new(o.y * o.z - d.x * o.x, o.x * o.z - d.y * o.y, o.x * o.y - d.z * o.z);
+        let det = d.x * c.x + o.z * e.z + o.y * e.y;
+        let positive = d.x > 0.0 && c.z > 0.0 && det > 0.0 && det < f64::INFINITY;
+        positive.then(|| {
+            let scale = 1.0 / det;
+            Self { d: c * scale, o: e * scale }
+        })
+    }
+}
+
+impl Mul<DVec3> for Sym3 {
+    type Output = DVec3;
+    #[inline]
+    fn mul(self, v: DVec3) -> DVec3 {
+        let Self { d, o } = self;
+        DVec3::new(
+            d.x * v.x + o.z * v.y + o.y * v.z,
+            o.z * v.x + d.y * v.y + o.x * v.z,
+            o.y * v.x + o.x * v.y + d.z * v.z,
+        )
+    }
+}
+
+impl Mul<f64> for Sym3 {
+    type Output = Self;
+    #[inline]
+    fn mul(self, scale: f64) -> Self {
+        Self { d: self.d * scale, o: self.o * scale }
+    }
+}
+
+impl Add for Sym3 {
+    type Output = Self;
+    #[inline]
+    fn add(self, other: Self) -> Self {
+        Self { d: self.d + other.d, o: self.o + other.o }
+    }
+}
+
+impl AddAssign for Sym3 {
+    #[inline]
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_undoes_the_matrix() {
+        let m = Sym3::diagonal(DVec3::new(2.0, 3.0, 4.0)) + Sym3::outer(DVec3::new(1.0, -2.0, 0.5), 0.7);
+        let product = m.times(&m.inverse().unwrap());
+        assert!((product - DMat3::IDENTITY).abs_diff_eq(DMat3::ZERO, 1e-14), "{product}"); // condition 3
+        assert_eq!(m.minus_product(&m.full(), &DMat3::IDENTITY), Sym3::default());
+        assert_eq!(Sym3::diagonal(DVec3::new(1.0, 1.0, -1.0)).inverse(), None);
+    }
+}

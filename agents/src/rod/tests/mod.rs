@@ -1,0 +1,86 @@
+//! What the tube promises, against independent answers (`tests/reference/`).
+
+mod statics;
+mod violent;
+
+use super::config::Config;
+use super::*;
+use crate::{Agent, AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Surroundings};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// The reference tube of `tests/reference/cosserat_tube.json` with this modulus, along +x from the origin, 1 m.
+pub fn reference_spec(young_pa: f64, segments: usize) -> TubeSpec {
+    let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    let resolution = Resolution { eps_m: 1.0 / segments as f64, n: 3 };
+    TubeSpec {
+        path_m: vec![DVec3::ZERO, DVec3::X],
+        section,
+        mass_per_length_kg_m,
+        resolution,
+        range: ResolutionRange { eps_m: (1e-4, 1.0), n: (0, 5) },
+        segments: Some(segments),
+        substeps: 1,
+        damping_per_s: 0.0,
+        clamp: [false; 2],
+        pin: [false; 2],
+        attachments: vec![],
+        peristalsis: None,
+        pressure_pa: 0.0,
+        self_contact: false,
+        friction: 0.3,
+        gravity: DVec3::ZERO,
+        obstacles: Arc::from([]),
+        sleep: false,
+    }
+}
+
+/// The reference tube in no field, held nowhere.
+pub fn free_tube(segments: usize) -> Tube {
+    Tube::new(reference_spec(1e6, segments)).unwrap()
+}
+
+/// A state of `tube` moved and turned at random (a fixed sequence), strains up to date.
+pub fn shake(tube: &Tube, seed: u64) -> Config {
+    let mut random = Random(seed);
+    let mut state = tube.state().clone();
+    state.u.iter_mut().for_each(|u| *u = random.vector() * 2.0);
+    state.x.iter_mut().for_each(|x| *x += random.vector() * 0.004);
+    state.q.iter_mut().for_each(|q| *q = turn::unit(turn::exp(random.vector() * 0.3) * *q));
+    state.strain(tube.matter(), tube.division());
+    state
+}
+
+/// A fixed sequence of numbers.
+pub struct Random(pub u64);
+
+impl Random {
+    /// −1 … 1.
+    pub fn number(&mut self) -> f64 {
+        self.0 = self.0.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (self.0 >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+    }
+
+    /// In the cube of that.
+    pub fn vector(&mut self) -> DVec3 {
+        DVec3::new(self.number(), self.number(), self.number())
+    }
+}
+
+pub fn millis(ms: f64) -> SimSpan {
+    SimSpan::from_secs_f64(ms * 1e-3).unwrap()
+}
+
+/// Steps `tube` alone for `seconds` with steps of `dt_ms`; returns how many substeps were taken.
+pub fn run(tube: &mut Tube, dt_ms: f64, seconds: f64) -> u32 {
+    let steps = (seconds * 1e3 / dt_ms).round() as u64;
+    let dt = millis(dt_ms);
+    let mut time = SimTime::ZERO;
+    let mut substeps = 0;
+    for _ in 0..steps {
+        substeps += tube.step(dt, &Surroundings::alone(AgentId(0), time)).unwrap().substeps;
+        time += dt;
+    }
+    substeps
+}

@@ -1,0 +1,300 @@
+//! The tube as an agent: one divided rod, its holds, its radius, its rest.
+//!
+//! In: a [`TubeSpec`], steps, pulls, wishes for a resolution. Out: snapshots. Never here: how a step is solved
+//! ([`super::step`]), how a state is carried to another division ([`super::remesh`]). Theory: docs/theory/rod.md.
+
+use super::check::{TubeError, check};
+use super::config::{Config, Matter};
+use super::division::{self, Division};
+use super::holds::{NodeSpring, Tie, springs};
+use super::remesh::Remesher;
+use super::rest::RestWatch;
+use super::skeleton::Skeleton;
+use super::step::{Lost, Setting, Stepper, stored};
+use super::{Section, TubeSpec, residual};
+use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
+use glam::DVec3;
+
+/// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
+pub const STRETCH_WARN: f64 = 1.4;
+
+/// A tube, cable or rod that lives by its own steps.
+#[derive(Debug, Clone)]
+pub struct Tube {
+    spec: TubeSpec,
+    skeleton: Skeleton,
+    matter: Matter,
+    division: Division,
+    now: Config,
+    stepper: Stepper,
+    remesher: Remesher,
+    springs: Vec<NodeSpring>,
+    ties: Vec<Tie>,
+    grips: Vec<Grip>,
+    rest: RestWatch,
+    resolution: Resolution,
+    time: SimTime,
+    steps: u64,
+}
+
+/// The outer radius under `pressure_pa` inside: r + p r² (1 − ν/2)/(E t) (docs/theory/rod.md, eq. 33).
+#[must_use]
+pub fn pressed_radius_m(section: &Section, pressure_pa: f64) -> f64 {
+    let Section { radius_m: r, wall_m, young_pa, poisson, .. } = *section;
+    r + pressure_pa * r * r * (1.0 - 0.5 * poisson) / (young_pa * wall_m)
+}
+
+impl Tube {
+    /// Builds a tube at rest on its stress-free path.
+    ///
+    /// # Errors
+    /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
+    pub fn new(spec: TubeSpec) -> Result<Self, TubeError> {
+        check(&spec)?;
+        let skeleton = Skeleton::new(&spec.path_m);
+        let resolution = spec.range.clamp(spec.resolution);
+        let count = match spec.segments {
+            Some(count) => division::limit(&skeleton, count),
+            None => division::segments_for(&skeleton, resolution.eps_m),
+        };
+        let division = Division::first(&skeleton, count);
+        let matter = matter_of(&spec);
+        let mut now = Config::at_rest(&division);
+        now.strain(&matter, &division);
+        let mut tube = Self {
+            resolution: held(resolution, &skeleton, count),
+            spec,
+            skeleton,
+            matter,
+            division,
+            now,
+            stepper: Stepper::default(),
+            remesher: Remesher::default(),
+            springs: vec![],
+            ties: vec![],
+            grips: vec![],
+            rest: RestWatch::default(),
+            time: SimTime::ZERO,
+            steps: 0,
+        };
+        springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
+        Ok(tube)
+    }
+
+    /// The numbers it was built from.
+    #[must_use]
+    pub fn spec(&self) -> &TubeSpec {
+        &self.spec
+    }
+
+    /// Rest length of the centre line, metres.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.skeleton.length_m()
+    }
+
+    /// How many segments the simulation has now: 2 … 4096.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.division.segments()
+    }
+
+    /// The largest stretch of any segment along its director, 1 at rest.
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        self.now.stretch
+    }
+
+    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravity's, zero at the origin.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        self.now.kinetic_j(&self.matter, &self.division) + stored(&self.now, &self.springs)
+    }
+
+    /// What a user should know of the present state: one sentence each, none as a rule.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let mut list = vec![];
+        if self.now.stretch > STRETCH_WARN {
+            let Matter { ea, ga, .. } = self.matter;
+            let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
+            list.push(format!(
+                "the tube is stretched {:.2} times (warned of above {STRETCH_WARN}): past {limit:.2} its sections tilt and the answer is no longer that of a tube; use a stiffer or lighter one",
+                self.now.stretch
+            ));
+        }
+        list
+    }
+
+    /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
+    #[must_use]
+    pub fn radius_at_m(&self, arc_m: f64) -> f64 {
+        let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
+        let Some(wave) = self.spec.peristalsis else { return radius };
+        let phase = (arc_m - wave.speed_m_s * self.time.as_secs_f64()) / wave.wavelength_m;
+        let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
+        radius * (1.0 - wave.amplitude * lift)
+    }
+
+    /// Lists this step's pulls; none is forgotten and none is made up.
+    fn take_pulls(&mut self, around: &Surroundings<'_>) {
+        self.ties.clear();
+        self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
+    }
+
+    fn write_grips(&mut self, dt: f64) {
+        self.grips.clear();
+        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
+    }
+
+    fn diverged(&self, lost: Lost, dt_s: f64) -> StepError {
+        let what = match lost.slot {
+            Some(slot) if slot % 2 == 0 => format!("the system's pivot at node {}", slot / 2),
+            Some(slot) => format!("the system's pivot at segment {}", slot / 2),
+            None => "positions or velocities".to_owned(),
+        };
+        StepError::Diverged { model: self.model(), dt_s, what }
+    }
+
+    /// Whether the tube is at rest after a step of `dt` seconds; it then stands still exactly.
+    fn watch_rest(&mut self, dt: f64) -> bool {
+        let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
+        if !self.spec.sleep || wave || !self.ties.is_empty() {
+            self.rest.wake();
+            return false;
+        }
+        let at_rest = self.rest.observe(&self.now, dt);
+        if at_rest {
+            self.now.u.fill(DVec3::ZERO); // what is drawn of a sleeping tube must not drift
+        }
+        at_rest
+    }
+}
+
+/// What tests look into.
+#[cfg(test)]
+impl Tube {
+    pub(super) fn matter(&self) -> &Matter {
+        &self.matter
+    }
+
+    pub(super) fn division(&self) -> &Division {
+        &self.division
+    }
+
+    pub(super) fn state(&self) -> &Config {
+        &self.now
+    }
+
+    /// Replaces the state, as violent starts do; its strains are brought up to date.
+    pub(super) fn set_state(&mut self, mut state: Config) {
+        state.strain(&self.matter, &self.division);
+        self.now = state;
+    }
+}
+
+impl Agent for Tube {
+    fn model(&self) -> &'static str {
+        "tube"
+    }
+
+    /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
+    ///
+    /// pulls    the springs of hands and tools on this tube
+    /// step     substeps of the linearly implicit Euler rule ([`Stepper::step`])
+    /// grips    the mean force of each pull
+    /// rest     whether it could sleep
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        self.take_pulls(around);
+        let setting = Setting {
+            matter: &self.matter,
+            division: &self.division,
+            springs: &self.springs,
+            dt: dt_s,
+            substeps: self.spec.substeps,
+        };
+        let taken = self.stepper.step(&mut self.now, &setting, &mut self.ties);
+        let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
+        self.write_grips(dt_s);
+        self.time = around.time + dt;
+        self.steps += 1;
+        let at_rest = self.watch_rest(dt_s);
+        Ok(StepReport { work: self.segments() as f64 * f64::from(substeps), substeps, at_rest })
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        Some(self.resolution)
+    }
+
+    fn retune(&mut self, wanted: Resolution) {
+        let wanted = self.spec.range.clamp(wanted);
+        let (fine, coarse) = self.spec.range.eps_m;
+        self.resolution.n = wanted.n;
+        if fine == coarse {
+            return; // a fixed spacing: the division is the scene's
+        }
+        let count = division::segments_for(&self.skeleton, wanted.eps_m);
+        self.resolution = held(wanted, &self.skeleton, count);
+        if count == self.segments() {
+            return;
+        }
+        let old = self.division.clone();
+        let arcs = self.remesher.arcs(&self.now, &old, count);
+        self.division.rebuild(&self.skeleton, arcs);
+        let mut next = Config::default();
+        self.remesher.carry(&self.matter, (&self.now, &old), (&mut next, &self.division));
+        next.strain(&self.matter, &self.division);
+        self.now = next;
+        springs(&self.spec.attachments, &self.division, &mut self.springs);
+        self.rest.wake();
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+        into.resolution = Some(self.resolution);
+        into.energy_j = self.energy_j();
+        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division);
+        into.touches.clear();
+        into.grips.clone_from(&self.grips);
+        let curve = into.body.curve_mut();
+        curve.arc_m.clone_from(&self.division.arc_m);
+        curve.positions.clone_from(&self.now.x);
+        curve.velocities.clear();
+        curve.velocities.extend(self.now.u.iter().step_by(2));
+        curve.frames.clone_from(&self.now.q);
+        curve.radii_m.clear();
+        curve.radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_at_m(s)));
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        self.now.momentum(&self.matter, &self.division)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.matter.mu * self.length_m()
+    }
+}
+
+fn matter_of(spec: &TubeSpec) -> Matter {
+    let s = &spec.section;
+    Matter {
+        ea: s.ea_n,
+        ga: s.ga_n,
+        ei: s.ei_n_m2,
+        gj: s.gj_n_m2,
+        mu: spec.mass_per_length_kg_m,
+        rotary: s.rotary_kg_m,
+        damping: spec.damping_per_s,
+        gravity: spec.gravity,
+        clamp: spec.clamp,
+        held: [0, 1].map(|end| spec.clamp[end] || spec.pin[end]),
+    }
+}
+
+/// The resolution that `count` segments are: the wish where it gave that count, else the mean spacing.
+fn held(wanted: Resolution, skeleton: &Skeleton, count: usize) -> Resolution {
+    let kept = division::segments_for(skeleton, wanted.eps_m) == count;
+    let exact = libm::ceil(skeleton.length_m() / wanted.eps_m - 1e-9) == count as f64;
+    if kept && exact { wanted } else { Resolution { eps_m: skeleton.length_m() / count as f64, n: wanted.n } }
+}
