@@ -163,8 +163,9 @@ pub struct Offscreen {
     texture: Option<wgpu::Texture>,
 }
 
-/// Format of the textures that are read back.
-const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8UnormSrgb;
+/// Format of the textures that are read back: the shaders write the sRGB curve themselves, which costs a processor less than
+/// a format that does.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Offscreen {
     /// A target of `size` on `gpu`; one without pixels draws nothing.

@@ -20,26 +20,34 @@ pub struct Globals {
     floor_point: [f32; 4],
     floor_normal: [f32; 4],
     floor_colour: [f32; 4],
+    lamp_x: [f32; 4],
+    lamp_y: [f32; 4],
     materials: [[f32; 4]; 8],
 }
 
 /// Towards the key light: over the left shoulder of who stands at −y.
 const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
 
+/// Direction of the lamp's long side, roughly.
+const LAMP_SIDE: DVec3 = DVec3::new(0.79, 0.61, 0.0);
+
+/// Comparisons at the rim of a soft shadow; the pattern in the shader has four.
+const SHADOW_TAPS: f64 = 4.0;
+
 /// How far the shadow's depths reach towards the light and away from it, in radii of the focus: shafts stand high.
 const REACH: (f64, f64) = (2.5, 1.5);
 
-/// Two rows a material, in the order of `Material`: wrap, reflectance, sharpness, sharp gain; broad sharpness, broad
-/// gain, mirror, metal.
+/// Two rows a material, in the order of `Material`: wrap, reflectance, width and gain of the sharp lobe; width and gain of the
+/// broad lobe, mirror, metal. Widths are squares of the roughness.
 const MATERIALS: [[f32; 4]; 8] = [
-    [0.38, 0.040, 420.0, 34.0],
-    [26.0, 2.6, 1.0, 0.0],
-    [0.00, 0.600, 160.0, 3.0],
-    [18.0, 0.7, 1.15, 1.0],
-    [0.10, 0.042, 140.0, 14.0],
-    [22.0, 2.0, 0.65, 0.0],
-    [0.34, 0.030, 60.0, 3.0],
-    [12.0, 1.6, 0.20, 0.0],
+    [0.38, 0.040, 0.0030, 30.0],
+    [0.0600, 2.8, 1.0, 0.0],
+    [0.00, 0.600, 0.0120, 2.5],
+    [0.1200, 0.6, 1.15, 1.0],
+    [0.10, 0.042, 0.0120, 12.0],
+    [0.0900, 2.2, 0.65, 0.0],
+    [0.34, 0.030, 0.0300, 2.5],
+    [0.1800, 1.6, 0.20, 0.0],
 ];
 
 impl Globals {
@@ -52,7 +60,7 @@ impl Globals {
         let projection = light_projection(light, picture.focus_m, picture.origin, (radius, texel_m));
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let stripes = f64::from(picture.style.colouring == Colouring::Resolution);
-        let edges = f64::from(picture.style.wireframe);
+        let lamp_x = (LAMP_SIDE - light * LAMP_SIDE.dot(light)).normalize();
         let floor = picture.floor.as_ref();
         let colour = floor.map_or([0; 3], |f| f.colour).map(|c| (f64::from(c) / 255.0).powf(2.2));
         Self {
@@ -61,10 +69,14 @@ impl Globals {
             eye: four(camera.eye() - picture.origin, texel_m),
             light: four(light, 1.0 / f64::from(shadow_px)),
             focus: four(focus, radius),
-            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, edges).as_vec4().to_array(),
+            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, SHADOW_TAPS)
+                .as_vec4()
+                .to_array(),
             floor_point: four(floor.map_or(DVec3::ZERO, |f| f.point), 0.0),
             floor_normal: four(floor.map_or(DVec3::Z, |f| f.normal), 0.0),
             floor_colour: four(DVec3::from(colour), (REACH.0 + REACH.1) * radius),
+            lamp_x: four(lamp_x, 0.0),
+            lamp_y: four(light.cross(lamp_x), 0.0),
             materials: MATERIALS,
         }
     }

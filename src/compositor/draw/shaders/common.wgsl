@@ -7,10 +7,12 @@ struct Globals {
     eye: vec4f,                // w: shadow texel in metres
     light: vec4f,              // xyz: towards the light; w: one shadow texel in texture coordinates
     focus: vec4f,              // xyz: centre of what is lit, w: its radius
-    viewport: vec4f,           // width, height, whether stripes show intervals, whether edges are drawn
+    viewport: vec4f,           // width, height, whether stripes show intervals, comparisons of a soft shadow
     floor_point: vec4f,
     floor_normal: vec4f,
     floor_colour: vec4f,       // w: metres that the shadow's depth range spans
+    lamp_x: vec4f,             // the lamp's sides
+    lamp_y: vec4f,
     materials: array<vec4f, 8>,
 }
 
@@ -48,16 +50,23 @@ fn room(pixel: vec2f) -> vec3f {
     return mix(vec3f(0.040, 0.052, 0.066), vec3f(0.010, 0.012, 0.016), saturate(y * 0.9 + x * x * 0.6));
 }
 
-// Share of the key light that reaches a point: four filtered comparisons.
+// Share of the key light that reaches a point: filtered comparisons around it. Two that lie opposite and agree settle
+// it, so that only the rims of shadows pay for all; the count is no constant so that the loop stays a loop.
 fn lit(p: vec3f, n: vec3f) -> f32 {
     let at = g.light_projection * vec4f(p + n * (2.0 * g.eye.w), 1.0);
-    let t = 1.1 * g.light.w;
     let z = min(at.z, 1.0);
-    let a = textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + vec2f(-t, -0.4 * t), z);
-    let b = textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + vec2f(0.4 * t, -t), z);
-    let c = textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + vec2f(t, 0.4 * t), z);
-    let d = textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + vec2f(-0.4 * t, t), z);
-    return 0.25 * (a + b + c + d);
+    var o = vec2f(1.2, 0.5) * g.light.w;
+    var sum = 0.0;
+    var count = 0.0;
+    for (var i = 0; i < i32(g.viewport.w); i++) {
+        sum += textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + o, z);
+        count += 1.0;
+        if i == 1 && (sum < 0.001 || sum > 1.999) {
+            break;
+        }
+        o = select(-o, vec2f(-o.y, o.x), i == 1);
+    }
+    return sum / count;
 }
 
 // How open a point is to the sky, from how far its surroundings rise above it towards the light.
@@ -65,15 +74,17 @@ fn openness(p: vec3f, n: vec3f) -> f32 {
     let reach = 0.075 * g.focus.w;
     let at = g.light_projection * vec4f(p + n * (0.35 * reach), 1.0);
     let size = 1.0 / g.light.w;
-    let r = reach / g.eye.w; // in texels
+    let o = vec2f(0.9, 0.35) * (reach / g.eye.w);
     let c = at.xy * size;
-    var shut = 0.0;
-    let o = array<vec2f, 4>(vec2f(0.9, 0.35), vec2f(-0.35, 0.9), vec2f(-0.9, -0.35), vec2f(0.35, -0.9));
-    for (var i = 0; i < 4; i++) {
-        let d = textureLoad(shadow_depths, vec2i(clamp(c + o[i] * r, vec2f(0.0), vec2f(size - 1.0))), 0).r;
-        shut += saturate((at.z - d) * g.floor_colour.w / reach * 0.6);
-    }
-    return 1.0 - 0.17 * shut;
+    let low = rise(c + o, at.z) + rise(c - o, at.z);
+    let high = rise(c + vec2f(-o.y, o.x), at.z) + rise(c + vec2f(o.y, -o.x), at.z);
+    return 1.0 - 0.17 * (low + high);
+}
+
+// How far what lies at a texel stands above a depth, in shares of the reach of `openness`.
+fn rise(texel: vec2f, depth: f32) -> f32 {
+    let d = textureLoad(shadow_depths, vec2i(clamp(texel, vec2f(0.0), vec2f(1.0 / g.light.w - 1.0))), 0).r;
+    return saturate((depth - d) * g.floor_colour.w / g.focus.w * 8.0);
 }
 
 // The light pool: full near the focus, fading outward.
@@ -87,10 +98,11 @@ fn pool(p: vec3f) -> f32 {
 // What a mirror would see: a room, and a soft rectangular lamp overhead.
 fn reflected(r: vec3f) -> vec3f {
     let toward = max(dot(r, g.light.xyz), 1e-3);
-    let x = abs(dot(r, vec3f(0.79, 0.61, 0.0))) / toward;
-    let y = abs(dot(r, cross(g.light.xyz, vec3f(0.79, 0.61, 0.0)))) / toward;
-    let lamp = (1.0 - smoothstep(0.20, 0.34, x)) * (1.0 - smoothstep(0.11, 0.22, y)) * step(0.0, r.z);
-    return mix(GROUND * 0.6, SKY * 1.1, smoothstep(-0.5, 0.8, r.z)) + BOX * lamp;
+    let off = abs(vec2f(dot(r, g.lamp_x.xyz), dot(r, g.lamp_y.xyz))) / toward;
+    let inside = saturate((vec2f(0.34, 0.22) - off) * vec2f(7.0, 9.0));
+    let soft = inside * inside * (3.0 - 2.0 * inside);
+    let sky = saturate(r.z * 0.75 + 0.4);
+    return mix(GROUND * 0.6, SKY * 1.1, sky) + BOX * (soft.x * soft.y * step(0.0, r.z));
 }
 
 struct Surface {
@@ -100,41 +112,42 @@ struct Surface {
     albedo: vec3f,
     material: u32,
     gloss: f32,
+    open: f32,
 }
 
 fn shade(s: Surface) -> vec3f {
-    let m = g.materials[2u * s.material];      // wrap, reflectance, sharpness, sharp gain
-    let k = g.materials[2u * s.material + 1u]; // broad sharpness, broad gain, mirror, metal
+    let m = g.materials[2u * s.material];      // wrap, reflectance, sharp width, sharp gain
+    let k = g.materials[2u * s.material + 1u]; // broad width, broad gain, mirror, metal
     let v = normalize(g.eye.xyz - s.p);
     let l = g.light.xyz;
     let nl = dot(s.n, l);
     let nv = saturate(dot(s.n, v));
-    let share = lit(s.p, s.geometric) * pool(s.p);
-    let open = openness(s.p, s.geometric);
+    let within = pool(s.p);
+    let share = lit(s.p, s.geometric) * within;
     // light that went in here comes out a little further round, redder
-    let wrapped = saturate((nl + m.x) / (1.0 + m.x));
-    let bleed = vec3f(1.0, 0.42, 0.34) * (wrapped - saturate(nl));
+    let faced = saturate(nl);
+    let bleed = vec3f(1.0, 0.42, 0.34) * (saturate((nl + m.x) / (1.0 + m.x)) - faced);
     let key = KEY * share;
-    let ambient = mix(GROUND, SKY, 0.5 + 0.5 * s.n.z) * open * (0.35 + 0.65 * pool(s.p));
-    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (saturate(nl) + bleed) * 0.62 + ambient);
-    let h = normalize(l + v);
-    let nh = saturate(dot(s.n, h));
-    let edge = pow(1.0 - nv, 5.0);
+    let ambient = mix(GROUND, SKY, 0.5 + 0.5 * s.n.z) * (s.open * (0.35 + 0.65 * within));
+    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.62 + ambient);
+    // two lobes of Trowbridge and Reitz, each 1 at its peak times its gain
+    let nh = saturate(dot(s.n, normalize(l + v)));
+    let lobes = vec2f(m.z, k.x) / (1.0 + nh * nh * (vec2f(m.z, k.x) - 1.0));
+    let glint = dot(lobes * lobes, vec2f(m.w * s.gloss, k.y)) * saturate(nl * 4.0);
+    let rim = (1.0 - nv) * (1.0 - nv);
+    let edge = rim * rim * (1.0 - nv);
     let f0 = mix(vec3f(m.y), s.albedo, k.w);
-    let fresnel = f0 + (1.0 - f0) * edge * (0.25 + 0.75 * s.gloss);
-    let sharp = m.w * pow(nh, m.z) * s.gloss;
-    let broad = k.y * pow(nh, k.x);
-    let glint = key * saturate(nl * 4.0) * f0 * (sharp + broad);
-    let mirror = reflected(reflect(-v, s.n)) * fresnel * k.z * s.gloss * open * (0.3 + 0.7 * share + 0.25 * k.w);
-    return diffuse + glint + mirror;
+    let fresnel = f0 + (1.0 - f0) * (edge * (0.25 + 0.75 * s.gloss));
+    let mirror = reflected(reflect(-v, s.n)) * fresnel;
+    return diffuse + key * f0 * glint + mirror * (k.z * s.gloss * s.open * (0.3 + 0.7 * share + 0.25 * k.w));
 }
 
-// Tone mapping (Narkowicz's fit of ACES) and, where the target does not do it, the sRGB curve.
+// Tone mapping by Hejl's and Burgess-Dawson's curve, which ends in sRGB values; taken back where the target makes them.
 fn finish(colour: vec3f) -> vec4f {
-    let x = max(colour, vec3f(0.0)) * 0.82;
-    var c = saturate((x * (2.51 * x + 0.03)) / (x * (2.43 * x + 0.59) + 0.14));
+    let x = max(colour * 0.92 - 0.004, vec3f(0.0));
+    let c = (x * (6.2 * x + 0.5)) / (x * (6.2 * x + 1.7) + 0.06);
     if ENCODE_SRGB {
-        c = select(1.055 * pow(c, vec3f(1.0 / 2.4)) - 0.055, c * 12.92, c <= vec3f(0.0031308));
+        return vec4f(c, 1.0);
     }
-    return vec4f(c, 1.0);
+    return vec4f(linear(c), 1.0);
 }

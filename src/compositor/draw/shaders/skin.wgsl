@@ -21,7 +21,7 @@ struct Skin {
     @location(0) p: vec3f,
     @location(1) n: vec3f,
     @location(2) t: vec3f,
-    @location(3) uv: vec2f,
+    @location(3) uv: vec3f, // z: openness to the sky
     @location(4) @interpolate(flat) colour: vec4f,
     @location(5) @interpolate(flat) tint: vec4f,
 }
@@ -63,7 +63,8 @@ fn vs_skin(in: Patch) -> Skin {
     out.p = b.p;
     out.n = b.n;
     out.t = b.t;
-    out.uv = vec2f(mix(in.arc_a.x, in.arc_b.x, u) * in.arc_a.y, 2.0 * (in.at.y - twist * 0.15915494));
+    let along = mix(in.arc_a.x, in.arc_b.x, u) * in.arc_a.y;
+    out.uv = vec3f(along, 2.0 * (in.at.y - twist * 0.15915494), openness(b.p, b.n));
     out.colour = vec4f(linear(in.colour.rgb), round(in.colour.a * 255.0));
     let stripe = select(1.0, 0.62, g.viewport.z > 0.5 && (in.interval & 1u) == 1u);
     out.tint = vec4f(linear(in.tint.rgb) * stripe, in.tint.a);
@@ -79,7 +80,7 @@ fn vs_skin_shadow(in: Patch) -> @builtin(position) vec4f {
 // Wet tissue: mottled, veined, with a film of water over small folds.
 @fragment
 fn fs_tissue(in: Skin) -> @location(0) vec4f {
-    let tissue = textureSample(tissue_map, tissue_sampler, in.uv);
+    let tissue = textureSample(tissue_map, tissue_sampler, in.uv.xy);
     let plain = 1.0 - in.tint.a;
     let base = in.colour.rgb;
     var albedo = base * (0.70 + 0.60 * tissue.r);
@@ -89,7 +90,7 @@ fn fs_tissue(in: Skin) -> @location(0) vec4f {
     let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
     let n = normalize(n0 - in.t * fold.x - cross(in.t, n0) * fold.y);
     albedo = mix(albedo, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, u32(in.colour.a), 0.55 + 0.45 * plain)));
+    return finish(shade(Surface(in.p, n, n0, albedo, u32(in.colour.a), 0.55 + 0.45 * plain, in.uv.z)));
 }
 
 // A tube of anything else: cable, wire.
@@ -97,7 +98,7 @@ fn fs_tissue(in: Skin) -> @location(0) vec4f {
 fn fs_skin(in: Skin) -> @location(0) vec4f {
     let n = normalize(in.n);
     let albedo = mix(in.colour.rgb, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n, albedo, u32(in.colour.a), 1.0)));
+    return finish(shade(Surface(in.p, n, n, albedo, u32(in.colour.a), 1.0, in.uv.z)));
 }
 
 @fragment

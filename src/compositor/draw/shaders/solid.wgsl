@@ -47,13 +47,13 @@ fn vs_solid_shadow(in: Corner) -> @builtin(position) vec4f {
 fn fs_solid(in: Solid) -> @location(0) vec4f {
     let n0 = normalize(in.n);
     let material = u32(in.colour.a);
-    // brushed around the axis: fine grooves scatter light along it
+    // brushed around the axis: fine grooves scatter light along it, as long as they are wider than pixels
     let metal = g.materials[2u * material + 1u].w;
-    let groove = sin(in.own.z * 9000.0) * 0.5 + sin(in.own.z * 3710.0 + in.own.x * 900.0) * 0.5;
-    let fade = saturate(1.0 - 2600.0 * length(fwidth(in.own)));
-    let n = normalize(n0 + vec3f(0.03, -0.02, 0.05) * (groove * metal * fade));
+    let groove = abs(fract(in.own.z * 1400.0) - 0.5) + abs(fract(in.own.z * 590.0 + in.own.x * 140.0) - 0.5) - 0.5;
+    let fade = saturate(1.0 - 2600.0 * abs(dpdx(in.own.z)) - 2600.0 * abs(dpdy(in.own.z)));
+    let n = normalize(n0 + vec3f(0.06, -0.04, 0.10) * (groove * metal * fade));
     let albedo = mix(in.colour.rgb, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, material, 1.0)));
+    return finish(shade(Surface(in.p, n, n0, albedo, material, 1.0, 1.0)));
 }
 
 @fragment
