@@ -10,6 +10,8 @@ use metachron::compositor::{Colouring, Gpu, GpuError, Offscreen, RendererOptions
 use std::path::Path;
 use std::time::Instant;
 
+const HD: Size = Size { width: 1280, height: 720 };
+
 fn main() -> Result<(), Box<dyn std::error::Error>> {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let gpu = Gpu::headless()?;
@@ -24,7 +26,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
     let number = |i: usize, default: f64| numbers.get(i).map_or(Ok(default), |text| text.parse());
     let (eps_m, n) = (number(0, 0.006)?, number(1, 5.0)? as u8);
     let size = Size { width: number(2, 1280.0)? as u32, height: number(3, 720.0)? as u32 };
-    let options = RendererOptions { samples: number(4, 4.0)? as u32, shadow_px: 2048 };
+    let options = RendererOptions { samples: number(4, 4.0)? as u32, shadow_px: 2048, shadow_taps: 4 };
     let style = match numbers.get(5).map(String::as_str) {
         Some("resolution") => Style { colouring: Colouring::Resolution, wireframe: true },
         Some("age") => Style { colouring: Colouring::Age, wireframe: false },
@@ -69,27 +71,29 @@ fn cost(gpu: &Gpu, size: Size, eps_m: f64, n: u8) -> Result<Cost, GpuError> {
 }
 
 fn measure(gpu: &Gpu) -> Result<(), GpuError> {
-    let hd = Size { width: 1280, height: 720 };
     println!("{:>8} {:>3} {:>10} {:>9} {:>9}", "eps_m", "n", "triangles", "wall_ms", "cpu_ms");
     let mut points = Vec::new();
     for (eps_m, n) in [(0.1, 0), (0.04, 1), (0.02, 2), (0.02, 3), (0.01, 3), (0.01, 4), (0.005, 4), (0.005, 5)] {
-        let Cost { wall_ms, cpu_ms, triangles } = cost(gpu, hd, eps_m, n)?;
+        let Cost { wall_ms, cpu_ms, triangles } = cost(gpu, HD, eps_m, n)?;
         println!("{eps_m:>8} {n:>3} {triangles:>10} {wall_ms:>9.2} {cpu_ms:>9.2}");
-        points.push((triangles as f64, wall_ms, cpu_ms));
+        points.push(Cost { wall_ms, cpu_ms, triangles });
     }
     let small = Size { width: 64, height: 36 };
     let (few, many) = (cost(gpu, small, 0.1, 0)?, cost(gpu, small, 0.005, 4)?);
-    let kinds: [(&str, fn(&Cost) -> f64, usize); 2] = [("wall", |c| c.wall_ms, 1), ("cpu", |c| c.cpu_ms, 2)];
-    for (name, read, column) in kinds {
-        let of = |p: &(f64, f64, f64)| (p.0, if column == 1 { p.1 } else { p.2 });
-        let (base, slope) = line(&points.iter().map(of).collect::<Vec<_>>());
-        let triangle_ms = (read(&many) - read(&few)) / (many.triangles - few.triangles) as f64;
-        let setup = read(&few) - triangle_ms * few.triangles as f64;
-        let pixel_ns = (base - setup) * 1e6 / hd.pixels();
-        println!("{name}: at 1280 x 720 {base:.2} ms + {:.3} us a triangle;", slope * 1e3);
-        println!("  at 64 x 36 {setup:.2} ms + {:.3} us a triangle; a pixel {pixel_ns:.2} ns", triangle_ms * 1e3);
-    }
+    report("wall", &points, (few, many), |cost| cost.wall_ms);
+    report("cpu", &points, (few, many), |cost| cost.cpu_ms);
     Ok(())
+}
+
+/// Prints what a frame, a triangle and a pixel cost of one kind of time.
+fn report(name: &str, points: &[Cost], (few, many): (Cost, Cost), ms: fn(&Cost) -> f64) {
+    let pairs: Vec<_> = points.iter().map(|cost| (cost.triangles as f64, ms(cost))).collect();
+    let (base, slope) = line(&pairs);
+    let triangle_ms = (ms(&many) - ms(&few)) / (many.triangles - few.triangles) as f64;
+    let setup = ms(&few) - triangle_ms * few.triangles as f64;
+    let pixel_ns = (base - setup) * 1e6 / HD.pixels();
+    println!("{name}: at 1280 x 720 {base:.2} ms + {:.3} us a triangle;", slope * 1e3);
+    println!("  at 64 x 36 {setup:.2} ms + {:.3} us a triangle; a pixel {pixel_ns:.2} ns", triangle_ms * 1e3);
 }
 
 /// Least squares: offset and slope.

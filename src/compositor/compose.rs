@@ -19,7 +19,7 @@ const PROP_LEVEL: u8 = 4;
 /// Repeats of the skin's texture around a tube; the shader has the same number.
 const TEXTURE_AROUND: f64 = 2.0;
 /// Share of the distance to the target that the user's spring is thick.
-const SPRING_SHARE: f64 = 0.006;
+const SPRING_SHARE: f64 = 0.011;
 /// Turns of that spring, and intervals a turn.
 const SPRING_TURNS: (usize, usize) = (9, 8);
 /// Force that colours a grasp fully red, newtons.
@@ -275,7 +275,7 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
             slope: axis + out * (radius_m * rate) + side * (radius_m * swell * turn),
             normal: out,
             twist_rad: 0.0,
-            radius_m: 0.16 * radius_m,
+            radius_m: 0.2 * radius_m,
             radius_slope: 0.0,
         };
         picture.samples.push(sample(&frame, picture.origin, 0.0, paint));

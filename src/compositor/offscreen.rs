@@ -160,7 +160,7 @@ pub struct Offscreen {
     gpu: Gpu,
     renderer: Renderer,
     size: Size,
-    texture: Option<wgpu::Texture>,
+    texture: Option<(wgpu::Texture, wgpu::TextureView)>,
 }
 
 /// Format of the textures that are read back: the shaders write the sRGB curve themselves, which costs a processor less than
@@ -179,7 +179,7 @@ impl Offscreen {
             return Err(DrawError::TooLarge { width: size.width, height: size.height, max }.into());
         }
         let texture = (!size.is_empty()).then(|| {
-            gpu.device.create_texture(&wgpu::TextureDescriptor {
+            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
                 label: Some("offscreen"),
                 size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
                 mip_level_count: 1,
@@ -188,7 +188,9 @@ impl Offscreen {
                 format: FORMAT,
                 usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
                 view_formats: &[],
-            })
+            });
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            (texture, view)
         });
         Ok(Self { gpu, renderer, size, texture })
     }
@@ -216,9 +218,8 @@ impl Offscreen {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn render(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
-        let Some(texture) = &self.texture else { return Ok(DrawTimes::default()) };
-        let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
-        let times = self.renderer.render(picture, camera, Target { view: &view, size: self.size })?;
+        let Some((_, view)) = &self.texture else { return Ok(DrawTimes::default()) };
+        let times = self.renderer.render(picture, camera, Target { view, size: self.size })?;
         wait(&self.gpu.device, self.renderer.lost())?;
         Ok(DrawTimes { gpu: self.renderer.gpu_time(), ..times })
     }
@@ -230,7 +231,7 @@ impl Offscreen {
     pub fn read_back(&self) -> Result<PictureFile, GpuError> {
         match &self.texture {
             None => Ok(RgbaImage::new(0, 0)),
-            Some(texture) => read_back(&self.gpu, texture, self.renderer.lost()),
+            Some((texture, _)) => read_back(&self.gpu, texture, self.renderer.lost()),
         }
     }
 

@@ -22,7 +22,7 @@ pub fn still_life() -> (Stage, Camera) {
         look: look([205, 208, 214], Material::Metal),
     };
     let actors = vec![
-        Actor { id: AgentId(TUBE), form: Form::Tube, look: look([214, 128, 118], Material::Tissue) },
+        Actor { id: AgentId(TUBE), form: Form::Tube, look: look([216, 122, 110], Material::Tissue) },
         solid(1, Solid::Ball { radius_m: 0.028 }, look([226, 214, 190], Material::Plastic)),
         solid(2, Solid::Box { half_extents_m: DVec3::new(0.03, 0.022, 0.02) }, look([78, 122, 140], Material::Plastic)),
         solid(3, Solid::Capsule { radius_m: 0.014, half_height_m: 0.03 }, look([200, 202, 208], Material::Metal)),
@@ -58,7 +58,7 @@ pub fn still_life() -> (Stage, Camera) {
 
 /// The tray the tube lies in: a bottom and four walls, and the floor below.
 fn tray() -> Vec<Prop> {
-    let steel = Look { colour: [70, 92, 98], material: Material::Skin };
+    let steel = Look { colour: [74, 88, 94], material: Material::Skin };
     let (x, y, wall, high) = (0.36, 0.22, 0.008, 0.03);
     let side = |position, half_extents_m| Prop {
         obstacle: Obstacle {
@@ -73,7 +73,7 @@ fn tray() -> Vec<Prop> {
     };
     let floor = Prop {
         obstacle: Obstacle { solid: Solid::Plane, ..side(DVec3::new(0.0, 0.0, -0.016), DVec3::ONE).obstacle },
-        look: Look { colour: [34, 74, 80], material: Material::Skin },
+        look: Look { colour: [30, 58, 66], material: Material::Skin },
     };
     vec![
         floor,

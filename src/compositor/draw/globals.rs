@@ -31,19 +31,16 @@ const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
 /// Direction of the lamp's long side, roughly.
 const LAMP_SIDE: DVec3 = DVec3::new(0.79, 0.61, 0.0);
 
-/// Comparisons at the rim of a soft shadow; the pattern in the shader has four.
-const SHADOW_TAPS: f64 = 4.0;
-
 /// How far the shadow's depths reach towards the light and away from it, in radii of the focus: shafts stand high.
 const REACH: (f64, f64) = (2.5, 1.5);
 
 /// Two rows a material, in the order of `Material`: wrap, reflectance, width and gain of the sharp lobe; width and gain of the
 /// broad lobe, mirror, metal. Widths are squares of the roughness.
 const MATERIALS: [[f32; 4]; 8] = [
-    [0.38, 0.040, 0.0030, 30.0],
-    [0.0600, 2.8, 1.0, 0.0],
-    [0.00, 0.600, 0.0120, 2.5],
-    [0.1200, 0.6, 1.15, 1.0],
+    [0.38, 0.055, 0.0025, 34.0],
+    [0.0500, 3.0, 1.25, 0.0],
+    [0.00, 0.600, 0.0100, 2.2],
+    [0.1000, 0.6, 1.50, 1.0],
     [0.10, 0.042, 0.0120, 12.0],
     [0.0900, 2.2, 0.65, 0.0],
     [0.34, 0.030, 0.0300, 2.5],
@@ -69,9 +66,7 @@ impl Globals {
             eye: four(camera.eye() - picture.origin, texel_m),
             light: four(light, 1.0 / f64::from(shadow_px)),
             focus: four(focus, radius),
-            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, SHADOW_TAPS)
-                .as_vec4()
-                .to_array(),
+            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, 0.0).as_vec4().to_array(),
             floor_point: four(floor.map_or(DVec3::ZERO, |f| f.point), 0.0),
             floor_normal: four(floor.map_or(DVec3::Z, |f| f.normal), 0.0),
             floor_colour: four(DVec3::from(colour), (REACH.0 + REACH.1) * radius),

@@ -2,6 +2,7 @@
 //!
 //! In: a device and a format. Out: everything that does not change from frame to frame. Never here: a frame.
 
+use super::RendererOptions;
 use super::globals::Globals;
 use super::tissue;
 use wgpu::util::DeviceExt;
@@ -199,19 +200,20 @@ struct Kitchen<'a> {
     layouts: [wgpu::PipelineLayout; 2],
     format: TextureFormat,
     samples: u32,
+    shadow_taps: u32,
 }
 
 const SAMPLE_STRIDE: u64 = 64;
 
 impl Pipelines {
-    /// All pipelines for targets of `format` with `samples` samples a pixel.
-    pub fn new(device: &Device, layouts: &Layouts, format: TextureFormat, samples: u32) -> Self {
+    /// All pipelines for targets of `format`.
+    pub fn new(device: &Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
         let module = |label, source: &str| {
             let source = wgpu::ShaderSource::Wgsl(format!("{COMMON}\n{source}").into());
             device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
         };
         let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
-        let kitchen = Kitchen::new(device, layouts, format, samples);
+        let kitchen = Kitchen::new(device, layouts, format, options);
         let begin = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
         let end = wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
         let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
@@ -252,7 +254,7 @@ impl Pipelines {
 }
 
 impl<'a> Kitchen<'a> {
-    fn new(device: &'a Device, layouts: &Layouts, format: TextureFormat, samples: u32) -> Self {
+    fn new(device: &'a Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
         let layouts = [&layouts.light, &layouts.picture].map(|group| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: None,
@@ -260,16 +262,17 @@ impl<'a> Kitchen<'a> {
                 immediate_size: 0,
             })
         });
-        Self { device, layouts, format, samples }
+        Self { device, layouts, format, samples: options.samples, shadow_taps: options.shadow_taps }
     }
 
     fn cook(&self, recipe: &Recipe<'_>) -> RenderPipeline {
         let lines = recipe.topology == wgpu::PrimitiveTopology::LineList;
         let shadow = recipe.fragment.is_none();
         let flag = |on: bool| f64::from(u8::from(on));
-        let constants = [("ENCODE_SRGB", flag(!self.format.is_srgb()))];
-        // lines lie a five-thousandth of the reversed depth nearer than what they outline
-        let nudge = [("NUDGE", if lines { 2e-4 } else { 0.0 })];
+        let taps = f64::from(self.shadow_taps);
+        let constants = [("ENCODE_SRGB", flag(!self.format.is_srgb())), ("SHADOW_TAPS", taps)];
+        // lines lie a little nearer than what they outline: a millimetre and a half at a metre
+        let nudge = [("NUDGE", if lines { 1.5e-3 } else { 0.0 })];
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         let targets =
             [Some(wgpu::ColorTargetState { format: self.format, blend: None, write_mask: wgpu::ColorWrites::ALL })];

@@ -7,7 +7,7 @@ struct Globals {
     eye: vec4f,                // w: shadow texel in metres
     light: vec4f,              // xyz: towards the light; w: one shadow texel in texture coordinates
     focus: vec4f,              // xyz: centre of what is lit, w: its radius
-    viewport: vec4f,           // width, height, whether stripes show intervals, comparisons of a soft shadow
+    viewport: vec4f,           // width, height, whether stripes show intervals, free
     floor_point: vec4f,
     floor_normal: vec4f,
     floor_colour: vec4f,       // w: metres that the shadow's depth range spans
@@ -25,13 +25,15 @@ struct Globals {
 @group(0) @binding(5) var shadow_depths: texture_2d<f32>;
 
 override ENCODE_SRGB: bool = false;
+// comparisons of a soft shadow: one where a processor draws, four elsewhere
+override SHADOW_TAPS: i32 = 1;
 // lines lie on the triangles they outline: they come a little nearer
 override NUDGE: f32 = 0.0;
 
-const KEY = vec3f(3.1, 2.95, 2.7);
-const SKY = vec3f(0.36, 0.42, 0.50);
-const GROUND = vec3f(0.17, 0.12, 0.11);
-const BOX = vec3f(3.4, 3.3, 3.15);
+const KEY = vec3f(3.7, 3.5, 3.2);
+const SKY = vec3f(0.26, 0.31, 0.39);
+const GROUND = vec3f(0.13, 0.09, 0.085);
+const BOX = vec3f(6.5, 6.3, 6.0);
 
 fn linear(c: vec3f) -> vec3f {
     return c * c * (c * 0.305306 + 0.682171) + c * 0.0125229;
@@ -50,23 +52,20 @@ fn room(pixel: vec2f) -> vec3f {
     return mix(vec3f(0.040, 0.052, 0.066), vec3f(0.010, 0.012, 0.016), saturate(y * 0.9 + x * x * 0.6));
 }
 
-// Share of the key light that reaches a point: filtered comparisons around it. Two that lie opposite and agree settle
-// it, so that only the rims of shadows pay for all; the count is no constant so that the loop stays a loop.
+// Share of the key light that reaches a point: filtered comparisons around it.
 fn lit(p: vec3f, n: vec3f) -> f32 {
     let at = g.light_projection * vec4f(p + n * (2.0 * g.eye.w), 1.0);
     let z = min(at.z, 1.0);
+    if SHADOW_TAPS == 1 {
+        return textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy, z);
+    }
     var o = vec2f(1.2, 0.5) * g.light.w;
     var sum = 0.0;
-    var count = 0.0;
-    for (var i = 0; i < i32(g.viewport.w); i++) {
+    for (var i = 0; i < SHADOW_TAPS; i++) {
         sum += textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + o, z);
-        count += 1.0;
-        if i == 1 && (sum < 0.001 || sum > 1.999) {
-            break;
-        }
-        o = select(-o, vec2f(-o.y, o.x), i == 1);
+        o = vec2f(-o.y, o.x);
     }
-    return sum / count;
+    return sum / f32(SHADOW_TAPS);
 }
 
 // How open a point is to the sky, from how far its surroundings rise above it towards the light.
@@ -91,7 +90,7 @@ fn rise(texel: vec2f, depth: f32) -> f32 {
 fn pool(p: vec3f) -> f32 {
     let arm = p - g.focus.xyz;
     let off = arm - g.light.xyz * dot(arm, g.light.xyz);
-    let d = dot(off, off) / (2.6 * g.focus.w * g.focus.w);
+    let d = dot(off, off) / (1.5 * g.focus.w * g.focus.w);
     return 1.0 / (1.0 + d * d);
 }
 
@@ -101,8 +100,9 @@ fn reflected(r: vec3f) -> vec3f {
     let off = abs(vec2f(dot(r, g.lamp_x.xyz), dot(r, g.lamp_y.xyz))) / toward;
     let inside = saturate((vec2f(0.34, 0.22) - off) * vec2f(7.0, 9.0));
     let soft = inside * inside * (3.0 - 2.0 * inside);
-    let sky = saturate(r.z * 0.75 + 0.4);
-    return mix(GROUND * 0.6, SKY * 1.1, sky) + BOX * (soft.x * soft.y * step(0.0, r.z));
+    // dark below, a bright band above the horizon, dimmer overhead
+    let band = saturate(r.z * 3.0 + 0.3) * (1.3 - r.z);
+    return mix(GROUND * 0.5, SKY * 2.2, band) + BOX * (soft.x * soft.y * step(0.0, r.z));
 }
 
 struct Surface {
@@ -110,14 +110,15 @@ struct Surface {
     n: vec3f,
     geometric: vec3f,
     albedo: vec3f,
-    material: u32,
+    m: vec4f, // wrap, reflectance, sharp width, sharp gain
+    k: vec4f, // broad width, broad gain, mirror, metal
     gloss: f32,
     open: f32,
 }
 
 fn shade(s: Surface) -> vec3f {
-    let m = g.materials[2u * s.material];      // wrap, reflectance, sharp width, sharp gain
-    let k = g.materials[2u * s.material + 1u]; // broad width, broad gain, mirror, metal
+    let m = s.m;
+    let k = s.k;
     let v = normalize(g.eye.xyz - s.p);
     let l = g.light.xyz;
     let nl = dot(s.n, l);
@@ -129,7 +130,7 @@ fn shade(s: Surface) -> vec3f {
     let bleed = vec3f(1.0, 0.42, 0.34) * (saturate((nl + m.x) / (1.0 + m.x)) - faced);
     let key = KEY * share;
     let ambient = mix(GROUND, SKY, 0.5 + 0.5 * s.n.z) * (s.open * (0.35 + 0.65 * within));
-    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.62 + ambient);
+    let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.42 + ambient);
     // two lobes of Trowbridge and Reitz, each 1 at its peak times its gain
     let nh = saturate(dot(s.n, normalize(l + v)));
     let lobes = vec2f(m.z, k.x) / (1.0 + nh * nh * (vec2f(m.z, k.x) - 1.0));

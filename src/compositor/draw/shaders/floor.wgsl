@@ -23,18 +23,14 @@ fn fs_floor(in: Ground) -> @location(0) vec4f {
     let arm = in.p - g.focus.xyz;
     let far = length(arm - g.floor_normal.xyz * dot(arm, g.floor_normal.xyz)) / g.focus.w;
     let n = g.floor_normal.xyz;
-    let v = normalize(g.eye.xyz - in.p);
     let light = pool(in.p);
     let share = lit(in.p, n) * light;
     let line = abs(fract(in.p.xy * 10.0 - 0.5) - 0.5);
     let width = fwidth(in.p.xy * 10.0);
     let grid = max(1.0 - line.x / (width.x + 0.008), 1.0 - line.y / (width.y + 0.008));
     let albedo = g.floor_colour.rgb * (1.0 + 0.16 * saturate(grid) * (1.0 - smoothstep(0.5, 3.0, far)));
-    let rim = 1.0 - saturate(dot(n, v));
-    let mirror = reflected(reflect(-v, n)) * (0.02 + 0.25 * rim * rim * rim * rim);
-    let colour = albedo * (KEY * share * 0.62 * saturate(dot(n, g.light.xyz)) + SKY * (0.25 + 0.75 * light))
-        + mirror * (0.4 + 0.6 * share);
-    return finish(mix(colour, room(in.clip.xy), smoothstep(1.1, 3.6, far)));
+    let colour = albedo * (KEY * share * 0.42 * saturate(dot(n, g.light.xyz)) + SKY * (0.25 + 0.75 * light));
+    return finish(mix(colour, room(in.clip.xy), smoothstep(0.9, 2.8, far)));
 }
 
 struct Room {

@@ -22,8 +22,10 @@ struct Skin {
     @location(1) n: vec3f,
     @location(2) t: vec3f,
     @location(3) uv: vec3f, // z: openness to the sky
-    @location(4) @interpolate(flat) colour: vec4f,
+    @location(4) @interpolate(flat) colour: vec3f,
     @location(5) @interpolate(flat) tint: vec4f,
+    @location(6) @interpolate(flat) m: vec4f,
+    @location(7) @interpolate(flat) k: vec4f,
 }
 
 struct Bent {
@@ -65,7 +67,10 @@ fn vs_skin(in: Patch) -> Skin {
     out.t = b.t;
     let along = mix(in.arc_a.x, in.arc_b.x, u) * in.arc_a.y;
     out.uv = vec3f(along, 2.0 * (in.at.y - twist * 0.15915494), openness(b.p, b.n));
-    out.colour = vec4f(linear(in.colour.rgb), round(in.colour.a * 255.0));
+    let material = 2u * u32(round(in.colour.a * 255.0));
+    out.m = g.materials[material];
+    out.k = g.materials[material + 1u];
+    out.colour = linear(in.colour.rgb);
     let stripe = select(1.0, 0.62, g.viewport.z > 0.5 && (in.interval & 1u) == 1u);
     out.tint = vec4f(linear(in.tint.rgb) * stripe, in.tint.a);
     return out;
@@ -82,23 +87,23 @@ fn vs_skin_shadow(in: Patch) -> @builtin(position) vec4f {
 fn fs_tissue(in: Skin) -> @location(0) vec4f {
     let tissue = textureSample(tissue_map, tissue_sampler, in.uv.xy);
     let plain = 1.0 - in.tint.a;
-    let base = in.colour.rgb;
-    var albedo = base * (0.70 + 0.60 * tissue.r);
+    let base = in.colour;
+    var albedo = base * (0.50 + 0.85 * tissue.r);
     let vein = tissue.g * plain;
-    albedo = mix(albedo, base * vec3f(0.62, 0.16, 0.20), 0.72 * vein);
+    albedo = mix(albedo, base * vec3f(0.55, 0.10, 0.15), 0.85 * vein);
     let n0 = normalize(in.n);
     let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
     let n = normalize(n0 - in.t * fold.x - cross(in.t, n0) * fold.y);
     albedo = mix(albedo, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, u32(in.colour.a), 0.55 + 0.45 * plain, in.uv.z)));
+    return finish(shade(Surface(in.p, n, n0, albedo, in.m, in.k, 0.55 + 0.45 * plain, in.uv.z)));
 }
 
 // A tube of anything else: cable, wire.
 @fragment
 fn fs_skin(in: Skin) -> @location(0) vec4f {
     let n = normalize(in.n);
-    let albedo = mix(in.colour.rgb, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n, albedo, u32(in.colour.a), 1.0, in.uv.z)));
+    let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
+    return finish(shade(Surface(in.p, n, n, albedo, in.m, in.k, 1.0, in.uv.z)));
 }
 
 @fragment

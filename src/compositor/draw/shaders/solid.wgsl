@@ -15,8 +15,10 @@ struct Solid {
     @location(0) p: vec3f,
     @location(1) n: vec3f,
     @location(2) own: vec3f,
-    @location(3) @interpolate(flat) colour: vec4f,
+    @location(3) @interpolate(flat) colour: vec3f,
     @location(4) @interpolate(flat) tint: vec4f,
+    @location(5) @interpolate(flat) m: vec4f,
+    @location(6) @interpolate(flat) k: vec4f,
 }
 
 fn turned(q: vec4f, v: vec3f) -> vec3f {
@@ -31,7 +33,10 @@ fn vs_solid(in: Corner) -> Solid {
     out.n = turned(in.rotation, in.normal);
     out.clip = clip(out.p);
     out.own = own;
-    out.colour = vec4f(linear(in.colour.rgb), round(in.colour.a * 255.0));
+    let material = 2u * u32(round(in.colour.a * 255.0));
+    out.m = g.materials[material];
+    out.k = g.materials[material + 1u];
+    out.colour = linear(in.colour.rgb);
     out.tint = vec4f(linear(in.tint.rgb), in.tint.a);
     return out;
 }
@@ -46,14 +51,12 @@ fn vs_solid_shadow(in: Corner) -> @builtin(position) vec4f {
 @fragment
 fn fs_solid(in: Solid) -> @location(0) vec4f {
     let n0 = normalize(in.n);
-    let material = u32(in.colour.a);
     // brushed around the axis: fine grooves scatter light along it, as long as they are wider than pixels
-    let metal = g.materials[2u * material + 1u].w;
     let groove = abs(fract(in.own.z * 1400.0) - 0.5) + abs(fract(in.own.z * 590.0 + in.own.x * 140.0) - 0.5) - 0.5;
     let fade = saturate(1.0 - 2600.0 * abs(dpdx(in.own.z)) - 2600.0 * abs(dpdy(in.own.z)));
-    let n = normalize(n0 + vec3f(0.06, -0.04, 0.10) * (groove * metal * fade));
-    let albedo = mix(in.colour.rgb, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, material, 1.0, 1.0)));
+    let n = normalize(n0 + vec3f(0.06, -0.04, 0.10) * (groove * in.k.w * fade));
+    let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
+    return finish(shade(Surface(in.p, n, n0, albedo, in.m, in.k, 1.0, 1.0)));
 }
 
 @fragment
