@@ -1,0 +1,200 @@
+//! Where the keyframes lead: a smooth curve through all of them.
+//!
+//! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: hands, jaws that catch.
+//!
+//! Tip and jaw are monotone cubics (FB84): once continuously differentiable, and between two keyframes no coordinate leaves
+//! the range of both, so a tool never dips below the place it was sent to. Rotation turns by slerp along 3u² − 2u³, at rest
+//! in every keyframe. A script that repeats is one closed curve.
+
+use super::Keyframe;
+use glam::{DQuat, DVec3, DVec4};
+
+/// Where the script wants the tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Pose {
+    pub tip: DVec3,
+    pub velocity: DVec3,
+    pub rotation: DQuat,
+    pub jaw: f64,
+}
+
+/// A keyframe and the slope of the curve there.
+#[derive(Debug, Clone, Copy)]
+struct Knot {
+    at_s: f64,
+    /// Tip and jaw.
+    value: DVec4,
+    slope: DVec4,
+    rotation: DQuat,
+}
+
+/// A script ready to be read.
+#[derive(Debug, Clone)]
+pub(super) struct Script {
+    knots: Vec<Knot>,
+    repeat: bool,
+}
+
+impl Script {
+    /// A curve through `keyframes`: at least one, times rising.
+    pub(super) fn new(keyframes: &[Keyframe], repeat: bool) -> Self {
+        let mut knots: Vec<Knot> = keyframes
+            .iter()
+            .map(|key| Knot {
+                at_s: key.at_s,
+                value: key.tip_m.extend(key.jaw),
+                slope: DVec4::ZERO,
+                rotation: key.rotation.normalize(),
+            })
+            .collect();
+        if repeat && knots.len() > 1 {
+            close(&mut knots);
+        }
+        set_slopes(&mut knots, repeat);
+        let repeat = repeat && knots.len() > 1;
+        Self { knots, repeat }
+    }
+
+    /// Where the script leads at `time_s`: it waits in its first keyframe before it and in its last after it.
+    pub(super) fn at(&self, time_s: f64) -> Pose {
+        let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
+        let t = if self.repeat && time_s > first.at_s {
+            first.at_s + (time_s - first.at_s) % (last.at_s - first.at_s)
+        } else {
+            time_s
+        };
+        let right = self.knots.partition_point(|knot| knot.at_s <= t);
+        match (right.checked_sub(1), self.knots.get(right)) {
+            (None, _) => still(&first),
+            (Some(left), Some(next)) => between(&self.knots[left], next, t),
+            (Some(_), None) => still(&last),
+        }
+    }
+
+    /// Whether nothing moves any more from `time_s` on.
+    pub(super) fn is_over(&self, time_s: f64) -> bool {
+        !self.repeat && time_s >= self.knots[self.knots.len() - 1].at_s
+    }
+}
+
+/// Ends the script where it began, so that it can start again without a jump.
+fn close(knots: &mut Vec<Knot>) {
+    let (first, before, last) = (knots[0], knots[knots.len() - 2], knots[knots.len() - 1]);
+    let same = first.value == last.value && first.rotation.dot(last.rotation).abs() >= 1.0 - 1e-12;
+    if !same {
+        knots.push(Knot { at_s: last.at_s + (last.at_s - before.at_s), ..first });
+    }
+}
+
+/// The harmonic mean of both neighbouring slopes where they agree in sign, else zero (FB84); zero at open ends.
+fn set_slopes(knots: &mut [Knot], closed: bool) {
+    let last = knots.len() - 1;
+    let secant = |a: &Knot, b: &Knot| (b.at_s - a.at_s, (b.value - a.value) / (b.at_s - a.at_s));
+    for i in 1..last {
+        knots[i].slope = mean_slope(secant(&knots[i - 1], &knots[i]), secant(&knots[i], &knots[i + 1]));
+    }
+    if closed && last > 1 {
+        let around = mean_slope(secant(&knots[last - 1], &knots[last]), secant(&knots[0], &knots[1]));
+        (knots[0].slope, knots[last].slope) = (around, around);
+    }
+}
+
+fn mean_slope((h0, s0): (f64, DVec4), (h1, s1): (f64, DVec4)) -> DVec4 {
+    let (w0, w1) = (h0 + 2.0 * h1, 2.0 * h0 + h1);
+    let mean = |a: f64, b: f64| if a * b > 0.0 { (w0 + w1) / (w0 / a + w1 / b) } else { 0.0 };
+    DVec4::new(mean(s0.x, s1.x), mean(s0.y, s1.y), mean(s0.z, s1.z), mean(s0.w, s1.w))
+}
+
+fn still(knot: &Knot) -> Pose {
+    Pose { tip: knot.value.truncate(), velocity: DVec3::ZERO, rotation: knot.rotation, jaw: knot.value.w }
+}
+
+/// The cubic Hermite curve between two knots.
+fn between(a: &Knot, b: &Knot, t: f64) -> Pose {
+    let h = b.at_s - a.at_s;
+    let u = (t - a.at_s) / h;
+    let (u2, u3) = (u * u, u * u * u);
+    let rise = 3.0 * u2 - 2.0 * u3;
+    let value =
+        a.value * (1.0 - rise) + b.value * rise + a.slope * (h * (u3 - 2.0 * u2 + u)) + b.slope * (h * (u3 - u2));
+    let velocity = (b.value - a.value) * (6.0 * (u - u2) / h)
+        + a.slope * (3.0 * u2 - 4.0 * u + 1.0)
+        + b.slope * (3.0 * u2 - 2.0 * u);
+    Pose {
+        tip: value.truncate(),
+        velocity: velocity.truncate(),
+        rotation: a.rotation.slerp(b.rotation, rise).normalize(),
+        jaw: value.w.clamp(0.0, 1.0),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn keys() -> Vec<Keyframe> {
+        let key = |at_s, x, z, turn: f64, jaw| Keyframe {
+            at_s,
+            tip_m: DVec3::new(x, 0.0, z),
+            rotation: DQuat::from_rotation_y(turn),
+            jaw,
+        };
+        vec![
+            key(0.5, 0.0, 1.0, 0.0, 1.0),
+            key(1.0, 0.3, 0.2, 0.5, 0.0),
+            key(3.0, 1.0, 0.1, 2.0, 0.0),
+            key(3.5, 0.2, 0.9, 0.0, 1.0),
+        ]
+    }
+
+    #[test]
+    fn the_script_passes_through_every_keyframe() {
+        for repeat in [false, true] {
+            let script = Script::new(&keys(), repeat);
+            for key in keys() {
+                let pose = script.at(key.at_s);
+                assert!(pose.tip.distance(key.tip_m) < 1e-15, "{pose:?}"); // exact but for the last rounding
+                assert!((pose.jaw - key.jaw).abs() < 1e-15);
+                assert!(pose.rotation.angle_between(key.rotation) < 1e-7); // acos near 1 loses half the digits
+            }
+        }
+    }
+
+    #[test]
+    fn position_and_velocity_have_no_jump_anywhere_not_even_where_it_starts_again() {
+        for repeat in [false, true] {
+            let script = Script::new(&keys(), repeat);
+            let h = 1e-5;
+            // the largest acceleration of these legs is below 60 m/s²: a change of 2 h times that is no jump
+            for i in 0..900_000_u32 {
+                let t = f64::from(i) * h;
+                let (a, b) = (script.at(t), script.at(t + h));
+                assert!((b.velocity - a.velocity).length() < 120.0 * h, "repeat {repeat}: velocity jumps at {t}");
+                let moved = (b.tip - a.tip) / h - 0.5 * (a.velocity + b.velocity);
+                assert!(moved.length() < 120.0 * h, "repeat {repeat}: at {t} the velocity is not how the tip moves");
+                assert!((b.jaw - a.jaw).abs() < 10.0 * h && a.rotation.angle_between(b.rotation) < 1e-3);
+            }
+        }
+    }
+
+    #[test]
+    fn between_two_keyframes_no_coordinate_leaves_their_range() {
+        let script = Script::new(&keys(), false);
+        for pair in keys().windows(2) {
+            let (low, high) = (pair[0].tip_m.min(pair[1].tip_m), pair[0].tip_m.max(pair[1].tip_m));
+            for i in 0..=1000_u32 {
+                let t = pair[0].at_s + (pair[1].at_s - pair[0].at_s) * f64::from(i) / 1000.0;
+                let tip = script.at(t).tip;
+                assert!((tip - tip.clamp(low, high)).length() < 1e-15, "{tip} at {t}"); // rounding
+            }
+        }
+    }
+
+    #[test]
+    fn a_script_that_ends_elsewhere_goes_back_in_as_long_as_its_last_leg_took() {
+        let script = Script::new(&keys(), true);
+        assert!(script.at(4.0).tip.distance(keys()[0].tip_m) < 1e-12); // rounding of the remainder
+        assert!(script.at(0.5 + 7.0 * 3.5 + 0.5).tip.distance(keys()[1].tip_m) < 1e-12);
+        assert!(!script.is_over(1e6) && Script::new(&keys(), false).is_over(3.5));
+    }
+}

@@ -1,0 +1,178 @@
+//! The agent: one step of a tool, told as a contents page.
+//!
+//! In: a span, the hand, the tubes around. Out: a [`ToolState`]. Never here: forces; the held tube solves them.
+//!
+//! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
+//! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
+
+use super::jaws::{Jaws, nearest};
+use super::script::{Pose, Script};
+use super::spec::REACH_MAX_M;
+use super::{ToolError, ToolSpec};
+use crate::{
+    Agent, Anchor, Body, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings, ToolState,
+    check_span,
+};
+use glam::{DQuat, DVec3};
+
+/// A driven tool that lives by its own steps.
+#[derive(Debug, Clone)]
+pub struct Instrument {
+    spec: ToolSpec,
+    script: Script,
+    tool: ToolState,
+    jaws: Jaws,
+    steps: u64,
+}
+
+/// How fast the tip closes up to a hand, 1/s: nine tenths of the way in 65 ms, the tremor of a mouse is gone.
+const HAND_RATE_PER_S: f64 = 60.0;
+/// How fast it returns to its script after a hand, 1/s: nine tenths of the way in a second.
+const RETURN_RATE_PER_S: f64 = 4.0;
+/// How fast jaws open and close where no script says, 1/s.
+const JAW_RATE_PER_S: f64 = 4.0;
+/// In the hand, jaws close on a tube whose skin is nearer than this share of their reach.
+const CATCH_SHARE: f64 = 0.5;
+/// A tip nearer than this to its script has arrived, metres (and m/s).
+const ARRIVED: f64 = 1e-7;
+/// Rotations whose dot product is within this of one are the same.
+const SAME_TURN: f64 = 1e-14;
+
+impl Instrument {
+    /// Builds the tool of `spec`, in its first keyframe.
+    ///
+    /// # Errors
+    /// [`ToolError`] for a script without keyframes, times that do not rise, and any number outside its range.
+    pub fn new(spec: ToolSpec) -> Result<Self, ToolError> {
+        spec.check()?;
+        let script = Script::new(&spec.keyframes, spec.repeat);
+        let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
+        let tool = ToolState { tip, rotation, velocity, jaw, grasp: None, force_n: 0.0 };
+        Ok(Self { spec, script, tool, jaws: Jaws::new(), steps: 0 })
+    }
+
+    /// Where the hand wants the tip, and how fast it moves there.
+    fn hand_target(&self, hand: &Pull) -> (DVec3, DVec3) {
+        let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
+        (hand.target - self.tool.rotation * local, hand.target_velocity)
+    }
+
+    /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on a tube that is near.
+    fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
+        let (target, target_velocity) = self.hand_target(hand);
+        let now = (self.tool.tip - target, self.tool.velocity - target_velocity);
+        let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
+        let tip = target + target_velocity * dt + off;
+        let near = nearest(&self.spec, tip, around).is_some_and(|(_, _, gap)| gap < CATCH_SHARE * self.spec.reach_m);
+        let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
+        let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
+        ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
+    }
+
+    /// Follows the script; what separates the tool from it dies out.
+    fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
+        let now = (self.tool.tip - from.tip, self.tool.velocity - from.velocity);
+        let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
+        let jaw_off = self.tool.jaw - from.jaw;
+        let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
+        let turned_off = self.tool.rotation * from.rotation.conjugate();
+        let rotation = if turned_off.w.abs() >= 1.0 - SAME_TURN {
+            to.rotation
+        } else {
+            let left = libm::exp(-RETURN_RATE_PER_S * dt);
+            (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
+        };
+        ToolState {
+            tip: to.tip + off,
+            velocity: to.velocity + off_velocity,
+            rotation,
+            jaw: jaw.clamp(0.0, 1.0),
+            ..self.tool
+        }
+    }
+
+    /// The force that what is held says this tool exerts on it, newtons.
+    fn felt_n(&self, around: &Surroundings<'_>) -> f64 {
+        let Some(grasp) = self.tool.grasp else { return 0.0 };
+        let held = around.neighbours.iter().find(|other| other.id == grasp.target);
+        let grip = held.and_then(|other| other.snapshot.grips.iter().find(|grip| grip.by == Some(around.me)));
+        grip.map_or(0.0, |grip| grip.force_n.length())
+    }
+
+    /// Whether the tool has come to the end of its script and waits there, empty.
+    fn rests(&mut self, end: &Pose, time_s: f64) -> bool {
+        let there = (self.tool.tip - end.tip).length() < ARRIVED && self.tool.velocity.length() < ARRIVED;
+        let rests = there && self.script.is_over(time_s) && !self.jaws.holds() && self.tool.jaw == end.jaw;
+        if rests {
+            (self.tool.tip, self.tool.velocity) = (end.tip, DVec3::ZERO);
+        }
+        rests
+    }
+}
+
+/// A deviation and its rate after `t` seconds of critical damping: exact, whatever the step.
+fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
+    let left = libm::exp(-damping_s * t);
+    let push = rate + off * damping_s;
+    ((off + push * t) * left, (rate - push * (damping_s * t)) * left)
+}
+
+impl Agent for Instrument {
+    fn model(&self) -> &'static str {
+        "instrument"
+    }
+
+    /// Leads the tip by `dt`, moves the jaws, reads what is felt.
+    ///
+    /// Of a hand's spring only the target counts: a tool is led, so stiffness and damping mean nothing to it.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        let (start_s, end_s) = (around.time.as_secs_f64(), (around.time + dt).as_secs_f64());
+        let end = self.script.at(end_s);
+        let hand = around.hands.first();
+        let led = match hand {
+            Some(hand) => self.follow_hand(hand, dt_s, around),
+            None => self.follow_script(&self.script.at(start_s), &end, dt_s),
+        };
+        let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
+        if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
+            let what = format!("the hand leads its tip to {}", led.tip);
+            return Err(StepError::Diverged { model: "instrument", dt_s, what });
+        }
+        let was = self.tool.jaw;
+        self.tool = led;
+        self.jaws.move_to(&self.spec, (was, led.jaw), led.tip, (around, dt_s));
+        self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.tool.force_n = self.felt_n(around);
+        self.steps += 1;
+        let at_rest = hand.is_none() && self.rests(&end, end_s);
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest })
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    /// A tool has no samples to spread: nothing changes.
+    fn retune(&mut self, _wanted: Resolution) {}
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+        into.resolution = None;
+        into.body = Body::Tool(self.tool);
+        into.energy_j = 0.0;
+        into.residual_m = 0.0;
+        into.touches.clear();
+        into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
+        into.grips.clear();
+    }
+
+    /// A tool is led from outside and weighs nothing here.
+    fn momentum(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
+}
