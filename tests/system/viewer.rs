@@ -42,7 +42,7 @@ impl Fake {
             policy: "feedback".to_owned(),
             policies: vec!["full".to_owned(), "feedback".to_owned()],
             law: Some(Law::Corrected { kappa: 0.3, margin: 0.1 }),
-            law_default: Some(Law::Corrected { kappa: 0.5, margin: 0.1 }),
+            laws: vec![Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, margin: 0.1 }],
             agents: vec![tube, ball, tool],
             ..Status::default()
         };
@@ -237,10 +237,15 @@ fn sliders_move_the_target_and_the_gains() {
 }
 
 #[test]
-fn a_window_left_alone_asks_for_nothing() {
-    let mut harness = window();
-    harness.run_steps(30);
-    assert_eq!(asked(&mut harness), []);
+fn a_window_left_alone_asks_for_nothing_whatever_the_numbers() {
+    let laws = [Law::Printed { alpha: 0.333_333, beta: 99.9 }, Law::Corrected { kappa: 0.123_456_7, margin: 0.777 }];
+    for law in laws {
+        let mut show = Fake::new();
+        (show.status.law, show.status.target_hz) = (Some(law), 239.76);
+        let mut harness = window_of(show);
+        harness.run_steps(30);
+        assert_eq!(asked(&mut harness), []);
+    }
 }
 
 #[test]

@@ -30,7 +30,7 @@ pub fn help(ctx: &egui::Context) -> bool {
             keys(&mut columns[1], "Picture and panels", Group::Picture);
         });
         title(ui, "Mouse over the picture");
-        egui::Grid::new("mouse").num_columns(2).spacing(vec2(24.0, 5.0)).show(ui, |ui| {
+        egui::Grid::new("mouse").num_columns(2).min_row_height(16.0).spacing(vec2(24.0, 5.0)).show(ui, |ui| {
             for (hand, does) in MOUSE {
                 ui.label(RichText::new(hand).strong());
                 ui.label(does);
@@ -55,13 +55,16 @@ fn title(ui: &mut Ui, text: &str) {
 
 fn keys(ui: &mut Ui, name: &str, group: Group) {
     title(ui, name);
-    egui::Grid::new(name).num_columns(2).min_col_width(82.0).spacing(vec2(14.0, 5.0)).show(ui, |ui| {
-        for shortcut in SHORTCUTS.iter().filter(|row| row.group == group) {
-            ui.label(RichText::new(commands::keys_text(ui.ctx(), shortcut.command)).monospace());
-            ui.label(shortcut.does);
-            ui.end_row();
-        }
-    });
+    egui::Grid::new(name).num_columns(2).min_row_height(16.0).min_col_width(82.0).spacing(vec2(14.0, 5.0)).show(
+        ui,
+        |ui| {
+            for shortcut in SHORTCUTS.iter().filter(|row| row.group == group) {
+                ui.label(RichText::new(commands::keys_text(ui.ctx(), shortcut.command)).monospace());
+                ui.label(shortcut.does);
+                ui.end_row();
+            }
+        },
+    );
 }
 
 /// Numbers of the run, at the top left of the picture.
@@ -69,7 +72,7 @@ pub fn info(ui: &Ui, over: Rect, status: &Status, summary: &FrameSummary, adapte
     let palette = palette(ui);
     Area::new(Id::unique("info")).order(Order::Middle).fixed_pos(over.min + vec2(12.0, 12.0)).show(ui.ctx(), |ui| {
         card(&palette).show(ui, |ui| {
-            egui::Grid::new("info grid").num_columns(2).spacing(vec2(18.0, 3.0)).show(ui, |ui| {
+            egui::Grid::new("info grid").num_columns(2).min_row_height(15.0).spacing(vec2(18.0, 4.0)).show(ui, |ui| {
                 for (name, value) in info_rows(status, summary, adapter) {
                     ui.label(RichText::new(name).color(palette.weak));
                     ui.label(RichText::new(value).monospace());

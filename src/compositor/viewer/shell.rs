@@ -18,6 +18,8 @@ use std::time::{Duration, Instant};
 /// How a window starts.
 #[derive(Debug, Clone)]
 pub struct WindowOptions {
+    /// Width and height at the start, points; `None` opens the window as it was closed last time.
+    pub size: Option<[f32; 2]>,
     /// Where screenshots go: a folder that exists.
     pub screenshots: PathBuf,
     /// Destroys the device after this many pictures, once: shows that the window comes back. Never set by users.
@@ -116,7 +118,7 @@ enum Fate {
 fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
     let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
     let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
-    let native = native_options(&show.status().scene);
+    let native = native_options(&show.status().scene, options.size);
     let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
         Viewer::install(&cc.egui_ctx);
         if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
@@ -149,11 +151,11 @@ fn named_error(error: eframe::Error) -> WindowError {
     }
 }
 
-fn native_options(scene: &str) -> NativeOptions {
+fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
     let viewport = egui::ViewportBuilder::default()
         .with_title(format!("metachron – {scene}"))
         .with_app_id("metachron")
-        .with_inner_size([1440.0, 900.0])
+        .with_inner_size(size.unwrap_or([1440.0, 900.0]))
         .with_min_inner_size([640.0, 420.0])
         .with_drag_and_drop(true)
         .with_icon(super::icons::window_icon());
@@ -161,7 +163,8 @@ fn native_options(scene: &str) -> NativeOptions {
     if let egui_wgpu::WgpuSetup::CreateNew(setup) = &mut wgpu_options.wgpu_setup {
         setup.device_descriptor = std::sync::Arc::new(super::super::offscreen::device_descriptor);
     }
-    NativeOptions { viewport, wgpu_options, renderer: eframe::Renderer::Wgpu, ..NativeOptions::default() }
+    let renderer = eframe::Renderer::Wgpu;
+    NativeOptions { viewport, wgpu_options, renderer, persist_window: size.is_none(), ..NativeOptions::default() }
 }
 
 /// The application inside eframe.

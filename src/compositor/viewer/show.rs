@@ -76,18 +76,18 @@ pub enum Action {
 /// The picture's feedback law and its gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// The law as printed (GDC04, eq. 1).
+    /// The law as printed (GDC04, eq. 1), on ε̂ = 40 ε/L.
     Printed {
-        /// Gain from frame rate to ε̂, 1/Hz, > 0. Past about 1e-3 the loop swings for ever on a fast machine.
+        /// α: change of ε̂ for each frame per second that is missing, > 0.
         alpha: f64,
-        /// Gain from ε̂ to ρ, > 0.
+        /// β: change of ρ for each unit of ε̂, > 0.
         beta: f64,
     },
     /// The law on the logarithm of the measured time, whose gain no machine changes.
     Corrected {
-        /// Gain κ, 0 … 1; above 1 it overshoots.
+        /// κ, 0.01 … 0.99: the share of an error that one frame removes.
         kappa: f64,
-        /// Share of the frame's time that is left free, 0 … 0.5.
+        /// Share of the frame's time that is left free, 0 … 0.9.
         margin: f64,
     },
 }
@@ -174,8 +174,8 @@ pub struct Status {
     pub policies: Vec<String>,
     /// The feedback law and its gains; `None` where the policy has none.
     pub law: Option<Law>,
-    /// The law and gains that the scene started with.
-    pub law_default: Option<Law>,
+    /// Every law with its default gains; the scene's own where it gives them.
+    pub laws: Vec<Law>,
     /// The loop's variable as its law keeps it, for the plots.
     pub loop_value: Option<f64>,
     /// Says that the controller rests on a limit, and on which.
@@ -264,6 +264,14 @@ impl AgentRow {
             force_n: None,
             state: AgentState::Running,
         }
+    }
+}
+
+impl Law {
+    /// Whether `other` is the same law, with any gains.
+    #[must_use]
+    pub fn is_same_law(&self, other: &Self) -> bool {
+        std::mem::discriminant(self) == std::mem::discriminant(other)
     }
 }
 

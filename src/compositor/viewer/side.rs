@@ -8,7 +8,7 @@ use super::plots;
 use super::show::{Action, AgentRow, AgentState, Law, Status};
 use super::text;
 use super::theme::{Palette, palette};
-use egui::{Align, ComboBox, Layout, RichText, Slider, Ui};
+use egui::{Align, ComboBox, Layout, RichText, Slider, SliderClamping, Ui};
 
 /// Wanted frame rates that the slider offers, per second.
 const TARGET_HZ: (f64, f64) = (5.0, 144.0);
@@ -79,14 +79,14 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
         return;
     };
     let mut wanted = law;
-    choose_law(ui, &mut wanted);
+    choose_law(ui, &mut wanted, &status.laws);
     gains(ui, &mut wanted);
     ui.horizontal(|ui| {
-        let default = status.law_default.unwrap_or_else(|| default_of(&wanted));
+        let default = status.laws.iter().copied().find(|law| law.is_same_law(&wanted)).unwrap_or(wanted);
         if ui.add_enabled(wanted != default, egui::Button::new("Reset to default")).clicked() {
             wanted = default;
         }
-        if ui.button("Copy as TOML").on_hover_text("Gains and target, for the scene file").clicked() {
+        if ui.button("Copy as TOML").on_hover_text("Target rate and gains, for the scene file").clicked() {
             ui.ctx().copy_text(as_toml(status, &wanted));
         }
     });
@@ -95,26 +95,17 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
     }
 }
 
-fn choose_law(ui: &mut Ui, law: &mut Law) {
+fn choose_law(ui: &mut Ui, law: &mut Law, laws: &[Law]) {
     labelled(ui, "Law", |ui| {
-        let printed = matches!(law, Law::Printed { .. });
         ui.spacing_mut().item_spacing.x = 3.0;
-        if ui.selectable_label(printed, "As printed").clicked() && !printed {
-            *law = PRINTED;
-        }
-        if ui.selectable_label(!printed, "Corrected").clicked() && printed {
-            *law = CORRECTED;
+        for other in laws {
+            let name = if matches!(other, Law::Printed { .. }) { "As printed" } else { "Corrected" };
+            let chosen = other.is_same_law(law);
+            if ui.selectable_label(chosen, name).clicked() && !chosen {
+                *law = *other;
+            }
         }
     });
-}
-
-/// The printed law with the gains of (GDC04).
-const PRINTED: Law = Law::Printed { alpha: 1e-4, beta: 5.0 };
-/// The corrected law with gains that settle well inside a second at 20 frames per second.
-const CORRECTED: Law = Law::Corrected { kappa: 0.5, margin: 0.1 };
-
-fn default_of(law: &Law) -> Law {
-    if matches!(law, Law::Printed { .. }) { PRINTED } else { CORRECTED }
 }
 
 fn gains(ui: &mut Ui, law: &mut Law) {
@@ -126,7 +117,7 @@ fn gains(ui: &mut Ui, law: &mut Law) {
             slider(ui, "Gain β", beta, (0.1, 50.0), |s| s.logarithmic(true).max_decimals(2));
         }
         Law::Corrected { kappa, margin } => {
-            slider(ui, "Gain κ", kappa, (0.02, 0.98), |s| s.max_decimals(2));
+            slider(ui, "Gain κ", kappa, (0.01, 0.99), |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
             slider(ui, "Margin", &mut percent, (0.0, 50.0), |s| s.max_decimals(0).suffix(" %"));
             // moving through percent must not count as a change by itself
@@ -223,7 +214,9 @@ fn slider(
     shape: impl FnOnce(Slider<'_>) -> Slider<'_>,
 ) {
     labelled(ui, name, |ui| {
-        ui.add(shape(Slider::new(value, low..=high))).accessible_name(name);
+        // a value outside the slider's range stays as it is until it is moved
+        let free = Slider::new(value, low..=high).clamping(SliderClamping::Edits);
+        ui.add(shape(free)).accessible_name(name);
     });
 }
 
@@ -234,7 +227,7 @@ mod tests {
     #[test]
     fn copied_gains_are_valid_toml() {
         let status = Status { target_hz: 30.0, policy: "feedback".to_owned(), ..Status::default() };
-        for law in [PRINTED, CORRECTED] {
+        for law in [Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, margin: 0.1 }] {
             let text = as_toml(&status, &law);
             let table: toml::Table = text.parse().unwrap();
             assert_eq!(table["target"]["frame_hz"].as_float(), Some(30.0), "{text}");

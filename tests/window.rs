@@ -1,0 +1,181 @@
+//! The window on a real display: it opens, loses its device, comes back, and says so where there is no display.
+//!
+//! A window must be opened on the main thread, which the test harness keeps for itself: so this is a program of its own.
+//! It starts an Xvfb of its own; each claim runs in a process with a home of its own. Without Xvfb or an adapter the
+//! window is not tested, which METACHRON_REQUIRE_ADAPTER=1 turns into a failure.
+
+use glam::DVec3;
+use metachron::compositor::viewer::{
+    Action, Bounds, FrameTimes, Show, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions, run_window,
+};
+use metachron::compositor::{Camera, Gpu, Hit, Picture, Ray};
+use metachron_agents::AgentId;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Command, ExitCode, Stdio};
+use std::time::{Duration, Instant};
+
+/// A claim and the function that checks it in its own process.
+type Claim = (&'static str, fn());
+
+const CLAIMS: [Claim; 2] = [
+    ("a_lost_device_is_replaced_and_the_show_goes_on", a_lost_device_is_replaced_and_the_show_goes_on),
+    ("without_a_display_the_error_says_so", without_a_display_the_error_says_so),
+];
+
+/// Pictures before the device is destroyed.
+const LOST_AFTER: u64 = 6;
+/// Pictures in all.
+const PICTURES: usize = 14;
+/// A window that has not ended by itself after this long is stuck.
+const STUCK: Duration = Duration::from_secs(120);
+
+/// A show of nothing that ends after [`PICTURES`].
+struct Empty {
+    status: Status,
+    picture: Picture,
+    frames: Vec<FrameTimes>,
+    actions: Vec<Action>,
+    begin: Instant,
+}
+
+impl Empty {
+    fn new() -> Self {
+        let status = Status { scene: "nothing".to_owned(), running: true, target_hz: 60.0, ..Status::default() };
+        Self { status, picture: Picture::default(), frames: Vec::new(), actions: Vec::new(), begin: Instant::now() }
+    }
+}
+
+impl Show for Empty {
+    fn apply(&mut self, action: Action) {
+        self.actions.push(action);
+    }
+
+    fn compose(&mut self, _view: &ViewRequest) -> &Picture {
+        &self.picture
+    }
+
+    fn measured(&mut self, times: &FrameTimes) {
+        self.frames.push(*times);
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn scene_camera(&self) -> Camera {
+        Camera::looking(DVec3::ONE, DVec3::ZERO, 0.8)
+    }
+
+    fn pick(&self, _ray: Ray) -> Option<Hit> {
+        None
+    }
+
+    fn bounds(&self, _of: Option<AgentId>) -> Option<Bounds> {
+        None
+    }
+
+    fn wants_close(&self) -> bool {
+        self.frames.len() >= PICTURES || self.begin.elapsed() > STUCK
+    }
+}
+
+fn options() -> WindowOptions {
+    WindowOptions { size: Some([800.0, 500.0]), screenshots: std::env::temp_dir(), lose_device_after: Some(LOST_AFTER) }
+}
+
+fn a_lost_device_is_replaced_and_the_show_goes_on() {
+    let mut show = Empty::new();
+    let end = run_window(&mut show, &options());
+    assert_eq!(end.unwrap(), WindowEnd::Finished);
+    assert_eq!(show.frames.len(), PICTURES, "the window was stuck");
+    let warm_up = show.frames.iter().filter(|frame| frame.skip == Some(Skip::WarmUp)).count();
+    assert_eq!(warm_up, 6, "three pictures of each of two devices say nothing");
+    assert_eq!(show.actions, [], "the show must not notice");
+    assert!(show.frames.iter().all(|frame| frame.work >= frame.draw && frame.draw > Duration::ZERO));
+}
+
+fn without_a_display_the_error_says_so() {
+    let mut show = Empty::new();
+    let error = run_window(&mut show, &options()).unwrap_err();
+    assert!(matches!(error, WindowError::NoDisplay(_)), "{error}");
+    assert!(show.frames.is_empty());
+}
+
+/// A display of our own, gone when this is dropped.
+struct Display {
+    server: Child,
+    name: String,
+}
+
+impl Display {
+    /// Starts an Xvfb on a number that it finds free itself; `None` where there is no Xvfb.
+    fn start() -> Option<Self> {
+        let arguments = ["-displayfd", "1", "-screen", "0", "1024x768x24", "-nolisten", "tcp"];
+        let xvfb = Command::new("Xvfb").args(arguments).stdout(Stdio::piped()).stderr(Stdio::null()).spawn();
+        let mut server = xvfb.ok()?;
+        let mut number = String::new();
+        BufReader::new(server.stdout.take()?).read_line(&mut number).ok()?;
+        let name = format!(":{}", number.trim());
+        Some(Self { server, name })
+    }
+}
+
+impl Drop for Display {
+    fn drop(&mut self) {
+        // it may have ended by itself
+        let _ = self.server.kill();
+        let _ = self.server.wait();
+    }
+}
+
+/// Runs a claim in a process of its own; gives whether it holds.
+fn holds(name: &str, display: Option<&str>, home: &Path) -> bool {
+    let mut child = Command::new(std::env::current_exe().unwrap());
+    child.args(["--claim", name]).env("HOME", home).env("XDG_DATA_HOME", home).env("XDG_RUNTIME_DIR", home);
+    for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
+        child.env_remove(variable);
+    }
+    if let Some(display) = display {
+        child.env("DISPLAY", display);
+    }
+    let holds = child.status().unwrap().success();
+    println!("test {name} ... {}", if holds { "ok" } else { "FAILED" });
+    holds
+}
+
+/// Whether the claim was not left out by a filter on the command line, as libtest takes it.
+fn wanted(name: &str) -> bool {
+    std::env::args().skip(1).find(|argument| !argument.starts_with('-')).is_none_or(|filter| name.contains(&filter))
+}
+
+fn verdict(all_hold: bool) -> ExitCode {
+    if all_hold { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    if let [flag, name] = &arguments[..]
+        && flag == "--claim"
+    {
+        let (_, check) = CLAIMS.into_iter().find(|claim| claim.0 == name).unwrap();
+        check();
+        return ExitCode::SUCCESS;
+    }
+    let [with, without] = CLAIMS.map(|(name, _)| name);
+    if !cfg!(target_os = "linux") || !(wanted(with) || wanted(without)) {
+        return ExitCode::SUCCESS;
+    }
+    let home = tempfile::tempdir().unwrap();
+    let refused = !wanted(without) || holds(without, None, home.path());
+    if !wanted(with) {
+        return verdict(refused);
+    }
+    let (display, adapter) = (Display::start(), Gpu::headless().is_ok());
+    let Some(display) = display.filter(|_| adapter) else {
+        println!("no window was tested: it takes Xvfb and a graphics adapter (adapter found: {adapter})");
+        let required = std::env::var_os("METACHRON_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
+        return verdict(refused && !required);
+    };
+    verdict(refused & holds(with, Some(&display.name), home.path()))
+}
