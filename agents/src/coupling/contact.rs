@@ -50,14 +50,13 @@ impl Slots {
     /// The relative velocity J v (eq. 1).
     #[must_use]
     pub fn velocity(&self, velocities: &[DVec3]) -> DVec3 {
-        let linear: DVec3 = self.linear().iter().map(|&(slot, w)| velocities[slot as usize] * w).sum();
         let angular: DVec3 = self.angular().iter().map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum();
-        linear + angular
+        self.velocity_of_nodes(velocities) + angular
     }
 
-    /// The part of the relative velocity that comes from velocities, not spins, read by `at` from each slot.
-    pub(crate) fn linear_with(&self, at: impl Fn(usize) -> DVec3) -> DVec3 {
-        self.linear().iter().map(|&(slot, w)| at(slot as usize) * w).sum()
+    /// The part of the relative velocity that nodes give: spins move a round skin across its normal only.
+    pub(crate) fn velocity_of_nodes(&self, velocities: &[DVec3]) -> DVec3 {
+        self.linear().iter().map(|&(slot, w)| velocities[slot as usize] * w).sum()
     }
 
     /// Adds the impulses and angular impulses Jᵀ λ (eq. 2).

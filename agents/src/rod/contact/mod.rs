@@ -22,8 +22,8 @@ const SLACK_RADII: f64 = 0.05;
 pub(crate) struct Skin<'a> {
     /// Node positions, metres.
     pub positions: &'a [DVec3],
-    /// Node velocities without contact, m/s.
-    pub velocities: &'a [DVec3],
+    /// Velocities without contact, in slots ([`node_slot`], [`segment_slot`]), m/s and rad/s.
+    pub slots: &'a [DVec3],
     /// Outer radius at each node, metres.
     pub radii_m: &'a [f64],
     /// Rest arc length of each node, metres.
@@ -84,7 +84,7 @@ impl TubeContacts {
         if let Some(pairs) = pairs {
             pairs.visit(skin, slack_m, |meeting| {
                 let contact = of_meeting(&meeting, *friction);
-                let closing = closing(&contact.slots, skin.velocities, contact.normal);
+                let closing = contact.slots.velocity_of_nodes(skin.slots).dot(contact.normal);
                 if contact.gap_m + closing * skin.h_s <= slack_m {
                     contacts.push(contact);
                 }
@@ -123,6 +123,10 @@ impl Skin<'_> {
         self.positions.len() - 1
     }
 
+    fn velocity(&self, node: usize) -> DVec3 {
+        self.slots[node_slot(node)]
+    }
+
     fn ball(&self, node: usize) -> Ball {
         Ball { centre: self.positions[node], radius_m: self.radii_m[node] }
     }
@@ -149,17 +153,12 @@ impl Skin<'_> {
 
     /// The speed of the fastest node, m/s.
     fn speed(&self) -> f64 {
-        self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
+        (0..self.positions.len()).map(|i| self.velocity(i).length_squared()).fold(0.0, f64::max).sqrt()
     }
 
     fn span_speed(&self, segment: usize) -> f64 {
-        self.velocities[segment].length().max(self.velocities[segment + 1].length())
+        self.velocity(segment).length().max(self.velocity(segment + 1).length())
     }
-}
-
-/// The normal velocity of a contact from the velocities of nodes alone: a spin moves the skin across the normal only.
-fn closing(slots: &Slots, nodes: &[DVec3], normal: DVec3) -> f64 {
-    slots.linear_with(|slot| nodes[slot / 2]).dot(normal)
 }
 
 /// Self-contact: the nearest points of two segments, and arms to the middle of the gap (eq. 20).

@@ -114,10 +114,10 @@ impl Pairs {
             self.last.extend_from_slice(nodes);
         }
         let mean_way = nodes.iter().zip(&self.last).map(|(now, last)| *now - *last).sum::<DVec3>() / count;
-        let mean_speed = skin.velocities.iter().sum::<DVec3>() / count;
+        let mean_speed = (0..nodes.len()).map(|i| skin.velocity(i)).sum::<DVec3>() / count;
         let node = |i: usize| {
             let way = nodes[i] - self.last[i] - mean_way;
-            (way.length_squared(), (skin.velocities[i] - mean_speed).length_squared())
+            (way.length_squared(), (skin.velocity(i) - mean_speed).length_squared())
         };
         let widened = if known { (widest - self.last_radius_m).max(0.0) } else { 0.0 };
         let mut left = node(0);

@@ -122,7 +122,7 @@ impl Wall {
     fn measure(&mut self, skin: &Skin<'_>, slack_m: f64, travel_m: f64, visit: &mut impl FnMut(WallTouch)) {
         let look_m = LOOK_RADII * skin.widest_m();
         for node in 0..skin.positions.len() {
-            let margin_m = slack_m + skin.velocities[node].length() * skin.h_s;
+            let margin_m = slack_m + skin.velocity(node).length() * skin.h_s;
             let (gap_m, at_m) = self.nodes[node];
             if gap_m - (travel_m - at_m) <= margin_m {
                 self.measure_node(skin, node, (slack_m, margin_m + look_m), visit);
@@ -152,7 +152,7 @@ impl Wall {
     ) {
         let ball = skin.ball(node);
         let touches = self.field.touches(ball.centre, ball.radius_m + reach_m);
-        let way = skin.velocities[node] * skin.h_s;
+        let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
         self.nodes[node].0 = self.near[node].map_or(reach_m, |t| t.distance_m - ball.radius_m);
         for (place, touch) in (0_u32..).zip(touches.iter()) {
@@ -175,7 +175,7 @@ impl Wall {
         let ends = [skin.ball(segment), skin.ball(segment + 1)];
         let Some((share, touch)) = self.field.touches_span(ends, reach_m) else { return };
         let ball = ends[0].toward(ends[1], share);
-        let way = skin.velocities[segment].lerp(skin.velocities[segment + 1], share) * skin.h_s;
+        let way = skin.velocity(segment).lerp(skin.velocity(segment + 1), share) * skin.h_s;
         let gap_m = touch.distance_m - ball.radius_m;
         let told = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
         if gap_m + way.dot(touch.normal) <= slack_m && !told {
