@@ -14,7 +14,6 @@ mod band;
 mod calm;
 mod check;
 mod config;
-#[expect(dead_code, reason = "the step of the rod, which calls it, lands after it")]
 mod contact;
 mod division;
 mod holds;

@@ -6,6 +6,7 @@
 use super::band::{Factor, Row};
 use super::calm;
 use super::config::{Config, Matter};
+use super::contact::{Solved, TubeContacts};
 use super::division::Division;
 use super::holds::{NodeSpring, Tie};
 use super::system::{Iterate, Scene, assemble};
@@ -52,6 +53,10 @@ pub struct Stepper {
     rhs: Vec<DVec3>,
     next: Config,
     energy_j: f64,
+    /// What the skin touches.
+    pub contacts: TubeContacts,
+    /// Work that contact does in the substep tried, J.
+    pushed_j: f64,
 }
 
 /// What became of a trial substep.
@@ -124,13 +129,25 @@ impl Stepper {
         if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Lost { slot: None }) }
     }
 
-    /// Builds and solves the system about the iterate; the change of velocities is left in `rhs` (eq. 11).
+    /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
     fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
         self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
+        self.touch(now, scene, first);
         Ok(())
+    }
+
+    /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
+    fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+        let Self { rhs, next, rows, factor, contacts, pushed_j, .. } = self;
+        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        // contact is a law of whole velocities, not of what an iteration changes of them
+        let known = if first { &[][..] } else { &next.u[..] };
+        rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
+        *pushed_j = contacts.act(&now.x, rhs, &solved, first);
+        rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
     }
 
     /// The fastest spin in `rhs`, rad/s.
@@ -161,7 +178,8 @@ impl Stepper {
     fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
         let kinetic = self.next.kinetic_j(scene.matter, scene.division);
         let after = kinetic + stored(&self.next, scene.springs);
-        let (mut work, mut effort) = (0.0, 0.0);
+        // what friction takes is no licence to make as much elsewhere
+        let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
         for tie in scene.ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let x = tie.mix(self.next.x[a], self.next.x[b]);

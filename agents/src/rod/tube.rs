@@ -5,6 +5,7 @@
 
 use super::check::{TubeError, check};
 use super::config::{Config, Matter};
+use super::contact::TubeContacts;
 use super::division::{self, Division};
 use super::holds::{NodeSpring, Tie, springs};
 use super::remesh::Remesher;
@@ -78,6 +79,7 @@ impl Tube {
             steps: 0,
         };
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
+        tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
         Ok(tube)
     }
 
@@ -129,9 +131,14 @@ impl Tube {
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
     #[must_use]
     pub fn radius_at_m(&self, arc_m: f64) -> f64 {
+        self.radius_then_m(arc_m, self.time)
+    }
+
+    /// The same at another time.
+    fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
         let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
         let Some(wave) = self.spec.peristalsis else { return radius };
-        let phase = (arc_m - wave.speed_m_s * self.time.as_secs_f64()) / wave.wavelength_m;
+        let phase = (arc_m - wave.speed_m_s * time.as_secs_f64()) / wave.wavelength_m;
         let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
         radius * (1.0 - wave.amplitude * lift)
     }
@@ -140,6 +147,13 @@ impl Tube {
     fn take_pulls(&mut self, around: &Surroundings<'_>) {
         self.ties.clear();
         self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
+    }
+
+    /// Tells the contacts how wide the tube will be at the end of the step.
+    fn widen(&mut self, then: SimTime) {
+        let mut contacts = std::mem::take(&mut self.stepper.contacts);
+        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, then)));
+        self.stepper.contacts = contacts;
     }
 
     fn write_grips(&mut self, dt: f64) {
@@ -207,6 +221,7 @@ impl Agent for Tube {
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         self.take_pulls(around);
+        self.widen(around.time + dt);
         let setting = Setting {
             matter: &self.matter,
             division: &self.division,
@@ -247,6 +262,7 @@ impl Agent for Tube {
         next.strain(&self.matter, &self.division);
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
+        self.stepper.contacts.forget();
         self.rest.wake();
     }
 

@@ -3,6 +3,7 @@
 //! In: where the skin is, how it would move without contact, and the body's answer to impulses (the factor of the rod's own solve).
 //! Out: velocities that keep the skin apart. Never here: the rod's elasticity. Theory: `docs/theory/contact.md`.
 
+mod act;
 mod grid;
 mod pairs;
 mod walls;
@@ -10,6 +11,7 @@ mod walls;
 use crate::coupling::{Contact, Problem, Response, Settings, Slots, Solver, SolverReport};
 use crate::shape::field::Ball;
 use crate::shape::{Obstacle, ShapeError};
+pub(crate) use act::Solved;
 use glam::DVec3;
 use pairs::{Meeting, Pairs};
 use walls::{WallTouch, Walls};
@@ -28,6 +30,8 @@ pub(crate) struct Skin<'a> {
     pub radii_m: &'a [f64],
     /// Rest arc length of each node, metres.
     pub arc_m: &'a [f64],
+    /// Ends whose node cannot move: walls do not see them.
+    pub held: [bool; 2],
     /// The substep, seconds.
     pub h_s: f64,
 }
@@ -43,12 +47,14 @@ pub(crate) const fn segment_slot(segment: usize) -> usize {
 }
 
 /// The contacts of one tube, from substep to substep.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(crate) struct TubeContacts {
     pairs: Option<Pairs>,
     walls: Walls,
     friction: f64,
+    radii_m: Vec<f64>,
     contacts: Vec<Contact>,
+    mobilities: Vec<f64>,
     solver: Solver,
 }
 
@@ -58,13 +64,7 @@ impl TubeContacts {
     /// # Errors
     /// [`ShapeError`] for an obstacle that has no shape.
     pub fn new(obstacles: &[Obstacle], with_itself: bool, friction: f64) -> Result<Self, ShapeError> {
-        Ok(Self {
-            pairs: with_itself.then(Pairs::default),
-            walls: Walls::new(obstacles)?,
-            friction,
-            contacts: vec![],
-            solver: Solver::default(),
-        })
+        Ok(Self { pairs: with_itself.then(Pairs::default), walls: Walls::new(obstacles)?, friction, ..Self::default() })
     }
 
     /// Forgets what it knows of nodes and segments: the tube was divided anew.
@@ -95,25 +95,27 @@ impl TubeContacts {
         contacts.len()
     }
 
-    /// The contacts found last, by rising keys.
-    pub fn contacts(&self) -> &[Contact] {
-        &self.contacts
+    /// Takes the outer radius at each node, metres.
+    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>) {
+        self.radii_m.clear();
+        if !self.is_idle() {
+            self.radii_m.extend(radii_m);
+        }
     }
 
-    /// The impulse of each contact, N·s.
-    pub fn impulses(&self) -> &[DVec3] {
-        self.solver.impulses()
+    /// Whether there is nothing to touch.
+    fn is_idle(&self) -> bool {
+        self.pairs.is_none() && self.walls.is_empty()
     }
 
-    /// Solves the contacts found last: `velocities` (slots of [`node_slot`] and [`segment_slot`]) become such that none closes.
-    pub fn solve(
+    /// Solves the contacts found last: `velocities` become such that none closes.
+    fn solve(
         &mut self,
         (h_s, settings): (f64, Settings),
         velocities: &mut [DVec3],
-        mobilities: &[f64],
         body: &mut impl Response,
     ) -> SolverReport {
-        let problem = Problem { contacts: &self.contacts, h_s, mobilities, settings };
+        let problem = Problem { contacts: &self.contacts, h_s, mobilities: &self.mobilities, settings };
         self.solver.solve(&problem, velocities, body)
     }
 }
@@ -121,6 +123,11 @@ impl TubeContacts {
 impl Skin<'_> {
     fn segments(&self) -> usize {
         self.positions.len() - 1
+    }
+
+    /// Whether a node is an end that is held.
+    fn is_held(&self, node: usize) -> bool {
+        (node == 0 && self.held[0]) || (node == self.segments() && self.held[1])
     }
 
     fn velocity(&self, node: usize) -> DVec3 {
@@ -201,3 +208,5 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
 
 #[cfg(test)]
 mod tests;
+#[cfg(test)]
+mod tube_tests;

@@ -60,7 +60,7 @@ impl Chain {
 
     fn skin(&self) -> Skin<'_> {
         let Self { positions, slots, radii_m, arc_m } = self;
-        Skin { positions, slots, radii_m, arc_m, h_s: STEP }
+        Skin { positions, slots, radii_m, arc_m, held: [false; 2], h_s: STEP }
     }
 }
 
@@ -68,12 +68,12 @@ impl Chain {
 fn found_afresh(skin: &Skin<'_>, obstacles: &[Obstacle], with_itself: bool) -> Vec<(u64, f64)> {
     let mut contacts = TubeContacts::new(obstacles, with_itself, 0.3).unwrap();
     contacts.find(skin);
-    contacts.contacts().iter().map(|c| (c.key, c.gap_m)).collect()
+    contacts.contacts.iter().map(|c| (c.key, c.gap_m)).collect()
 }
 
 fn found(contacts: &mut TubeContacts, skin: &Skin<'_>) -> Vec<(u64, f64)> {
     contacts.find(skin);
-    contacts.contacts().iter().map(|c| (c.key, c.gap_m)).collect()
+    contacts.contacts.iter().map(|c| (c.key, c.gap_m)).collect()
 }
 
 #[test]
@@ -166,7 +166,7 @@ fn self_contact_gives_no_net_force_and_no_net_torque() {
     let chain = Chain::crumpled(120, &mut noise);
     let mut contacts = TubeContacts::new(&[], true, 0.3).unwrap();
     assert!(contacts.find(&chain.skin()) > 10);
-    for contact in contacts.contacts() {
+    for contact in &contacts.contacts {
         let impulse = noise.vector();
         let mut slots = vec![DVec3::ZERO; 2 * chain.positions.len()];
         contact.slots.scatter(impulse, &mut slots);
@@ -186,7 +186,7 @@ fn keys_are_unique_and_rise() {
     chain.positions.iter_mut().for_each(|x| x.z -= 0.08);
     let mut contacts = TubeContacts::new(&solids(), true, 0.3).unwrap();
     assert!(contacts.find(&chain.skin()) > 50);
-    assert!(contacts.contacts().windows(2).all(|pair| pair[0].key < pair[1].key));
+    assert!(contacts.contacts.windows(2).all(|pair| pair[0].key < pair[1].key));
 }
 
 #[test]

@@ -12,7 +12,7 @@ use glam::DVec3;
 const LOOK_RADII: f64 = 1.0;
 
 /// All fixed solids around a tube.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Walls {
     walls: Vec<Wall>,
     /// How far any node has moved, and how much the tube has widened; it only grows.
@@ -72,7 +72,12 @@ impl Walls {
             })
         };
         let walls = obstacles.iter().map(wall).collect::<Result<_, ShapeError>>()?;
-        Ok(Self { walls, travel_m: 0.0, last: vec![], last_radius_m: 0.0 })
+        Ok(Self { walls, ..Self::default() })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.walls.is_empty()
     }
 
     /// Forgets all measurements: the tube was divided anew.
@@ -155,6 +160,9 @@ impl Wall {
         let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
         self.nodes[node].0 = self.near[node].map_or(reach_m, |t| t.distance_m - ball.radius_m);
+        if skin.is_held(node) {
+            return;
+        }
         for (place, touch) in (0_u32..).zip(touches.iter()) {
             let gap_m = touch.distance_m - ball.radius_m;
             if gap_m + way.dot(touch.normal) > slack_m || (gap_m > slack_m && self.field.is_missed(ball, way, slack_m))

@@ -1,0 +1,96 @@
+//! Where contact meets the rod's own step: between its solve and its move.
+//!
+//! In: the state a substep starts from, its free velocities and its factor. Out: velocities that keep the skin apart.
+//! Never here: which contacts there are ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
+
+use super::{Skin, TubeContacts, node_slot, segment_slot};
+use crate::coupling::Settings;
+use crate::rod::band::{Factor, Row};
+use crate::rod::config::Matter;
+use crate::rod::division::Division;
+use glam::DVec3;
+
+/// When a tube's contacts are good enough: 10 µm/s, a tenth of what counts as rest.
+/// A stiff tube (10⁸ Pa) that lands flat takes 30 answers, a soft one at rest takes one or two.
+const SETTINGS: Settings = Settings { iterations: 30, tolerance_m_s: 1e-5 };
+
+/// A substep at the point where its system is solved and nothing has moved yet.
+#[derive(Clone, Copy)]
+pub(crate) struct Solved<'a> {
+    /// The material.
+    pub matter: &'a Matter,
+    /// The division.
+    pub division: &'a Division,
+    /// The matrix.
+    pub rows: &'a [Row],
+    /// Its factor.
+    pub factor: &'a Factor,
+    /// The substep, seconds.
+    pub h: f64,
+}
+
+impl TubeContacts {
+    /// Corrects the free `velocities` of a substep that starts at `positions`; returns the work that contact then does, J.
+    ///
+    /// `first` finds the contacts; a further Newton iteration of the same substep keeps them.
+    pub fn act(&mut self, positions: &[DVec3], velocities: &mut [DVec3], solved: &Solved<'_>, first: bool) -> f64 {
+        // a system that was lost has no motion to correct: the step will see it and give up or divide
+        if self.is_idle() || !velocities.iter().sum::<DVec3>().is_finite() {
+            return 0.0;
+        }
+        if first {
+            let arc_m = &solved.division.arc_m;
+            let radii_m = std::mem::take(&mut self.radii_m);
+            let skin = Skin {
+                positions,
+                slots: velocities,
+                radii_m: &radii_m,
+                arc_m,
+                held: solved.matter.held,
+                h_s: solved.h,
+            };
+            self.find(&skin);
+            self.radii_m = radii_m;
+        }
+        if self.contacts.is_empty() {
+            self.solver.forget();
+            return 0.0;
+        }
+        self.scale(solved);
+        let held = solved.matter.held;
+        let last = velocities.len() - 1;
+        let mut answer = |impulses: &mut [DVec3]| {
+            for (end, slot) in [(0, 0), (1, last)] {
+                if held[end] {
+                    impulses[slot] = DVec3::ZERO;
+                }
+            }
+            solved.factor.solve(impulses);
+        };
+        self.solve((solved.h, SETTINGS), velocities, &mut answer);
+        let pairs = self.contacts.iter().zip(self.solver.impulses());
+        pairs.map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum()
+    }
+
+    /// The size of each slot's inverse mass (eq. 22): a node's from its own mass, a segment's from the matrix, because what
+    /// it is joined to by shear resists its turning far more than its own inertia.
+    fn scale(&mut self, solved: &Solved<'_>) {
+        let Solved { matter, division, rows, .. } = solved;
+        let count = division.segments();
+        self.mobilities.resize(rows.len(), 0.0);
+        for node in 0..=count {
+            let beside = [node.checked_sub(1), Some(node).filter(|&k| k < count)];
+            let length: f64 = beside.into_iter().flatten().map(|k| division.length[k]).sum();
+            self.mobilities[node_slot(node)] = 2.0 / (matter.mu * length);
+        }
+        for segment in 0..count {
+            let slot = segment_slot(segment);
+            self.mobilities[slot] = 3.0 / rows[slot].diag.d.element_sum();
+        }
+        for (end, node) in [(0, 0), (1, count)] {
+            if matter.held[end] {
+                self.mobilities[node_slot(node)] = 0.0;
+            }
+        }
+    }
+}
