@@ -402,3 +402,14 @@ proptest! {
         let _ = load(&source, &[(format!("object.intestine.{}", keys[key]), shown)]);
     }
 }
+
+#[test]
+fn the_machines_and_models_that_scenes_can_name_are_those_that_exist() {
+    for preset in metachron::runtime::PRESETS {
+        assert!(read(&format!("{TUBE}\n[machine]\npreset = \"{preset}\"\n")).is_ok(), "{preset}");
+    }
+    let said = problem(&format!("{TUBE}\n[machine]\npreset = \"laptop\"\n")).3;
+    assert!(metachron::runtime::PRESETS.iter().all(|p| said.contains(p)), "{said}");
+    let said = problem(&format!("{TUBE}\n[machine.step.tub]\nunit_us = 0.1\n")).3;
+    assert!(said.contains("did you mean `tube`?"), "{said}");
+}
