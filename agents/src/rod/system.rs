@@ -181,7 +181,8 @@ fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
         rhs[0] = DVec3::ZERO;
     }
     if matter.held[1] {
-        rows[last] = Row { diag: Sym3::identity(1.0), ..Row::default() };
+        // not `..Row::default()`: glam's default matrix is the identity
+        rows[last] = Row { diag: Sym3::identity(1.0), near: DMat3::ZERO, far: Sym3::default() };
         rhs[last] = DVec3::ZERO;
     }
 }

@@ -43,3 +43,22 @@ fn the_hanging_tip_converges_with_second_order() {
     let order = (errors[0] / errors[3]).log2() / 3.0;
     assert!(order >= 1.9, "order {order} of {errors:?}");
 }
+
+#[test]
+fn a_tube_held_at_its_end_moves_as_the_mirror_image_of_one_held_at_its_start() {
+    for clamped in [false, true] {
+        let swung = |ends: [bool; 2]| {
+            let mut spec = reference_spec(1e6, 16);
+            (spec.clamp, spec.pin) = if clamped { (ends, [false; 2]) } else { ([false; 2], ends) };
+            spec.gravity = DVec3::NEG_Z * 9.81;
+            let mut tube = Tube::new(spec).unwrap();
+            run(&mut tube, 5.0, 0.3);
+            tube.state().x.clone()
+        };
+        let (start, end) = (swung([true, false]), swung([false, true]));
+        for (a, b) in start.iter().zip(end.iter().rev()) {
+            let mirrored = DVec3::new(1.0 - b.x, b.y, b.z);
+            assert!(a.distance(mirrored) < 1e-9, "clamped {clamped}: {a} and {mirrored}"); // elimination runs the other way
+        }
+    }
+}
