@@ -1,7 +1,7 @@
 //! An integer level from a real number that does not chatter when the number trembles about a whole one.
 //!
 //! In: ρ. Out: ⌊ρ⌋, held until ρ is a quarter past an edge. Never here: where ρ comes from.
-//! Theory: `docs/theory/control.md`, eq. 13.
+//! Theory: `docs/theory/control.md`, eq. 15.
 
 /// How far past an edge ρ must be, in levels. Two switches of the same edge are half a level apart: a factor √2 of polygons.
 pub const BAND: f64 = 0.25;

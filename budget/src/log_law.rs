@@ -1,7 +1,7 @@
 //! The corrected law: ln ε ← ln ε + κ ln(t / T), a gain that no machine changes.
 //!
 //! In: measured time over wanted time. Out: ln ε, inside its range, and whether it rests there.
-//! Never here: what ε is, or where the time was measured. Theory: `docs/theory/control.md`, eq. 7 and 10 … 12.
+//! Never here: what ε is, or where the time was measured. Theory: `docs/theory/control.md`, eq. 7 … 12.
 
 use crate::{Bound, within};
 
@@ -12,6 +12,9 @@ pub const LESSON_MAX: f64 = 2.0 * core::f64::consts::LN_2;
 /// the same side. So a single frame of five times its time costs e^(−κ ln 1.5) = 18 % of the polygons, and a load that stays
 /// is believed one frame later.
 pub const SURPRISE_MAX: f64 = 0.405_465_108_108_164_4;
+
+/// Nearer to the wanted time than this, |ln(t/T)|, a time that no level improves is as good as settled.
+const NEAR: f64 = 0.05;
 
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -92,7 +95,7 @@ impl LogLaw {
         self.rest
     }
 
-    /// The error as far as it is believed (control.md, eq. 10).
+    /// The error as far as it is believed (control.md, eq. 9).
     fn believed(&mut self, error: f64) -> f64 {
         let seen_before = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > SURPRISE_MAX);
         self.before = Some(error);
@@ -113,7 +116,8 @@ impl LogLaw {
         self.value = within(wish.max(soonest), self.range);
         match (wish < self.range.0, wish < soonest) {
             (true, _) if self.value == self.range.0 => Rest::Clamped(Bound::Finest),
-            (_, true) => Rest::BetweenLevels,
+            (_, true) if error < -NEAR => Rest::BetweenLevels,
+            (_, true) => Rest::Settled,
             _ => Rest::Moving,
         }
     }

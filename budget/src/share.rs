@@ -1,7 +1,7 @@
 //! One budget shared out by weight: everybody gets weight × level, inside their own least and most.
 //!
 //! In: a budget and [`Share`]s. Out: the water level μ at which the shares add up to the budget.
-//! Never here: what the budget is made of. Theory: `docs/theory/control.md`, eq. 9.
+//! Never here: what the budget is made of. Theory: `docs/theory/control.md`, eq. 14.
 
 /// What one party may get of a budget.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -1,7 +1,7 @@
 //! How one object spends its share of the polygons: the pair (ε, n) that is nearest to square quads, and does not chatter.
 //!
 //! In: a wanted number of polygons. Out: (ε, n), and the polygons it really makes.
-//! Never here: how much there is to share. Theory: `docs/theory/control.md`, eq. 8, 13 and 14.
+//! Never here: how much there is to share. Theory: `docs/theory/control.md`, eq. 15 and 16.
 
 use super::view::{Kind, ObjectView};
 use metachron_agents::{N_MAX, Resolution, ResolutionRange};
@@ -103,7 +103,7 @@ impl Held {
     }
 }
 
-/// ε at which an object of level `n` has about `polygons` (control.md, eq. 8); a primitive has none and gives its coarsest.
+/// ε at which an object of level `n` has about `polygons` (control.md, eq. 16); a primitive has none and gives its coarsest.
 fn spacing_m(view: &ObjectView, polygons: f64, n: u8) -> f64 {
     match view.kind {
         Kind::Tube { length_m, .. } => PATCH_TRIANGLES * two_to(n) * length_m / polygons,
@@ -133,7 +133,7 @@ fn level(n: u8) -> usize {
     usize::from(n.min(N_MAX))
 }
 
-/// The level at which a tube's quads are nearest to square: ⌊ρ⌋ with a band (control.md, eq. 13), where ε stays in its range.
+/// The level at which a tube's quads are nearest to square: ⌊ρ⌋ with a band (control.md, eq. 15), where ε stays in its range.
 fn tube_level(polygons: f64, (length_m, radius_m): (f64, f64), range: ResolutionRange, before: Option<u8>) -> u8 {
     // ε at level n is 2ⁿ / per_m
     let per_m = polygons / (PATCH_TRIANGLES * length_m);

@@ -3,7 +3,7 @@
 //! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring.
 //! A frame is `plan`, draw, `observe`. The corrected law steers the polygons of the whole scene through ln ε̂, and the objects
 //! share them by what they cover, how far they are and how fast they move; the printed law steers ε̂ and n of all tubes alike.
-//! Theory: `docs/theory/control.md`, eq. 1, 7 … 9 and 12.
+//! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
 
 use super::level::{self, Held, Span};
 use super::status::Status;
@@ -18,7 +18,7 @@ use std::time::Duration;
 /// Intervals of a tube at ε̂ = 1: ε̂ = 40 ε/L.
 const INTERVALS_AT_ONE: f64 = 40.0;
 
-/// Polygons of one tube at ε̂ = 1 and n = 0: by it the polygons of a scene are told as ε̂ (control.md, eq. 8).
+/// Polygons of one tube at ε̂ = 1 and n = 0: by it the polygons of a scene are told as ε̂ (control.md, eq. 13).
 const POLYGONS_AT_ONE: f64 = 12.0 * INTERVALS_AT_ONE;
 
 /// Where ε̂ and n of the printed law move while no tube is in view and n alone counts.
@@ -177,7 +177,7 @@ impl PictureControl {
         }
     }
 
-    /// The polygons that ln ε̂ stands for, shared out (control.md, eq. 8 and 9).
+    /// The polygons that ln ε̂ stands for, shared out (control.md, eq. 13 and 14).
     fn plan_corrected(&mut self) {
         self.bound_corrected();
         let budget = POLYGONS_AT_ONE * libm::exp(-self.corrected.value());

@@ -2,7 +2,7 @@
 //!
 //! In: a [`TurnMeasure`] after every turn. Out: now and then a [`RateDemand`]. Never here: agents, clocks.
 //! One loop variable climbs two stairs: first ε grows to its coarsest, then dt to its longest; it comes down the other way.
-//! Theory: `docs/theory/control.md`, eq. 15 … 17.
+//! Theory: `docs/theory/control.md`, eq. 17 … 19.
 
 use metachron_budget::Bound;
 use metachron_budget::log_law::{Gains, LogLaw, Rest};
@@ -152,7 +152,7 @@ impl RateControl {
         window.span_s >= WINDOW_S && window.turns >= WINDOW_TURNS
     }
 
-    /// t/T = max(work / (share · period), real period / wanted where that is late) (control.md, eq. 15).
+    /// t/T = max(work / (share · period), real period / wanted where that is late) (control.md, eq. 17).
     fn learn(&mut self, window: &Window) {
         let load = window.work_s / (self.limits.share * window.wanted_s);
         let lateness = window.late / f64::from(window.turns);
@@ -195,7 +195,7 @@ impl RateControl {
         Some(self.demand())
     }
 
-    /// What is asked for at present (control.md, eq. 16).
+    /// What is asked for at present (control.md, eq. 18).
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));

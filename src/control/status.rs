@@ -51,10 +51,8 @@ impl fmt::Display for Status {
             Self::Waiting => "waiting for a first measured frame",
             Self::Moving => "moving towards the target",
             Self::Settled => "on target",
-            Self::Clamped(Bound::Finest) => {
-                "at its finest: everything in view is as fine as it may be, and there is time left"
-            }
-            Self::Clamped(Bound::Coarsest) => "at its coarsest: even so frames take longer than they should",
+            Self::Clamped(Bound::Finest) => "at its finest: ε may not be finer, and there is time left",
+            Self::Clamped(Bound::Coarsest) => "at its coarsest: ε may not be coarser, and frames still take too long",
             Self::BetweenLevels => "between levels: there is time left, but the next finer level would be late",
             Self::Fixed => "fixed: nothing in view has a range to choose from",
             Self::Full => "full detail: the time is not looked at",

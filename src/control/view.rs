@@ -123,7 +123,7 @@ const DISTANCE_MIN_M: f64 = 0.05;
 const SPEED_HALF_PX_S: f64 = 600.0;
 
 impl ObjectView {
-    /// Area of a quad in square metres for each steradian of the scene's quads (control.md, eq. 8): far or fast is coarser.
+    /// Area of a quad in square metres for each steradian of the scene's quads (control.md, eq. 14): far or fast is coarser.
     pub(super) fn coarseness_m2(&self) -> f64 {
         let distance = if self.distance_m.is_finite() { self.distance_m.max(DISTANCE_MIN_M) } else { 1.0 };
         let speed = if self.speed_px_s.is_finite() { self.speed_px_s.max(0.0) } else { 0.0 };
