@@ -4,6 +4,7 @@
 //! Never here: a clock, a thread, a file, the GPU. Theory: `docs/theory/rod.md`.
 
 mod agent;
+pub mod conformance;
 pub mod coupling;
 pub mod instrument;
 mod resolution;
