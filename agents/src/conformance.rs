@@ -14,7 +14,9 @@
 //!     let agent = Synthetic::new(spec, range, Resolution { eps_m: 0.04, n: 0 }).unwrap();
 //!     Box::new(agent) as Box<dyn Agent>
 //! };
-//! let suite = Suite::new(&make, SimSpan::from_nanos(4_000_000));
+//! let resolutions = [0.04, 0.02, 0.01].map(|eps_m| Resolution { eps_m, n: 0 }).to_vec();
+//! let dt = SimSpan::from_nanos(4_000_000);
+//! let suite = Suite { resolutions, converging: Some((&make, 1)), ..Suite::new(&make, dt) };
 //! assert_eq!(check(&suite), []);
 //! ```
 
@@ -55,7 +57,8 @@ pub struct Suite<'a> {
     pub absurd: Vec<Pull>,
     /// A closed form: how wrong the agent is after t seconds, and how wrong it may be.
     pub closed_form: Option<(Deviation<'a>, f64)>,
-    /// Resolutions to retune to and fro, from coarse to fine; empty for a model that has none.
+    /// Resolutions to retune to and fro, from coarse to fine. Where none are given, a wish for what it holds (or for
+    /// anything, where it holds none) must change no bit.
     pub resolutions: Vec<Resolution>,
     /// Builds the agent in a case that converges, and how many steps of `dt` that takes.
     pub converging: Option<(Make<'a>, u32)>,

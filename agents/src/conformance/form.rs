@@ -72,8 +72,9 @@ pub(super) fn retune(suite: &Suite<'_>) -> Result<(), String> {
     }
     if suite.resolutions.is_empty() {
         let before = run.hash();
-        run.agent.retune(Resolution { eps_m: 0.01, n: 2 });
-        return if run.hash() == before { Ok(()) } else { Err("a model without resolution changed".to_owned()) };
+        let wanted = run.agent.resolution().unwrap_or(Resolution { eps_m: 0.01, n: 2 });
+        run.agent.retune(wanted);
+        return if run.hash() == before { Ok(()) } else { Err("a wish for what it holds changed it".to_owned()) };
     }
     // to and fro: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
