@@ -431,3 +431,25 @@ fn the_layout_comes_back_from_its_stored_form() {
     let older: metachron::compositor::viewer::Layout = serde_json::from_str("{}").unwrap();
     assert!(older.panels);
 }
+
+#[test]
+fn the_theme_changes_and_changes_back() {
+    let mut harness = window();
+    let before = harness.ctx.theme();
+    for expected_same in [false, true] {
+        harness.key_press_modifiers(Modifiers::COMMAND, Key::T);
+        asked(&mut harness);
+        assert_eq!(harness.ctx.theme() == before, expected_same);
+    }
+}
+
+#[test]
+fn a_narrow_window_keeps_every_digit_of_the_table() {
+    let mut harness = window();
+    harness.set_size(egui::vec2(640.0, 420.0));
+    harness.run_steps(3);
+    let row = harness.get_by_label_contains("intestine, tube").rect();
+    assert!(row.width() > 900.0, "{} points", row.width()); // wider than the window: it scrolls
+    harness.get_by_label("Pause").click();
+    assert_eq!(asked(&mut harness), [Action::Pause]);
+}

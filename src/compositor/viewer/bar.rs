@@ -10,19 +10,25 @@ use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, Color32, Layout, RichText, Ui};
 
+/// In a bar of fewer points the name and the real-time factor give way to buttons.
+const WIDE: f32 = 800.0;
+
 /// Draws the bar.
 pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command> {
     let mut commands = Vec::new();
     let palette = palette(ui);
     ui.horizontal_centered(|ui| {
-        ui.label(RichText::new("metachron").strong().size(14.0));
-        ui.label(RichText::new(&status.scene).size(14.0).color(palette.weak));
-        ui.add_space(10.0);
+        let wide = ui.available_width() > WIDE;
+        if wide {
+            ui.label(RichText::new("metachron").strong().size(14.0));
+        }
+        ui.add(egui::Label::new(RichText::new(&status.scene).size(14.0).color(palette.weak)).truncate());
+        ui.add_space(if wide { 10.0 } else { 2.0 });
         transport(ui, status, &mut commands);
         ui.add_space(6.0);
         speed(ui, status, &mut commands);
         ui.add_space(10.0);
-        clock(ui, status, &palette);
+        clock(ui, status, wide, &palette);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             tools(ui, &mut commands);
             ui.add_space(8.0);
@@ -50,10 +56,13 @@ fn speed(ui: &mut Ui, status: &Status, out: &mut Vec<Command>) {
     button(ui, (Icon::Plus, "Faster"), Command::Faster, out);
 }
 
-fn clock(ui: &mut Ui, status: &Status, palette: &Palette) {
+fn clock(ui: &mut Ui, status: &Status, wide: bool, palette: &Palette) {
     ui.spacing_mut().item_spacing.x = 8.0;
     let time = format!("{:9.3} s", status.sim_time.as_secs_f64());
     ui.label(RichText::new(time).monospace().size(13.0)).on_hover_text("Simulated time");
+    if !wide {
+        return;
+    }
     let factor = format!("{:.2}× real time", status.real_time_factor);
     let behind = status.running && status.real_time_factor < 0.95 * status.speed;
     let color = if behind { palette.warn } else { palette.weak };

@@ -38,6 +38,8 @@ pub enum Command {
     Ages,
     /// Only the picture.
     HideUi,
+    /// Dark on light, or light on dark.
+    Theme,
     /// Write the picture to a file.
     Screenshot,
     /// Keys and mouse.
@@ -91,7 +93,7 @@ const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static
 }
 
 /// Every key of the window.
-pub const SHORTCUTS: [Shortcut; 22] = [
+pub const SHORTCUTS: [Shortcut; 23] = [
     row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
     row(Command::Step, &[key(Key::ArrowRight)], "Step one frame", Group::Time),
     row(Command::Reset, &[key(Key::Backspace)], "Reset the scene", Group::Time),
@@ -108,6 +110,7 @@ pub const SHORTCUTS: [Shortcut; 22] = [
     row(Command::Wireframe, &[key(Key::W)], "Wireframe", Group::Picture),
     row(Command::Ages, &[key(Key::A)], "Colour by age", Group::Picture),
     row(Command::HideUi, &[key(Key::H)], "Hide the panels", Group::Picture),
+    row(Command::Theme, &[ctrl(Key::T)], "Light or dark", Group::Picture),
     row(Command::Screenshot, &[key(Key::F12)], "Screenshot", Group::Picture),
     row(Command::Help, &[key(Key::F1), key(Key::Questionmark)], "Help", Group::Picture),
     row(Command::Info, &[key(Key::F2)], "Run information", Group::Picture),

@@ -49,6 +49,7 @@ pub struct Wishes {
     pub screenshot: bool,
     /// Close the window.
     pub quit: bool,
+    theme: bool,
 }
 
 /// How the picture is drawn, as it is kept between runs.
@@ -149,6 +150,10 @@ impl Viewer {
         let mut wishes = Wishes::default();
         for command in commands {
             self.execute(command, show, &mut actions, &mut wishes);
+        }
+        if wishes.theme {
+            let other = if ui.ctx().theme() == egui::Theme::Dark { egui::Theme::Light } else { egui::Theme::Dark };
+            ui.ctx().set_theme(other);
         }
         actions.drain(..).for_each(|action| show.apply(action));
         let drawing = self.stage(ui, show, screen);
@@ -264,6 +269,7 @@ impl Viewer {
             Command::Wireframe => looks.wireframe = !looks.wireframe,
             Command::Ages => (looks.ages, looks.colours) = (!looks.ages, false),
             Command::HideUi => self.layout.panels = !self.layout.panels,
+            Command::Theme => wishes.theme = true,
             Command::Screenshot => wishes.screenshot = true,
             Command::Help => self.help = !self.help,
             Command::Info => self.layout.info = !self.layout.info,

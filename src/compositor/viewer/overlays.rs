@@ -37,7 +37,9 @@ pub fn help(ctx: &egui::Context) -> bool {
                 ui.end_row();
             }
         });
-        ui.add_space(8.0);
+        ui.add_space(6.0);
+        ui.label(RichText::new("Ctrl with +, - or 0 changes the size of the interface.").color(palette(ui).weak));
+        ui.add_space(6.0);
         ui.button("Close").clicked()
     });
     !(modal.inner || modal.should_close())
@@ -70,7 +72,8 @@ fn keys(ui: &mut Ui, name: &str, group: Group) {
 /// Numbers of the run, at the top left of the picture.
 pub fn info(ui: &Ui, over: Rect, status: &Status, summary: &FrameSummary, adapter: &str) {
     let palette = palette(ui);
-    Area::new(Id::unique("info")).order(Order::Middle).fixed_pos(over.min + vec2(12.0, 12.0)).show(ui.ctx(), |ui| {
+    let area = Area::new(Id::unique("info")).order(Order::Background).interactable(false);
+    area.fixed_pos(over.min + vec2(12.0, 12.0)).show(ui.ctx(), |ui| {
         card(&palette).show(ui, |ui| {
             egui::Grid::new("info grid").num_columns(2).min_row_height(15.0).spacing(vec2(18.0, 4.0)).show(ui, |ui| {
                 for (name, value) in info_rows(status, summary, adapter) {
@@ -119,7 +122,7 @@ pub fn messages(ui: &Ui, over: Rect, messages: &[Message]) {
         return;
     }
     let palette = palette(ui);
-    let area = Area::new(Id::unique("messages")).order(Order::Middle).interactable(false);
+    let area = Area::new(Id::unique("messages")).order(Order::Background).interactable(false);
     area.pivot(Align2::LEFT_BOTTOM).fixed_pos(over.left_bottom() + vec2(12.0, -12.0)).show(ui.ctx(), |ui| {
         ui.set_max_width(0.7 * over.width());
         for message in &messages[messages.len().saturating_sub(SHOWN)..] {

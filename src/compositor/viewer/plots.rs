@@ -27,11 +27,11 @@ pub fn frame_times(ui: &mut Ui, history: &History, target_hz: f64) {
     let work = Line::new("Work", points(|f| f.work)).color(palette.accent).width(1.6);
     let target = HLine::new("Target", target_ms).color(palette.warn).style(LineStyle::dashed_loose()).width(1.0);
     quiet("frame times", 112.0, &palette)
+        .y_grid_spacer(|input| even_marks(input, 4.0))
         .include_x(0.0)
         .include_x(FRAMES as f64)
         .include_y(0.0)
         .include_y(top)
-        .y_grid_spacer(even_marks)
         .y_axis_formatter(|mark, _| format!("{} ms", text::plain(mark.value)))
         .show_axes([false, true])
         .show(ui, move |plot| {
@@ -48,6 +48,7 @@ fn quiet(name: &'static str, height: f32, palette: &Palette) -> Plot<'static> {
         .height(height)
         .show_grid([false, true])
         .grid_color(palette.line)
+        .grid_spacing(4.0..=14.0)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
@@ -59,10 +60,10 @@ fn quiet(name: &'static str, height: f32, palette: &Palette) -> Plot<'static> {
         .set_margin_fraction(vec2(0.0, 0.06))
 }
 
-/// Three to six marks at round numbers, all of one weight, so that every one of them gets its label.
-fn even_marks(input: egui_plot::GridInput) -> Vec<egui_plot::GridMark> {
+/// Marks at round numbers that cut the axis into about `parts`, all of one weight, so that each gets its label.
+fn even_marks(input: egui_plot::GridInput, parts: f64) -> Vec<egui_plot::GridMark> {
     let (low, high) = input.bounds;
-    let step_size = round_step((high - low) / 4.0);
+    let step_size = round_step((high - low) / parts);
     if !(step_size > 0.0 && (high - low).is_finite()) {
         return Vec::new();
     }
@@ -70,10 +71,10 @@ fn even_marks(input: egui_plot::GridInput) -> Vec<egui_plot::GridMark> {
     marks.map(|i| egui_plot::GridMark { value: i as f64 * step_size, step_size }).collect()
 }
 
-/// The number 1, 2 or 5 times a power of ten at or above two thirds of `rough`.
+/// The number 1, 2 or 5 times a power of ten at or above five eighths of `rough`.
 fn round_step(rough: f64) -> f64 {
     let power = 10_f64.powf(rough.log10().floor());
-    [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|&step| step >= rough / 1.5).unwrap_or(10.0 * power)
+    [1.0, 2.0, 5.0, 10.0].map(|m| m * power).into_iter().find(|&step| step >= 0.625 * rough).unwrap_or(10.0 * power)
 }
 
 fn legend(ui: &mut Ui, entries: &[(&str, Color32)]) {
@@ -162,6 +163,7 @@ fn small(ui: &mut Ui, name: &'static str, lines: Vec<(&'static str, Vec<[f64; 2]
     }
     let palette = palette(ui);
     ui.horizontal(|ui| {
+        ui.set_height(14.0);
         ui.label(egui::RichText::new(name).small().color(palette.weak));
         for (_, points, color) in &lines {
             let newest = points.last().map_or_else(String::new, |point| text::figures(point[1]));
@@ -176,7 +178,7 @@ fn small(ui: &mut Ui, name: &'static str, lines: Vec<(&'static str, Vec<[f64; 2]
         .include_y(0.0)
         .include_y(1.1 * top)
         .show_axes([false, true])
-        .y_grid_spacer(even_marks)
+        .y_grid_spacer(|input| even_marks(input, 1.5))
         .y_axis_formatter(|mark, _| text::plain(mark.value))
         .show(ui, move |plot| {
             for (label, points, color) in lines {
@@ -193,10 +195,10 @@ mod tests {
     fn an_axis_of_any_length_gets_three_to_seven_round_marks() {
         for top in [1e-3, 0.07, 1.0, 3.3, 16.0, 50.0, 99.0, 1234.0] {
             let input = egui_plot::GridInput { bounds: (0.0, top), base_step_size: 1.0 };
-            let marks = even_marks(input);
+            let marks = even_marks(input, 4.0);
             assert!((3..=7).contains(&marks.len()), "{} marks up to {top}", marks.len());
         }
         let nothing = egui_plot::GridInput { bounds: (0.0, f64::NAN), base_step_size: 1.0 };
-        assert!(even_marks(nothing).is_empty());
+        assert!(even_marks(nothing, 4.0).is_empty());
     }
 }

@@ -9,6 +9,8 @@ use egui::{Align2, Color32, FontId, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec
 use metachron_agents::{AgentId, Resolution};
 
 const ROW: f32 = 22.0;
+/// The least width of the table, points.
+const WIDTH_MIN: f32 = 940.0;
 /// Names of the columns, their share of the width, and whether they hold numbers.
 const COLUMNS: [(&str, f32, bool); 10] = [
     ("Agent", 1.5, false),
@@ -38,14 +40,24 @@ pub enum Press {
 pub fn show(ui: &mut Ui, status: &Status) -> Option<Press> {
     let mut press = None;
     let palette = palette(ui);
-    let edges = column_edges(ui.available_width() - 12.0);
-    header(ui, &edges, &palette);
+    // narrower than this, numbers would lose their first digits: the table scrolls sideways instead
+    let width = (ui.available_width() - 12.0).max(WIDTH_MIN);
+    egui::ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
+        ui.set_width(width);
+        press = rows(ui, status, &column_edges(width), &palette);
+    });
+    press
+}
+
+fn rows(ui: &mut Ui, status: &Status, edges: &[f32], palette: &Palette) -> Option<Press> {
+    let mut press = None;
+    header(ui, edges, palette);
     ui.spacing_mut().item_spacing.y = 0.0;
     let area = egui::ScrollArea::vertical().auto_shrink([false, false]);
     area.show_rows(ui, ROW, status.agents.len(), |ui, range| {
         for row in &status.agents[range] {
             let selected = status.selected == Some(row.id);
-            let response = agent(ui, row, &edges, selected, &palette);
+            let response = agent(ui, row, edges, selected, palette);
             if response.double_clicked() {
                 press = Some(Press::Frame(row.id));
             } else if response.clicked() {
