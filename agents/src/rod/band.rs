@@ -9,7 +9,7 @@ use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 
 /// One block row of the system's lower half.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 pub struct Row {
     /// The block on the diagonal.
     pub diag: Sym3,
@@ -17,6 +17,13 @@ pub struct Row {
     pub near: DMat3,
     /// The block that couples this slot to the one two before it: node to node, segment to segment, hence symmetric.
     pub far: Sym3,
+}
+
+impl Default for Row {
+    /// A row of zeros: glam's own default of a matrix is the identity.
+    fn default() -> Self {
+        Self { diag: Sym3::default(), near: DMat3::ZERO, far: Sym3::default() }
+    }
 }
 
 /// One block row of the factor.
