@@ -1,1 +1,17 @@
 //! The loop that joins the rooms: gather, choose, draw, measure.
+//!
+//! In: a checked [`crate::scene::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that says how it went.
+//! A [`Session`] is a scene in play; [`play_headless`] and [`play_in_window`] drive it. Never here: a law of control, physics.
+
+mod cast;
+mod governor;
+mod headless;
+mod outcome;
+mod panels;
+mod session;
+mod window;
+
+pub use headless::{Drawing, End, Headless, play_headless};
+pub use outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
+pub use session::{Session, SessionError};
+pub use window::{WindowFailure, WindowPlan, play_in_window};

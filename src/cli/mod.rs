@@ -7,6 +7,7 @@ mod args;
 mod check;
 mod describe;
 mod output;
+mod play;
 mod progress;
 pub mod report;
 pub mod run;
@@ -42,9 +43,9 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Runs the command that the arguments ask for; `player` plays scenes.
+/// Runs the command that the arguments ask for.
 #[must_use]
-pub fn main(player: run::Player) -> ExitCode {
+pub fn main() -> ExitCode {
     let mut arguments: Vec<_> = std::env::args_os().collect();
     if arguments.len() < 2 {
         arguments.truncate(1);
@@ -52,15 +53,15 @@ pub fn main(player: run::Player) -> ExitCode {
     }
     let matches = Cli::command().get_matches_from(arguments);
     let done = match Cli::from_arg_matches(&matches) {
-        Ok(cli) => dispatch(cli, &matches, player),
+        Ok(cli) => dispatch(cli, &matches),
         Err(error) => error.exit(),
     };
     done.unwrap_or_else(|error| output::tell(&error)).into()
 }
 
-fn dispatch(cli: Cli, matches: &clap::ArgMatches, player: run::Player) -> anyhow::Result<Exit> {
+fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
-        Command::Run(args) => run::command(&args, matches.subcommand_matches("run"), player),
+        Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
         Command::Check(args) => check::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),

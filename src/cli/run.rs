@@ -1,13 +1,15 @@
 //! `run`: plays a scene and tells how it went.
 //!
-//! In: arguments, and a [`Player`] that knows the frame loop. Out: a picture, a report, rows of frames, verdicts on goals.
+//! In: arguments. Out: a picture, a report, rows of frames, verdicts on goals.
 //! Never here: the loop itself.
 
 use super::Exit;
 use super::args::RunArgs;
 use super::output::{BadInput, data, message};
+use super::play::play;
 use super::progress::Bar;
-use super::report::{FrameRow, Report, Verdict};
+use super::report::{Report, Verdict};
+use crate::frame::FrameRecord;
 use crate::scene::{Scene, Source, load};
 use anyhow::Context;
 use clap::ArgMatches;
@@ -26,6 +28,10 @@ const HEADLESS_S: f64 = 10.0;
 pub struct Request {
     /// The scene, with everything that flags, overrides and environment changed in it.
     pub scene: Scene,
+    /// Where it came from, so that it can be read again.
+    pub source: Source,
+    /// What was laid over it, in rising precedence.
+    pub overrides: Vec<(String, String)>,
     /// Whether a window is wanted; where none can be opened the run goes headless.
     pub window: bool,
     /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
@@ -53,7 +59,7 @@ pub struct Played {
     /// Its numbers.
     pub report: Report,
     /// Its frames.
-    pub frames: Vec<FrameRow>,
+    pub frames: Vec<FrameRecord>,
     /// Why there was no window though one was wanted.
     pub no_window: Option<String>,
     /// The picture that was written.
@@ -73,9 +79,6 @@ pub struct Step {
     pub frame_ms: f64,
 }
 
-/// Plays a scene. It is told a function that is called after every headless frame and answers whether to go on.
-pub type Player = fn(&Request, &mut dyn FnMut(Step) -> bool) -> anyhow::Result<Played>;
-
 impl Request {
     /// When a headless run ends.
     #[must_use]
@@ -85,14 +88,14 @@ impl Request {
 }
 
 /// Runs a scene.
-pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>, player: Player) -> anyhow::Result<Exit> {
+pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Exit> {
     check_outputs(args)?;
     let request = request(args, matches)?;
     let bar = Bar::new(&request.scene.name, args.quiet);
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
-    let played = player(&request, &mut |step| {
+    let played = play(&request, &mut |step| {
         bar.show(step.done, step.sim_s, step.frame_ms);
         !stopped.load(Ordering::Relaxed)
     })?;
@@ -121,7 +124,16 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     let scene = load(&source, &overrides)?;
     let end = args.frames.map(RunLength::Frames).or(args.seconds.map(RunLength::Seconds));
     let png_without_window = format!("metachron-{}.png", stem(&scene.name)).into();
-    Ok(Request { scene, window: !args.headless, end, size: args.size, png: args.png.clone(), png_without_window })
+    Ok(Request {
+        scene,
+        source,
+        overrides,
+        window: !args.headless,
+        end,
+        size: args.size,
+        png: args.png.clone(),
+        png_without_window,
+    })
 }
 
 fn quoted(text: &str) -> String {
@@ -181,7 +193,7 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     Ok(())
 }
 
-fn write_frames(path: &Path, frames: &[FrameRow]) -> anyhow::Result<()> {
+fn write_frames(path: &Path, frames: &[FrameRecord]) -> anyhow::Result<()> {
     let mut rows = csv::Writer::from_writer(BufWriter::new(File::create(path)?));
     for frame in frames {
         rows.serialize(frame)?;

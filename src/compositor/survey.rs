@@ -38,6 +38,16 @@ impl Stage {
             seen.push(view);
         }
     }
+
+    /// Centre and radius in metres of a ball that holds one actor, or all of them; `None` where there is nothing to see.
+    #[must_use]
+    pub fn bounds(&self, of: Option<AgentId>) -> Option<(DVec3, f64)> {
+        let wanted = |track: &&Track| of.is_none_or(|id| track.actor.id == id) && track.bounds.radius_m > 0.0;
+        let balls = || self.tracks.iter().filter(wanted).map(|track| (track.bounds.centre, track.bounds.radius_m));
+        let count = balls().count();
+        let centre = balls().map(|(centre, _)| centre).sum::<DVec3>() / count as f64;
+        (count > 0).then(|| (centre, balls().map(|(c, r)| c.distance(centre) + r).fold(0.0, f64::max)))
+    }
 }
 
 fn look(track: &Track, camera: &Camera, size: Size) -> Seen {

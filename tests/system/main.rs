@@ -2,5 +2,4 @@
 mod cli;
 mod picture;
 mod scene;
-mod scenes;
 mod viewer;

@@ -5,6 +5,7 @@
 //! x is a frame's work in units of the target. *Binding* frames are those whose full-detail cost exceeds 1.15 of it:
 //! the others would be on time by themselves and say nothing of a policy.
 
+use crate::frame::FrameRecord;
 use serde::Serialize;
 
 /// A miss is a frame whose work exceeds this many targets.
@@ -17,29 +18,6 @@ const SETTLE_MEDIAN: usize = 9;
 const SETTLE_BAND: f64 = 0.06;
 /// … for so many frames.
 const SETTLE_HOLD: usize = 20;
-
-/// One frame of a run: a row of `--frames-csv`.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
-pub struct FrameRow {
-    /// Number of the frame, from 0.
-    pub frame: u64,
-    /// The simulated time that it shows, seconds.
-    pub sim_s: f64,
-    /// Its work in milliseconds: gather, cull, select, draw, GPU where timed.
-    pub frame_ms: f64,
-    /// Distance to the start of the frame before, milliseconds.
-    pub interval_ms: f64,
-    /// What full detail would have cost, milliseconds, by the cost model; zero where there is none.
-    pub full_ms: f64,
-    /// Triangles drawn.
-    pub triangles: u64,
-    /// Objects drawn.
-    pub objects: u64,
-    /// The control loop's ε: ε̂ = 40·ε/L of the printed law, metres for the corrected one.
-    pub eps: f64,
-    /// Mean level n of what was drawn.
-    pub n: f64,
-}
 
 /// Mean, spread and percentiles of a measured time, milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
@@ -110,7 +88,7 @@ fn mean_and_stddev(values: &[f64]) -> (f64, f64) {
 
 /// The statistics of `frames`, which should each take `target_ms`.
 #[must_use]
-pub fn summarise(frames: &[FrameRow], target_ms: f64) -> FrameSummary {
+pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
     let x: Vec<f64> = frames.iter().map(|row| row.frame_ms / target_ms).collect();
     let binding: Vec<f64> =
         frames.iter().zip(&x).filter(|(row, _)| row.full_ms > BINDING * target_ms).map(|(_, x)| *x).collect();
@@ -162,8 +140,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn rows(work: impl IntoIterator<Item = f64>, full_ms: f64) -> Vec<FrameRow> {
-        work.into_iter().map(|frame_ms| FrameRow { frame_ms, full_ms, ..FrameRow::default() }).collect()
+    fn rows(work: impl IntoIterator<Item = f64>, full_ms: f64) -> Vec<FrameRecord> {
+        work.into_iter().map(|frame_ms| FrameRecord { frame_ms, full_ms, ..FrameRecord::default() }).collect()
     }
 
     #[test]

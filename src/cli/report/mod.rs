@@ -6,7 +6,7 @@ mod frames;
 mod goal;
 mod summary;
 
-pub use frames::{FrameRow, FrameSummary, Spread, summarise};
+pub use frames::{FrameSummary, Spread, summarise};
 pub use goal::{Goal, GoalError, Verdict};
 
 use serde::Serialize;
@@ -56,6 +56,8 @@ pub struct AgentReport {
     pub name: String,
     /// Its model.
     pub model: String,
+    /// What it did at the end: `running`, `resting` or `parked`.
+    pub state: &'static str,
     /// Steps taken.
     pub steps: u64,
     /// Steps a simulated second while it was awake.
@@ -66,14 +68,20 @@ pub struct AgentReport {
     pub dt_ms: f64,
     /// Last spacing of its simulation, metres; `None` for a model without one.
     pub eps_m: Option<f64>,
-    /// Last level of its primitive; `None` for a model without one.
+    /// Level of the primitive that its picture was last drawn with; `None` where it was never drawn.
     pub n: Option<u8>,
+    /// Spacing that its picture was last drawn with, metres; `None` for a model without one.
+    pub picture_eps_m: Option<f64>,
     /// CPU seconds of its turns, really measured.
     pub cpu_s: f64,
     /// Age of its state where it was drawn.
     pub age_ms: Quantiles,
+    /// How late its turns began.
+    pub late_ms: Quantiles,
     /// Simulated milliseconds that could not be made up.
     pub dropped_ms: f64,
+    /// Simulated milliseconds at rest.
+    pub rested_ms: f64,
     /// Whether it was taken out of the run after a failed step.
     pub parked: bool,
     /// Why it was parked.
@@ -140,20 +148,24 @@ impl Report {
     /// A report with one of everything, to tell names that exist from names that do not.
     #[must_use]
     fn template() -> Self {
-        let summary = summarise(&[FrameRow::default()], 1.0);
+        let summary = summarise(&[crate::frame::FrameRecord::default()], 1.0);
         let name = String::new;
         let agent = AgentReport {
             name: name(),
             model: name(),
+            state: "",
             steps: 0,
             rate_hz: 0.0,
             wanted_hz: 0.0,
             dt_ms: 0.0,
             eps_m: None,
             n: None,
+            picture_eps_m: None,
             cpu_s: 0.0,
             age_ms: Quantiles::default(),
+            late_ms: Quantiles::default(),
             dropped_ms: 0.0,
+            rested_ms: 0.0,
             parked: false,
             parked_reason: None,
             energy_j: 0.0,

@@ -7,7 +7,7 @@
 use super::super::Lost;
 use super::screen::GpuScreen;
 use super::show::{FrameTimes, Message, Show, Skip, Weight};
-use super::{Layout, Viewer, Wishes};
+use super::{Layout, Screen, Viewer, Wishes};
 use eframe::{CreationContext, NativeOptions, egui_wgpu};
 use std::cell::{Cell, OnceCell};
 use std::panic::{self, AssertUnwindSafe};
@@ -127,6 +127,7 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
         let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
+        show.drawn_by(screen.adapter());
         Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));

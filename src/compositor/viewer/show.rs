@@ -34,6 +34,9 @@ pub trait Show {
     /// A ball around one object, or around every movable object; `None` where there is nothing to see.
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds>;
 
+    /// Told who draws, each time a device is made.
+    fn drawn_by(&mut self, _adapter: &str) {}
+
     /// Whether the run has ended and the window should close by itself.
     fn wants_close(&self) -> bool {
         false

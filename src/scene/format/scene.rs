@@ -207,6 +207,9 @@ impl ExecutorKind {
 }
 
 impl PolicyKind {
+    /// All of them.
+    pub const ALL: [Self; 2] = [Self::Full, Self::Feedback];
+
     /// The name as scenes write it.
     #[must_use]
     pub const fn name(self) -> &'static str {

@@ -1,0 +1,175 @@
+//! Plays a request and turns what happened into a report.
+//!
+//! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
+
+use super::report::{AgentReport, BudgetReport, CouplingReport, ProbeReport, Quantiles, Report, summarise};
+use super::run::{Played, Request, RunLength, Step};
+use crate::compositor::viewer::WindowError;
+use crate::compositor::{Gpu, GpuError, Offscreen, RendererOptions, Size};
+use crate::frame::{
+    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Outcome, ProbeOutcome, Session, WindowFailure,
+    WindowPlan, play_headless, play_in_window,
+};
+use crate::runtime::{AgentState, Spread};
+use std::path::PathBuf;
+
+/// Told of every frame; answers whether to go on.
+type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
+
+/// Plays what is asked for: in a window where there can be one, else without.
+///
+/// # Errors
+/// What the models, the executor or the adapter refuse.
+pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+    let session = Session::open(request.scene.clone())?;
+    if !request.window {
+        return headless(session, request, request.png.clone(), go_on);
+    }
+    match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
+        Ok(outcome) => Ok(played(outcome, None)),
+        Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
+        Err(WindowFailure::Session(error)) => Err(error.into()),
+    }
+}
+
+fn window_plan(request: &Request) -> WindowPlan {
+    let (frames, seconds) = match request.end {
+        Some(RunLength::Frames(frames)) => (Some(frames), None),
+        Some(RunLength::Seconds(seconds)) => (None, Some(seconds)),
+        None => (None, None),
+    };
+    WindowPlan {
+        source: request.source.clone(),
+        overrides: request.overrides.clone(),
+        screenshots: PathBuf::from("."),
+        seconds,
+        frames,
+    }
+}
+
+/// A window was wanted and is not to be had: the run goes on without, and leaves a picture.
+fn without_window(session: Session, why: &WindowError, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+    let png = request.png.clone().unwrap_or_else(|| request.png_without_window.clone());
+    let mut played = headless(session, request, Some(png), go_on)?;
+    played.no_window = Some(why.to_string());
+    Ok(played)
+}
+
+fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+    let size = Size { width: request.size[0], height: request.size[1] };
+    let drawing = drawing(&session, png.is_some(), size)?;
+    let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
+    let end = match request.headless_end() {
+        RunLength::Frames(frames) => End::Frames(frames),
+        RunLength::Seconds(seconds) => End::Seconds(seconds),
+    };
+    let plan = Headless { end, size, drawing, png };
+    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, done)))?;
+    Ok(played(outcome, picture))
+}
+
+/// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter.
+fn drawing(session: &Session, picture: bool, size: Size) -> anyhow::Result<Drawing> {
+    if session.is_virtual() && !picture {
+        return Ok(Drawing::Nothing);
+    }
+    let gpu = match Gpu::headless() {
+        Ok(gpu) => gpu,
+        Err(error @ GpuError::NoAdapter { .. }) => {
+            super::output::message(&format!("nothing is drawn: {error}"));
+            return Ok(Drawing::Nothing);
+        }
+        Err(error) => return Err(error.into()),
+    };
+    let options = RendererOptions::for_adapter(&gpu.info);
+    let screen = Box::new(Offscreen::new(gpu, size, options)?);
+    Ok(if session.is_virtual() { Drawing::Last(screen) } else { Drawing::Every(screen) })
+}
+
+fn step(record: &FrameRecord, done: f64) -> Step {
+    Step { done, sim_s: record.sim_s, frame_ms: record.frame_ms }
+}
+
+fn played(outcome: Outcome, picture: Option<PathBuf>) -> Played {
+    let warm = outcome.warm_up.min(outcome.frames.len().saturating_sub(1));
+    let summary = summarise(&outcome.frames[warm..], outcome.target_ms);
+    let spent_share = (!outcome.frames.is_empty()).then(|| summary.frame_ms.mean / outcome.target_ms);
+    let report = Report {
+        scene: outcome.scene,
+        policy: outcome.policy.to_owned(),
+        law: outcome.law.to_owned(),
+        executor: outcome.executor.to_owned(),
+        adapter: outcome.adapter,
+        frames: outcome.frames.len() as u64,
+        sim_s: outcome.sim_s,
+        wall_s: outcome.wall_s,
+        cpu_s: outcome.cpu_s,
+        state_hash: format!("{:016x}", outcome.state_hash),
+        target_ms: outcome.target_ms,
+        summary,
+        agents: outcome.agents.iter().map(agent).collect(),
+        couplings: outcome.couplings.iter().map(coupling).collect(),
+        budget: BudgetReport { spent_share, clamped: outcome.clamp },
+        probes: outcome.probes.iter().map(probe).collect(),
+    };
+    Played { report, frames: outcome.frames, no_window: None, picture, interrupted: outcome.interrupted }
+}
+
+fn agent(agent: &AgentOutcome) -> AgentReport {
+    let stats = &agent.stats;
+    let parked_reason = match &stats.state {
+        AgentState::Parked(reason) => Some(reason.clone()),
+        AgentState::Running | AgentState::Resting => None,
+    };
+    AgentReport {
+        name: stats.name.to_string(),
+        model: stats.model.to_owned(),
+        state: match &stats.state {
+            AgentState::Running => "running",
+            AgentState::Resting => "resting",
+            AgentState::Parked(_) => "parked",
+        },
+        steps: stats.steps,
+        rate_hz: stats.mean_hz,
+        wanted_hz: stats.wanted_hz,
+        dt_ms: stats.dt.as_secs_f64() * 1e3,
+        eps_m: stats.resolution.map(|held| held.eps_m),
+        n: agent.picture.map(|drawn| drawn.n),
+        picture_eps_m: agent.picture.filter(|_| stats.resolution.is_some()).map(|drawn| drawn.eps_m),
+        cpu_s: stats.cpu_s,
+        age_ms: quantiles(stats.age),
+        late_ms: quantiles(stats.late),
+        dropped_ms: stats.dropped.as_secs_f64() * 1e3,
+        rested_ms: stats.rested.as_secs_f64() * 1e3,
+        parked: parked_reason.is_some(),
+        parked_reason,
+        energy_j: stats.energy_j,
+        residual_m: stats.residual_m,
+    }
+}
+
+fn quantiles(spread: Spread) -> Quantiles {
+    Quantiles { p50: spread.p50_s * 1e3, p99: spread.p99_s * 1e3 }
+}
+
+fn coupling(coupling: &Coupling) -> CouplingReport {
+    CouplingReport {
+        a: coupling.a.clone(),
+        b: coupling.b.clone(),
+        kind: coupling.kind.to_owned(),
+        contacts: u64::from(coupling.contacts),
+        force_n: coupling.force_n,
+        force_max_n: coupling.force_max_n,
+    }
+}
+
+fn probe(probe: &ProbeOutcome) -> ProbeReport {
+    let row = |&(time, at): &(metachron_agents::SimTime, glam::DVec3)| [time.as_secs_f64(), at.x, at.y, at.z];
+    ProbeReport {
+        object: probe.object.clone(),
+        at: probe.at,
+        position_m: probe.position.to_array(),
+        velocity_m_s: probe.velocity.to_array(),
+        samples: probe.samples.as_ref().map(|samples| samples.iter().map(row).collect()),
+    }
+}

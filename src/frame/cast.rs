@@ -1,0 +1,226 @@
+//! From a scene's cast to running agents and to what is seen of them.
+//!
+//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
+//! Never here: time passing.
+
+use super::governor::RateGovernor;
+use super::session::SessionError;
+use crate::compositor::{Actor, Camera, Form, Look, Material, Prop, Seen, Stage};
+use crate::control::{Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits};
+use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};
+use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind};
+use crate::scene::{self, Member, Scene, Spec};
+use glam::DVec3;
+use metachron_agents::Agent;
+use metachron_agents::instrument::Instrument;
+use metachron_agents::rigid::RigidBody;
+use metachron_agents::rod::Tube;
+use metachron_agents::shape::{Primitive, Solid, ToolShape};
+use metachron_agents::synthetic::Synthetic;
+use std::borrow::Cow;
+
+/// The agents of `scene`, ready to run.
+///
+/// # Errors
+/// [`SessionError::Build`] where a model refuses its object.
+pub(super) fn spawns(scene: &Scene) -> Result<Vec<AgentSpawn>, SessionError> {
+    let share = fair_share(machine(scene).cores, scene.agents.len());
+    scene.agents.iter().map(|member| spawn(scene, member, share)).collect()
+}
+
+/// The share of its period that one agent's work may take, so that all find room on `cores` beside the frame loop.
+fn fair_share(cores: u32, agents: usize) -> f64 {
+    (ROOM * f64::from(cores) / agents.max(1) as f64).min(SHARE_MAX)
+}
+
+/// Share of all cores that agents together may plan with: the frame loop wants the rest.
+const ROOM: f64 = 0.75;
+/// Share of its period that an agent may take however many cores are idle: past it every hiccup makes it late.
+const SHARE_MAX: f64 = 0.6;
+
+fn spawn(scene: &Scene, member: &Member, share: f64) -> Result<AgentSpawn, SessionError> {
+    let agent = build(member, scene.executor)
+        .map_err(|reason| SessionError::Build { name: member.name.clone(), reason: reason.to_string() })?;
+    let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
+    let watches = watches.filter_map(|probe| Some(Watch { at: probe.at, every: probe.every? }));
+    Ok(AgentSpawn {
+        name: member.name.clone(),
+        agent,
+        rate_hz: member.pace.rate_hz,
+        dt: member.pace.dt,
+        dt_range: member.pace.dt_range,
+        range: Some(member.simulation),
+        links: member.links.clone(),
+        watches: watches.collect(),
+        governor: governor(member, share),
+    })
+}
+
+fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<dyn std::error::Error>> {
+    Ok(match member.spec.clone() {
+        Spec::Tube(tube) => Box::new(Tube::new(tube)?),
+        Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
+        Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
+        Spec::Synthetic(synthetic) => {
+            let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
+            // where costs are declared nobody needs them burnt
+            Box::new(if executor == ExecutorKind::Lockstep { agent.declared_only() } else { agent })
+        }
+    })
+}
+
+/// Who steers the agent's dt and ε; nobody where the scene fixes both.
+fn governor(member: &Member, share: f64) -> Option<Box<dyn Governor>> {
+    let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
+    let limits = RateLimits {
+        dt_wanted_s: member.pace.dt.as_secs_f64(),
+        dt_max_s: member.pace.dt_range.1.as_secs_f64(),
+        eps_m: meshed.then_some(member.simulation.eps_m),
+        share,
+    };
+    let control = RateControl::new(limits, meshed.then_some(member.start.eps_m));
+    control.steers().then(|| Box::new(RateGovernor(control)) as Box<dyn Governor>)
+}
+
+/// The machine that `scene` declares.
+pub(super) fn machine(scene: &Scene) -> Machine {
+    let wish = &scene.machine;
+    let mut machine = Machine::preset(&wish.preset).unwrap_or_else(Machine::two_cores_software);
+    machine.cores = wish.cores.unwrap_or(machine.cores);
+    for (model, base_us, unit_us) in &wish.steps {
+        let known = machine.steps.iter().position(|price| price.model == *model);
+        let at = known.unwrap_or_else(|| {
+            machine.steps.push(StepPrice { model: Cow::Owned(model.clone()), base_us: 0.0, unit_us: 0.0 });
+            machine.steps.len() - 1
+        });
+        let price = &mut machine.steps[at];
+        price.base_us = base_us.unwrap_or(price.base_us);
+        price.unit_us = unit_us.unwrap_or(price.unit_us);
+    }
+    let draw = &mut machine.draw;
+    draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
+    draw.object_us = wish.draw_object_us.unwrap_or(draw.object_us);
+    draw.triangle_us = wish.draw_triangle_us.unwrap_or(draw.triangle_us);
+    draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
+    machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
+    machine.seed = wish.seed.unwrap_or(machine.seed);
+    machine
+}
+
+/// Everything that can be seen.
+pub(super) fn stage(scene: &Scene) -> Stage {
+    let actors =
+        scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
+    let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
+    let props = props.map(|(obstacle, wish)| Prop { obstacle: obstacle.clone(), look: look(wish) });
+    Stage::new(actors.collect(), props.collect())
+}
+
+fn form(spec: &Spec) -> Form {
+    match spec {
+        Spec::Tube(_) => Form::Tube,
+        Spec::Rigid(body) => Form::Solid(body.solid.clone()),
+        Spec::Instrument(_) => Form::Tool(ToolShape::default()),
+        Spec::Synthetic(_) => Form::Unseen,
+    }
+}
+
+const fn look(wish: &scene::Look) -> Look {
+    let material = match wish.material {
+        format::Material::Tissue => Material::Tissue,
+        format::Material::Metal => Material::Metal,
+        format::Material::Plastic => Material::Plastic,
+        format::Material::Skin => Material::Skin,
+    };
+    Look { colour: wish.colour, material }
+}
+
+/// The controller of the picture that `scene` asks for.
+pub(super) fn picture_control(scene: &Scene) -> PictureControl {
+    PictureControl::new(policy(scene.target.policy), law(&scene.target), scene.target.frame_hz)
+}
+
+/// Control's word for a policy.
+pub(super) const fn policy(kind: PolicyKind) -> Policy {
+    match kind {
+        PolicyKind::Full => Policy::Full,
+        PolicyKind::Feedback => Policy::Feedback,
+    }
+}
+
+/// The feedback law that a target asks for.
+pub(super) fn law(target: &scene::Target) -> Law {
+    let gains = &target.gains;
+    match target.law {
+        LawKind::Printed => {
+            let Law::Printed { alpha, beta } = Law::PRINTED else { return Law::PRINTED };
+            Law::Printed { alpha: gains.alpha.unwrap_or(alpha), beta: gains.beta.unwrap_or(beta) }
+        }
+        LawKind::Corrected => {
+            let Law::Corrected { kappa, margin } = Law::CORRECTED else { return Law::CORRECTED };
+            Law::Corrected { kappa: gains.kappa.unwrap_or(kappa), margin: gains.margin.unwrap_or(margin) }
+        }
+    }
+}
+
+/// An object in view as control wants to know it.
+pub(super) fn view(seen: &Seen, member: &Member) -> ObjectView {
+    let kind = match seen.tube_m {
+        Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
+        None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
+    };
+    ObjectView {
+        id: seen.id,
+        kind,
+        range: member.picture,
+        pixels: seen.pixels,
+        distance_m: seen.distance_m,
+        speed_px_s: seen.speed_px_s,
+        importance: member.look.importance,
+        visible: seen.visible,
+    }
+}
+
+/// Triangles of an object that is one mesh a level, at every level.
+fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
+    let of_tool = |n: u8| ToolShape::default().parts(0.0).iter().map(|part| part.primitive.triangles(n)).sum();
+    std::array::from_fn(|n| {
+        let n = n as u8;
+        match spec {
+            Spec::Rigid(body) => solid_triangles(&body.solid, n),
+            Spec::Instrument(_) => of_tool(n),
+            Spec::Tube(_) | Spec::Synthetic(_) => 0,
+        }
+    })
+}
+
+fn solid_triangles(solid: &Solid, n: u8) -> u32 {
+    match (Primitive::of(solid, n), solid) {
+        (Some((primitive, _)), _) => primitive.triangles(n),
+        (None, Solid::Mesh { triangles, .. }) => triangles.len() as u32,
+        // Euler: a closed triangle mesh of p corners has 2p - 4 faces
+        (None, Solid::Hull { points_m }) => (2 * points_m.len() as u32).saturating_sub(4),
+        (None, _) => 0,
+    }
+}
+
+/// The scene's camera `seconds` after the start; one that sees everything from the front where the scene has none.
+pub(super) fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
+    match &scene.camera {
+        Some(camera) => {
+            let view = camera.view_at(seconds);
+            Camera::looking(view.eye_m, view.look_at_m, view.fov_deg.to_radians())
+        }
+        None => overview(stage),
+    }
+}
+
+/// Vertical angle of view of a camera that nobody placed, radians.
+const OVERVIEW_FOV_RAD: f64 = 0.7;
+
+fn overview(stage: &Stage) -> Camera {
+    let (centre, radius_m) = stage.bounds(None).unwrap_or((DVec3::ZERO, 1.0));
+    let distance = 1.1 * radius_m / libm::sin(0.5 * OVERVIEW_FOV_RAD);
+    let towards = DVec3::new(0.35, -1.0, 0.55).normalize();
+    Camera::looking(centre + towards * distance, centre, OVERVIEW_FOV_RAD)
+}

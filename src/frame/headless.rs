@@ -1,0 +1,104 @@
+//! Plays a scene without a window: for reports, pictures and tests.
+//!
+//! In: a session, an end, what draws. Out: an [`Outcome`], and a picture file where one is wanted.
+//! Never here: arguments, progress bars (the caller is told of every frame).
+
+use super::outcome::{FrameRecord, Outcome};
+use super::session::{Session, SessionError};
+use crate::compositor::{Camera, Offscreen, Size, Style};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// When a run ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum End {
+    /// After so many frames.
+    Frames(u64),
+    /// After so many simulated seconds.
+    Seconds(f64),
+}
+
+/// What draws the frames.
+pub enum Drawing {
+    /// Nothing: a frame costs what the declared machine says, or nothing on real time.
+    Nothing,
+    /// Every frame is drawn.
+    Every(Box<Offscreen>),
+    /// Only the last frame is drawn, for its picture; costs are declared.
+    Last(Box<Offscreen>),
+}
+
+/// A run without a window.
+pub struct Headless {
+    /// When it ends.
+    pub end: End,
+    /// Size of the picture in pixels.
+    pub size: Size,
+    /// What draws it.
+    pub drawing: Drawing,
+    /// Where the last frame's picture goes.
+    pub png: Option<PathBuf>,
+}
+
+/// Plays `session` to its end. `go_on` is told of every frame and of the share of the run that is done, 0 … 1; on its `false`
+/// the run ends.
+///
+/// # Errors
+/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where the picture cannot be written.
+pub fn play_headless(
+    mut session: Session,
+    mut plan: Headless,
+    go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
+) -> Result<Outcome, SessionError> {
+    let period = session.period();
+    let mut due = Duration::ZERO;
+    let mut interrupted = false;
+    loop {
+        session.wait_until(due);
+        let done = share_done(&session, plan.end);
+        if done >= 1.0 || interrupted {
+            break;
+        }
+        let record = one_frame(&mut session, &mut plan)?;
+        interrupted = !go_on(&record, done);
+        due = (due + period).max(session.now());
+    }
+    write_picture(&mut session, &mut plan)?;
+    let adapter = match &plan.drawing {
+        Drawing::Every(gpu) | Drawing::Last(gpu) => Some(gpu.gpu().describe()),
+        Drawing::Nothing => None,
+    };
+    Ok(session.end(adapter, interrupted))
+}
+
+fn share_done(session: &Session, end: End) -> f64 {
+    match end {
+        End::Frames(frames) => session.frames() as f64 / frames as f64,
+        End::Seconds(seconds) => session.sim_now().as_secs_f64() / seconds,
+    }
+}
+
+/// Gathers, chooses, draws and learns.
+fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, SessionError> {
+    let started = session.now();
+    let camera = session.scene_camera();
+    session.compose(&camera, plan.size, Style::default(), None);
+    match &mut plan.drawing {
+        Drawing::Every(gpu) if !session.is_virtual() => draw(session, gpu, &camera)?,
+        Drawing::Every(_) | Drawing::Last(_) | Drawing::Nothing => session.spend_declared(plan.size),
+    }
+    let work = session.now().saturating_sub(started);
+    Ok(session.finish(started, work, false))
+}
+
+fn draw(session: &mut Session, gpu: &mut Offscreen, camera: &Camera) -> Result<(), SessionError> {
+    gpu.render(session.picture(), camera).map(drop).map_err(SessionError::Draw)
+}
+
+fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
+    let (Some(path), Drawing::Every(gpu) | Drawing::Last(gpu)) = (&plan.png, &mut plan.drawing) else { return Ok(()) };
+    let camera = session.scene_camera();
+    session.compose(&camera, plan.size, Style::default(), None);
+    gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+    gpu.save(path).map_err(SessionError::Picture)
+}

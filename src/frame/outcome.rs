@@ -1,0 +1,118 @@
+//! What a run leaves behind: every frame, every agent, every probe.
+//!
+//! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
+
+use crate::runtime::{AgentStats, Sample};
+use glam::DVec3;
+use metachron_agents::Resolution;
+use serde::Serialize;
+
+/// One frame: a row of `--frames-csv`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct FrameRecord {
+    /// Number of the frame, from 0.
+    pub frame: u64,
+    /// Simulated time it shows, seconds.
+    pub sim_s: f64,
+    /// Work of the frame, milliseconds: gather, choose, draw, adapter; virtual in lockstep.
+    pub frame_ms: f64,
+    /// From the start of the frame before to the start of this one, milliseconds; the first has the target's.
+    pub interval_ms: f64,
+    /// What drawing everything at its finest would have taken, milliseconds, by the declared machine's price of a triangle.
+    pub full_ms: f64,
+    /// Triangles drawn.
+    pub triangles: u64,
+    /// Objects in view.
+    pub objects: u64,
+    /// The loop's ε̂ = 40·ε/L of the printed law, or the corrected law's scene-wide ε in metres.
+    pub eps: f64,
+    /// Mean level n of the tubes in view, else of everything in view.
+    pub n: f64,
+}
+
+/// A probe's point at the end of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProbeOutcome {
+    /// The object's name.
+    pub object: String,
+    /// Share of its rest length.
+    pub at: f64,
+    /// Position, metres.
+    pub position: DVec3,
+    /// Velocity, m/s.
+    pub velocity: DVec3,
+    /// Time and position of the first state at or after every multiple of the wanted period.
+    pub samples: Option<Vec<Sample>>,
+}
+
+/// What two agents did to each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// Who holds.
+    pub a: String,
+    /// Who is held.
+    pub b: String,
+    /// Which law: `grasp`.
+    pub kind: &'static str,
+    /// Holds at the end of the run.
+    pub contacts: u32,
+    /// Force at the end of the run, newtons.
+    pub force_n: f64,
+    /// Largest force seen by a frame, newtons.
+    pub force_max_n: f64,
+}
+
+impl Coupling {
+    /// A grasp that has just begun.
+    pub(super) fn grasp(a: &str, b: &str) -> Self {
+        Self { a: a.to_owned(), b: b.to_owned(), kind: "grasp", contacts: 1, force_n: 0.0, force_max_n: 0.0 }
+    }
+}
+
+/// An agent at the end of the run, with the picture's resolution.
+#[derive(Debug, Clone)]
+pub struct AgentOutcome {
+    /// How it fared.
+    pub stats: AgentStats,
+    /// The resolution it was last drawn at; `None` where it has no picture.
+    pub picture: Option<Resolution>,
+}
+
+/// A run that has ended.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The scene's name.
+    pub scene: String,
+    /// The policy that chose levels.
+    pub policy: &'static str,
+    /// The feedback law.
+    pub law: &'static str,
+    /// The executor.
+    pub executor: &'static str,
+    /// Who drew; `None` where nothing was drawn.
+    pub adapter: Option<String>,
+    /// Wanted time of a frame, milliseconds.
+    pub target_ms: f64,
+    /// All frames.
+    pub frames: Vec<FrameRecord>,
+    /// Frames that taught nothing (the first ones): left out of the statistics of frame times.
+    pub warm_up: usize,
+    /// Simulated time, seconds.
+    pub sim_s: f64,
+    /// Wall time, seconds; virtual in lockstep.
+    pub wall_s: f64,
+    /// CPU time of all agents' turns, seconds; really measured.
+    pub cpu_s: f64,
+    /// Hash of all final states.
+    pub state_hash: u64,
+    /// All agents.
+    pub agents: Vec<AgentOutcome>,
+    /// All couplings.
+    pub couplings: Vec<Coupling>,
+    /// All probes.
+    pub probes: Vec<ProbeOutcome>,
+    /// Says that the controller rested on a limit at the end, and on which.
+    pub clamp: Option<String>,
+    /// Whether the user ended the run before its end.
+    pub interrupted: bool,
+}

@@ -1,0 +1,380 @@
+//! A scene in play: the runtime, the controller and the stage of one run, joined.
+//!
+//! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
+//! Never here: windows, files, arguments.
+
+use super::cast;
+use super::outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
+use crate::compositor::{Camera, GpuError, Hand, Picture, Seen, Size, Stage, States, Style};
+use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
+use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
+use crate::scene::format::{ExecutorKind, LawKind, PolicyKind, StatesKind};
+use crate::scene::{Probe, Scene};
+use metachron_agents::{AgentId, Body, Pull, Resolution, SimTime, Snapshot};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Why a scene could not be played, or not to its end.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// A model refused its object.
+    #[error("object \"{name}\": {reason}")]
+    Build {
+        /// The object's name.
+        name: String,
+        /// What the model said.
+        reason: String,
+    },
+    /// The agents could not be started.
+    #[error(transparent)]
+    Run(#[from] runtime::RunError),
+    /// The adapter failed.
+    #[error("drawing failed: {0}")]
+    Draw(#[source] GpuError),
+    /// The picture could not be written.
+    #[error("no picture: {0}")]
+    Picture(#[source] GpuError),
+}
+
+/// A scene in play.
+pub struct Session {
+    scene: Scene,
+    machine: Machine,
+    run: Box<dyn Run>,
+    stage: Stage,
+    control: PictureControl,
+    newest: Vec<Arc<Snapshot>>,
+    seen: Vec<Seen>,
+    views: Vec<ObjectView>,
+    levels: Vec<Resolution>,
+    couplings: Vec<Coupling>,
+    records: Vec<FrameRecord>,
+    chosen: Chosen,
+    last_start: Option<Duration>,
+    warm_up: usize,
+}
+
+/// What the last composition asks of the adapter.
+#[derive(Debug, Clone, Copy, Default)]
+struct Chosen {
+    sim: SimTime,
+    triangles: u64,
+    more_triangles: f64,
+    objects: u64,
+}
+
+/// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
+const WARM_UP_FRAMES: usize = 3;
+
+impl Session {
+    /// Starts the agents of `scene`.
+    ///
+    /// # Errors
+    /// [`SessionError::Build`] and [`SessionError::Run`]; nothing runs then.
+    pub fn open(scene: Scene) -> Result<Self, SessionError> {
+        let machine = cast::machine(&scene);
+        let spawns = cast::spawns(&scene)?;
+        let run: Box<dyn Run> = match scene.executor {
+            ExecutorKind::Threads => Box::new(Threads::start(spawns, Arc::new(runtime::SystemClock::new()))?),
+            ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, machine.clone())?),
+        };
+        Ok(Self {
+            control: cast::picture_control(&scene),
+            newest: run.agents().iter().map(AgentHandle::latest).collect(),
+            stage: cast::stage(&scene),
+            machine,
+            run,
+            seen: Vec::new(),
+            views: Vec::new(),
+            levels: Vec::new(),
+            couplings: Vec::new(),
+            records: Vec::new(),
+            chosen: Chosen::default(),
+            last_start: None,
+            warm_up: 0,
+            scene,
+        })
+    }
+
+    /// The scene that is played.
+    #[must_use]
+    pub const fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Wall time since the start; virtual in lockstep.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.run.now()
+    }
+
+    /// Simulated time now.
+    #[must_use]
+    pub fn sim_now(&self) -> SimTime {
+        self.run.sim_now()
+    }
+
+    /// Whether time is virtual and costs are declared.
+    #[must_use]
+    pub fn is_virtual(&self) -> bool {
+        self.scene.executor == ExecutorKind::Lockstep
+    }
+
+    /// Frames finished.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.records.len() as u64
+    }
+
+    /// Wanted time between frames.
+    #[must_use]
+    pub fn period(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.control.target_hz())
+    }
+
+    /// The agents.
+    #[must_use]
+    pub fn agents(&self) -> &[AgentHandle] {
+        self.run.agents()
+    }
+
+    /// The controller of the picture.
+    pub const fn control(&mut self) -> &mut PictureControl {
+        &mut self.control
+    }
+
+    /// The name of the policy that chooses levels, as scenes write it.
+    #[must_use]
+    pub fn policy_name(&self) -> &'static str {
+        match self.control.policy() {
+            Policy::Full => PolicyKind::Full.name(),
+            Policy::Feedback => PolicyKind::Feedback.name(),
+        }
+    }
+
+    /// Lets the policy of this name choose levels; an unknown name changes nothing.
+    pub fn set_policy(&mut self, name: &str) {
+        if let Some(kind) = PolicyKind::ALL.into_iter().find(|kind| kind.name() == name) {
+            self.control.set_policy(cast::policy(kind));
+        }
+    }
+
+    /// The name of the feedback law, as scenes write it.
+    #[must_use]
+    pub fn law_name(&self) -> &'static str {
+        match self.control.law() {
+            Law::Printed { .. } => LawKind::Printed.name(),
+            Law::Corrected { .. } => LawKind::Corrected.name(),
+        }
+    }
+
+    /// Says that the controller rests on a limit, and on which; `None` where it does not.
+    #[must_use]
+    pub fn clamp(&self) -> Option<String> {
+        let status = self.control.status();
+        matches!(status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed).then(|| status.to_string())
+    }
+
+    /// The force of the user's hand on an agent, newtons.
+    #[must_use]
+    pub fn hand_force_n(&self, on: AgentId) -> f64 {
+        let grips = self.newest.get(on.0 as usize).map_or(&[][..], |state| &state.grips);
+        grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()
+    }
+
+    /// What can be seen.
+    #[must_use]
+    pub const fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// The picture composed last.
+    #[must_use]
+    pub fn picture(&self) -> &Picture {
+        self.stage.picture()
+    }
+
+    /// The level each agent was last drawn at, in their order.
+    #[must_use]
+    pub fn levels(&self) -> &[Resolution] {
+        &self.levels
+    }
+
+    /// The scene's own camera at this moment.
+    #[must_use]
+    pub fn scene_camera(&self) -> Camera {
+        cast::camera(&self.scene, &self.stage, self.sim_now().as_secs_f64())
+    }
+
+    /// Waits until the wall time `until`, the agents going on meanwhile.
+    pub fn wait_until(&mut self, until: Duration) {
+        self.run.wait_until(until);
+    }
+
+    /// Changes the flow of time.
+    pub fn drive(&mut self, drive: Drive) {
+        self.run.drive(drive);
+    }
+
+    /// Lets the user's hand pull at an agent, or let go. An agent that is gone takes no hand.
+    pub fn hand(&self, to: AgentId, pull: Option<Pull>) -> Result<(), runtime::SendError> {
+        self.run.send(to, Command::Hand(pull))
+    }
+
+    /// Takes the newest states, finds what `camera` sees of them, chooses levels and makes the picture.
+    pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
+        self.gather();
+        self.stage.survey(camera, size, &mut self.seen);
+        self.choose();
+        let picture = self.stage.compose(camera, &self.levels, style, hand);
+        self.chosen.triangles = picture.triangles();
+        picture
+    }
+
+    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself.
+    pub fn spend_declared(&mut self, size: Size) {
+        let Chosen { objects, triangles, .. } = self.chosen;
+        let cost = self.machine.draw_time(objects, triangles, size.pixels() as u64, self.frames());
+        self.run.spend(cost);
+    }
+
+    /// Ends the frame that began at `started` and took `work`; `skip` keeps the controller from learning from it.
+    pub fn finish(&mut self, started: Duration, work: Duration, skip: bool) -> FrameRecord {
+        let record = self.record(started, work);
+        self.records.push(record);
+        self.last_start = Some(started);
+        let cold = !self.is_virtual() && self.records.len() <= WARM_UP_FRAMES;
+        self.warm_up += usize::from(cold);
+        self.control.observe(FrameWork { work, skip: skip || cold });
+        record
+    }
+
+    /// Ends the run.
+    #[must_use]
+    pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
+        self.gather();
+        let handles = self.run.agents().to_vec();
+        let clamp = self.clamp();
+        let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
+        let (wall_s, sim_s) = (self.now().as_secs_f64(), self.sim_now().as_secs_f64());
+        let stats = self.run.shutdown();
+        let drawn = |at: usize| self.levels.get(at).copied();
+        Outcome {
+            scene,
+            policy,
+            law,
+            executor: self.scene.executor.name(),
+            adapter,
+            target_ms: 1e3 / self.control.target_hz(),
+            frames: self.records,
+            warm_up: self.warm_up,
+            sim_s,
+            wall_s,
+            cpu_s: stats.iter().map(|s| s.cpu_s).sum(),
+            state_hash: runtime::state_hash(&handles),
+            probes: probes(&self.scene, &handles),
+            agents: stats
+                .into_iter()
+                .enumerate()
+                .map(|(at, stats)| AgentOutcome { picture: drawn(at), stats })
+                .collect(),
+            couplings: self.couplings,
+            clamp,
+            interrupted,
+        }
+    }
+
+    fn gather(&mut self) {
+        let now = self.run.sim_now();
+        for (agent, newest) in self.run.agents().iter().zip(&mut self.newest) {
+            *newest = agent.latest();
+            agent.record_age(agent.age_s(newest, now));
+            self.stage.see(agent.id(), newest, agent.state() == AgentState::Running);
+        }
+        self.stage.pose(now, states(self.scene.states));
+        self.chosen.sim = now;
+        self.note_grasps();
+    }
+
+    /// Keeps who holds whom, and how hard.
+    fn note_grasps(&mut self) {
+        self.couplings.iter_mut().for_each(|c| (c.contacts, c.force_n) = (0, 0.0));
+        for (holder, snapshot) in self.scene.agents.iter().zip(&self.newest) {
+            let Body::Tool(tool) = &snapshot.body else { continue };
+            let Some(grasp) = tool.grasp else { continue };
+            let held = &self.scene.agents[grasp.target.0 as usize].name;
+            let known = self.couplings.iter().position(|c| c.a == holder.name && c.b == *held);
+            let at = known.unwrap_or_else(|| {
+                self.couplings.push(Coupling::grasp(&holder.name, held));
+                self.couplings.len() - 1
+            });
+            let coupling = &mut self.couplings[at];
+            coupling.contacts = 1;
+            coupling.force_n = tool.force_n;
+            coupling.force_max_n = coupling.force_max_n.max(tool.force_n);
+        }
+    }
+
+    fn choose(&mut self) {
+        self.views.clear();
+        self.views.extend(self.seen.iter().zip(&self.scene.agents).map(|(seen, member)| cast::view(seen, member)));
+        let plan = self.control.plan(&self.views);
+        self.levels.clear();
+        self.levels.extend(plan.levels.iter().map(|level| level.resolution));
+        self.chosen.objects = self.seen.iter().filter(|s| s.visible).count() as u64;
+        self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
+    }
+
+    fn record(&self, started: Duration, work: Duration) -> FrameRecord {
+        let Chosen { sim, triangles, more_triangles, objects } = self.chosen;
+        let frame_ms = work.as_secs_f64() * 1e3;
+        let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
+        FrameRecord {
+            frame: self.frames(),
+            sim_s: sim.as_secs_f64(),
+            frame_ms,
+            interval_ms: interval.as_secs_f64() * 1e3,
+            full_ms: frame_ms + more_triangles * self.machine.draw.triangle_us * 1e-3,
+            triangles,
+            objects,
+            eps: self.control.eps_hat(),
+            n: self.mean_level(),
+        }
+    }
+
+    /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
+    fn mean_level(&self) -> f64 {
+        let mean = |tubes_only: bool| {
+            let drawn =
+                self.seen.iter().zip(&self.levels).filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
+            let (sum, count) = drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.n), count + 1.0));
+            (count > 0.0).then(|| sum / count)
+        };
+        mean(true).or_else(|| mean(false)).unwrap_or(0.0)
+    }
+}
+
+const fn states(kind: StatesKind) -> States {
+    match kind {
+        StatesKind::Interpolate => States::Interpolate,
+        StatesKind::Extrapolate => States::Extrapolate,
+        StatesKind::Latest => States::Latest,
+    }
+}
+
+/// Where every probe's point is in the final states.
+fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
+    // an agent's watches are its probes with a period, in the scene's order
+    let watch = |at: usize| {
+        let probe = &scene.probes[at];
+        scene.probes[..at].iter().filter(|p| p.agent == probe.agent && p.every.is_some()).count()
+    };
+    let point = |(at, probe): (usize, &Probe)| {
+        let agent = &handles[probe.agent.0 as usize];
+        let (position, velocity) = agent.latest().body.probe(probe.at)?;
+        let samples = probe.every.map(|_| agent.samples(watch(at)));
+        Some(ProbeOutcome { object: probe.object.clone(), at: probe.at, position, velocity, samples })
+    };
+    scene.probes.iter().enumerate().filter_map(point).collect()
+}

@@ -1,0 +1,263 @@
+//! A session in a window: what the viewer asks for reaches the rooms, what the rooms say reaches the viewer.
+//!
+//! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
+
+use super::outcome::{FrameRecord, Outcome};
+use super::panels;
+use super::session::{Session, SessionError};
+use crate::compositor::viewer::{
+    Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
+    run_window,
+};
+use crate::compositor::{Camera, Hand, Hit, Picture, Ray};
+use crate::runtime::Drive;
+use crate::scene::{self, Scene, SceneError, Source};
+use glam::DVec3;
+use metachron_agents::{AgentId, Pull, SimSpan};
+use std::path::PathBuf;
+use std::time::Duration;
+
+/// A run in a window.
+pub struct WindowPlan {
+    /// Where the scene came from, so that it can be read again.
+    pub source: Source,
+    /// Values that were laid over it.
+    pub overrides: Vec<(String, String)>,
+    /// Where screenshots go.
+    pub screenshots: PathBuf,
+    /// Simulated seconds after which the window closes by itself.
+    pub seconds: Option<f64>,
+    /// Frames after which the window closes by itself.
+    pub frames: Option<u64>,
+}
+
+/// Why a window could not be shown; the session is given back where it can go on without one.
+pub enum WindowFailure {
+    /// There is no display or no adapter for one.
+    NoWindow(Box<Session>, WindowError),
+    /// A scene could not be started again.
+    Session(SessionError),
+}
+
+/// Shows `session` in a window until it is closed.
+///
+/// # Errors
+/// [`WindowFailure::NoWindow`] gives the session back.
+pub fn play_in_window(
+    session: Session,
+    plan: WindowPlan,
+    go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
+) -> Result<Outcome, WindowFailure> {
+    let options = WindowOptions { size: None, screenshots: plan.screenshots.clone(), lose_device_after: None };
+    let mut show = WindowShow::new(session, plan, go_on);
+    match run_window(&mut show, &options) {
+        Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
+        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
+    }
+}
+
+/// A session as the viewer sees it.
+struct WindowShow<'a> {
+    go_on: &'a mut dyn FnMut(&FrameRecord, f64) -> bool,
+    adapter: Option<String>,
+    stopped: bool,
+    session: Session,
+    plan: WindowPlan,
+    status: Status,
+    hand: Option<Hand>,
+    started: Duration,
+    refreshed: Option<Duration>,
+    speed: f64,
+    running: bool,
+}
+
+/// Panels are filled anew this often: faster, nobody reads them.
+const PANELS_EVERY: Duration = Duration::from_millis(100);
+/// How fast a held body swings on the user's spring, rad/s: firm, and slow enough for every agent's step.
+const HAND_RAD_S: f64 = 25.0;
+/// Share of critical damping of the user's spring.
+const HAND_DAMPING: f64 = 0.7;
+
+impl<'a> WindowShow<'a> {
+    fn new(session: Session, plan: WindowPlan, go_on: &'a mut dyn FnMut(&FrameRecord, f64) -> bool) -> Self {
+        let mut show = Self {
+            go_on,
+            adapter: None,
+            stopped: false,
+            status: panels::first(&session),
+            session,
+            plan,
+            hand: None,
+            started: Duration::ZERO,
+            refreshed: None,
+            speed: 1.0,
+            running: true,
+        };
+        show.refresh();
+        show
+    }
+
+    /// Plays `scene` from its beginning instead.
+    fn restart(&mut self, scene: Scene) {
+        match Session::open(scene) {
+            Ok(session) => {
+                drop(std::mem::replace(&mut self.session, session));
+                let messages = std::mem::take(&mut self.status.messages);
+                self.status = Status { messages, ..panels::first(&self.session) };
+                (self.hand, self.refreshed) = (None, None);
+                self.session.drive(Drive::Speed(self.speed));
+                if !self.running {
+                    self.session.drive(Drive::Pause);
+                }
+            }
+            Err(error) => self.say(Weight::Failure, error.to_string()),
+        }
+    }
+
+    fn reload(&mut self) {
+        match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
+            Ok(scene) => self.restart(scene),
+            Err(error) => self.say(Weight::Failure, format!("not reloaded: {error}")),
+        }
+    }
+
+    fn open(&mut self, path: &std::path::Path) {
+        self.plan.overrides.clear();
+        match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
+            Ok(scene) => self.restart(scene),
+            Err(error) => self.say(Weight::Failure, format!("not opened: {error}")),
+        }
+    }
+
+    fn load(&mut self, source: Source) -> Result<Scene, SceneError> {
+        let scene = scene::load(&source, &self.plan.overrides)?;
+        self.plan.source = source;
+        Ok(scene)
+    }
+
+    fn say(&mut self, weight: Weight, text: String) {
+        self.status.messages.push(Message { weight, text });
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        match drive {
+            Drive::Run => self.running = true,
+            Drive::Pause | Drive::Step(_) => self.running = false,
+            Drive::Speed(speed) => self.speed = speed,
+        }
+        self.session.drive(drive);
+    }
+
+    fn pull(&mut self, hand: Option<Hand>) {
+        if let Some(left) = self.hand.filter(|old| hand.is_none_or(|new| new.object != old.object)) {
+            self.tell(left.object, None);
+        }
+        self.hand = hand;
+        if let Some(hand) = hand {
+            let mass_kg = panels::mass_kg(&self.session.scene().agents[hand.object.0 as usize].spec);
+            let pull = Pull {
+                by: None,
+                anchor: hand.anchor,
+                target: hand.target,
+                target_velocity: DVec3::ZERO,
+                stiffness_n_m: mass_kg * HAND_RAD_S * HAND_RAD_S,
+                damping_n_s_m: 2.0 * HAND_DAMPING * mass_kg * HAND_RAD_S,
+            };
+            self.tell(hand.object, Some(pull));
+        }
+    }
+
+    fn tell(&mut self, to: AgentId, pull: Option<Pull>) {
+        if let Err(error) = self.session.hand(to, pull) {
+            self.say(Weight::Warning, error.to_string());
+        }
+    }
+
+    /// How much of a run that ends by itself is done, 0 … 1.
+    fn share_done(&self) -> f64 {
+        let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
+        let seconds = self.plan.seconds.map(|all| self.session.sim_now().as_secs_f64() / all);
+        frames.or(seconds).unwrap_or(0.0)
+    }
+
+    /// Fills the panels anew where their time has come.
+    fn refresh(&mut self) {
+        let now = self.session.now();
+        if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
+            return;
+        }
+        let since = self.refreshed.map_or(Duration::ZERO, |last| now - last);
+        panels::fill(&mut self.status, &mut self.session, since);
+        self.refreshed = Some(now);
+    }
+}
+
+impl Show for WindowShow<'_> {
+    fn apply(&mut self, action: Action) {
+        match action {
+            Action::Run => self.drive(Drive::Run),
+            Action::Pause => self.drive(Drive::Pause),
+            Action::SingleStep => {
+                let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
+                self.drive(Drive::Step(frame));
+            }
+            Action::Reset => self.restart(self.session.scene().clone()),
+            Action::Reload => self.reload(),
+            Action::Speed(speed) => self.drive(Drive::Speed(speed)),
+            Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
+            Action::Policy(name) => self.session.set_policy(&name),
+            Action::Law(law) => self.session.control().set_law(panels::control_law(law)),
+            Action::DragStart(hit) => {
+                self.pull(Some(Hand { object: hit.object, anchor: hit.anchor, target: hit.point_m }));
+            }
+            Action::DragMove(target) => self.pull(self.hand.map(|hand| Hand { target, ..hand })),
+            Action::DragEnd => self.pull(None),
+            Action::Select(agent) => self.status.selected = agent,
+            Action::OpenScene(path) => self.open(&path),
+        }
+    }
+
+    fn compose(&mut self, view: &ViewRequest) -> &Picture {
+        self.started = self.session.now();
+        self.session.wait_until(self.started);
+        self.refresh();
+        self.status.sim_time = self.session.sim_now();
+        (self.status.running, self.status.speed) = (self.running, self.speed);
+        self.status.held =
+            self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
+        self.session.compose(&view.camera, view.size, view.style, self.hand)
+    }
+
+    fn measured(&mut self, times: &FrameTimes) {
+        let skip = times.skip.is_some();
+        if times.skip != Some(Skip::Hidden) {
+            let record = self.session.finish(self.started, times.work, skip);
+            let done = self.share_done();
+            self.stopped |= !(self.go_on)(&record, done);
+        }
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn drawn_by(&mut self, adapter: &str) {
+        self.adapter = Some(adapter.to_owned());
+    }
+
+    fn scene_camera(&self) -> Camera {
+        self.session.scene_camera()
+    }
+
+    fn pick(&self, ray: Ray) -> Option<Hit> {
+        self.session.stage().pick(ray)
+    }
+
+    fn bounds(&self, of: Option<AgentId>) -> Option<Bounds> {
+        self.session.stage().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
+    }
+
+    fn wants_close(&self) -> bool {
+        self.stopped || self.share_done() >= 1.0
+    }
+}
