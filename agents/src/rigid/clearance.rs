@@ -66,7 +66,13 @@ impl Mover {
             _ => solid.to_shared_shape()?,
         };
         let convex = shape.as_compound().is_none_or(|parts| parts.shapes().len() == 1);
-        let (radius_m, swing_m) = extents(solid, body.com);
+        let (mut radius_m, mut swing_m) = extents(solid, body.com);
+        if !convex {
+            // voxels stick out of the mesh a little
+            let ball = shape.compute_local_bounding_sphere();
+            let far = f64::from(ball.radius) + ball.center.as_dvec3().distance(body.com);
+            (radius_m, swing_m) = (radius_m.max(far), swing_m.max(far));
+        }
         Ok(Self { shape, com: body.com, convex, radius_m, swing_m })
     }
 

@@ -8,6 +8,8 @@ use crate::{
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
+mod surfaces;
+
 const G: f64 = 9.81;
 const UP: DVec3 = DVec3::Z;
 
@@ -115,7 +117,12 @@ fn flight_past_an_obstacle_is_the_same_flight() {
 }
 
 fn apexes(restitution: f64, count: usize, dt: f64) -> Vec<f64> {
-    let mut body = RigidBody::new(ball(1.0, restitution)).unwrap();
+    apexes_of(ball(1.0, restitution), count, dt)
+}
+
+/// The first heights from which a ball of 5 cm falls again, metres above where it touches.
+fn apexes_of(spec: RigidSpec, count: usize, dt: f64) -> Vec<f64> {
+    let mut body = RigidBody::new(spec).unwrap();
     let (mut heights, mut last) = (vec![], state(&body));
     for _ in 0..100_000 {
         step(&mut body, dt);
