@@ -296,3 +296,74 @@ fn sort_solids(solids: &mut [(MeshKey, SolidInstance)], picture: &mut Picture) {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::gather::{Actor, States};
+    use super::super::view::Size;
+    use super::*;
+    use metachron_agents::{CurveState, SimTime, Snapshot};
+    use std::sync::Arc;
+
+    const SIZE: Size = Size { width: 640, height: 360 };
+
+    fn tube_at(ms: u64) -> Arc<Snapshot> {
+        let arc_m: Vec<f64> = (0..=40).map(|i| f64::from(i) * 0.01).collect();
+        let height = 0.001 * ms as f64;
+        let body = Body::Curve(CurveState {
+            positions: arc_m.iter().map(|&s| DVec3::new(s, 0.1 * (9.0 * s).sin(), height)).collect(),
+            velocities: vec![DVec3::Z; 41],
+            frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); 40],
+            radii_m: vec![0.01; 41],
+            arc_m,
+        });
+        Arc::new(Snapshot { time: SimTime::from_nanos(ms * 1_000_000), steps: ms, body, ..Snapshot::default() })
+    }
+
+    fn stage() -> (Stage, Camera) {
+        let look = Look { colour: [220, 120, 110], material: Material::Tissue };
+        let stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
+        (stage, Camera::looking(DVec3::new(0.2, -1.0, 0.5), DVec3::new(0.2, 0.0, 0.0), 0.7))
+    }
+
+    #[test]
+    fn later_frames_use_the_storage_of_the_first_ones() {
+        let (mut stage, camera) = stage();
+        let (mut seen, mut places) = (Vec::new(), Vec::new());
+        let levels = [Resolution { eps_m: 0.005, n: 4 }];
+        for frame in 0..6 {
+            stage.see(AgentId(0), &tube_at(10 * frame), true);
+            stage.pose(SimTime::from_nanos(10_000_000 * frame + 500_000), States::Interpolate);
+            stage.survey(&camera, SIZE, &mut seen);
+            let picture = stage.compose(&camera, &levels, Style::default(), None);
+            let buffers = [picture.samples.as_ptr().addr(), picture.instances.as_ptr().addr()];
+            let Some((Body::Curve(curve), _)) = stage.shown(AgentId(0)) else { panic!("a curve was seen") };
+            places.push((buffers, curve.positions.as_ptr().addr(), seen.as_ptr().addr()));
+        }
+        assert!(places[1..].iter().all(|p| *p == places[1]), "{places:?}");
+    }
+
+    #[test]
+    fn a_tube_gets_the_intervals_and_triangles_of_its_level() {
+        let (mut stage, camera) = stage();
+        stage.see(AgentId(0), &tube_at(0), true);
+        stage.pose(SimTime::ZERO, States::Latest);
+        for (eps_m, n, intervals) in [(0.1, 0, 4), (0.005, 3, 80)] {
+            let picture = stage.compose(&camera, &[Resolution { eps_m, n }], Style::default(), None);
+            assert_eq!((picture.tubes[0].intervals, picture.samples.len()), (intervals, intervals as usize + 1));
+            let caps = 2 * u64::from(Primitive::Ball.triangles(n));
+            assert_eq!(picture.triangles(), u64::from(intervals) * (12 << n) + caps);
+        }
+    }
+
+    #[test]
+    fn a_tube_out_of_sight_is_kept_for_its_shadow_only() {
+        let (mut stage, camera) = stage();
+        stage.see(AgentId(0), &tube_at(0), true);
+        stage.pose(SimTime::ZERO, States::Latest);
+        let away = Camera::looking(camera.eye(), camera.eye() - camera.forward(), camera.fov_y_rad);
+        stage.survey(&away, SIZE, &mut Vec::new());
+        let picture = stage.compose(&away, &[], Style::default(), None);
+        assert!(!picture.tubes[0].shown);
+    }
+}

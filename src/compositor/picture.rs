@@ -161,7 +161,7 @@ impl Default for Picture {
             instances: Vec::new(),
             solids: Vec::new(),
             floor: None,
-            meshes: Arc::from([]),
+            meshes: Arc::default(),
         }
     }
 }

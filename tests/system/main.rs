@@ -2,4 +2,5 @@
 mod cli;
 mod picture;
 mod scene;
+mod scenes;
 mod viewer;
