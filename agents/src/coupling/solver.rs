@@ -32,6 +32,9 @@ pub struct Settings {
 pub struct Problem<'a> {
     /// The contacts, by rising keys.
     pub contacts: &'a [Contact],
+    /// How far, in keys, the names lie that a contact may have had in the last solve: a place that passes from one
+    /// segment to the next takes its impulse along.
+    pub kin: &'a [i64],
     /// The step, seconds, > 0.
     pub h_s: f64,
     /// A scale of each slot's inverse mass, 1/kg, or 1/(kg·m²) for a spin; ≥ 0. Only the speed of convergence depends on it.
@@ -52,7 +55,7 @@ pub struct SolverReport {
 /// The memory of the solve: warm starts by key, and room to work in (nothing is allocated once the sizes settle).
 #[derive(Debug, Clone, Default)]
 pub struct Solver {
-    known: Vec<(u64, DVec3)>,
+    known: Vec<Known>,
     known_h: f64,
     stiffness: f64,
     scale: Vec<f64>,
@@ -61,6 +64,15 @@ pub struct Solver {
     ahead: Iterate,
     next: Iterate,
     answer: Vec<DVec3>,
+}
+
+/// The impulse of a contact of the last solve.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    key: u64,
+    lambda: DVec3,
+    /// Whether a contact of this solve has taken it up.
+    taken: bool,
 }
 
 /// Impulses λ, and the velocities W λ they cause at the contacts.
@@ -110,19 +122,45 @@ impl Solver {
         self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h)));
         self.scale.clear();
         self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
-        let longer = if self.known_h > 0.0 { h / self.known_h } else { 0.0 };
-        let mut known = self.known.iter().peekable();
-        self.now.lambda.clear();
-        self.now.lambda.extend(contacts.iter().map(|c| {
-            while known.next_if(|(key, _)| *key < c.key).is_some() {}
-            known.next_if(|(key, _)| *key == c.key).map_or(DVec3::ZERO, |(_, lambda)| c.project(*lambda * longer))
-        }));
+        self.start(problem);
         self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
     }
 
+    /// Starts from the impulses of the last solve: those of the same name, then those of kin that no longer are.
+    fn start(&mut self, problem: &Problem<'_>) {
+        let Self { known, known_h, now, .. } = self;
+        let longer = if *known_h > 0.0 { problem.h_s / *known_h } else { 0.0 };
+        let mut at = 0;
+        now.lambda.clear();
+        now.lambda.extend(problem.contacts.iter().map(|c| {
+            at += known[at..].iter().take_while(|k| k.key < c.key).count();
+            let same = known.get_mut(at).filter(|k| k.key == c.key);
+            same.map_or(DVec3::NAN, |k| {
+                k.taken = true;
+                k.lambda
+            })
+        }));
+        for (contact, lambda) in problem.contacts.iter().zip(&mut now.lambda) {
+            if lambda.is_nan() {
+                *lambda = DVec3::ZERO;
+                for offset in problem.kin {
+                    let key = contact.key.wrapping_add_signed(*offset);
+                    let Ok(found) = known.binary_search_by_key(&key, |k| k.key) else { continue };
+                    if !known[found].taken {
+                        known[found].taken = true;
+                        *lambda += known[found].lambda;
+                    }
+                }
+            }
+            *lambda = contact.project(*lambda * longer);
+        }
+    }
+
     fn remember(&mut self, problem: &Problem<'_>) {
-        self.known.clear();
-        self.known.extend(problem.contacts.iter().zip(&self.now.lambda).map(|(c, &lambda)| (c.key, lambda)));
+        let Self { known, now, .. } = self;
+        let named = problem.contacts.iter().zip(&now.lambda);
+        known.clear();
+        known.extend(named.map(|(c, &lambda)| Known { key: c.key, lambda, taken: false }));
         self.known_h = problem.h_s;
     }
 

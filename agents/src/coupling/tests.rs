@@ -64,7 +64,7 @@ fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> 
 fn after(contacts: &[Contact], free: &[DVec3], body: &mut Dense, settings: Settings) -> (Vec<DVec3>, Solver) {
     let (mut velocities, mut solver) = (free.to_vec(), Solver::default());
     let mobilities = body.mobilities();
-    let problem = Problem { contacts, h_s: 0.01, mobilities: &mobilities, settings };
+    let problem = Problem { contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings };
     solver.solve(&problem, &mut velocities, body);
     (velocities, solver)
 }
@@ -178,7 +178,7 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
     let settings = Settings { iterations: 50, tolerance_m_s: 1e-9 };
     for _ in 0..200 {
         velocities.iter_mut().for_each(|v| *v += gravity * h);
-        let problem = Problem { contacts: &contacts, h_s: h, mobilities: &[10.0; N as usize], settings };
+        let problem = Problem { contacts: &contacts, kin: &[], h_s: h, mobilities: &[10.0; N as usize], settings };
         solver.solve(&problem, &mut velocities, &mut body);
         way += velocities[2].x * h;
     }
@@ -204,7 +204,7 @@ fn a_warm_start_saves_most_of_the_answers() {
     let free: Vec<DVec3> = (0..8).map(|_| noise.vector()).collect();
     let mobilities = body.mobilities();
     let settings = Settings { iterations: 500, tolerance_m_s: 1e-6 };
-    let problem = Problem { contacts: &contacts, h_s: 0.01, mobilities: &mobilities, settings };
+    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings };
     let mut solver = Solver::default();
     let cold = solver.solve(&problem, &mut free.clone(), &mut body);
     let warm = solver.solve(&problem, &mut free.clone(), &mut body);
@@ -217,9 +217,26 @@ fn contacts_that_stay_open_cost_no_answer() {
     let mut slots = Slots::default();
     slots.add_linear(0, 1.0);
     let contacts = [Contact { key: 0, slots, normal: DVec3::Z, gap_m: 0.1, friction: 0.5 }];
-    let problem = Problem { contacts: &contacts, h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
+    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
     let mut never = |_: &mut [DVec3]| unreachable!("nothing touches");
     let mut velocities = [DVec3::new(0.0, 0.0, -5.0)];
     let report = Solver::default().solve(&problem, &mut velocities, &mut never);
     assert_eq!((report.iterations, velocities[0].z), (0, -5.0));
+}
+
+#[test]
+fn an_impulse_passes_to_the_next_of_kin() {
+    let mut body = Dense::diagonal(&[1.0]);
+    let mut slots = Slots::default();
+    slots.add_linear(0, 1.0);
+    let mut solver = Solver::default();
+    let mut press = |key: u64| {
+        let contacts = [Contact { key, slots, normal: DVec3::Z, gap_m: 0.0, friction: 0.5 }];
+        let mut velocities = [DVec3::new(0.1, 0.0, -1.0)];
+        let problem = Problem { contacts: &contacts, kin: &[-1, 1], h_s: 0.01, mobilities: &[0.3], settings: PATIENT };
+        solver.solve(&problem, &mut velocities, &mut body).iterations
+    };
+    assert!(press(7) > 1);
+    assert_eq!([press(7), press(8), press(7)], [1; 3]);
+    assert!(press(9) > 1); // two names away is nobody's kin
 }

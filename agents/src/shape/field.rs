@@ -25,6 +25,8 @@ pub(crate) const TOUCHES_MAX: usize = 4;
 pub(crate) struct Touches {
     places: [Option<Touch>; TOUCHES_MAX],
     count: usize,
+    /// No surface is nearer than this, metres, whatever the reach was.
+    pub clear_m: f64,
 }
 
 impl Touches {
@@ -126,9 +128,15 @@ impl Field {
     pub fn touches(&self, point: DVec3, reach_m: f64) -> Touches {
         let mut found = Touches::default();
         if let Kind::Mesh(mesh) = &self.kind {
-            mesh.touches(point, reach_m, &mut found);
+            let around_m = mesh.distance_from_bounds(point);
+            if around_m <= reach_m {
+                mesh.touches(point, reach_m, &mut found);
+            }
+            let nearest = found.iter().next();
+            found.clear_m = nearest.map_or(reach_m.max(around_m), |t| t.distance_m);
         } else {
             let touch = self.nearest(point);
+            found.clear_m = touch.distance_m;
             if touch.distance_m <= reach_m {
                 found.push(touch);
             }

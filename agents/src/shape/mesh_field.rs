@@ -19,6 +19,7 @@ pub(crate) struct MeshField {
     face_tree: Bvh,
     edges: Vec<Edge>,
     edge_tree: Bvh,
+    bounds: (DVec3, DVec3),
 }
 
 #[derive(Debug, Clone)]
@@ -70,7 +71,14 @@ impl MeshField {
         let edges = standing_edges(&mut faces);
         let face_tree = tree(faces.iter().map(|f| f.corners.as_slice()));
         let edge_tree = tree(edges.iter().map(|e| e.ends.as_slice()));
-        Self { faces, face_tree, edges, edge_tree }
+        let bounds = super::convert::bounds(&mesh.points);
+        Self { faces, face_tree, edges, edge_tree, bounds }
+    }
+
+    /// How far `point` is from the box around all triangles, metres; 0 inside.
+    pub fn distance_from_bounds(&self, point: DVec3) -> f64 {
+        let (low, high) = self.bounds;
+        (low - point).max(point - high).max(DVec3::ZERO).length()
     }
 
     /// Every wall within `reach_m` of `centre`, nearest first (eq. 13).

@@ -13,11 +13,16 @@ use crate::shape::field::Ball;
 use crate::shape::{Obstacle, ShapeError};
 pub(crate) use act::Solved;
 use glam::DVec3;
-use pairs::{Meeting, Pairs};
+use pairs::{Meeting, PLACES, Pairs};
 use walls::{WallTouch, Walls};
 
 /// Contacts are taken up this share of the radius before they touch: impulses of other contacts may close the rest.
 const SLACK_RADII: f64 = 0.05;
+
+/// What a step of the second and of the first segment is in the key of a pair's place.
+const KEY_STEPS: [u64; 2] = [PLACES as u64, 1 << 20];
+/// The names that a foot had before it passed to the next segment.
+const KIN: [i64; 4] = [KEY_STEPS[0] as i64, -(KEY_STEPS[0] as i64), KEY_STEPS[1] as i64, -(KEY_STEPS[1] as i64)];
 
 /// A tube's skin at the start of a substep: balls on nodes, joined by spans.
 #[derive(Debug, Clone, Copy)]
@@ -115,7 +120,7 @@ impl TubeContacts {
         velocities: &mut [DVec3],
         body: &mut impl Response,
     ) -> SolverReport {
-        let problem = Problem { contacts: &self.contacts, h_s, mobilities: &self.mobilities, settings };
+        let problem = Problem { contacts: &self.contacts, kin: &KIN, h_s, mobilities: &self.mobilities, settings };
         self.solver.solve(&problem, velocities, body)
     }
 }
@@ -168,7 +173,7 @@ impl Skin<'_> {
     }
 }
 
-/// Self-contact: the nearest points of two segments, and arms to the middle of the gap (eq. 20).
+/// Self-contact: facing points of two segments, and arms to the middle of the gap (eq. 20).
 fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
     let mut slots = Slots::default();
     for (side, sign) in [(0, 1.0), (1, -1.0)] {
@@ -179,7 +184,8 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
         let arm = meeting.normal * -sign * (meeting.radii_m[side] + 0.5 * meeting.gap_m);
         slots.add_angular(segment_slot(segment) as u32, arm * sign);
     }
-    let key = u64::from(meeting.segments[0]) << 20 | u64::from(meeting.segments[1]);
+    let [first, second] = meeting.segments.map(u64::from);
+    let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(meeting.place);
     Contact { key, slots, normal: meeting.normal, gap_m: meeting.gap_m, friction }
 }
 

@@ -44,20 +44,28 @@ struct Motion {
     ahead_m: f64,
 }
 
-/// Where two segments are nearest.
+/// A place where two segments face each other.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Meeting {
     /// The segments; the first has the lower number.
     pub segments: [u32; 2],
-    /// The nearest points, as shares of the segments.
+    /// Which of the places of this pair, [`PLACES`] at most: its name together with the segments.
+    pub place: u32,
+    /// The facing points, as shares of the segments.
     pub shares: [f64; 2],
     /// Unit vector from the second segment to the first.
     pub normal: DVec3,
     /// Distance of the surfaces, metres; negative where they overlap.
     pub gap_m: f64,
-    /// Radii at the nearest points, metres.
+    /// Radii at the facing points, metres.
     pub radii_m: [f64; 2],
 }
+
+/// Places of a pair: the first node of either segment, the last node of the tube, a crossing.
+pub(super) const PLACES: u32 = 4;
+/// Segments cross if the sine of their angle is above this. Below it their nodes tell it all: at 0.2 the axes of a crossing
+/// are (0.1 l)²/2d nearer than the nodes, 40 µm for l = 15 mm and d = 30 mm.
+const CROSSING_SINE: f64 = 0.2;
 
 /// The near pairs of a tube, kept while they hold.
 #[derive(Debug, Clone, Default)]
@@ -94,10 +102,10 @@ impl Pairs {
             if pair.gap_m - (travel_m - pair.measured_at_m) > margin_m {
                 continue;
             }
-            let meeting = meet(skin, [pair.first, pair.second]);
-            (pair.gap_m, pair.measured_at_m) = (meeting.gap_m, travel_m);
-            if meeting.gap_m <= margin_m && !is_told_by_next(skin, &meeting) {
-                visit(meeting);
+            let nearest = nearest(skin, [pair.first, pair.second]);
+            (pair.gap_m, pair.measured_at_m) = (nearest.gap_m, travel_m);
+            if nearest.gap_m <= margin_m {
+                visit_places(skin, nearest, margin_m, &mut visit);
             }
         }
     }
@@ -152,7 +160,7 @@ impl Pairs {
         list.clear();
         list.extend(keys.iter().filter_map(|key| {
             let (first, second) = ((key >> 32) as u32, *key as u32);
-            let gap_m = meet(skin, [first, second]).gap_m;
+            let gap_m = nearest(skin, [first, second]).gap_m;
             let apart = first.abs_diff(second) > 1;
             (apart && gap_m <= reach_m).then_some(Pair { first, second, gap_m, measured_at_m: 0.0 })
         }));
@@ -182,27 +190,75 @@ pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
     i.abs_diff(j) <= 1 || Capsule::new(skin, i).is_neighbour(&Capsule::new(skin, j))
 }
 
-/// Whether the next segment along the tube meets the same point: each end is told once.
-pub(super) fn is_told_by_next(skin: &Skin<'_>, meeting: &Meeting) -> bool {
-    let [i, j] = meeting.segments.map(|s| s as usize);
-    let [s, t] = meeting.shares;
-    (s >= 1.0 && !is_neighbour(skin, i + 1, j)) || (t >= 1.0 && j + 1 < skin.segments())
+/// Visits the places of a near pair whose gap is within the margin (eq. 18).
+///
+/// The nearest points alone would not do: where strands run side by side they jump from end to end at the slightest tilt,
+/// and the tube rocks for ever. Nodes and their feet stay.
+pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, visit: &mut impl FnMut(Meeting)) {
+    let [first, second] = nearest.segments;
+    let [i, j] = [first as usize, second as usize];
+    let mut try_at = |place: u32, shares: [f64; 2]| {
+        let meeting = at(skin, [first, second], place, shares);
+        if meeting.gap_m <= margin_m {
+            visit(meeting);
+        }
+    };
+    if let Some(t) = foot(skin, i, j) {
+        try_at(0, [0.0, t]);
+    }
+    if let Some(s) = foot(skin, j, i) {
+        try_at(1, [s, 0.0]);
+    }
+    if j + 1 == skin.segments()
+        && let Some(s) = foot(skin, j + 1, i)
+    {
+        try_at(2, [s, 1.0]);
+    }
+    let inside = nearest.shares.iter().all(|s| (1e-3..=1.0 - 1e-3).contains(s));
+    let [u, v] = [i, j].map(|k| skin.positions[k + 1] - skin.positions[k]);
+    let sine2 = u.cross(v).length_squared() / (u.length_squared() * v.length_squared());
+    if inside && sine2 > CROSSING_SINE * CROSSING_SINE {
+        visit(nearest);
+    }
+}
+
+/// The share of `segment` at which a node has its foot. Each foot on a chain is told by one segment: at a joint that sticks
+/// out by the later one, past an end of the chain by the last one there.
+fn foot(skin: &Skin<'_>, node: usize, segment: usize) -> Option<f64> {
+    let share = |k: usize| {
+        let (a, b) = (skin.positions[k], skin.positions[k + 1]);
+        (skin.positions[node] - a).dot(b - a) / (b - a).length_squared()
+    };
+    let here = share(segment);
+    if here >= 1.0 {
+        return (segment + 1 == skin.segments()).then_some(1.0);
+    }
+    let ours = here >= 0.0 || segment == 0 || share(segment - 1) >= 1.0;
+    ours.then_some(here.max(0.0))
 }
 
 /// Where two segments are nearest (eq. 18).
-pub(super) fn meet(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
+pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
     let [a, b] = segments.map(|k| [skin.positions[k as usize], skin.positions[k as usize + 1]]);
     let (s, t) = near_segments(a, b);
-    let way = a[0].lerp(a[1], s) - b[0].lerp(b[1], t);
-    let distance = way.length();
-    let radius = |k: u32, share: f64| {
-        let [from, to] = [skin.radii_m[k as usize], skin.radii_m[k as usize + 1]];
-        from + (to - from) * share
+    at(skin, segments, PLACES - 1, [s, t])
+}
+
+/// The meeting of two given points.
+fn at(skin: &Skin<'_>, segments: [u32; 2], place: u32, shares: [f64; 2]) -> Meeting {
+    let ball = |side: usize| {
+        let k = segments[side] as usize;
+        skin.ball(k).toward(skin.ball(k + 1), shares[side])
     };
-    let radii_m = [radius(segments[0], s), radius(segments[1], t)];
+    let (a, b) = (ball(0), ball(1));
+    let way = a.centre - b.centre;
+    let distance = way.length();
     // axes that cross have no way between them: across both is as good as any
-    let along = (a[1] - a[0]).normalize_or(DVec3::Z);
-    let across = || along.cross(b[1] - b[0]).try_normalize().unwrap_or_else(|| along.any_orthonormal_vector());
+    let across = || {
+        let [u, v] = segments.map(|k| skin.positions[k as usize + 1] - skin.positions[k as usize]);
+        u.cross(v).try_normalize().unwrap_or_else(|| u.normalize_or(DVec3::Z).any_orthonormal_vector())
+    };
     let normal = if distance > 1e-9 { way / distance } else { across() };
-    Meeting { segments, shares: [s, t], normal, gap_m: distance - radii_m[0] - radii_m[1], radii_m }
+    let radii_m = [a.radius_m, b.radius_m];
+    Meeting { segments, place, shares, normal, gap_m: distance - a.radius_m - b.radius_m, radii_m }
 }

@@ -84,17 +84,17 @@ fn the_grid_finds_every_pair_that_trying_all_finds() {
         chain.shake(DVec3::ZERO, &mut noise);
         let skin = chain.skin();
         let mut met = Vec::new();
-        Pairs::default().visit(&skin, 0.001, |m| met.push((m.segments, m.gap_m)));
+        Pairs::default().visit(&skin, 0.001, |m| met.push((m.segments, m.place, m.gap_m)));
         let speeds: Vec<DVec3> = chain.slots.iter().step_by(2).copied().collect();
         let mean = speeds.iter().sum::<DVec3>() / speeds.len() as f64;
         let ahead = |k: usize| STEP * speeds[k].distance(mean).max(speeds[k + 1].distance(mean));
         let mut all = Vec::new();
         for i in 0..skin.segments() {
             for j in i + 1..skin.segments() {
-                let meeting = pairs::meet(&skin, [i as u32, j as u32]);
-                let near = meeting.gap_m <= 0.001 + ahead(i) + ahead(j) && !pairs::is_neighbour(&skin, i, j);
-                if near && !pairs::is_told_by_next(&skin, &meeting) {
-                    all.push((meeting.segments, meeting.gap_m));
+                let nearest = pairs::nearest(&skin, [i as u32, j as u32]);
+                let margin_m = 0.001 + ahead(i) + ahead(j);
+                if nearest.gap_m <= margin_m && !pairs::is_neighbour(&skin, i, j) {
+                    pairs::visit_places(&skin, nearest, margin_m, &mut |m| all.push((m.segments, m.place, m.gap_m)));
                 }
             }
         }

@@ -159,7 +159,7 @@ impl Wall {
         let touches = self.field.touches(ball.centre, ball.radius_m + reach_m);
         let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
-        self.nodes[node].0 = self.near[node].map_or(reach_m, |t| t.distance_m - ball.radius_m);
+        self.nodes[node].0 = touches.clear_m - ball.radius_m;
         if skin.is_held(node) {
             return;
         }
