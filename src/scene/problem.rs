@@ -8,7 +8,7 @@ use std::ops::Range;
 use std::sync::Arc;
 use thiserror::Error;
 
-/// More problems than this are counted, not shown.
+/// More problems than this are counted, not told.
 const SHOWN_MAX: usize = 50;
 
 /// Text longer than this is cut where a problem quotes it, in characters.
@@ -16,13 +16,15 @@ const QUOTE_MAX: usize = 80;
 
 /// A scene that cannot be used, with everything that is wrong with it.
 #[derive(Debug, Error, Diagnostic)]
-#[error("{}", headline(name, problems.len()))]
+#[error("{}", headline(name, problems.len() + hidden))]
 pub struct SceneError {
     /// The scene's name or file.
     pub name: String,
     /// What is wrong, in the order of the text; at least one.
     #[related]
     pub problems: Vec<SceneProblem>,
+    /// How many more problems there are than are told of.
+    pub hidden: usize,
 }
 
 fn headline(name: &str, count: usize) -> String {
@@ -69,7 +71,7 @@ impl SceneError {
             source_code: None,
             span: None,
         };
-        Self { name: name.to_owned(), problems: vec![problem] }
+        Self { name: name.to_owned(), problems: vec![problem], hidden: 0 }
     }
 
     /// `problems` shown in `text`, in its order.
@@ -78,11 +80,8 @@ impl SceneError {
         let hidden = problems.len().saturating_sub(SHOWN_MAX);
         problems.truncate(SHOWN_MAX);
         let source: Arc<str> = text.into();
-        let mut problems: Vec<_> = problems.into_iter().map(|p| p.shown(name, &source)).collect();
-        if let Some(last) = problems.last_mut().filter(|_| hidden > 0) {
-            last.help = Some(format!("and {hidden} more problems"));
-        }
-        Self { name: name.to_owned(), problems }
+        let problems = problems.into_iter().map(|p| p.shown(name, &source)).collect();
+        Self { name: name.to_owned(), problems, hidden }
     }
 }
 

@@ -236,6 +236,18 @@ fn all_problems_are_told_at_once_in_the_order_of_the_text() {
 }
 
 #[test]
+fn deep_nesting_and_many_problems_stay_readable() {
+    for open in ["[", "{a="] {
+        let said = problem(&format!("format = 1\nx = {}\n", open.repeat(100_000))).3;
+        assert!(said.contains("recurs"), "{said}");
+    }
+    let objects: String = (0..200).map(|i| format!("[[object]]\nname = \"{i}\"\nmodel = \"x\"\n")).collect();
+    let error = read(&format!("format = 1\n{objects}")).unwrap_err();
+    assert_eq!(error.problems.len() + error.hidden, 200);
+    assert!(error.problems.len() <= 50 && error.to_string().contains("200 problems"), "{error}");
+}
+
+#[test]
 fn more_agents_than_threads_can_carry_are_refused() {
     let ball = |i| format!("[[object]]\nname = \"b{i}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n");
     let many = |n| format!("format = 1\n{}", (0..n).map(ball).collect::<String>());

@@ -110,7 +110,7 @@ pub(in crate::scene) fn read_objects(
 ) -> Objects {
     let Some(list) = list else { return Objects::default() };
     let DeValue::Array(items) = list.get_ref() else {
-        let found = format!("`object` is a {}", list.get_ref().type_str());
+        let found = format!("`object` is of type {}", list.get_ref().type_str());
         c.push(Problem::new(list.span(), found).expecting("expected tables under `[[object]]`"));
         return Objects::default();
     };
@@ -130,7 +130,7 @@ pub(in crate::scene) fn read_objects(
 fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>) -> Option<Entry> {
     let path = format!("object.{index}");
     let DeValue::Table(table) = item.get_ref() else {
-        let found = format!("entry {} of `object` is a {}", index + 1, item.get_ref().type_str());
+        let found = format!("entry {} of `object` is of type {}", index + 1, item.get_ref().type_str());
         c.push(Problem::new(item.span(), found).expecting("expected a table: `[[object]]`"));
         return None;
     };
@@ -167,7 +167,7 @@ fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) 
     }
     let message = match found {
         Some(found) => format!("`model` is `{found}`, which does not exist"),
-        None => format!("`model` is a {}", value.get_ref().type_str()),
+        None => format!("`model` is of type {}", value.get_ref().type_str()),
     };
     let help = found.and_then(|found| did_you_mean(found, MODELS));
     c.push(Problem::new(value.span(), message).expecting(format!("expected one of {list}")).helped(help));
