@@ -179,13 +179,15 @@ impl Capsule {
         }
     }
 
+    /// Whether two segments are so near along the tube that they touch through its own thickness (eq. 15): a tube bent as
+    /// sharply as it can be, to the radius of its own skin, comes back to itself after π r.
     fn is_neighbour(&self, other: &Self) -> bool {
         (self.arc_m - other.arc_m).abs() < self.neighbourhood_m + other.neighbourhood_m
     }
 }
 
-/// Whether two segments are so near along the tube that they touch through its own thickness (eq. 15): a tube bent as sharply
-/// as it can be, to the radius of its own skin, comes back to itself after π r.
+/// Whether two segments never touch, for tests.
+#[cfg(test)]
 pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
     i.abs_diff(j) <= 1 || Capsule::new(skin, i).is_neighbour(&Capsule::new(skin, j))
 }
