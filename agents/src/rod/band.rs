@@ -19,15 +19,8 @@ pub struct Row {
     pub far: Sym3,
 }
 
-impl Default for Row {
-    /// A row of zeros: glam's own default of a matrix is the identity.
-    fn default() -> Self {
-        Self { diag: Sym3::default(), near: DMat3::ZERO, far: Sym3::default() }
-    }
-}
-
 /// One block row of the factor.
-#[derive(Debug, Clone, Copy, Default)]
+#[derive(Debug, Clone, Copy)]
 struct Factored {
     /// Inverse of the pivot D_i.
     inverse: Sym3,
@@ -35,6 +28,15 @@ struct Factored {
     near: DMat3,
     /// L(i, i − 2).
     far: DMat3,
+}
+
+impl Row {
+    /// Nothing at all. (No `Default`: that of a `DMat3` is the identity.)
+    pub const ZERO: Self = Self { diag: Sym3::ZERO, near: DMat3::ZERO, far: Sym3::ZERO };
+}
+
+impl Factored {
+    const ZERO: Self = Self { inverse: Sym3::ZERO, near: DMat3::ZERO, far: DMat3::ZERO };
 }
 
 /// The factor of A. It answers impulses with velocities: this is the seam at which contacts work ([`crate::rod`]).
@@ -55,10 +57,15 @@ pub struct InverseBlocks {
 }
 
 impl Factor {
+    /// How many slots the matrix had; none before the first.
+    pub fn slots(&self) -> usize {
+        self.rows.len()
+    }
+
     /// Factors the matrix; returns the first slot whose pivot is not positive definite, where there is one (eq. 16).
     pub fn factor(&mut self, rows: &[Row]) -> Result<(), usize> {
-        self.rows.resize(rows.len(), Factored::default());
-        let (mut before, mut last) = (Sym3::default(), Sym3::default()); // pivots' inverses of rows i − 2, i − 1
+        self.rows.resize(rows.len(), Factored::ZERO);
+        let (mut before, mut last) = (Sym3::ZERO, Sym3::ZERO); // pivots' inverses of rows i − 2, i − 1
         let mut last_near = DMat3::ZERO; // A(i − 1, i − 2) after elimination
         for (i, (row, out)) in rows.iter().zip(&mut self.rows).enumerate() {
             let far = row.far.times(&before);
@@ -90,11 +97,10 @@ impl Factor {
         }
     }
 
-    #[cfg_attr(not(test), expect(dead_code, reason = "contacts, which call it, land after it"))]
     /// The blocks of A⁻¹ inside the band, in one sweep from the last row (eq. 18).
     pub fn inverse_blocks(&self, into: &mut InverseBlocks) {
         let n = self.rows.len();
-        into.diag.resize(n, Sym3::default());
+        into.diag.resize(n, Sym3::ZERO);
         into.near.resize(n.saturating_sub(1), DMat3::ZERO);
         into.far.resize(n.saturating_sub(2), DMat3::ZERO);
         for j in (0..n).rev() {
@@ -136,10 +142,10 @@ mod tests {
         let mut vector = move || DVec3::new(next(), next(), next());
         (0..n)
             .map(|i| {
-                let mut row = Row { diag: Sym3::diagonal(DVec3::splat(6.0)), ..Row::default() };
+                let mut row = Row { diag: Sym3::diagonal(DVec3::splat(6.0)), ..Row::ZERO };
                 row.diag += Sym3::outer(vector(), 1.0);
                 row.near = if i > 0 { DMat3::from_cols(vector(), vector(), vector()) } else { DMat3::ZERO };
-                row.far = if i > 1 { Sym3::outer(vector(), 1.0) } else { Sym3::default() };
+                row.far = if i > 1 { Sym3::outer(vector(), 1.0) } else { Sym3::ZERO };
                 row
             })
             .collect()

@@ -56,6 +56,8 @@ pub struct Config {
     pub elastic_j: f64,
     /// Energy in gravity, J, zero at the origin.
     pub gravity_j: f64,
+    /// Kinetic energy with consistent mass and rotary inertia, J (eq. 10).
+    pub kinetic_j: f64,
     /// The largest stretch along the director, 1 at rest.
     pub stretch: f64,
 }
@@ -79,11 +81,10 @@ impl Config {
         self.force.resize(2 * segments + 1, DVec3::ZERO);
     }
 
-    /// Whether every position, frame and velocity is finite.
+    /// Whether every position, frame and velocity is finite. Needs [`Config::strain`].
     pub fn is_finite(&self) -> bool {
-        // a sum is finite only if all its terms are, and overflow of a sum of states is no state to keep either
-        let sum: DVec3 = self.x.iter().chain(&self.u).sum();
-        sum.is_finite() && self.q.iter().fold(DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), |s, q| s + *q).is_finite()
+        // energies hold every position, velocity and frame in squares or products: they are finite only if all are
+        (self.elastic_j + self.gravity_j + self.kinetic_j).is_finite()
     }
 
     /// Computes strains, forces and energies of this state (eq. 2–10).
@@ -93,6 +94,7 @@ impl Config {
         self.stretch = 0.0;
         self.force[0] = DVec3::ZERO;
         self.stretch_and_shear(matter, division);
+        self.measure_motion(matter, division);
         self.bend_and_twist(matter, division);
     }
 
@@ -109,15 +111,16 @@ impl Config {
             let tk = director(q[k]);
             let u = (x[k + 1] - x[k]) * (1.0 / l);
             let (along, u2) = (tk.dot(u), u.length_squared());
-            let n = u * ga + tk * ((ea - ga) * along - ea * s0);
+            // shear and extension apart: C u − s₀ EA t without its cancellation
+            let (shear, extension) = (u - tk * along, along - s0);
+            let n = shear * ga + tk * (ea * extension);
             let weight = gravity * (0.5 * mu * l);
-            let extension = along - s0;
             (t[k], e[k]) = (tk, u);
             b[k] = if u2 > 0.0 { (n.dot(u) / u2).clamp(0.0, tension_max) } else { 0.0 };
             force[2 * k] += n + weight;
             force[2 * k + 1] = u.cross(n) * l;
             force[2 * k + 2] = weight - n;
-            self.elastic_j += 0.5 * l * (ga * (u2 - along * along) + ea * extension * extension);
+            self.elastic_j += 0.5 * l * (ga * shear.length_squared() + ea * extension * extension);
             self.gravity_j -= weight.dot(x[k] + x[k + 1]);
             self.stretch = self.stretch.max(along / s0);
         }
@@ -144,16 +147,17 @@ impl Config {
         }
     }
 
-    /// Kinetic energy with consistent mass and rotary inertia, J (eq. 10). Needs directors.
-    pub fn kinetic_j(&self, matter: &Matter, division: &Division) -> f64 {
-        let (mut linear, mut rotary) = (0.0, 0.0);
-        for (k, &l) in division.length.iter().enumerate() {
-            let (a, w, b) = (self.u[2 * k], self.u[2 * k + 1], self.u[2 * k + 2]);
+    /// Brings the kinetic energy up to date with the velocities (eq. 10). Needs directors.
+    pub fn measure_motion(&mut self, matter: &Matter, division: &Division) {
+        let (mut linear, mut rotary, mut a) = (0.0, 0.0, self.u[0]);
+        for ((pair, t), &l) in self.u[1..].chunks_exact(2).zip(&self.t).zip(&division.length) {
+            let (w, b) = (pair[0], pair[1]);
             linear += l * (a.dot(a + b) + b.length_squared());
-            let about = self.t[k].dot(w);
+            let about = t.dot(w);
             rotary += l * (w.length_squared() + about * about);
+            a = b;
         }
-        matter.mu * linear / 6.0 + 0.5 * matter.rotary * rotary
+        self.kinetic_j = matter.mu * linear / 6.0 + 0.5 * matter.rotary * rotary;
     }
 
     /// Linear momentum, kg·m/s, and angular momentum about the origin, kg·m²/s. Needs directors.
@@ -182,7 +186,7 @@ pub struct Joint {
 
 impl Joint {
     /// Joint `index` of the division, between these frames.
-    #[inline]
+    #[inline(always)]
     pub fn between(division: &Division, index: usize, before: DQuat, after: DQuat) -> Self {
         let theta = log(after * before.conjugate());
         let strain = theta - before * division.bend[index];
@@ -190,7 +194,7 @@ impl Joint {
     }
 
     /// The moment that turns what lies before the joint forward and what lies after it back (eq. 6, 9).
-    #[inline]
+    #[inline(always)]
     fn moment(&self, matter: &Matter, axis: DVec3, energy_j: &mut f64) -> DVec3 {
         let Self { theta, strain, inverse } = *self;
         let m = (strain * matter.ei + axis * ((matter.gj - matter.ei) * axis.dot(strain))) * inverse;

@@ -3,7 +3,7 @@
 //! In: a state, a span, what holds and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
-use super::band::{Factor, Row};
+use super::band::{Factor, InverseBlocks, Row};
 use super::calm;
 use super::config::{Config, Matter};
 use super::contact::{Solved, TubeContacts};
@@ -11,7 +11,7 @@ use super::division::Division;
 use super::holds::{NodeSpring, Tie};
 use super::system::{Iterate, Scene, assemble};
 use super::turn::{exp, unit};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
 pub const TURN_MAX_RAD: f64 = 0.25;
@@ -23,6 +23,8 @@ const TURN_TICKS: u64 = 1 << (HALVINGS - 5);
 const ITERATIONS_MORE: u32 = 2;
 /// A rise of energy below this share of the energies at work is rounding.
 const ENERGY_SLACK: f64 = 1e-9;
+/// Strains below this are rounding (positions of 1 m over segments of 1 cm: 1e-14), whatever energy they hold.
+const STRAIN_SLACK: f64 = 1e-10;
 
 /// What a step needs besides the state.
 pub struct Setting<'a> {
@@ -52,7 +54,6 @@ pub struct Stepper {
     factor: Factor,
     rhs: Vec<DVec3>,
     next: Config,
-    energy_j: f64,
     /// What the skin touches.
     pub contacts: TubeContacts,
     /// Work that contact does in the substep tried, J.
@@ -77,7 +78,6 @@ impl Stepper {
         let ticks = u64::from(setting.substeps) << HALVINGS;
         let tick = setting.dt / ticks as f64;
         let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
-        self.energy_j = self.energy(now, setting);
         while gone < ticks {
             let scene = Scene {
                 matter: setting.matter,
@@ -91,7 +91,7 @@ impl Stepper {
                 size /= 2;
                 continue;
             }
-            self.accept(now, setting, ties, (tick * size as f64, tick * (gone + size) as f64));
+            self.accept(now, ties, (tick * size as f64, tick * (gone + size) as f64));
             (gone, taken) = (gone + size, taken + 1);
             // twice as long again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
@@ -99,6 +99,19 @@ impl Stepper {
             }
         }
         Ok(taken)
+    }
+
+    /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
+    /// it (eq. 18); `None` where the segments have changed since, or no step was taken.
+    pub fn inverse_mass(&self, (segment, w): (usize, f64), slots: usize) -> Option<DMat3> {
+        if self.factor.slots() != slots {
+            return None;
+        }
+        let mut blocks = InverseBlocks::default();
+        self.factor.inverse_blocks(&mut blocks);
+        let (a, b) = (blocks.diag[2 * segment].full(), blocks.diag[2 * segment + 2].full());
+        let across = blocks.far[2 * segment];
+        Some(a * ((1.0 - w) * (1.0 - w)) + (across + across.transpose()) * (w * (1.0 - w)) + b * (w * w))
     }
 
     /// One trial substep, from `now` into `next` (eq. 11–20); `bound` if turns are, `divide` if it can be smaller.
@@ -176,8 +189,7 @@ impl Stepper {
 
     /// By how much the energy of `next` exceeds what `now` had and the pulls gave, less the rounding, J (eq. 27).
     fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
-        let kinetic = self.next.kinetic_j(scene.matter, scene.division);
-        let after = kinetic + stored(&self.next, scene.springs);
+        let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
         // what friction takes is no licence to make as much elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
         for tie in scene.ties {
@@ -189,30 +201,26 @@ impl Stepper {
             effort += done.abs();
         }
         let lifted = (self.next.gravity_j - now.gravity_j).abs();
-        let at_work = kinetic + self.next.elastic_j + now.elastic_j + lifted + effort;
-        // the sums themselves round at their own size
-        let rounding = f64::EPSILON * 64.0 * (self.energy_j.abs() + after.abs() + now.gravity_j.abs());
-        after - self.energy_j - work - ENERGY_SLACK * at_work - rounding
+        let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted + effort;
+        // the sums themselves round at their own size, and positions at theirs
+        let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
+        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * scene.matter.ea * scene.division.total_m();
+        after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
     /// Makes `next` the state and books what the pulls gave.
-    fn accept(&mut self, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie], (h, until): (f64, f64)) {
+    fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (h, until): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
         for tie in ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let (x, v) = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));
             tie.impulse += tie.force(x, v, until) * h;
         }
-        self.energy_j = self.energy(now, setting);
-    }
-
-    fn energy(&self, state: &Config, setting: &Setting<'_>) -> f64 {
-        state.kinetic_j(setting.matter, setting.division) + stored(state, setting.springs)
     }
 }
 
-/// Elastic energy, gravity's and that of the attachments, J (eq. 10).
-pub fn stored(state: &Config, springs: &[NodeSpring]) -> f64 {
+/// Kinetic and elastic energy, gravity's and that of the attachments, J (eq. 10).
+pub fn energy(state: &Config, springs: &[NodeSpring]) -> f64 {
     let held: f64 = springs.iter().map(|s| s.energy_j(state.x[s.node])).sum();
-    state.elastic_j + state.gravity_j + held
+    state.kinetic_j + state.elastic_j + state.gravity_j + held
 }

@@ -15,6 +15,9 @@ pub struct Sym3 {
 }
 
 impl Sym3 {
+    /// No entry at all.
+    pub const ZERO: Self = Self { d: DVec3::ZERO, o: DVec3::ZERO };
+
     /// The matrix with this diagonal.
     #[inline]
     pub fn diagonal(d: DVec3) -> Self {

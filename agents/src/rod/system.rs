@@ -47,7 +47,7 @@ impl Iterate<'_> {
 /// Fills `rows` and `rhs` (eq. 11–15, 19–24).
 pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
     let slots = iterate.at.u.len();
-    rows.resize(slots, Row::default());
+    rows.resize(slots, Row::ZERO);
     rhs.resize(slots, DVec3::ZERO);
     fill_segments(scene, iterate.at, rows);
     fill_joints(scene, iterate.at, rows);
@@ -65,7 +65,7 @@ fn fill_segments(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
     let count = at.q.len();
     let rows = &mut rows[..2 * count + 1];
     let (length, t, e, b) = (&scene.division.length[..count], &at.t[..count], &at.e[..count], &at.b[..count]);
-    rows[0] = Row::default();
+    rows[0] = Row::ZERO;
     for k in 0..count {
         let (l, t, u) = (length[k], t[k], e[k]);
         let (a, d) = (h2 * (ga - b[k]), h2 * (ea - ga));
@@ -78,7 +78,7 @@ fn fill_segments(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
         rows[2 * k + 1] = Row {
             diag: spin + Sym3::outer(u, -l * a) + Sym3::outer(w, l * d),
             near: cross - product(w * d, t),
-            far: Sym3::default(),
+            far: Sym3::ZERO,
         };
         rows[2 * k + 2] = Row {
             diag: stiffness + Sym3::identity(2.0 * mass),
@@ -177,12 +177,11 @@ fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
     if matter.held[0] {
         rows[0].diag = Sym3::identity(1.0);
         rows[1].near = DMat3::ZERO;
-        rows[2].far = Sym3::default();
+        rows[2].far = Sym3::ZERO;
         rhs[0] = DVec3::ZERO;
     }
     if matter.held[1] {
-        // not `..Row::default()`: glam's default matrix is the identity
-        rows[last] = Row { diag: Sym3::identity(1.0), near: DMat3::ZERO, far: Sym3::default() };
+        rows[last] = Row { diag: Sym3::identity(1.0), ..Row::ZERO };
         rhs[last] = DVec3::ZERO;
     }
 }

@@ -11,10 +11,10 @@ use super::holds::{NodeSpring, Tie, springs};
 use super::remesh::Remesher;
 use super::rest::RestWatch;
 use super::skeleton::Skeleton;
-use super::step::{Lost, Setting, Stepper, stored};
+use super::step::{Lost, Setting, Stepper, energy};
 use super::{Section, TubeSpec, residual};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
 pub const STRETCH_WARN: f64 = 1.4;
@@ -110,7 +110,7 @@ impl Tube {
     /// Mechanical energy, joules: kinetic, elastic, attachments, and gravity's, zero at the origin.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
-        self.now.kinetic_j(&self.matter, &self.division) + stored(&self.now, &self.springs)
+        energy(&self.now, &self.springs)
     }
 
     /// What a user should know of the present state: one sentence each, none as a rule.
@@ -126,6 +126,16 @@ impl Tube {
             ));
         }
         list
+    }
+
+    /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
+    /// impulse (N·s) on it causes, within the substep that ended last (docs/theory/rod.md, eq. 18).
+    ///
+    /// One O(N) sweep. `None` before the first step and after a change of resolution until the next; a held end gives the
+    /// identity of its slot, which means nothing.
+    #[must_use]
+    pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
+        self.stepper.inverse_mass(self.division.locate(arc_m), self.now.u.len())
     }
 
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
@@ -180,6 +190,7 @@ impl Tube {
         let at_rest = self.rest.observe(&self.now, dt);
         if at_rest {
             self.now.u.fill(DVec3::ZERO); // what is drawn of a sleeping tube must not drift
+            self.now.kinetic_j = 0.0;
         }
         at_rest
     }

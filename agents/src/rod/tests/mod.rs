@@ -1,5 +1,7 @@
 //! What the tube promises, against independent answers (`tests/reference/`).
 
+mod motion;
+mod remesh;
 mod statics;
 mod violent;
 
