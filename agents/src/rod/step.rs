@@ -103,15 +103,19 @@ impl Stepper {
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
     /// it (eq. 18); `None` where the segments have changed since, or no step was taken.
-    pub fn inverse_mass(&self, (segment, w): (usize, f64), slots: usize) -> Option<DMat3> {
+    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &Matter, slots: usize) -> Option<DMat3> {
         if self.factor.slots() != slots {
             return None;
         }
+        let last = 2 * segment + 3 == slots;
+        let (start, end) = (matter.held[0] && segment == 0, matter.held[1] && last);
+        // a held node does not move: its slot of the matrix only keeps a place
+        let (v, w) = (if start { 0.0 } else { 1.0 - w }, if end { 0.0 } else { w });
         let mut blocks = InverseBlocks::default();
         self.factor.inverse_blocks(&mut blocks);
         let (a, b) = (blocks.diag[2 * segment].full(), blocks.diag[2 * segment + 2].full());
         let across = blocks.far[2 * segment];
-        Some(a * ((1.0 - w) * (1.0 - w)) + (across + across.transpose()) * (w * (1.0 - w)) + b * (w * w))
+        Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
     /// One trial substep, from `now` into `next` (eq. 11–20); `bound` if turns are, `divide` if it can be smaller.

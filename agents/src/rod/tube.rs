@@ -131,11 +131,10 @@ impl Tube {
     /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
     /// impulse (N·s) on it causes, within the substep that ended last (docs/theory/rod.md, eq. 18).
     ///
-    /// One O(N) sweep. `None` before the first step and after a change of resolution until the next; a held end gives the
-    /// identity of its slot, which means nothing.
+    /// One O(N) sweep. `None` before the first step and after a change of resolution until the next.
     #[must_use]
     pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
-        self.stepper.inverse_mass(self.division.locate(arc_m), self.now.u.len())
+        self.stepper.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
     }
 
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).

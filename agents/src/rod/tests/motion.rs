@@ -267,5 +267,6 @@ fn the_inverse_mass_of_a_point_says_what_a_pull_does_to_it() {
     pulled.step(millis(4.0), &around).unwrap();
     let moved = snapshot(&pulled).body.point(crate::Anchor::Arc(0.7)).unwrap().1;
     let want = still.inverse_mass(0.7).unwrap() * DVec3::Y * 1e-3 * 4e-3;
+    assert_eq!(still.inverse_mass(0.0), Some(glam::DMat3::ZERO));
     assert!((moved - want).length() < 1e-9 * want.length(), "{moved}, not {want}"); // linear but for the spring's 1e-9 N/m
 }

@@ -31,7 +31,6 @@ fn tip_error(case: &str, young_pa: f64, segments: usize, dt_ms: f64) -> f64 {
 fn a_clamped_tube_hangs_as_the_reference_does() {
     for (case, young_pa) in [("soft", 1e6), ("firm", 1e7)] {
         let error = tip_error(case, young_pa, 64, 10.0);
-        println!("{case}: {error:e}");
         assert!(error <= 5e-4, "{case}: {error}"); // the bound; 3.8e-4 and less is the static floor of 64 segments
     }
 }
@@ -39,7 +38,6 @@ fn a_clamped_tube_hangs_as_the_reference_does() {
 #[test]
 fn the_hanging_tip_converges_with_second_order() {
     let errors: Vec<f64> = [16, 32, 64, 128].iter().map(|&n| tip_error("soft", 1e6, n, 10.0)).collect();
-    println!("{errors:?}");
     let order = (errors[0] / errors[3]).log2() / 3.0;
     assert!(order >= 1.9, "order {order} of {errors:?}");
 }
