@@ -46,11 +46,11 @@ pub struct Ray {
 pub struct Camera {
     /// What the eye looks at, metres.
     pub target_m: DVec3,
-    /// Distance of the eye from it, metres; kept within [`DISTANCE_M`].
+    /// Distance of the eye from it, metres; kept within 1 cm … 10 km.
     pub distance_m: f64,
     /// Direction of the eye from the target, about z from x, radians.
     pub yaw_rad: f64,
-    /// Height of the eye above the horizon, radians; kept within ±[`PITCH_MAX_RAD`].
+    /// Height of the eye above the horizon, radians; kept within ± a right angle less a degree.
     pub pitch_rad: f64,
     /// Vertical field of view, radians, 0.01 … 3.
     pub fov_y_rad: f64,

@@ -225,7 +225,7 @@ impl Agent for Tube {
     /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
     ///
     /// pulls    the springs of hands and tools on this tube
-    /// step     substeps of the linearly implicit Euler rule ([`Stepper::step`])
+    /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
     /// grips    the mean force of each pull
     /// rest     whether it could sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
