@@ -36,6 +36,9 @@ fn tube(segments: usize) -> Tube {
     Tube::new(spec).expect("the reference tube is a tube")
 }
 
+/// How many batches of some 4000 segment-steps are timed.
+const BATCHES: usize = 500;
+
 fn main() {
     let dt = SimSpan::from_nanos(10_000_000);
     println!("segments  us/step  ns/segment/step  substeps/step");
@@ -45,19 +48,18 @@ fn main() {
     }
     for segments in sizes {
         let mut tube = tube(segments);
-        let steps = (2_000_000 / segments).max(200);
+        let batch = (4_000 / segments).max(1);
         let (mut best, mut substeps, mut time) = (f64::MAX, 0, SimTime::ZERO);
-        // the least of several runs: what a shared machine adds is never negative
-        for _ in 0..5 {
-            substeps = 0;
+        // the least of many short batches: what a shared machine adds is never negative
+        for _ in 0..BATCHES {
             let start = Instant::now();
-            for _ in 0..steps / 5 {
+            for _ in 0..batch {
                 substeps += tube.step(dt, &Surroundings::alone(AgentId(0), time)).expect("a step").substeps;
                 time += dt;
             }
-            best = best.min(start.elapsed().as_secs_f64() / f64::from(substeps));
+            best = best.min(start.elapsed().as_secs_f64() / batch as f64);
         }
-        let share = f64::from(substeps) / (steps / 5) as f64;
+        let share = f64::from(substeps) / (batch * BATCHES) as f64;
         println!("{segments:8}  {:7.2}  {:15.1}  {share:13.2}", best * 1e6, best * 1e9 / segments as f64);
     }
 }

@@ -83,14 +83,14 @@ impl Factor {
     pub fn solve(&self, r: &mut [DVec3]) {
         let (mut before, mut last) = (DVec3::ZERO, DVec3::ZERO);
         for (row, r) in self.rows.iter().zip(r.iter_mut()) {
-            let y = *r - row.near * last - row.far * before;
+            let y = minus(*r - row.far * before, &row.near, last);
             *r = row.inverse * y;
             (before, last) = (last, y);
         }
         let (mut after, mut next) = (DVec3::ZERO, DVec3::ZERO); // rows' answers i + 2, i + 1 …
         let (mut near, mut far, mut far_next) = (DMat3::ZERO, DMat3::ZERO, DMat3::ZERO); // … and their L
         for (row, r) in self.rows.iter().zip(r.iter_mut()).rev() {
-            let y = *r - transposed(&near, next) - transposed(&far, after);
+            let y = minus(*r - transposed(&far, after), &near.transpose(), next);
             *r = y;
             (after, next) = (next, y);
             (near, far, far_next) = (row.near, far_next, row.far);
@@ -121,6 +121,12 @@ impl Factor {
             into.diag[j] = diag;
         }
     }
+}
+
+/// v − m w, summed in pairs: each row waits for the one before it, so the way from `w` is kept short.
+#[inline]
+fn minus(v: DVec3, m: &DMat3, w: DVec3) -> DVec3 {
+    (v - m.x_axis * w.x) - (m.y_axis * w.y + m.z_axis * w.z)
 }
 
 #[inline]
