@@ -75,7 +75,7 @@ impl Show for Empty {
         None
     }
 
-    fn wants_close(&self) -> bool {
+    fn wants_close(&mut self) -> bool {
         self.frames.len() >= PICTURES || self.begin.elapsed() > STUCK
     }
 }

@@ -97,9 +97,9 @@ pub struct RunArgs {
     /// How agents run: a thread each, or one thread in virtual time with declared costs (the same bits on every run)
     #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["threads", "lockstep"]))]
     pub executor: Option<String>,
-    /// Size of the picture in pixels, each 1 to 8192
-    #[arg(long, value_name = "WxH", default_value = "1280x720", env = "METACHRON_SIZE", value_parser = size)]
-    pub size: [u32; 2],
+    /// Size of the picture in pixels, or of the window, each 1 to 8192; a picture nobody sized has 1280x720
+    #[arg(long, value_name = "WxH", env = "METACHRON_SIZE", value_parser = size)]
+    pub size: Option<[u32; 2]>,
     /// Seed of the declared machine's noise
     #[arg(long, value_name = "N", env = "METACHRON_SEED")]
     pub seed: Option<u32>,
@@ -112,7 +112,7 @@ pub struct RunArgs {
     /// Write the report here (JSON); - is standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub report: Option<PathBuf>,
-    /// Write one row a frame here (CSV)
+    /// Write one row a frame here (CSV); a window without an end remembers the newest 108000 frames at least
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub frames_csv: Option<PathBuf>,
     /// End with code 4 where this holds of the report, such as missed_share>0.01 or frame_ms.p99>40; may be repeated

@@ -16,6 +16,9 @@ use std::path::PathBuf;
 /// Told of every frame; answers whether to go on.
 type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
 
+/// Width and height of a headless picture that nobody sized, pixels.
+const PICTURE_SIZE: [u32; 2] = [1280, 720];
+
 /// Plays what is asked for: in a window where there can be one, else without.
 ///
 /// # Errors
@@ -41,6 +44,7 @@ fn window_plan(request: &Request) -> WindowPlan {
     WindowPlan {
         source: request.source.clone(),
         overrides: request.overrides.clone(),
+        size: request.size.map(|[width, height]| [width as f32, height as f32]),
         screenshots: PathBuf::from("."),
         seconds,
         frames,
@@ -56,7 +60,8 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
 }
 
 fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let size = Size { width: request.size[0], height: request.size[1] };
+    let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
+    let size = Size { width, height };
     let drawing = drawing(&session, png.is_some(), size)?;
     let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
     let end = match request.headless_end() {
@@ -64,7 +69,7 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
         RunLength::Seconds(seconds) => End::Seconds(seconds),
     };
     let plan = Headless { end, size, drawing, png };
-    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, done)))?;
+    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(done))))?;
     Ok(played(outcome, picture))
 }
 
@@ -86,7 +91,7 @@ fn drawing(session: &Session, picture: bool, size: Size) -> anyhow::Result<Drawi
     Ok(if session.is_virtual() { Drawing::Last(screen) } else { Drawing::Every(screen) })
 }
 
-fn step(record: &FrameRecord, done: f64) -> Step {
+fn step(record: &FrameRecord, done: Option<f64>) -> Step {
     Step { done, sim_s: record.sim_s, frame_ms: record.frame_ms }
 }
 
@@ -100,7 +105,7 @@ fn played(outcome: Outcome, picture: Option<PathBuf>) -> Played {
         law: outcome.law.to_owned(),
         executor: outcome.executor.to_owned(),
         adapter: outcome.adapter,
-        frames: outcome.frames.len() as u64,
+        frames: outcome.finished,
         sim_s: outcome.sim_s,
         wall_s: outcome.wall_s,
         cpu_s: outcome.cpu_s,

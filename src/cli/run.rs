@@ -36,8 +36,9 @@ pub struct Request {
     pub window: bool,
     /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
     pub end: Option<RunLength>,
-    /// Width and height of the picture in pixels, each 1 … 8192.
-    pub size: [u32; 2],
+    /// Width and height of the picture in pixels, or of the window in points, each 1 … 8192; `None`: 1280 × 720, or the
+    /// window as it was closed last time.
+    pub size: Option<[u32; 2]>,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
     /// Where to write it when a window was wanted and none could be opened, and `png` says nothing.
@@ -71,8 +72,8 @@ pub struct Played {
 /// How far a headless run is.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Share that is done, 0 … 1.
-    pub done: f64,
+    /// Share that is done, 0 … 1; `None` where the run has no end.
+    pub done: Option<f64>,
     /// Simulated seconds.
     pub sim_s: f64,
     /// Work of the last frame, milliseconds.
@@ -96,7 +97,9 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
     let played = play(&request, &mut |step| {
-        bar.show(step.done, step.sim_s, step.frame_ms);
+        if let Some(done) = step.done {
+            bar.show(done, step.sim_s, step.frame_ms);
+        }
         !stopped.load(Ordering::Relaxed)
     })?;
     drop(bar);
@@ -261,7 +264,10 @@ mod tests {
         ]);
         assert_eq!(request.scene.executor.name(), "lockstep");
         assert_eq!(request.scene.machine.seed, Some(9));
-        assert_eq!((request.headless_end(), request.size, request.window), (RunLength::Frames(7), [64, 32], false));
+        assert_eq!(
+            (request.headless_end(), request.size, request.window),
+            (RunLength::Frames(7), Some([64, 32]), false)
+        );
         assert_eq!(requested(&[]).headless_end(), RunLength::Seconds(10.0));
     }
 }

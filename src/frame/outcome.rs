@@ -93,7 +93,9 @@ pub struct Outcome {
     pub adapter: Option<String>,
     /// Wanted time of a frame, milliseconds.
     pub target_ms: f64,
-    /// All frames.
+    /// Frames drawn in all.
+    pub finished: u64,
+    /// Every frame of a run with an end; of one without, the newest ([`super::Session::keep_frames`]).
     pub frames: Vec<FrameRecord>,
     /// Frames that taught nothing (the first ones): left out of the statistics of frame times.
     pub warm_up: usize,

@@ -8,7 +8,7 @@ use crate::control;
 use crate::runtime::{self, AgentStats};
 use crate::scene::Spec;
 use crate::scene::format::PolicyKind;
-use metachron_agents::{Body, Snapshot};
+use metachron_agents::{Body, SimTime, Snapshot};
 use std::time::Duration;
 
 /// Mass at which the user's hand takes hold of something that has none of its own, kilograms.
@@ -34,12 +34,46 @@ pub(super) fn first(session: &Session) -> Status {
     }
 }
 
-/// Brings the numbers up to date; `since` has passed since the last time.
-pub(super) fn fill(status: &mut Status, session: &mut Session, since: Duration) {
-    let sim = session.sim_now();
-    if !since.is_zero() {
-        status.real_time_factor = sim.since(status.sim_time).as_secs_f64() / since.as_secs_f64();
+/// What is read off differences of counters, over windows long enough for them to mean something.
+pub(super) struct Meter {
+    since: (Duration, SimTime),
+    cpu_s: Vec<f64>,
+    shares: Vec<f64>,
+    real_time: f64,
+}
+
+/// Over how long a time shares and the flow of time are measured: an agent's CPU time is counted about this often.
+const METER_EVERY: Duration = Duration::from_millis(500);
+
+impl Meter {
+    /// A meter that begins now.
+    pub fn new(session: &Session) -> Self {
+        let agents = session.agents().len();
+        let since = (session.now(), session.sim_now());
+        Self { since, cpu_s: vec![0.0; agents], shares: vec![0.0; agents], real_time: 0.0 }
     }
+
+    fn read(&mut self, session: &Session) {
+        let (now, sim) = (session.now(), session.sim_now());
+        let wall_s = now.saturating_sub(self.since.0).as_secs_f64();
+        if wall_s < METER_EVERY.as_secs_f64() {
+            return;
+        }
+        for (at, agent) in session.agents().iter().enumerate() {
+            let cpu_s = agent.cpu_s();
+            self.shares[at] = ((cpu_s - self.cpu_s[at]) / wall_s).clamp(0.0, 1.0);
+            self.cpu_s[at] = cpu_s;
+        }
+        self.real_time = sim.since(self.since.1).as_secs_f64() / wall_s;
+        self.since = (now, sim);
+    }
+}
+
+/// Brings the numbers up to date; gives a line for each agent that has given up since the last time.
+pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
+    meter.read(session);
+    status.real_time_factor = meter.real_time;
+    let mut news = Vec::new();
     let control = session.control();
     status.target_hz = control.target_hz();
     status.law = Some(viewer_law(control.law()));
@@ -51,20 +85,27 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, since: Duration) 
     for (at, agent) in session.agents().iter().enumerate() {
         let (stats, newest) = (agent.stats(), agent.latest());
         let row = &mut status.agents[at];
-        fill_row(row, &stats, &newest, since);
+        let was_parked = matches!(row.state, AgentState::Parked(_));
+        fill_row(row, &stats, &newest);
+        row.cpu_share = meter.shares[at];
+        if let AgentState::Parked(reason) = &row.state
+            && !was_parked
+        {
+            news.push(format!("{} is parked: {reason}", row.name));
+        }
         row.picture = session.levels().get(at).copied();
         row.age_s = session.stage().age_s(agent.id()).unwrap_or(0.0);
         status.energy_j += stats.energy_j;
     }
+    news
 }
 
-fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot, since: Duration) {
+fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     row.wanted_hz = stats.wanted_hz;
     row.rate_hz = stats.rate_hz;
     row.dt_s = stats.dt.as_secs_f64();
     row.simulation = stats.resolution;
     row.step_s = stats.work_s;
-    row.cpu_share = if since.is_zero() { 0.0 } else { (stats.rate_hz * stats.work_s).min(1.0) };
     row.dropped_s = stats.dropped.as_secs_f64();
     row.residual_m = stats.residual_m;
     row.force_n = match &newest.body {

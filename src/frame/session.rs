@@ -53,6 +53,8 @@ pub struct Session {
     chosen: Chosen,
     last_start: Option<Duration>,
     warm_up: usize,
+    finished: u64,
+    keep: usize,
 }
 
 /// What the last composition asks of the adapter.
@@ -65,7 +67,7 @@ struct Chosen {
 }
 
 /// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
-const WARM_UP_FRAMES: usize = 3;
+const WARM_UP_FRAMES: u64 = 3;
 
 impl Session {
     /// Starts the agents of `scene`.
@@ -93,6 +95,8 @@ impl Session {
             chosen: Chosen::default(),
             last_start: None,
             warm_up: 0,
+            finished: 0,
+            keep: usize::MAX,
             scene,
         })
     }
@@ -124,7 +128,12 @@ impl Session {
     /// Frames finished.
     #[must_use]
     pub fn frames(&self) -> u64 {
-        self.records.len() as u64
+        self.finished
+    }
+
+    /// Remembers at least the newest `frames` frames from now on, and never twice as many: for runs without an end.
+    pub const fn keep_frames(&mut self, frames: usize) {
+        self.keep = frames;
     }
 
     /// Wanted time between frames.
@@ -176,11 +185,15 @@ impl Session {
         matches!(status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed).then(|| status.to_string())
     }
 
-    /// The force of the user's hand on an agent, newtons.
+    /// The force that the user's hand feels of an agent, newtons.
     #[must_use]
     pub fn hand_force_n(&self, on: AgentId) -> f64 {
-        let grips = self.newest.get(on.0 as usize).map_or(&[][..], |state| &state.grips);
-        grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()
+        let Some(state) = self.newest.get(on.0 as usize) else { return 0.0 };
+        // nothing resists the leading of a tool; what the hand feels is what the tool holds
+        if let Body::Tool(tool) = &state.body {
+            return tool.force_n;
+        }
+        state.grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()
     }
 
     /// What can be seen.
@@ -242,12 +255,27 @@ impl Session {
     /// Ends the frame that began at `started` and took `work`; `skip` keeps the controller from learning from it.
     pub fn finish(&mut self, started: Duration, work: Duration, skip: bool) -> FrameRecord {
         let record = self.record(started, work);
-        self.records.push(record);
+        self.finished += 1;
         self.last_start = Some(started);
-        let cold = !self.is_virtual() && self.records.len() <= WARM_UP_FRAMES;
+        let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
         self.warm_up += usize::from(cold);
+        self.remember(record);
         self.control.observe(FrameWork { work, skip: skip || cold });
         record
+    }
+
+    /// Ends a frame that counts for nothing: neither the report nor the controller hears of it.
+    pub const fn pass_over(&mut self) {
+        self.last_start = None;
+    }
+
+    fn remember(&mut self, record: FrameRecord) {
+        self.records.push(record);
+        if self.records.len() >= self.keep.saturating_mul(2) {
+            let old = self.records.len() - self.keep;
+            self.records.drain(..old);
+            self.warm_up = self.warm_up.saturating_sub(old);
+        }
     }
 
     /// Ends the run.
@@ -268,6 +296,7 @@ impl Session {
             adapter,
             target_ms: 1e3 / self.control.target_hz(),
             frames: self.records,
+            finished: self.finished,
             warm_up: self.warm_up,
             sim_s,
             wall_s,

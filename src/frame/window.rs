@@ -3,7 +3,7 @@
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
 use super::outcome::{FrameRecord, Outcome};
-use super::panels;
+use super::panels::{self, Meter};
 use super::session::{Session, SessionError};
 use crate::compositor::viewer::{
     Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
@@ -15,7 +15,7 @@ use crate::scene::{self, Scene, SceneError, Source};
 use glam::DVec3;
 use metachron_agents::{AgentId, Pull, SimSpan};
 use std::path::PathBuf;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// A run in a window.
 pub struct WindowPlan {
@@ -23,6 +23,8 @@ pub struct WindowPlan {
     pub source: Source,
     /// Values that were laid over it.
     pub overrides: Vec<(String, String)>,
+    /// Width and height of the window, points; `None` opens it as it was closed last time.
+    pub size: Option<[f32; 2]>,
     /// Where screenshots go.
     pub screenshots: PathBuf,
     /// Simulated seconds after which the window closes by itself.
@@ -39,16 +41,16 @@ pub enum WindowFailure {
     Session(SessionError),
 }
 
-/// Shows `session` in a window until it is closed.
+/// Shows `session` in a window until it is closed, or until `go_on`, asked many times a second whether or not anything is
+/// drawn, says no. It is told of the last frame, and of how much of the run is done where the run has an end.
+///
+/// The outcome is that of the last start: a reset begins a new run. Frames drawn while time stands still or the window is
+/// hidden are no part of it, and of a run without an end at least the newest [`FRAMES_KEPT`] are.
 ///
 /// # Errors
 /// [`WindowFailure::NoWindow`] gives the session back.
-pub fn play_in_window(
-    session: Session,
-    plan: WindowPlan,
-    go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
-) -> Result<Outcome, WindowFailure> {
-    let options = WindowOptions { size: None, screenshots: plan.screenshots.clone(), lose_device_after: None };
+pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
+    let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut show = WindowShow::new(session, plan, go_on);
     match run_window(&mut show, &options) {
         Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
@@ -56,40 +58,54 @@ pub fn play_in_window(
     }
 }
 
+/// Told of the last frame and of the share that is done, 0 … 1, of a run that has an end; answers whether to go on.
+pub type GoOn<'a> = &'a mut dyn FnMut(&FrameRecord, Option<f64>) -> bool;
+
 /// A session as the viewer sees it.
 struct WindowShow<'a> {
-    go_on: &'a mut dyn FnMut(&FrameRecord, f64) -> bool,
+    go_on: GoOn<'a>,
     adapter: Option<String>,
     stopped: bool,
     session: Session,
     plan: WindowPlan,
     status: Status,
+    meter: Meter,
+    notices: Vec<(Instant, Message)>,
     hand: Option<Hand>,
     started: Duration,
     refreshed: Option<Duration>,
+    last: FrameRecord,
     speed: f64,
     running: bool,
 }
 
+/// Frames that a run without an end remembers: an hour at 30 frames a second, some 10 MB.
+pub const FRAMES_KEPT: usize = 108_000;
 /// Panels are filled anew this often: faster, nobody reads them.
 const PANELS_EVERY: Duration = Duration::from_millis(100);
+/// A message stays this long: time to read a long line twice.
+const MESSAGE_STAYS: Duration = Duration::from_secs(12);
 /// How fast a held body swings on the user's spring, rad/s: firm, and slow enough for every agent's step.
 const HAND_RAD_S: f64 = 25.0;
 /// Share of critical damping of the user's spring.
 const HAND_DAMPING: f64 = 0.7;
 
 impl<'a> WindowShow<'a> {
-    fn new(session: Session, plan: WindowPlan, go_on: &'a mut dyn FnMut(&FrameRecord, f64) -> bool) -> Self {
+    fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
+        session.keep_frames(kept(&plan));
         let mut show = Self {
             go_on,
             adapter: None,
             stopped: false,
             status: panels::first(&session),
+            meter: Meter::new(&session),
+            notices: Vec::new(),
             session,
             plan,
             hand: None,
             started: Duration::ZERO,
             refreshed: None,
+            last: FrameRecord::default(),
             speed: 1.0,
             running: true,
         };
@@ -97,21 +113,39 @@ impl<'a> WindowShow<'a> {
         show
     }
 
-    /// Plays `scene` from its beginning instead.
+    /// Plays `scene` from its beginning instead; speed and pause stay.
     fn restart(&mut self, scene: Scene) {
         match Session::open(scene) {
-            Ok(session) => {
-                drop(std::mem::replace(&mut self.session, session));
-                let messages = std::mem::take(&mut self.status.messages);
-                self.status = Status { messages, ..panels::first(&self.session) };
-                (self.hand, self.refreshed) = (None, None);
-                self.session.drive(Drive::Speed(self.speed));
-                if !self.running {
-                    self.session.drive(Drive::Pause);
-                }
-            }
+            Ok(session) => self.replace(session),
             Err(error) => self.say(Weight::Failure, error.to_string()),
         }
+    }
+
+    fn replace(&mut self, mut session: Session) {
+        session.keep_frames(kept(&self.plan));
+        session.drive(Drive::Speed(self.speed));
+        if !self.running {
+            session.drive(Drive::Pause);
+        }
+        let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
+        drop(std::mem::replace(&mut self.session, session));
+        self.status = Status { selected, ..panels::first(&self.session) };
+        self.meter = Meter::new(&self.session);
+        (self.hand, self.refreshed) = (None, None);
+        self.refresh();
+    }
+
+    /// The same scene from its beginning, under the target, policy and law that the user has set.
+    fn reset(&mut self) {
+        let policy = self.session.policy_name();
+        let control = self.session.control();
+        let (hz, law) = (control.target_hz(), control.law());
+        self.restart(self.session.scene().clone());
+        self.session.set_policy(policy);
+        self.session.control().set_law(law);
+        self.session.control().set_target_hz(hz);
+        self.refreshed = None;
+        self.refresh();
     }
 
     fn reload(&mut self) {
@@ -136,7 +170,9 @@ impl<'a> WindowShow<'a> {
     }
 
     fn say(&mut self, weight: Weight, text: String) {
-        self.status.messages.push(Message { weight, text });
+        let message = Message { weight, text };
+        self.notices.retain(|(_, old)| *old != message);
+        self.notices.push((Instant::now() + MESSAGE_STAYS, message));
     }
 
     fn drive(&mut self, drive: Drive) {
@@ -174,10 +210,10 @@ impl<'a> WindowShow<'a> {
     }
 
     /// How much of a run that ends by itself is done, 0 … 1.
-    fn share_done(&self) -> f64 {
+    fn share_done(&self) -> Option<f64> {
         let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
         let seconds = self.plan.seconds.map(|all| self.session.sim_now().as_secs_f64() / all);
-        frames.or(seconds).unwrap_or(0.0)
+        frames.or(seconds)
     }
 
     /// Fills the panels anew where their time has come.
@@ -186,10 +222,23 @@ impl<'a> WindowShow<'a> {
         if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
             return;
         }
-        let since = self.refreshed.map_or(Duration::ZERO, |last| now - last);
-        panels::fill(&mut self.status, &mut self.session, since);
+        let news = panels::fill(&mut self.status, &mut self.session, &mut self.meter);
+        news.into_iter().for_each(|text| self.say(Weight::Failure, text));
         self.refreshed = Some(now);
     }
+
+    /// Lets the time of one frame pass where it does not pass by itself.
+    fn pass_time(&mut self) {
+        let now = self.session.now();
+        let next = self.started + self.session.period();
+        self.started = if self.session.is_virtual() && now > Duration::ZERO { next.max(now) } else { now };
+        self.session.wait_until(self.started);
+    }
+}
+
+/// Frames that a run of this plan remembers: all where it ends by itself.
+const fn kept(plan: &WindowPlan) -> usize {
+    if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
 }
 
 impl Show for WindowShow<'_> {
@@ -201,7 +250,7 @@ impl Show for WindowShow<'_> {
                 let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
                 self.drive(Drive::Step(frame));
             }
-            Action::Reset => self.restart(self.session.scene().clone()),
+            Action::Reset => self.reset(),
             Action::Reload => self.reload(),
             Action::Speed(speed) => self.drive(Drive::Speed(speed)),
             Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
@@ -218,23 +267,31 @@ impl Show for WindowShow<'_> {
     }
 
     fn compose(&mut self, view: &ViewRequest) -> &Picture {
-        self.started = self.session.now();
-        self.session.wait_until(self.started);
+        self.pass_time();
         self.refresh();
+        let now = Instant::now();
+        self.notices.retain(|(until, _)| now < *until);
+        self.status.messages.clear();
+        self.status.messages.extend(self.notices.iter().map(|(_, message)| message.clone()));
         self.status.sim_time = self.session.sim_now();
         (self.status.running, self.status.speed) = (self.running, self.speed);
         self.status.held =
             self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
-        self.session.compose(&view.camera, view.size, view.style, self.hand)
+        self.session.compose(&view.camera, view.size, view.style, self.hand);
+        if self.session.is_virtual() {
+            self.session.spend_declared(view.size);
+        }
+        self.session.picture()
     }
 
     fn measured(&mut self, times: &FrameTimes) {
-        let skip = times.skip.is_some();
-        if times.skip != Some(Skip::Hidden) {
-            let record = self.session.finish(self.started, times.work, skip);
-            let done = self.share_done();
-            self.stopped |= !(self.go_on)(&record, done);
+        if matches!(times.skip, Some(Skip::Hidden | Skip::Still)) {
+            self.session.pass_over();
+            return;
         }
+        let declared = || self.session.now().saturating_sub(self.started);
+        let work = if self.session.is_virtual() { declared() } else { times.work };
+        self.last = self.session.finish(self.started, work, times.skip.is_some());
     }
 
     fn status(&self) -> &Status {
@@ -257,7 +314,9 @@ impl Show for WindowShow<'_> {
         self.session.stage().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
     }
 
-    fn wants_close(&self) -> bool {
-        self.stopped || self.share_done() >= 1.0
+    fn wants_close(&mut self) -> bool {
+        let done = self.share_done();
+        self.stopped = self.stopped || !(self.go_on)(&self.last, done);
+        self.stopped || done.is_some_and(|share| share >= 1.0)
     }
 }

@@ -91,6 +91,12 @@ impl AgentHandle {
         Ok(())
     }
 
+    /// CPU time of its turns so far, seconds; counted about twice a second on threads.
+    #[must_use]
+    pub fn cpu_s(&self) -> f64 {
+        self.shared.gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9
+    }
+
     /// What was written down of the point watched as number `watch`; empty where there is none. To be read when the run has
     /// ended: until then it may hold up the agent.
     #[must_use]
@@ -116,7 +122,7 @@ impl AgentHandle {
             dt: span(&gauges.dt),
             resolution: newest.resolution,
             work_s: gauges.work_s.get(),
-            cpu_s: gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9,
+            cpu_s: self.cpu_s(),
             age: self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner).spread(),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),

@@ -178,7 +178,7 @@ impl Viewer {
         Panel::top("bar").exact_size(44.0).frame(frame(14, 0)).show(ui, |ui| {
             commands.extend(bar::show(ui, status, &summary));
         });
-        Panel::bottom("agents").resizable(true).default_size(156.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
+        Panel::bottom("agents").resizable(true).default_size(182.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
             match table::show(ui, status) {
                 Some(table::Press::Select(id)) => actions.push(Action::Select(Some(id))),
                 Some(table::Press::Frame(id)) => {

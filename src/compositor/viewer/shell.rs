@@ -59,6 +59,10 @@ const YOUNG: Duration = Duration::from_secs(1);
 const LOSSES_MAX: u32 = 5;
 /// While the window is hidden the show is asked this often whether it has ended.
 const HIDDEN_POLL: Duration = Duration::from_millis(200);
+/// While time stands still and nobody touches anything, pictures come this far apart.
+const STILL_PERIOD: Duration = Duration::from_millis(250);
+/// This long after the last touch a picture of standing time counts as untouched: a single step and a glide have ended.
+const CALM: f64 = 0.5;
 /// Pictures of a new device that say nothing: shaders are compiled, buffers grow.
 const WARM_UP: u64 = 3;
 /// A picture this much before its time is drawn rather than waited for.
@@ -179,6 +183,8 @@ struct Shell<'a> {
     /// Time that [`Viewer::ui`] spent on the picture in the frame before.
     drawing: Duration,
     hidden: bool,
+    /// When the user last did something, in egui's time.
+    touched_s: f64,
 }
 
 /// When pictures are due.
@@ -189,8 +195,14 @@ struct Pace {
 }
 
 impl Pace {
-    fn is_due(&self, now: Instant) -> bool {
-        now + EARLY >= self.due
+    fn is_due(&self, now: Instant, still: bool) -> bool {
+        now + EARLY >= self.next(still)
+    }
+
+    /// When the next picture is due; `still` is nothing to hurry for.
+    fn next(&self, still: bool) -> Instant {
+        let calm = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
+        calm.map_or(self.due, |calm| calm.max(self.due))
     }
 
     /// Counts a picture that starts now; gives the time since the one before.
@@ -211,7 +223,19 @@ impl<'a> Shell<'a> {
         (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
-        Self { show, viewer, screen, fate, screenshots, pace, drawing: Duration::ZERO, hidden: false }
+        Self { show, viewer, screen, fate, screenshots, pace, drawing: Duration::ZERO, hidden: false, touched_s: 0.0 }
+    }
+
+    /// Whether pictures may come slowly: time stands still and the user's hands lie still.
+    fn is_still(&mut self, ctx: &egui::Context) -> bool {
+        let (now_s, touched) = ctx.input(|input| {
+            let held = input.pointer.any_down() || !input.keys_down.is_empty();
+            (input.time, held || !input.raw.events.is_empty() || !input.raw.dropped_files.is_empty())
+        });
+        if touched || self.show.status().running {
+            self.touched_s = now_s;
+        }
+        now_s - self.touched_s > CALM
     }
 
     fn close(&self, ctx: &egui::Context, fate: Fate) {
@@ -228,6 +252,8 @@ impl<'a> Shell<'a> {
             Some(Skip::Hidden)
         } else if drawn.resized {
             Some(Skip::Resized)
+        } else if !self.show.status().running {
+            Some(Skip::Still)
         } else {
             None
         };
@@ -283,7 +309,8 @@ impl eframe::App for Shell<'_> {
         let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
         let panels = panels.saturating_sub(self.drawing);
         let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
-        let due = first_pass && self.pace.is_due(now);
+        let still = self.is_still(ui.ctx());
+        let due = first_pass && self.pace.is_due(now, still);
         let interval = if due { self.pace.start(now, period) } else { Duration::ZERO };
         self.screen.set_due(due);
         let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
@@ -298,7 +325,7 @@ impl eframe::App for Shell<'_> {
             // egui must not draw on a device that is gone: it would find no room for its vertices, and panic
             ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
         }
-        ui.ctx().request_repaint_after(self.pace.due.saturating_duration_since(Instant::now()));
+        ui.ctx().request_repaint_after(self.pace.next(still).saturating_duration_since(Instant::now()));
     }
 
     fn save(&mut self, storage: &mut dyn eframe::Storage) {
@@ -321,7 +348,8 @@ mod tests {
         let mut pace = Pace { due: begin, started: None, pictures: 0 };
         assert_eq!(pace.start(begin, period), period);
         let late = begin + Duration::from_millis(23);
-        assert!(pace.is_due(late) && !pace.is_due(begin + Duration::from_millis(19)));
+        assert!(pace.is_due(late, false) && !pace.is_due(begin + Duration::from_millis(19), false));
+        assert!(!pace.is_due(late, true) && pace.is_due(begin + STILL_PERIOD, true));
         assert_eq!(pace.start(late, period), Duration::from_millis(23));
         assert_eq!(pace.due, begin + 2 * period);
         let stalled = begin + Duration::from_millis(500);

@@ -37,8 +37,8 @@ pub trait Show {
     /// Told who draws, each time a device is made.
     fn drawn_by(&mut self, _adapter: &str) {}
 
-    /// Whether the run has ended and the window should close by itself.
-    fn wants_close(&self) -> bool {
+    /// Whether the run has ended and the window should close by itself; asked many times a second, hidden or not.
+    fn wants_close(&mut self) -> bool {
         false
     }
 }
@@ -152,6 +152,8 @@ pub enum Skip {
     Resized,
     /// The window was hidden before this frame.
     Hidden,
+    /// Simulated time stands still.
+    Still,
 }
 
 /// The numbers of the panels.

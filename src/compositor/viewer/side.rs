@@ -175,8 +175,9 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         value(ui, "Simulation ε", &text::metres(simulation.eps_m), "Spacing of samples along the shape");
     }
     if let Some(picture) = &row.picture {
-        let text = format!("{}, n {}", text::metres(picture.eps_m), picture.n);
-        value(ui, "Picture ε", &text, "Interval of the skin, and the level of its patch");
+        // a primitive is not divided along a shape: only its level says something
+        let eps = row.simulation.map_or_else(String::new, |_| format!("ε {}, ", text::metres(picture.eps_m)));
+        value(ui, "Picture", &format!("{eps}n {}", picture.n), "Interval of the skin, and the level of its patch");
     }
     if let Some(force_n) = row.force_n {
         value(ui, "Force", &format!("{} N", text::figures(force_n)), "What is held pulls back with this");

@@ -137,7 +137,9 @@ fn cells(row: &AgentRow) -> [String; COLUMNS.len()] {
         format!("{:.0} / {:.0} Hz", row.rate_hz, row.wanted_hz),
         text::seconds(row.dt_s),
         row.simulation.as_ref().map_or_else(dash, eps),
-        row.picture.as_ref().map_or_else(dash, |r| format!("{}, {}", text::metres(r.eps_m), r.n)),
+        row.picture
+            .as_ref()
+            .map_or_else(dash, |r| format!("{}, {}", row.simulation.as_ref().map_or_else(dash, |_| eps(r)), r.n)),
         text::seconds(row.age_s),
         text::seconds(row.step_s),
         format!("{:.1} %", 100.0 * row.cpu_share),
