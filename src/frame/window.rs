@@ -54,7 +54,10 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
     let mut show = WindowShow::new(session, plan, go_on);
     match run_window(&mut show, &options) {
         Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
-        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
+        Err(error) => {
+            show.begin();
+            Err(WindowFailure::NoWindow(Box::new(show.session), error))
+        }
     }
 }
 
@@ -75,6 +78,7 @@ struct WindowShow<'a> {
     started: Duration,
     refreshed: Option<Duration>,
     last: FrameRecord,
+    pictures: u64,
     speed: f64,
     running: bool,
 }
@@ -93,6 +97,8 @@ const HAND_DAMPING: f64 = 0.7;
 impl<'a> WindowShow<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(kept(&plan));
+        // nothing happens before there is somebody to see it
+        session.drive(Drive::Pause);
         let mut show = Self {
             go_on,
             adapter: None,
@@ -106,6 +112,7 @@ impl<'a> WindowShow<'a> {
             started: Duration::ZERO,
             refreshed: None,
             last: FrameRecord::default(),
+            pictures: 0,
             speed: 1.0,
             running: true,
         };
@@ -146,6 +153,13 @@ impl<'a> WindowShow<'a> {
         self.session.control().set_target_hz(hz);
         self.refreshed = None;
         self.refresh();
+    }
+
+    /// Lets time pass for the first time, unless the user has said otherwise.
+    fn begin(&mut self) {
+        if self.running {
+            self.session.drive(Drive::Run);
+        }
     }
 
     fn reload(&mut self) {
@@ -267,6 +281,10 @@ impl Show for WindowShow<'_> {
     }
 
     fn compose(&mut self, view: &ViewRequest) -> &Picture {
+        self.pictures += 1;
+        if self.pictures == 2 {
+            self.begin();
+        }
         self.pass_time();
         self.refresh();
         let now = Instant::now();
@@ -320,3 +338,6 @@ impl Show for WindowShow<'_> {
         self.stopped || done.is_some_and(|share| share >= 1.0)
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -101,15 +101,29 @@ impl History {
             return FrameSummary::default();
         }
         let count = work.len() as f64;
-        let gap = gaps.iter().sum::<f64>() / count;
         let late = gaps.iter().filter(|&&gap| gap * target_hz > 1.1).count() as f64;
         FrameSummary {
             mean_s: work.iter().sum::<f64>() / count,
             p99_s: percentile_99(work),
-            rate_hz: if gap > 0.0 { 1.0 / gap } else { 0.0 },
+            rate_hz: rate_hz(&gaps),
             late_share: late / count,
         }
     }
+}
+
+/// Over how long a time the frame rate is counted, seconds: long enough to be read, short enough to follow a slider.
+const RATE_OVER_S: f64 = 1.0;
+
+/// Frames a second over the newest of these gaps.
+fn rate_hz(gaps: &[f64]) -> f64 {
+    let (mut count, mut sum_s) = (0.0, 0.0);
+    for gap in gaps.iter().rev() {
+        (count, sum_s) = (count + 1.0, sum_s + gap);
+        if sum_s >= RATE_OVER_S {
+            break;
+        }
+    }
+    if sum_s > 0.0 { count / sum_s } else { 0.0 }
 }
 
 fn sample_of(at_s: f64, row: &AgentRow) -> Sample {
