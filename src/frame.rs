@@ -13,5 +13,5 @@ mod window;
 
 pub use headless::{Drawing, End, Headless, play_headless};
 pub use outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
-pub use session::{Session, SessionError};
+pub use session::{Finished, Session, SessionError};
 pub use window::{FRAMES_KEPT, GoOn, WindowFailure, WindowPlan, play_in_window};

@@ -4,8 +4,8 @@
 //! Never here: arguments, progress bars (the caller is told of every frame).
 
 use super::outcome::{FrameRecord, Outcome};
-use super::session::{Session, SessionError};
-use crate::compositor::{Camera, Offscreen, Size, Style};
+use super::session::{Finished, Session, SessionError};
+use crate::compositor::{Offscreen, Size, Style};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -83,16 +83,17 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
     let started = session.now();
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, Style::default(), None);
-    match &mut plan.drawing {
-        Drawing::Every(gpu) if !session.is_virtual() => draw(session, gpu, &camera)?,
-        Drawing::Every(_) | Drawing::Last(_) | Drawing::Nothing => session.spend_declared(plan.size),
-    }
+    let gpu = match &mut plan.drawing {
+        Drawing::Every(gpu) if !session.is_virtual() => {
+            gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu
+        }
+        Drawing::Every(_) | Drawing::Last(_) | Drawing::Nothing => {
+            session.spend_declared(plan.size);
+            None
+        }
+    };
     let work = session.now().saturating_sub(started);
-    Ok(session.finish(started, work, false))
-}
-
-fn draw(session: &mut Session, gpu: &mut Offscreen, camera: &Camera) -> Result<(), SessionError> {
-    gpu.render(session.picture(), camera).map(drop).map_err(SessionError::Draw)
+    Ok(session.finish(started, Finished { work, gpu, skip: false }))
 }
 
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {

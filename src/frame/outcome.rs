@@ -16,6 +16,8 @@ pub struct FrameRecord {
     pub sim_s: f64,
     /// Work of the frame, milliseconds: gather, choose, draw, adapter; virtual in lockstep.
     pub frame_ms: f64,
+    /// The adapter's own time on the newest frame it has told of, milliseconds; `None` where it has no time stamps.
+    pub gpu_ms: Option<f64>,
     /// From the start of the frame before to the start of this one, milliseconds; the first has the target's.
     pub interval_ms: f64,
     /// What drawing everything at its finest would have taken, milliseconds, by the declared machine's price of a triangle.

@@ -57,6 +57,17 @@ pub struct Session {
     keep: usize,
 }
 
+/// What a finished frame took.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Finished {
+    /// All work of the frame until its picture was finished.
+    pub work: Duration,
+    /// The adapter's own time on the newest frame it has told of; `None` where it has no time stamps.
+    pub gpu: Option<Duration>,
+    /// Whether the controller must not learn from it.
+    pub skip: bool,
+}
+
 /// What the last composition asks of the adapter.
 #[derive(Debug, Clone, Copy, Default)]
 struct Chosen {
@@ -252,9 +263,10 @@ impl Session {
         self.run.spend(cost);
     }
 
-    /// Ends the frame that began at `started` and took `work`; `skip` keeps the controller from learning from it.
-    pub fn finish(&mut self, started: Duration, work: Duration, skip: bool) -> FrameRecord {
-        let record = self.record(started, work);
+    /// Ends the frame that began at `started`.
+    pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
+        let Finished { work, skip, .. } = finished;
+        let record = self.record(started, finished);
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
@@ -355,14 +367,15 @@ impl Session {
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
     }
 
-    fn record(&self, started: Duration, work: Duration) -> FrameRecord {
+    fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
         let Chosen { sim, triangles, more_triangles, objects } = self.chosen;
-        let frame_ms = work.as_secs_f64() * 1e3;
+        let frame_ms = finished.work.as_secs_f64() * 1e3;
         let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
         FrameRecord {
             frame: self.frames(),
             sim_s: sim.as_secs_f64(),
             frame_ms,
+            gpu_ms: finished.gpu.map(|time| time.as_secs_f64() * 1e3),
             interval_ms: interval.as_secs_f64() * 1e3,
             full_ms: frame_ms + more_triangles * self.machine.draw.triangle_us * 1e-3,
             triangles,

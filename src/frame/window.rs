@@ -4,7 +4,7 @@
 
 use super::outcome::{FrameRecord, Outcome};
 use super::panels::{self, Meter};
-use super::session::{Session, SessionError};
+use super::session::{Finished, Session, SessionError};
 use crate::compositor::viewer::{
     Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
     run_window,
@@ -309,7 +309,8 @@ impl Show for WindowShow<'_> {
         }
         let declared = || self.session.now().saturating_sub(self.started);
         let work = if self.session.is_virtual() { declared() } else { times.work };
-        self.last = self.session.finish(self.started, work, times.skip.is_some());
+        self.last =
+            self.session.finish(self.started, Finished { work, gpu: times.draw_gpu, skip: times.skip.is_some() });
     }
 
     fn status(&self) -> &Status {

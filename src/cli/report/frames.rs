@@ -43,6 +43,8 @@ pub struct Spread {
 pub struct FrameSummary {
     /// Work of the frames.
     pub frame_ms: Spread,
+    /// The adapter's own time; `None` where it has no time stamps or nothing was drawn.
+    pub gpu_ms: Option<Spread>,
     /// Paced distance between frames.
     pub interval_ms: Spread,
     /// Standard deviation of x over binding frames; `None` without any.
@@ -101,6 +103,10 @@ pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
     };
     FrameSummary {
         frame_ms: Spread::of(frames.iter().map(|row| row.frame_ms)),
+        gpu_ms: frames
+            .iter()
+            .any(|row| row.gpu_ms.is_some())
+            .then(|| Spread::of(frames.iter().filter_map(|row| row.gpu_ms))),
         interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)),
         binding_stddev,
         avg_err,
