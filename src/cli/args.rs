@@ -70,6 +70,17 @@ pub enum Command {
     },
 }
 
+/// A word of `--style`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum StyleWord {
+    /// Draw every edge
+    Wireframe,
+    /// Colour by (ε, n): hue for n, stripes for ε
+    Resolution,
+    /// Colour by the age of what is shown
+    Age,
+}
+
 /// `run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -109,6 +120,9 @@ pub struct RunArgs {
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
+    /// How pictures without a window show things: wireframe, and colours by resolution or by age; more than one with a comma
+    #[arg(long, value_name = "STYLE", value_delimiter = ',')]
+    pub style: Vec<StyleWord>,
     /// Write the report here (JSON); - is standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub report: Option<PathBuf>,

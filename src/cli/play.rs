@@ -68,7 +68,7 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
         RunLength::Frames(frames) => End::Frames(frames),
         RunLength::Seconds(seconds) => End::Seconds(seconds),
     };
-    let plan = Headless { end, size, drawing, png };
+    let plan = Headless { end, size, style: request.style, drawing, png };
     let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(done))))?;
     Ok(played(outcome, picture))
 }

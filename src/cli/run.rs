@@ -4,11 +4,12 @@
 //! Never here: the loop itself.
 
 use super::Exit;
-use super::args::RunArgs;
+use super::args::{RunArgs, StyleWord};
 use super::output::{BadInput, data, message};
 use super::play::play;
 use super::progress::Bar;
 use super::report::{Report, Verdict};
+use crate::compositor::{Colouring, Style};
 use crate::frame::FrameRecord;
 use crate::scene::{Scene, Source, load};
 use anyhow::Context;
@@ -39,6 +40,8 @@ pub struct Request {
     /// Width and height of the picture in pixels, or of the window in points, each 1 … 8192; `None`: 1280 × 720, or the
     /// window as it was closed last time.
     pub size: Option<[u32; 2]>,
+    /// How pictures without a window show things.
+    pub style: Style,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
     /// Where to write it when a window was wanted and none could be opened, and `png` says nothing.
@@ -134,8 +137,18 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         window: !args.headless,
         end,
         size: args.size,
+        style: style(&args.style),
         png: args.png.clone(),
         png_without_window,
+    })
+}
+
+/// Of two colourings the last counts.
+fn style(words: &[StyleWord]) -> Style {
+    words.iter().fold(Style::default(), |style, word| match word {
+        StyleWord::Wireframe => Style { wireframe: true, ..style },
+        StyleWord::Resolution => Style { colouring: Colouring::Resolution, ..style },
+        StyleWord::Age => Style { colouring: Colouring::Age, ..style },
     })
 }
 

@@ -34,6 +34,8 @@ pub struct Headless {
     pub end: End,
     /// Size of the picture in pixels.
     pub size: Size,
+    /// How it shows things.
+    pub style: Style,
     /// What draws it.
     pub drawing: Drawing,
     /// Where the last frame's picture goes.
@@ -82,7 +84,7 @@ fn share_done(session: &Session, end: End) -> f64 {
 fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, SessionError> {
     let started = session.now();
     let camera = session.scene_camera();
-    session.compose(&camera, plan.size, Style::default(), None);
+    session.compose(&camera, plan.size, plan.style, None);
     let gpu = match &mut plan.drawing {
         Drawing::Every(gpu) if !session.is_virtual() => {
             gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu
@@ -99,7 +101,7 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
     let (Some(path), Drawing::Every(gpu) | Drawing::Last(gpu)) = (&plan.png, &mut plan.drawing) else { return Ok(()) };
     let camera = session.scene_camera();
-    session.compose(&camera, plan.size, Style::default(), None);
+    session.compose(&camera, plan.size, plan.style, None);
     gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?;
     gpu.save(path).map_err(SessionError::Picture)
 }
