@@ -9,13 +9,12 @@ const STEPS: u64 = 1000;
 pub(super) struct Bar(ProgressBar);
 
 impl Bar {
-    /// A bar for the scene `name`; nothing is shown where `quiet`.
+    /// A bar for the scene `name`, drawn once there is progress; nothing is shown where `quiet`.
     pub(super) fn new(name: &str, quiet: bool) -> Self {
-        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS) };
+        let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS).with_prefix(name.to_owned()) };
         if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:30} {percent:>3} %  {msg}") {
             bar.set_style(style);
         }
-        bar.set_prefix(name.to_owned());
         Self(bar)
     }
 

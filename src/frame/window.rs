@@ -138,6 +138,7 @@ impl<'a> WindowShow<'a> {
         drop(std::mem::replace(&mut self.session, session));
         self.status = Status { selected, ..panels::first(&self.session) };
         self.meter = Meter::new(&self.session);
+        self.notices.clear();
         (self.hand, self.refreshed) = (None, None);
         self.refresh();
     }
@@ -165,7 +166,7 @@ impl<'a> WindowShow<'a> {
     fn reload(&mut self) {
         match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not reloaded: {error}")),
+            Err(error) => self.say(Weight::Failure, format!("not reloaded: {}", first_problem(&error))),
         }
     }
 
@@ -173,7 +174,7 @@ impl<'a> WindowShow<'a> {
         self.plan.overrides.clear();
         match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
             Ok(scene) => self.restart(scene),
-            Err(error) => self.say(Weight::Failure, format!("not opened: {error}")),
+            Err(error) => self.say(Weight::Failure, format!("not opened: {}", first_problem(&error))),
         }
     }
 
@@ -248,6 +249,17 @@ impl<'a> WindowShow<'a> {
         self.started = if self.session.is_virtual() && now > Duration::ZERO { next.max(now) } else { now };
         self.session.wait_until(self.started);
     }
+}
+
+/// What is wrong with a scene in one line: where it begins, and how much more there is.
+fn first_problem(error: &SceneError) -> String {
+    let Some(first) = error.problems.first() else { return error.to_string() };
+    let place = if first.line == 0 { String::new() } else { format!("{}, line {}: ", error.name, first.line) };
+    let more = match error.problems.len() + error.hidden - 1 {
+        0 => String::new(),
+        more => format!(" (and {more} more)"),
+    };
+    format!("{place}{first}{more}")
 }
 
 /// Frames that a run of this plan remembers: all where it ends by itself.
