@@ -254,12 +254,12 @@ impl<'a> WindowShow<'a> {
 /// What is wrong with a scene in one line: where it begins, and how much more there is.
 fn first_problem(error: &SceneError) -> String {
     let Some(first) = error.problems.first() else { return error.to_string() };
-    let place = if first.line == 0 { String::new() } else { format!("{}, line {}: ", error.name, first.line) };
+    let line = if first.line == 0 { String::new() } else { format!(", line {}", first.line) };
     let more = match error.problems.len() + error.hidden - 1 {
         0 => String::new(),
         more => format!(" (and {more} more)"),
     };
-    format!("{place}{first}{more}")
+    format!("{}{line}: {first}{more}", error.name)
 }
 
 /// Frames that a run of this plan remembers: all where it ends by itself.
