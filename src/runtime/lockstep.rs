@@ -224,8 +224,8 @@ impl Run for Lockstep {
         &self.handles
     }
 
-    fn shutdown(self: Box<Self>) -> Vec<AgentStats> {
-        self.lives.iter().for_each(|life| life.actor.close_account());
+    fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
+        self.lives.iter_mut().for_each(|life| life.actor.close_account(&self.timeline, self.now));
         self.handles.iter().map(AgentHandle::stats).collect()
     }
 }

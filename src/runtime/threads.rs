@@ -168,7 +168,7 @@ impl Stage {
             };
         }
         self.settle(&mut actor);
-        actor.close_account();
+        actor.close_account(&self.timeline.read(), self.clock.now());
     }
 
     /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which does no harm.

@@ -139,6 +139,7 @@ impl Actor {
         if !self.shared.board.take_wake(self.id()) {
             return false;
         }
+        self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
         self.rhythm = Rhythm::default();
         self.diary.restart(timeline.sim_at(wall));
@@ -153,8 +154,13 @@ impl Actor {
         self.shared.gauges.cpu_nanos.fetch_add(nanos, Relaxed);
     }
 
-    /// Brings the account up to date, at the end of a run.
-    pub fn close_account(&self) {
+    /// Brings the account up to date, at the end of a run: who rests has rested until now.
+    pub fn close_account(&mut self, timeline: &Timeline, wall: Duration) {
+        if self.shared.gauges.is_resting() {
+            self.hold_watched(timeline.sim_at(wall));
+            self.pace.wake(timeline, wall);
+            self.diary.pace(&self.shared.gauges, &self.pace);
+        }
         self.diary.flush(&self.shared.gauges);
     }
 
@@ -219,6 +225,13 @@ impl Actor {
         let Some(state) = self.writer.filled() else { return };
         let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
         traces.iter_mut().for_each(|trace| trace.look(state));
+    }
+
+    /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.
+    fn hold_watched(&self, now: SimTime) {
+        let state = self.shared.slot.latest();
+        let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
+        traces.iter_mut().for_each(|trace| trace.hold(&state, now));
     }
 
     /// Tells those this agent acts on, once they can see how.

@@ -1,7 +1,7 @@
 //! Material points whose path is written down, state by state.
 //!
 //! In: an agent's snapshots, as it publishes them. Out: for each [`Watch`] the first state at or after every multiple of its
-//! period, with that state's own time. Never here: files, units of a report.
+//! period, with that state's own time; while the agent rests, its state at every multiple. Never here: files, units of a report.
 
 use glam::DVec3;
 use metachron_agents::{SimSpan, SimTime, Snapshot};
@@ -45,8 +45,24 @@ impl Trace {
         }
         let Some((position, _)) = state.body.probe(self.watch.at) else { return };
         self.samples.push((state.time, position));
-        let passed = state.time.as_nanos() / self.watch.every.as_nanos();
-        self.next = SimTime::from_nanos((passed + 1).saturating_mul(self.watch.every.as_nanos()));
+        self.next = self.multiple_after(state.time);
+    }
+
+    /// Writes the state down at every multiple of the period up to `until`: it holds that long.
+    pub fn hold(&mut self, state: &Snapshot, until: SimTime) {
+        if self.watch.every == SimSpan::ZERO {
+            return;
+        }
+        let Some((position, _)) = state.body.probe(self.watch.at) else { return };
+        while self.next <= until && self.samples.len() < SAMPLES_MAX {
+            self.samples.push((self.next, position));
+            self.next = self.multiple_after(self.next);
+        }
+    }
+
+    fn multiple_after(&self, time: SimTime) -> SimTime {
+        let every = self.watch.every.as_nanos();
+        SimTime::from_nanos((time.as_nanos() / every + 1).saturating_mul(every))
     }
 }
 
@@ -69,5 +85,16 @@ mod tests {
         }
         let kept: Vec<u64> = trace.samples().iter().map(|(t, _)| t.as_nanos() / 1_000_000).collect();
         assert_eq!(kept, [0, 12, 20, 32, 55, 60]);
+    }
+
+    #[test]
+    fn a_state_that_holds_is_written_down_at_every_multiple() {
+        let mut trace = Trace::new(Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) });
+        trace.look(&state(4));
+        trace.hold(&state(4), SimTime::from_nanos(30_000_000));
+        trace.hold(&state(4), SimTime::from_nanos(39_000_000));
+        trace.look(&state(41));
+        let kept: Vec<_> = trace.samples().iter().map(|(t, at)| (t.as_nanos() / 1_000_000, at.x)).collect();
+        assert_eq!(kept, [(4, 4.0), (10, 4.0), (20, 4.0), (30, 4.0), (41, 41.0)]);
     }
 }
