@@ -10,7 +10,11 @@ use crate::scene::format::{
 use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
 use glam::DVec3;
+use metachron_agents::instrument::Instrument;
+use metachron_agents::rigid::RigidBody;
+use metachron_agents::rod::{Tube, TubeError};
 use metachron_agents::shape::Obstacle;
+use metachron_agents::synthetic::Synthetic;
 use metachron_agents::{AgentId, Resolution, ResolutionRange};
 use serde::de::DeserializeOwned;
 use std::collections::BTreeMap;
@@ -250,7 +254,33 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Sta
     let mut members: Vec<Member> =
         moving.iter().zip(0..).filter_map(|(entry, id)| member(c, entry, AgentId(id), (names, stage))).collect();
     link(&mut members);
+    if c.count() == 0 {
+        members.iter().for_each(|member| try_out(c, &moving[member.id.0 as usize].place, member));
+    }
     members
+}
+
+/// Tells what only the model can say of an object: the object is built once, for the verdict alone.
+fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
+    let verdict = match member.spec.clone() {
+        Spec::Tube(spec) => match Tube::new(spec) {
+            Err(TubeError::Cusp { index, degrees }) => {
+                let what = format_args!("turns back on itself at point {index}, by {degrees:.0}°");
+                return c.wrong(place, &format!("path_m.{index}"), what, "expected a turn of at most 170°");
+            }
+            other => other.map(drop).map_err(|e| e.to_string()),
+        },
+        Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Instrument(spec) => Instrument::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Synthetic(spec) => {
+            Synthetic::new(spec, member.simulation, member.start).map(drop).map_err(|e| e.to_string())
+        }
+    };
+    if let Err(reason) = verdict {
+        let span = c.document().locate(&format!("{}.name", place.path));
+        let expected = format!("expected a {} that can be built", member.spec.model());
+        c.push(Problem::new(span, format!("`{}` cannot be built: {reason}", member.name)).expecting(expected));
+    }
 }
 
 fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (&Names, &Stage<'_>)) -> Option<Member> {
