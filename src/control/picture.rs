@@ -178,25 +178,32 @@ impl PictureControl {
     }
 
     /// The polygons that ln ε̂ stands for, shared out (control.md, eq. 13 and 14).
+    ///
+    /// Bodies, whose levels are few and far apart, choose first; tubes, which follow exactly, share what is then left.
     fn plan_corrected(&mut self) {
         self.bound_corrected();
         let budget = POLYGONS_AT_ONE * libm::exp(-self.corrected.value());
-        let share = |(view, span): &(ObjectView, Span)| Share {
-            weight: 2.0 * view.surface_m2() / view.coarseness_m2(),
-            least: span.least,
-            most: span.most,
-        };
         self.water = water_level(budget, self.in_view().map(share), self.water);
-        for (view, span) in &self.views {
-            let held = self.held.entry(view.id).or_default();
-            let (resolution, polygons) = if view.visible {
-                let at = held.choose(view, *span, share(&(*view, *span)).at(self.water));
-                (at, level::polygons(view, at))
+        let water = self.water;
+        self.plan.levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
+        self.choose(water, |view| !is_tube(view));
+        let taken: f64 = self.plan.levels.iter().map(|level| level.polygons).sum();
+        let tubes = self.in_view().filter(|(view, _)| is_tube(view)).map(share);
+        let water = water_level(budget - taken, tubes, water);
+        self.choose(water, is_tube);
+    }
+
+    /// Chooses the level of those in view that are `of` the kind, by their shares at `water`.
+    fn choose(&mut self, water: f64, of: impl Fn(&ObjectView) -> bool) {
+        let all = self.views.iter().zip(&mut self.plan.levels);
+        for (seen, level) in all.filter(|((view, _), _)| of(view)) {
+            let held = self.held.entry(seen.0.id).or_default();
+            if seen.0.visible {
+                level.resolution = held.choose(&seen.0, seen.1, share(seen).at(water));
+                level.polygons = level::polygons(&seen.0, level.resolution);
             } else {
                 held.forget();
-                (coarsest(view), 0.0)
-            };
-            self.plan.levels.push(LevelDemand { id: view.id, resolution, polygons });
+            }
         }
     }
 
@@ -256,7 +263,7 @@ impl PictureControl {
 
     /// The geometric mean of the tubes' coarseness: one tube alone has weight 1, and the law is exactly the printed one.
     fn mean_coarseness(&self) -> f64 {
-        let tubes = self.in_view().filter(|(view, _)| matches!(view.kind, Kind::Tube { .. }));
+        let tubes = self.in_view().filter(|(view, _)| is_tube(view));
         let (sum, count) = tubes.fold((0.0, 0.0), |(s, c), (view, _)| (s + libm::log(view.coarseness_m2()), c + 1.0));
         if count > 0.0 { libm::exp(sum / count) } else { 1.0 }
     }
@@ -352,6 +359,19 @@ impl PictureControl {
     pub fn target_hz(&self) -> f64 {
         self.target_hz
     }
+}
+
+fn is_tube(view: &ObjectView) -> bool {
+    matches!(view.kind, Kind::Tube { .. })
+}
+
+/// What an object in view may get of the polygons (control.md, eq. 14).
+fn share((view, span): &(ObjectView, Span)) -> Share {
+    Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
+}
+
+fn unseen(view: &ObjectView) -> LevelDemand {
+    LevelDemand { id: view.id, resolution: coarsest(view), polygons: 0.0 }
 }
 
 fn coarsest(view: &ObjectView) -> Resolution {
