@@ -166,6 +166,14 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.json && args.report.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
     }
+    for (flag, path) in [("--png", &args.png), ("--frames-csv", &args.frames_csv)] {
+        if path.as_deref() == Some(Path::new("-")) {
+            return Err(BadInput(format!(
+                "{flag} - would be standard output, which takes the report alone; name a file"
+            ))
+            .into());
+        }
+    }
     for path in [&args.png, &args.report, &args.frames_csv].into_iter().flatten() {
         let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
         if folder.is_some_and(|f| !f.is_dir()) {

@@ -65,7 +65,7 @@ pub enum GpuError {
         detail: String,
     },
     /// The file could not be written.
-    #[error("the picture could not be written to {path}: {source}")]
+    #[error("the picture could not be written to {path}")]
     File {
         /// Where it should have gone.
         path: PathBuf,

@@ -30,11 +30,11 @@ pub enum SessionError {
     #[error(transparent)]
     Run(#[from] runtime::RunError),
     /// The adapter failed.
-    #[error("drawing failed: {0}")]
+    #[error("drawing failed")]
     Draw(#[source] GpuError),
     /// The picture could not be written.
-    #[error("no picture: {0}")]
-    Picture(#[source] GpuError),
+    #[error(transparent)]
+    Picture(GpuError),
 }
 
 /// A scene in play.
@@ -312,7 +312,7 @@ impl Session {
             warm_up: self.warm_up,
             sim_s,
             wall_s,
-            cpu_s: stats.iter().map(|s| s.cpu_s).sum(),
+            cpu_s: stats.iter().map(|s| s.cpu_s).fold(0.0, |sum, s| sum + s), // an empty sum() is -0
             state_hash: runtime::state_hash(&handles),
             probes: probes(&self.scene, &handles),
             agents: stats
