@@ -140,6 +140,8 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--set", "nothing"], "KEY=VALUE"),
         (&["run", "--headless", "--report", "no/such/folder.json"], "does not exist"),
         (&["run", "--headless", "--json", "--report", "-"], "choose one"),
+        (&["run", "--headless", "--png", "-"], "--png -"),
+        (&["run", "--headless", "--frames-csv", "-"], "name a file"),
         (&["check"], "SCENE"),
     ] {
         let done = metachron(arguments);

@@ -1,6 +1,8 @@
 //! The whole program as its users meet it; one binary, so that it links once.
 mod cli;
 mod picture;
+mod play;
+mod run;
 mod scene;
 mod scenes;
 mod viewer;

@@ -1,0 +1,7 @@
+//! What the whole program promises, played from the command line: physics, control, rest, outputs and ends.
+
+mod isolation;
+mod limits;
+mod outputs;
+mod physics;
+mod settling;

@@ -1,0 +1,102 @@
+//! What a run writes, and where.
+
+use crate::play::{Folder, agent, metachron, number, report_of};
+use serde_json::Value;
+
+const BALL: &str =
+    "[[object]]\nname = \"ball\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
+
+fn run(scene: &Folder, arguments: &[&str]) -> std::process::Output {
+    let fixed = ["run", scene.scene(), "--headless", "--executor", "lockstep", "--frames", "7"];
+    let done = metachron(&[&fixed[..], arguments].concat());
+    assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    done
+}
+
+#[test]
+fn the_rows_of_frames_are_one_a_frame_with_the_documented_columns() {
+    let scene = Folder::with(BALL);
+    let path = scene.file("frames.csv");
+    run(&scene, &["--frames-csv", &path, "-q"]);
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut rows = text.lines();
+    assert_eq!(rows.next(), Some("frame,sim_s,frame_ms,gpu_ms,interval_ms,full_ms,triangles,objects,eps,n"));
+    let rows: Vec<Vec<&str>> = rows.map(|row| row.split(',').collect()).collect();
+    assert_eq!(rows.len(), 7);
+    for (k, row) in rows.iter().enumerate() {
+        assert_eq!((row.len(), row[0].parse()), (10, Ok(k)));
+        assert_eq!(row[3], "", "no adapter works in virtual time");
+        let shown_s: f64 = row[1].parse().unwrap();
+        assert!((shown_s - k as f64 / 60.0).abs() < 1e-8, "{row:?}"); // at most 7 periods, each rounded to a nanosecond
+    }
+}
+
+#[test]
+fn what_is_data_is_json_and_nothing_else_is_on_standard_output() {
+    let scene = Folder::with(BALL);
+    for arguments in [&["--json"][..], &["--json", "-q"], &["--report", "-"], &["--report", "-", "-q"]] {
+        let report: Value = serde_json::from_slice(&run(&scene, arguments).stdout).unwrap();
+        assert_eq!(report["frames"], 7, "{arguments:?}");
+    }
+    let path = scene.file("report.json");
+    let quiet = run(&scene, &["-q", "--report", &path]);
+    assert!(quiet.stdout.is_empty());
+    let both: Value = serde_json::from_slice(&run(&scene, &["--json", "--report", &path]).stdout).unwrap();
+    let file: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
+    assert!(both == file);
+    let summary = String::from_utf8(run(&scene, &[]).stdout).unwrap();
+    assert!(summary.contains("7 frames") && summary.contains("ball"), "{summary}");
+}
+
+#[test]
+fn what_cannot_be_written_ends_with_one_and_names_the_file_once() {
+    let scene = Folder::with(BALL);
+    if !std::path::Path::new("/dev/full").exists() {
+        return;
+    }
+    for flag in ["--report", "--frames-csv"] {
+        let done = metachron(&[
+            "run",
+            scene.scene(),
+            "--headless",
+            "--executor",
+            "lockstep",
+            "--frames",
+            "2",
+            flag,
+            "/dev/full",
+        ]);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert_eq!((done.status.code(), said.matches("/dev/full").count()), (Some(1), 1), "{said}");
+    }
+}
+
+#[test]
+fn a_picture_has_the_size_that_was_asked_for() {
+    let scene = Folder::with(BALL);
+    let path = scene.file("last.png");
+    let done = run(&scene, &["--png", &path, "--size", "97x31", "--json", "-q"]);
+    let report: Value = serde_json::from_slice(&done.stdout).unwrap();
+    if report["adapter"].is_null() {
+        let required = std::env::var("METACHRON_REQUIRE_ADAPTER").is_ok_and(|v| v == "1");
+        assert!(!required, "{}", String::from_utf8_lossy(&done.stderr));
+        eprintln!("picture test skipped: {}", String::from_utf8_lossy(&done.stderr));
+        return;
+    }
+    let picture = image::open(path).unwrap().to_rgb8();
+    assert_eq!(picture.dimensions(), (97, 31));
+    let first = picture.get_pixel(0, 0);
+    assert!(picture.pixels().any(|p| p != first), "the ball is not to be seen");
+}
+
+#[test]
+fn the_overrides_reach_the_run() {
+    let scene = Folder::with(BALL);
+    let report = report_of(
+        scene.scene(),
+        &["--executor", "lockstep", "--frames", "20", "--target-fps", "20", "--set", "object.ball.rate_hz=100"],
+    );
+    assert_eq!(number(&report, "/target_ms"), 50.0);
+    assert_eq!(number(agent(&report, "ball"), "/wanted_hz"), 100.0);
+    assert!((number(agent(&report, "ball"), "/rate_hz") - 100.0).abs() < 1e-6);
+}
