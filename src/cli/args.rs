@@ -88,7 +88,7 @@ pub struct RunArgs {
     #[arg(default_value = "tube", value_hint = ValueHint::FilePath)]
     pub scene: String,
     /// Open no window
-    #[arg(long, env = "METACHRON_HEADLESS")]
+    #[arg(long, env = "METACHRON_HEADLESS", value_parser = clap::builder::FalseyValueParser::new())]
     pub headless: bool,
     /// End after so many frames
     #[arg(long, value_name = "N", conflicts_with = "seconds", value_parser = clap::value_parser!(u64).range(1..))]
