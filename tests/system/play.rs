@@ -57,6 +57,11 @@ impl Folder {
         self.scene.to_str().unwrap()
     }
 
+    /// The folder's path.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
     /// A path in the folder.
     pub fn file(&self, name: &str) -> String {
         self.folder.path().join(name).to_str().unwrap().to_owned()

@@ -1,6 +1,6 @@
 //! What a run writes, and where.
 
-use crate::play::{Folder, agent, metachron, number, report_of};
+use crate::play::{Folder, agent, metachron, number, program, report_of};
 use serde_json::Value;
 
 const BALL: &str =
@@ -99,4 +99,23 @@ fn the_overrides_reach_the_run() {
     assert_eq!(number(&report, "/target_ms"), 50.0);
     assert_eq!(number(agent(&report, "ball"), "/wanted_hz"), 100.0);
     assert!((number(agent(&report, "ball"), "/rate_hz") - 100.0).abs() < 1e-6);
+}
+
+#[test]
+fn the_environment_says_headless_as_environments_do() {
+    let scene = Folder::with(BALL);
+    let traces = |value: &str| {
+        let mut child = program();
+        child.current_dir(scene.folder()).env("METACHRON_HEADLESS", value);
+        let done =
+            child.args(["run", scene.scene(), "--executor", "lockstep", "--frames", "1", "-q"]).output().unwrap();
+        assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+        std::fs::read_dir(scene.folder()).unwrap().count() - 1
+    };
+    for headless in ["1", "true", "yes", "on"] {
+        assert_eq!(traces(headless), 0, "{headless}: a headless run leaves nothing behind");
+    }
+    for windowed in ["0", "false", "no", ""] {
+        assert!(traces(windowed) > 0, "{windowed}: without a display a run leaves its report");
+    }
 }
