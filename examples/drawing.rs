@@ -26,7 +26,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
     let number = |i: usize, default: f64| numbers.get(i).map_or(Ok(default), |text| text.parse());
     let (eps_m, n) = (number(0, 0.006)?, number(1, 5.0)? as u8);
     let size = Size { width: number(2, 1280.0)? as u32, height: number(3, 720.0)? as u32 };
-    let options = RendererOptions { samples: number(4, 4.0)? as u32, shadow_px: 2048, shadow_taps: 4 };
+    let options = RendererOptions { samples: number(4, 4.0)? as u32, ..RendererOptions::STILL };
     let style = match numbers.get(5).map(String::as_str) {
         Some("resolution") => Style { colouring: Colouring::Resolution, wireframe: true },
         Some("age") => Style { colouring: Colouring::Age, wireframe: false },

@@ -16,6 +16,10 @@ use std::f64::consts::TAU;
 
 /// Level at which fixed solids are drawn.
 const PROP_LEVEL: u8 = 4;
+/// Cells of a fixed box are at most this share of the light's radius long: light is close to linear across one.
+const CELL_SHARE: f64 = 0.125;
+/// Most cells along a side of a fixed box; a larger one is lit pixel by pixel everywhere.
+const CELLS_MAX: f64 = 24.0;
 /// Repeats of the skin's texture around a tube; the shader has the same number.
 const TEXTURE_AROUND: f64 = 2.0;
 /// Share of the distance to the target that the user's spring is thick.
@@ -83,23 +87,26 @@ impl Stage {
         track.pose.point(anchor).map(|(position, _)| position)
     }
 
-    /// The ball that light and shadow are fitted to: all that is near what the camera looks at.
+    /// The ball that light is fitted to, and the box that shadow is: all that is near what the camera looks at.
     fn find_focus(&self, camera: &Camera, picture: &mut Picture) {
         let reach = FOCUS_REACH * camera.distance_m;
+        let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
-        let balls = moving.map(|t| (t.bounds.centre, t.bounds.radius_m));
-        let balls = balls.chain(self.props.iter().map(|p| (p.position, p.body.radius_m)));
-        let near = balls.filter(|(c, r)| *r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach);
-        let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        for (centre, radius) in near {
-            low = low.min(centre - radius);
-            high = high.max(centre + radius);
+        let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.half_extents()));
+        let fixed = self.props.iter().map(|p| (p.position, p.body.radius_m, p.half_extents()));
+        let (mut ball, mut tight) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], [DVec3::INFINITY, DVec3::NEG_INFINITY]);
+        for (centre, radius, half) in moving.chain(fixed).filter(|(c, r, _)| near(*c, *r)) {
+            ball = [ball[0].min(centre - radius), ball[1].max(centre + radius)];
+            tight = [tight[0].min(centre - half), tight[1].max(centre + half)];
         }
-        let found = low.is_finite() && high.is_finite();
+        let found = ball.iter().chain(&tight).all(|corner| corner.is_finite());
+        let around = |c: DVec3, r: f64| (c - r, c + r);
+        let [low, high] = ball;
         picture.focus_m = if found { 0.5 * (low + high) } else { camera.target_m };
         let radius = if found { 0.5 * low.distance(high) } else { camera.distance_m };
         // in steps of a tenth, so that shadows do not crawl with every move
         picture.focus_radius_m = 1.1_f64.powf((radius.max(1e-3).ln() / 1.1_f64.ln()).ceil());
+        picture.shadowed_m = if found { (tight[0], tight[1]) } else { around(picture.focus_m, picture.focus_radius_m) };
     }
 
     /// Cuts every tube into its intervals, tubes of one level side by side.
@@ -248,9 +255,20 @@ fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Vec<(MeshKey, 
         picture.floor.get_or_insert(floor);
         return;
     }
-    let Some((mesh, size)) = mesh_of(&prop.solid, prop.body.given, PROP_LEVEL) else { return };
+    let slab = slab_of(prop, picture.focus_radius_m);
+    let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.given, PROP_LEVEL)) else { return };
     let paint = Paint::of(prop.look, [0; 4]);
     solids.push((mesh, instance(prop.position - picture.origin, prop.rotation, size, paint)));
+}
+
+/// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and cut into cells small enough to be lit at their
+/// corners. Brushed metal is not, nor is what is far larger than the light.
+fn slab_of(prop: &PropShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)> {
+    let Solid::Box { half_extents_m } = prop.solid else { return None };
+    let cells = (2.0 * half_extents_m / (CELL_SHARE * light_radius_m)).ceil().max(DVec3::ONE);
+    let fits = cells.max_element() <= CELLS_MAX && prop.look.material != Material::Metal;
+    let size = Rounding { extents: half_extents_m.as_vec3(), radius_m: 0.0 };
+    fits.then(|| (MeshKey::Slab(cells.to_array().map(|count| count as u8)), size))
 }
 
 /// The user's spring as a coil of wire between two points.

@@ -7,7 +7,7 @@ use super::picture::Picture;
 use super::pose;
 use glam::{DQuat, DVec3};
 use metachron_agents::shape::{Obstacle, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh};
-use metachron_agents::{AgentId, Body, SimTime, Snapshot};
+use metachron_agents::{AgentId, Body, CurveState, SimTime, Snapshot};
 use std::sync::Arc;
 
 /// Which states a frame shows.
@@ -234,11 +234,17 @@ impl Track {
                 Bounds { centre: tool.tip - tool.rotation * DVec3::Z * half, radius_m: 1.2 * half }
             }
             Body::Curve(curve) => {
-                let bound = |pick: fn(DVec3, DVec3) -> DVec3| curve.positions.iter().copied().reduce(pick);
-                let (Some(low), Some(high)) = (bound(DVec3::min), bound(DVec3::max)) else { return Bounds::default() };
-                let skin = curve.radii_m.iter().copied().fold(0.0, f64::max);
+                let Some((low, high, skin)) = curve_box(curve) else { return Bounds::default() };
                 Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) + skin }
             }
+        }
+    }
+
+    /// Half the box along the world's axes that holds it, about the centre of its bounds, metres.
+    pub fn half_extents(&self) -> DVec3 {
+        match &self.pose {
+            Body::Curve(curve) => curve_box(curve).map_or(DVec3::ZERO, |(low, high, skin)| 0.5 * (high - low) + skin),
+            _ => DVec3::splat(self.bounds.radius_m),
         }
     }
 }
@@ -249,6 +255,24 @@ impl PropShape {
         let body = BodyShape::of(&solid, meshes);
         Self { solid, look: prop.look, position, rotation, body }
     }
+
+    /// Half the box along the world's axes that holds it, about its position, metres.
+    pub fn half_extents(&self) -> DVec3 {
+        match self.solid {
+            Solid::Box { half_extents_m: h } => {
+                let axes = glam::DMat3::from_quat(self.rotation);
+                axes.x_axis.abs() * h.x + axes.y_axis.abs() * h.y + axes.z_axis.abs() * h.z
+            }
+            _ => DVec3::splat(self.body.radius_m),
+        }
+    }
+}
+
+/// Lower and upper corner of the box around a curve's nodes, and its greatest radius, metres; `None` for one without nodes.
+fn curve_box(curve: &CurveState) -> Option<(DVec3, DVec3, f64)> {
+    let bound = |pick: fn(DVec3, DVec3) -> DVec3| curve.positions.iter().copied().reduce(pick);
+    let skin = curve.radii_m.iter().copied().fold(0.0, f64::max);
+    Some((bound(DVec3::min)?, bound(DVec3::max)?, skin))
 }
 
 impl BodyShape {

@@ -85,6 +85,8 @@ pub enum MeshKey {
     Primitive(Primitive, u8),
     /// Number of a mesh in [`Picture::meshes`].
     Given(u32),
+    /// A sharp box whose sides are cut into so many cells along x, y and z, each at least 1.
+    Slab([u8; 3]),
 }
 
 /// Intervals of one tube: samples `first ..= first + intervals`.
@@ -133,6 +135,8 @@ pub struct Picture {
     pub focus_m: DVec3,
     /// Radius of what the light falls on, metres.
     pub focus_radius_m: f64,
+    /// Lower and upper corner of the box around everything that casts a shadow worth drawing, metres, world axes.
+    pub shadowed_m: (DVec3, DVec3),
     /// How it is drawn.
     pub style: Style,
     /// All tubes' samples.
@@ -155,6 +159,7 @@ impl Default for Picture {
             origin: DVec3::ZERO,
             focus_m: DVec3::ZERO,
             focus_radius_m: 1.0,
+            shadowed_m: (DVec3::NEG_ONE, DVec3::ONE),
             style: Style::default(),
             samples: Vec::new(),
             tubes: Vec::new(),
@@ -188,6 +193,10 @@ impl Picture {
     pub(super) fn mesh_triangles(&self, key: MeshKey) -> u64 {
         match key {
             MeshKey::Primitive(primitive, n) => u64::from(primitive.triangles(n)),
+            MeshKey::Slab([x, y, z]) => {
+                let [x, y, z] = [x, y, z].map(u64::from);
+                4 * (x * y + y * z + z * x)
+            }
             MeshKey::Given(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
         }
     }

@@ -5,7 +5,7 @@
 
 use super::outcome::{FrameRecord, Outcome};
 use super::session::{Finished, Session, SessionError};
-use crate::compositor::{Offscreen, Size, Style};
+use crate::compositor::{Offscreen, RendererOptions, Size, Style};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -98,10 +98,12 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
     Ok(session.finish(started, Finished { work, gpu, skip: false }))
 }
 
+/// The last frame once more, with all the time it takes.
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
-    let (Some(path), Drawing::Every(gpu) | Drawing::Last(gpu)) = (&plan.png, &mut plan.drawing) else { return Ok(()) };
+    let (Some(path), Drawing::Every(gpu) | Drawing::Last(gpu)) = (&plan.png, &plan.drawing) else { return Ok(()) };
+    let mut still = Offscreen::new(gpu.gpu().clone(), plan.size, RendererOptions::STILL).map_err(SessionError::Draw)?;
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, plan.style, None);
-    gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?;
-    gpu.save(path).map_err(SessionError::Picture)
+    still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+    still.save(path).map_err(SessionError::Picture)
 }

@@ -2,10 +2,10 @@
 //!
 //! In: a picture and a camera. Out: one uniform block. Never here: the GPU.
 
-use super::super::picture::{Colouring, Picture};
+use super::super::picture::{Colouring, FloorDraw, Picture};
 use super::super::view::{Camera, Size};
 use bytemuck::{Pod, Zeroable};
-use glam::{DMat4, DVec3, DVec4};
+use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// The uniform block, laid out as the shaders' `Globals`.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
@@ -14,14 +14,15 @@ pub struct Globals {
     view_projection: [f32; 16],
     light_projection: [f32; 16],
     eye: [f32; 4],
-    light: [f32; 4],
+    texel: [f32; 4],
     focus: [f32; 4],
     viewport: [f32; 4],
     floor_point: [f32; 4],
     floor_normal: [f32; 4],
     floor_colour: [f32; 4],
-    lamp_x: [f32; 4],
-    lamp_y: [f32; 4],
+    patch_centre: [f32; 4],
+    patch_x: [f32; 4],
+    patch_y: [f32; 4],
     materials: [[f32; 4]; 8],
 }
 
@@ -47,70 +48,215 @@ const MATERIALS: [[f32; 4]; 8] = [
     [0.1800, 1.6, 0.20, 0.0],
 ];
 
+/// What of the light never changes, as the shaders' source.
+pub fn light_source() -> String {
+    let light = LIGHT.normalize();
+    let lamp_x = (LAMP_SIDE - light * LAMP_SIDE.dot(light)).normalize();
+    let line = |name, v: DVec3| format!("const {name} = vec3f({:.9}, {:.9}, {:.9});\n", v.x, v.y, v.z);
+    [line("LIGHT", light), line("LAMP_X", lamp_x), line("LAMP_Y", light.cross(lamp_x))].concat()
+}
+
 impl Globals {
     /// The block of one frame.
     pub fn new(picture: &Picture, camera: &Camera, size: Size, shadow_px: u32) -> Self {
-        let light = LIGHT.normalize();
+        let frame = LightFrame::new(picture, shadow_px);
         let focus = picture.focus_m - picture.origin;
         let radius = picture.focus_radius_m;
-        let texel_m = 2.0 * radius / f64::from(shadow_px);
-        let projection = light_projection(light, picture.focus_m, picture.origin, (radius, texel_m));
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let stripes = f64::from(picture.style.colouring == Colouring::Resolution);
-        let lamp_x = (LAMP_SIDE - light * LAMP_SIDE.dot(light)).normalize();
         let floor = picture.floor.as_ref();
         let colour = floor.map_or([0; 3], |f| f.colour).map(|c| (f64::from(c) / 255.0).powf(2.2));
+        let patch = floor.map_or_else(Patch::default, |floor| frame.patch(floor, picture.origin));
+        let reach = patch.reach(floor.map_or(focus, |f| f.below(focus)), radius);
         Self {
             view_projection: camera.view_projection(size, picture.origin).to_cols_array(),
-            light_projection: projection.as_mat4().to_cols_array(),
-            eye: four(camera.eye() - picture.origin, texel_m),
-            light: four(light, 1.0 / f64::from(shadow_px)),
+            light_projection: frame.projection(picture.origin).as_mat4().to_cols_array(),
+            eye: four(camera.eye() - picture.origin, frame.texel_m),
+            texel: [1.0 / shadow_px as f32; 4],
             focus: four(focus, radius),
             viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, 0.0).as_vec4().to_array(),
             floor_point: four(floor.map_or(DVec3::ZERO, |f| f.point), 0.0),
             floor_normal: four(floor.map_or(DVec3::Z, |f| f.normal), 0.0),
-            floor_colour: four(DVec3::from(colour), (REACH.0 + REACH.1) * radius),
-            lamp_x: four(lamp_x, 0.0),
-            lamp_y: four(light.cross(lamp_x), 0.0),
+            floor_colour: four(DVec3::from(colour), frame.range_m),
+            patch_centre: four(patch.centre, reach),
+            patch_x: four(patch.x, 0.0),
+            patch_y: four(patch.y, 0.0),
             materials: MATERIALS,
         }
     }
 }
 
-/// From positions relative to `origin` to the shadow map's texture coordinates and depths.
+impl FloorDraw {
+    /// The point of the floor nearest to another.
+    fn below(&self, point: DVec3) -> DVec3 {
+        point - self.normal * (point - self.point).dot(self.normal)
+    }
+}
+
+/// Past this many radii of the focus the floor is as dark as the room behind it; the shaders have the same number.
+const FLOOR_REACH: f64 = 2.8;
+
+/// Whether every pixel that nothing else covers shows the floor, before it has faded into the room.
 ///
-/// The map's centre moves in whole texels, so that shadows do not crawl when the focus moves.
-fn light_projection(light: DVec3, focus_m: DVec3, origin: DVec3, (radius, texel_m): (f64, f64)) -> DMat4 {
-    let right = DVec3::Z.cross(light).normalize();
-    let up = light.cross(right);
-    let snapped = |axis: DVec3| (focus_m.dot(axis) / texel_m).round() * texel_m - origin.dot(axis);
-    let (x, y, z) = (snapped(right), snapped(up), (focus_m - origin).dot(light));
-    let range = (REACH.0 + REACH.1) * radius;
-    let row = |axis: DVec3, scale: f64, offset: f64| (axis * scale).extend(offset);
-    let half = 0.5 / radius;
-    DMat4::from_cols(
-        row(right, half, 0.5 - x * half),
-        row(up, -half, 0.5 + y * half),
-        row(light, -1.0 / range, (z + REACH.0 * radius) / range),
-        DVec4::W,
-    )
-    .transpose()
+/// What a picture shows of a plane is convex if all four corners show it, and so is the disc that has not faded.
+pub fn floor_fills(picture: &Picture, camera: &Camera, size: Size) -> bool {
+    let Some(floor) = &picture.floor else { return false };
+    let centre = floor.below(picture.focus_m - picture.origin);
+    let (width, height) = (f64::from(size.width), f64::from(size.height));
+    [(0.0, 0.0), (width, 0.0), (0.0, height), (width, height)].into_iter().all(|(x, y)| {
+        let ray = camera.ray(DVec2::new(x, y), size);
+        let eye = ray.origin - picture.origin;
+        let along = (floor.point - eye).dot(floor.normal) / ray.direction.dot(floor.normal);
+        along > 0.0 && (eye + ray.direction * along).distance(centre) < FLOOR_REACH * picture.focus_radius_m
+    })
+}
+
+/// The square column of light whose depths the shadow map holds.
+struct LightFrame {
+    /// Towards the light, and the map's sides.
+    light: DVec3,
+    right: DVec3,
+    up: DVec3,
+    /// The middle of the map in world axes: across in whole texels, so that shadows do not crawl; along at the focus.
+    middle: DVec3,
+    /// Half the map's width, metres.
+    half_m: f64,
+    texel_m: f64,
+    /// What the depths span, metres, and the part of it that lies towards the light.
+    range_m: f64,
+    towards_m: f64,
+}
+
+impl LightFrame {
+    fn new(picture: &Picture, shadow_px: u32) -> Self {
+        let light = LIGHT.normalize();
+        let right = DVec3::Z.cross(light).normalize();
+        let up = light.cross(right);
+        let (low, high) = picture.shadowed_m;
+        let (centre, extents) = (0.5 * (low + high), 0.5 * (high - low));
+        let half = extents.dot(right.abs()).max(extents.dot(up.abs()));
+        // in steps of a tenth, so that shadows do not crawl with every move
+        let half_m = 1.1_f64.powf((half.max(1e-3).ln() / 1.1_f64.ln()).ceil());
+        let texel_m = 2.0 * half_m / f64::from(shadow_px);
+        let snapped = |axis: DVec3| (centre.dot(axis) / texel_m).round() * texel_m;
+        Self {
+            light,
+            right,
+            up,
+            middle: right * snapped(right) + up * snapped(up) + light * picture.focus_m.dot(light),
+            half_m,
+            texel_m,
+            range_m: (REACH.0 + REACH.1) * picture.focus_radius_m,
+            towards_m: REACH.0 * picture.focus_radius_m,
+        }
+    }
+
+    /// From positions relative to `origin` to the shadow map's texture coordinates and depths.
+    fn projection(&self, origin: DVec3) -> DMat4 {
+        let middle = self.middle - origin;
+        let row = |axis: DVec3, scale: f64, offset: f64| (axis * scale).extend(offset - axis.dot(middle) * scale);
+        let scale = 0.5 / self.half_m;
+        DMat4::from_cols(
+            row(self.right, scale, 0.5),
+            row(self.up, -scale, 0.5),
+            row(self.light, -1.0 / self.range_m, self.towards_m / self.range_m),
+            DVec4::W,
+        )
+        .transpose()
+    }
+
+    /// What the column cuts out of the floor; a floor that light only grazes is not followed into the distance.
+    fn patch(&self, floor: &FloorDraw, origin: DVec3) -> Patch {
+        let slope = self.light.dot(floor.normal);
+        let along = if slope > GRAZING { self.light / slope } else { floor.normal };
+        let slide = |v: DVec3| v - along * v.dot(floor.normal);
+        let centre = self.middle - origin;
+        Patch {
+            centre: centre - along * (centre - floor.point).dot(floor.normal),
+            x: slide(self.right) * (2.0 * self.half_m),
+            y: slide(-self.up) * (2.0 * self.half_m),
+        }
+    }
+}
+
+/// Cosine of the angle between light and a floor's normal under which light grazes it.
+const GRAZING: f64 = 0.15;
+
+/// The part of the floor that shadows can fall on: a parallelogram by its centre and sides, metres.
+#[derive(Default)]
+struct Patch {
+    centre: DVec3,
+    x: DVec3,
+    y: DVec3,
+}
+
+impl Patch {
+    /// How many times larger it must be to hold all of the floor that has not faded, at least 1.
+    fn reach(&self, floor_centre: DVec3, radius_m: f64) -> f64 {
+        let inscribed = 0.5 * self.x.cross(self.y).length() / self.x.length().max(self.y.length());
+        let wanted = FLOOR_REACH * radius_m + self.centre.distance(floor_centre);
+        let reach = wanted / inscribed;
+        if reach > 1.01 && reach.is_finite() { reach } else { 1.01 }
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn picture() -> Picture {
+        let focus_m = DVec3::new(3.2, -1.0, 0.4);
+        Picture {
+            focus_m,
+            origin: DVec3::new(3.0, -1.0, 0.0),
+            focus_radius_m: 0.7,
+            shadowed_m: (focus_m - DVec3::new(0.3, 0.2, 0.1), focus_m + DVec3::new(0.3, 0.2, 0.1)),
+            floor: Some(FloorDraw { point: DVec3::ZERO, normal: DVec3::Z, colour: [0; 3] }),
+            ..Picture::default()
+        }
+    }
+
     #[test]
-    fn the_focus_lies_in_the_middle_of_the_shadow_map() {
-        let (focus, origin, radius) = (DVec3::new(3.2, -1.0, 0.4), DVec3::new(3.0, -1.0, 0.0), 0.7);
-        let texel = 2.0 * radius / 1024.0;
-        let projection = light_projection(LIGHT.normalize(), focus, origin, (radius, texel));
-        let at = projection.transform_point3(focus - origin);
+    fn the_shadow_map_holds_the_box_of_all_that_casts() {
+        let picture = picture();
+        let frame = LightFrame::new(&picture, 1024);
+        let projection = frame.projection(picture.origin);
+        let at = projection.transform_point3(picture.focus_m - picture.origin);
         // snapped to whole texels: at most half a texel off
         assert!((at.x - 0.5).abs() <= 0.5 / 1024.0 + 1e-12 && (at.y - 0.5).abs() <= 0.5 / 1024.0 + 1e-12, "{at}");
         assert!((at.z - REACH.0 / (REACH.0 + REACH.1)).abs() < 1e-12, "{at}");
-        let nearer = projection.transform_point3(focus - origin + LIGHT.normalize() * radius);
+        let nearer = projection.transform_point3(picture.focus_m - picture.origin + frame.light * 0.7);
         assert!(nearer.z < at.z);
+        let (low, high) = picture.shadowed_m;
+        for i in 0..8 {
+            let pick = |axis: usize| if i >> axis & 1 == 0 { low[axis] } else { high[axis] };
+            let at = projection.transform_point3(DVec3::new(pick(0), pick(1), pick(2)) - picture.origin);
+            // again half a texel of snapping
+            assert!((at.truncate() - 0.5).abs().max_element() <= 0.5 + 0.5 / 1024.0, "{at}");
+        }
+    }
+
+    #[test]
+    fn the_floors_patch_is_what_the_shadow_map_cuts_out_of_it() {
+        let picture = picture();
+        let frame = LightFrame::new(&picture, 512);
+        let floor = picture.floor.unwrap();
+        let patch = frame.patch(&floor, picture.origin);
+        let projection = frame.projection(picture.origin);
+        for (x, y) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)] {
+            let corner = patch.centre + patch.x * x + patch.y * y;
+            assert!((corner - floor.point).dot(floor.normal).abs() < 1e-12, "{corner}"); // f64, sizes of a metre
+            let at = projection.transform_point3(corner).truncate();
+            assert!((at - DVec2::new(0.5 + x, 0.5 + y)).length() < 1e-12, "{at}");
+        }
+    }
+
+    #[test]
+    fn the_floor_fills_the_view_from_above_and_not_over_its_edge() {
+        let (picture, size) = (picture(), Size { width: 1280, height: 720 });
+        let from = |eye: DVec3| Camera::looking(picture.focus_m + eye, picture.focus_m, 0.6);
+        assert!(floor_fills(&picture, &from(DVec3::new(0.1, -0.5, 1.0)), size));
+        assert!(!floor_fills(&picture, &from(DVec3::new(0.0, -1.5, 0.1)), size)); // the horizon is in view
+        assert!(!floor_fills(&picture, &from(DVec3::new(0.0, -0.5, 20.0)), size)); // so is the floor's end
     }
 }

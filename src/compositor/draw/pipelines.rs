@@ -169,8 +169,10 @@ pub struct Pipelines {
     pub skin: RenderPipeline,
     /// Solids.
     pub solid: RenderPipeline,
-    /// The floor.
-    pub floor: RenderPipeline,
+    /// Boxes in cells.
+    pub slab: RenderPipeline,
+    /// The floor in its parts, and how many vertices each has.
+    pub floor: Vec<(RenderPipeline, u32)>,
     /// What lies behind everything.
     pub room: RenderPipeline,
     /// Tubes as lines.
@@ -205,11 +207,18 @@ struct Kitchen<'a> {
 
 const SAMPLE_STRIDE: u64 = 64;
 
+/// Cells along a side of the floor's shadowed patch, and rings around it; the shader has the same numbers.
+const FLOOR_CELLS: u32 = 8;
+const FLOOR_RINGS: u32 = 8;
+const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
+const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
+
 impl Pipelines {
     /// All pipelines for targets of `format`.
     pub fn new(device: &Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
+        let light = super::globals::light_source();
         let module = |label, source: &str| {
-            let source = wgpu::ShaderSource::Wgsl(format!("{COMMON}\n{source}").into());
+            let source = wgpu::ShaderSource::Wgsl(format!("{light}{COMMON}\n{source}").into());
             device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
         };
         let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
@@ -239,15 +248,30 @@ impl Pipelines {
         let plain = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment: Some(fragment), buffers: &[], topology, module: &floor })
         };
+        let lean = |entry: [&'static str; 2]| entry[usize::from(options.lean)];
+        let skin_vertex = lean(["vs_skin", "vs_skin_lean"]);
         Self {
-            tissue: tube("tissue", "vs_skin", Some("fs_tissue"), TriangleList),
-            skin: tube("skin", "vs_skin", Some("fs_skin"), TriangleList),
+            tissue: tube("tissue", skin_vertex, Some(lean(["fs_tissue", "fs_tissue_lean"])), TriangleList),
+            skin: tube("skin", skin_vertex, Some(lean(["fs_skin", "fs_skin_lean"])), TriangleList),
             skin_edges: tube("skin edges", "vs_skin", Some("fs_edge"), LineList),
             skin_shadow: tube("skin shadow", "vs_skin_shadow", None, TriangleList),
-            solid: solid("solid", "vs_solid", Some("fs_solid"), TriangleList),
+            solid: solid(
+                "solid",
+                lean(["vs_solid", "vs_solid_lean"]),
+                Some(lean(["fs_solid", "fs_solid_lean"])),
+                TriangleList,
+            ),
+            slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
             solid_edges: solid("solid edges", "vs_solid", Some("fs_solid_edge"), LineList),
             solid_shadow: solid("solid shadow", "vs_solid_shadow", None, TriangleList),
-            floor: plain("floor", "vs_floor", "fs_floor", TriangleStrip),
+            floor: if options.lean {
+                vec![
+                    (plain("floor patch", "vs_floor_patch", "fs_floor_patch", TriangleList), FLOOR_PATCH_CORNERS),
+                    (plain("floor rings", "vs_floor_rings", "fs_floor_rings", TriangleList), FLOOR_RING_CORNERS),
+                ]
+            } else {
+                vec![(plain("floor", "vs_floor", "fs_floor", TriangleStrip), 4)]
+            },
             room: plain("room", "vs_room", "fs_room", TriangleList),
         }
     }
@@ -270,9 +294,10 @@ impl<'a> Kitchen<'a> {
         let shadow = recipe.fragment.is_none();
         let flag = |on: bool| f64::from(u8::from(on));
         let taps = f64::from(self.shadow_taps);
-        let constants = [("ENCODE_SRGB", flag(!self.format.is_srgb())), ("SHADOW_TAPS", taps)];
+        let encode = ("ENCODE_SRGB", flag(!self.format.is_srgb()));
+        let constants = [encode, ("SHADOW_TAPS", taps)];
         // lines lie a little nearer than what they outline: a millimetre and a half at a metre
-        let nudge = [("NUDGE", if lines { 1.5e-3 } else { 0.0 })];
+        let nudge = [encode, ("NUDGE", if lines { 1.5e-3 } else { 0.0 })];
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         let targets =
             [Some(wgpu::ColorTargetState { format: self.format, blend: None, write_mask: wgpu::ColorWrites::ALL })];

@@ -1,18 +1,21 @@
 // What every shader shares: the frame's numbers, light, shadow, materials, tone.
 // Positions are metres relative to the picture's origin, z up; colours are linear until `finish`.
+// LIGHT (towards the key light), LAMP_X and LAMP_Y (its lamp's sides) are written before this text.
+// Lean fragments read no uniforms: Mesa's llvmpipe spends as long on one as on ten additions.
 
 struct Globals {
     view_projection: mat4x4f,
     light_projection: mat4x4f, // to shadow texture coordinates and depth
     eye: vec4f,                // w: shadow texel in metres
-    light: vec4f,              // xyz: towards the light; w: one shadow texel in texture coordinates
+    texel: vec4f,              // x: one shadow texel in texture coordinates
     focus: vec4f,              // xyz: centre of what is lit, w: its radius
     viewport: vec4f,           // width, height, whether stripes show intervals, free
     floor_point: vec4f,
     floor_normal: vec4f,
     floor_colour: vec4f,       // w: metres that the shadow's depth range spans
-    lamp_x: vec4f,             // the lamp's sides
-    lamp_y: vec4f,
+    patch_centre: vec4f,       // the part of the floor under the shadow map; w: how many times larger all of the floor is
+    patch_x: vec4f,            // its sides
+    patch_y: vec4f,
     materials: array<vec4f, 8>,
 }
 
@@ -46,20 +49,25 @@ fn clip(p: vec3f) -> vec4f {
 }
 
 // What lies behind everything: a dark room, lighter towards the top.
-fn room(pixel: vec2f) -> vec3f {
-    let y = pixel.y / g.viewport.y;
-    let x = pixel.x / g.viewport.x - 0.5;
+// `place`: 0 … 1 across and down.
+fn room(place: vec2f) -> vec3f {
+    let y = place.y;
+    let x = place.x - 0.5;
     return mix(vec3f(0.040, 0.052, 0.066), vec3f(0.010, 0.012, 0.016), saturate(y * 0.9 + x * x * 0.6));
 }
 
-// Share of the key light that reaches a point: filtered comparisons around it.
-fn lit(p: vec3f, n: vec3f) -> f32 {
-    let at = g.light_projection * vec4f(p + n * (2.0 * g.eye.w), 1.0);
+// Where a point of a surface is in the shadow map, a little off the surface.
+fn shadow_place(p: vec3f, n: vec3f) -> vec3f {
+    return (g.light_projection * vec4f(p + n * (2.0 * g.eye.w), 1.0)).xyz;
+}
+
+// Share of the key light that reaches a place in the shadow map: filtered comparisons around it.
+fn lit(at: vec3f) -> f32 {
     let z = min(at.z, 1.0);
     if SHADOW_TAPS == 1 {
         return textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy, z);
     }
-    var o = vec2f(1.2, 0.5) * g.light.w;
+    var o = vec2f(1.2, 0.5) * g.texel.x;
     var sum = 0.0;
     for (var i = 0; i < SHADOW_TAPS; i++) {
         sum += textureSampleCompareLevel(shadow_map, shadow_sampler, at.xy + o, z);
@@ -72,7 +80,7 @@ fn lit(p: vec3f, n: vec3f) -> f32 {
 fn openness(p: vec3f, n: vec3f) -> f32 {
     let reach = 0.075 * g.focus.w;
     let at = g.light_projection * vec4f(p + n * (0.35 * reach), 1.0);
-    let size = 1.0 / g.light.w;
+    let size = 1.0 / g.texel.x;
     let o = vec2f(0.9, 0.35) * (reach / g.eye.w);
     let c = at.xy * size;
     let low = rise(c + o, at.z) + rise(c - o, at.z);
@@ -82,22 +90,22 @@ fn openness(p: vec3f, n: vec3f) -> f32 {
 
 // How far what lies at a texel stands above a depth, in shares of the reach of `openness`.
 fn rise(texel: vec2f, depth: f32) -> f32 {
-    let d = textureLoad(shadow_depths, vec2i(clamp(texel, vec2f(0.0), vec2f(1.0 / g.light.w - 1.0))), 0).r;
+    let d = textureLoad(shadow_depths, vec2i(clamp(texel, vec2f(0.0), vec2f(1.0 / g.texel.x - 1.0))), 0).r;
     return saturate((depth - d) * g.floor_colour.w / g.focus.w * 8.0);
 }
 
 // The light pool: full near the focus, fading outward.
 fn pool(p: vec3f) -> f32 {
     let arm = p - g.focus.xyz;
-    let off = arm - g.light.xyz * dot(arm, g.light.xyz);
+    let off = arm - LIGHT * dot(arm, LIGHT);
     let d = dot(off, off) / (1.5 * g.focus.w * g.focus.w);
     return 1.0 / (1.0 + d * d);
 }
 
 // What a mirror would see: a room, and a soft rectangular lamp overhead.
 fn reflected(r: vec3f) -> vec3f {
-    let toward = max(dot(r, g.light.xyz), 1e-3);
-    let off = abs(vec2f(dot(r, g.lamp_x.xyz), dot(r, g.lamp_y.xyz))) / toward;
+    let toward = max(dot(r, LIGHT), 1e-3);
+    let off = abs(vec2f(dot(r, LAMP_X), dot(r, LAMP_Y))) / toward;
     let inside = saturate((vec2f(0.34, 0.22) - off) * vec2f(7.0, 9.0));
     let soft = inside * inside * (3.0 - 2.0 * inside);
     // dark below, a bright band above the horizon, dimmer overhead
@@ -106,9 +114,8 @@ fn reflected(r: vec3f) -> vec3f {
 }
 
 struct Surface {
-    p: vec3f,
     n: vec3f,
-    geometric: vec3f,
+    v: vec3f, // towards the eye
     albedo: vec3f,
     m: vec4f, // wrap, reflectance, sharp width, sharp gain
     k: vec4f, // broad width, broad gain, mirror, metal
@@ -116,30 +123,29 @@ struct Surface {
     open: f32,
 }
 
-fn shade(s: Surface) -> vec3f {
+// The light that leaves a surface towards the eye: `within` the pool, under a share of the key light.
+fn shade(s: Surface, within: f32, share: f32) -> vec3f {
     let m = s.m;
     let k = s.k;
-    let v = normalize(g.eye.xyz - s.p);
-    let l = g.light.xyz;
-    let nl = dot(s.n, l);
-    let nv = saturate(dot(s.n, v));
-    let within = pool(s.p);
-    let share = lit(s.p, s.geometric) * within;
+    let nl = dot(s.n, LIGHT);
+    let nv = saturate(dot(s.n, s.v));
+    let vl = dot(s.v, LIGHT);
     // light that went in here comes out a little further round, redder
     let faced = saturate(nl);
     let bleed = vec3f(1.0, 0.42, 0.34) * (saturate((nl + m.x) / (1.0 + m.x)) - faced);
     let key = KEY * share;
     let ambient = mix(GROUND, SKY, 0.5 + 0.5 * s.n.z) * (s.open * (0.35 + 0.65 * within));
     let diffuse = s.albedo * (1.0 - 0.85 * k.w) * (key * (faced + bleed) * 0.42 + ambient);
-    // two lobes of Trowbridge and Reitz, each 1 at its peak times its gain
-    let nh = saturate(dot(s.n, normalize(l + v)));
-    let lobes = vec2f(m.z, k.x) / (1.0 + nh * nh * (vec2f(m.z, k.x) - 1.0));
+    // two lobes of Trowbridge and Reitz about half way between eye and light, each 1 at its peak times its gain
+    let half = max(nl + nv, 0.0);
+    let nh2 = min(half * half * 0.5 / max(1.0 + vl, 1e-3), 1.0);
+    let lobes = vec2f(m.z, k.x) / (1.0 + nh2 * (vec2f(m.z, k.x) - 1.0));
     let glint = dot(lobes * lobes, vec2f(m.w * s.gloss, k.y)) * saturate(nl * 4.0);
     let rim = (1.0 - nv) * (1.0 - nv);
     let edge = rim * rim * (1.0 - nv);
     let f0 = mix(vec3f(m.y), s.albedo, k.w);
     let fresnel = f0 + (1.0 - f0) * (edge * (0.25 + 0.75 * s.gloss));
-    let mirror = reflected(reflect(-v, s.n)) * fresnel;
+    let mirror = reflected(s.n * (2.0 * nv) - s.v) * fresnel;
     return diffuse + key * f0 * glint + mirror * (k.z * s.gloss * s.open * (0.3 + 0.7 * share + 0.25 * k.w));
 }
 

@@ -20,17 +20,117 @@ fn vs_floor(@builtin(vertex_index) corner: u32) -> Ground {
 
 @fragment
 fn fs_floor(in: Ground) -> @location(0) vec4f {
-    let arm = in.p - g.focus.xyz;
-    let far = length(arm - g.floor_normal.xyz * dot(arm, g.floor_normal.xyz)) / g.focus.w;
-    let n = g.floor_normal.xyz;
-    let light = pool(in.p);
-    let share = lit(in.p, n) * light;
-    let line = abs(fract(in.p.xy * 10.0 - 0.5) - 0.5);
-    let width = fwidth(in.p.xy * 10.0);
+    let within = pool(in.p);
+    let share = lit(shadow_place(in.p, g.floor_normal.xyz)) * within;
+    let far = far_out(in.p);
+    let back = room(in.clip.xy / g.viewport.xy);
+    return ground(paint(), in.p.xy * 10.0, vec3f(within, haze(far), line_share(far)), share, back);
+}
+
+// The floor's colour under the key light and under the sky.
+struct Paint {
+    key: vec3f,
+    sky: vec3f,
+}
+
+fn paint() -> Paint {
+    let faced = 0.42 * saturate(dot(g.floor_normal.xyz, LIGHT));
+    return Paint(g.floor_colour.rgb * KEY * faced, g.floor_colour.rgb * SKY);
+}
+
+// Distance from the focus along the floor, in its radii.
+fn far_out(p: vec3f) -> f32 {
+    let arm = p - g.focus.xyz;
+    return length(arm - g.floor_normal.xyz * dot(arm, g.floor_normal.xyz)) / g.focus.w;
+}
+
+// How far the floor has faded into the room.
+fn haze(far: f32) -> f32 {
+    return smoothstep(0.9, 2.8, far);
+}
+
+// Strength of the grid's lines.
+fn line_share(far: f32) -> f32 {
+    return 0.16 * (1.0 - smoothstep(0.5, 3.0, far));
+}
+
+// The floor's light. `lines` are its coordinates in spaces of the grid; `air`: within the pool, haze, strength of the lines.
+fn ground(paint: Paint, lines: vec2f, air: vec3f, share: f32, back: vec3f) -> vec4f {
+    let line = abs(fract(lines - 0.5) - 0.5);
+    let width = fwidth(lines);
     let grid = max(1.0 - line.x / (width.x + 0.008), 1.0 - line.y / (width.y + 0.008));
-    let albedo = g.floor_colour.rgb * (1.0 + 0.16 * saturate(grid) * (1.0 - smoothstep(0.5, 3.0, far)));
-    let colour = albedo * (KEY * share * 0.42 * saturate(dot(n, g.light.xyz)) + SKY * (0.25 + 0.75 * light));
-    return finish(mix(colour, room(in.clip.xy), smoothstep(0.9, 2.8, far)));
+    let colour = (paint.key * share + paint.sky * (0.25 + 0.75 * air.x)) * (1.0 + saturate(grid) * air.z);
+    return finish(mix(colour, back, air.y));
+}
+
+// The lean floor: a patch of cells under the shadow map and rings of cells around it, which no shadow reaches.
+// What changes slowly is worked out at their corners.
+const CELLS = 8u;
+const RINGS = 8.0;
+
+struct Cell {
+    @builtin(position) clip: vec4f,
+    @location(0) lines: vec2f,
+    @location(1) air: vec3f,
+    @location(2) at: vec3f,
+    @location(3) @interpolate(flat) key: vec3f,
+    @location(4) @interpolate(flat) sky: vec3f,
+    @location(5) @interpolate(flat) pixel: vec2f,
+}
+
+// A corner of the floor at a place in the patch, whose sides are 1 long.
+fn cell(place: vec2f) -> Cell {
+    let p = g.patch_centre.xyz + g.patch_x.xyz * place.x + g.patch_y.xyz * place.y;
+    let far = far_out(p);
+    var out: Cell;
+    out.clip = clip(p);
+    out.lines = p.xy * 10.0;
+    out.air = vec3f(pool(p), haze(far), line_share(far));
+    out.at = shadow_place(p, g.floor_normal.xyz);
+    let paint = paint();
+    out.key = paint.key;
+    out.sky = paint.sky;
+    out.pixel = 1.0 / g.viewport.xy;
+    return out;
+}
+
+// The corner of a quad of two triangles.
+fn corner_of(vertex: u32) -> vec2u {
+    let i = vertex % 6u;
+    return vec2u(u32(i == 1u || i == 2u || i == 4u), u32(i == 2u || i >= 4u));
+}
+
+@vertex
+fn vs_floor_patch(@builtin(vertex_index) vertex: u32) -> Cell {
+    let quad = vertex / 6u;
+    let at = vec2u(quad % CELLS, quad / CELLS) + corner_of(vertex);
+    return cell(vec2f(at) / f32(CELLS) - 0.5);
+}
+
+@vertex
+fn vs_floor_rings(@builtin(vertex_index) vertex: u32) -> Cell {
+    let quad = vertex / 6u;
+    let corner = corner_of(vertex);
+    let around = (quad + corner.x) % (4u * CELLS);
+    let ring = (quad / (4u * CELLS)) + corner.y;
+    let side = around / CELLS;
+    let t = f32(around % CELLS) / f32(CELLS) - 0.5;
+    // along the four sides of a square, one after the other
+    var place = vec2f(t, -0.5);
+    place = select(place, vec2f(0.5, t), side == 1u);
+    place = select(place, vec2f(-t, 0.5), side == 2u);
+    place = select(place, vec2f(-0.5, -t), side == 3u);
+    return cell(place * pow(g.patch_centre.w, f32(ring) / RINGS));
+}
+
+@fragment
+fn fs_floor_patch(in: Cell) -> @location(0) vec4f {
+    return ground(Paint(in.key, in.sky), in.lines, in.air, lit(in.at) * in.air.x, room(in.clip.xy * in.pixel));
+}
+
+@fragment
+fn fs_floor_rings(in: Cell) -> @location(0) vec4f {
+    return ground(Paint(in.key, in.sky), in.lines, in.air, in.air.x, room(in.clip.xy * in.pixel));
 }
 
 struct Room {
@@ -46,5 +146,5 @@ fn vs_room(@builtin(vertex_index) corner: u32) -> Room {
 
 @fragment
 fn fs_room(in: Room) -> @location(0) vec4f {
-    return finish(room(in.clip.xy));
+    return finish(room(in.clip.xy / g.viewport.xy));
 }

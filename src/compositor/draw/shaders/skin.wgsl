@@ -57,6 +57,10 @@ fn bend(in: Patch) -> Bent {
 
 @vertex
 fn vs_skin(in: Patch) -> Skin {
+    return skin(in);
+}
+
+fn skin(in: Patch) -> Skin {
     let b = bend(in);
     let u = in.at.x;
     let twist = mix(in.normal_a.w, in.normal_b.w, u);
@@ -82,20 +86,35 @@ fn vs_skin_shadow(in: Patch) -> @builtin(position) vec4f {
     return vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, at.z, 1.0);
 }
 
+// What tissue looks like at a pixel.
+struct Flesh {
+    albedo: vec3f,
+    n: vec3f,
+    gloss: f32,
+}
+
 // Wet tissue: mottled, veined, with a film of water over small folds.
+fn flesh(uv: vec2f, n0: vec3f, t: vec3f, colour: vec3f, tint: vec4f) -> Flesh {
+    let tissue = textureSample(tissue_map, tissue_sampler, uv);
+    let plain = 1.0 - tint.a;
+    var out: Flesh;
+    out.albedo = colour * (0.50 + 0.85 * tissue.r);
+    out.albedo = mix(out.albedo, colour * vec3f(0.55, 0.10, 0.15), 0.85 * plain * tissue.g);
+    out.albedo = mix(out.albedo, tint.rgb, tint.a);
+    let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
+    out.n = normalize(n0 - t * fold.x - cross(t, n0) * fold.y);
+    out.gloss = 0.55 + 0.45 * plain;
+    return out;
+}
+
 @fragment
 fn fs_tissue(in: Skin) -> @location(0) vec4f {
-    let tissue = textureSample(tissue_map, tissue_sampler, in.uv.xy);
-    let plain = 1.0 - in.tint.a;
-    let base = in.colour;
-    var albedo = base * (0.50 + 0.85 * tissue.r);
-    let vein = tissue.g * plain;
-    albedo = mix(albedo, base * vec3f(0.55, 0.10, 0.15), 0.85 * vein);
     let n0 = normalize(in.n);
-    let fold = (tissue.ba - 0.5) * (0.85 * plain + 0.15);
-    let n = normalize(n0 - in.t * fold.x - cross(in.t, n0) * fold.y);
-    albedo = mix(albedo, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, in.m, in.k, 0.55 + 0.45 * plain, in.uv.z)));
+    let f = flesh(in.uv.xy, n0, in.t, in.colour, in.tint);
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit(shadow_place(in.p, n0)) * within;
+    return finish(shade(Surface(f.n, v, f.albedo, in.m, in.k, f.gloss, in.uv.z), within, share));
 }
 
 // A tube of anything else: cable, wire.
@@ -103,10 +122,60 @@ fn fs_tissue(in: Skin) -> @location(0) vec4f {
 fn fs_skin(in: Skin) -> @location(0) vec4f {
     let n = normalize(in.n);
     let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n, albedo, in.m, in.k, 1.0, in.uv.z)));
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit(shadow_place(in.p, n)) * within;
+    return finish(shade(Surface(n, v, albedo, in.m, in.k, 1.0, in.uv.z), within, share));
 }
 
 @fragment
 fn fs_edge(in: Skin) -> @location(0) vec4f {
     return finish(mix(vec3f(0.85, 0.95, 1.0), in.tint.rgb * 2.2, in.tint.a * 0.7));
+}
+
+// The lean skin: what does not depend on its folds is worked out at the corners of its triangles.
+struct Lean {
+    @builtin(position) clip: vec4f,
+    @location(0) at: vec3f, // in the shadow map
+    @location(1) uv: vec2f,
+    @location(2) @interpolate(linear) n: vec3f,
+    @location(3) @interpolate(linear) t: vec3f,
+    @location(4) @interpolate(linear) v: vec3f, // towards the eye
+    @location(5) @interpolate(linear) air: vec2f, // within the pool, openness to the sky
+    @location(6) @interpolate(flat) colour: vec3f,
+    @location(7) @interpolate(flat) tint: vec4f,
+    @location(8) @interpolate(flat) m: vec4f,
+    @location(9) @interpolate(flat) k: vec4f,
+}
+
+@vertex
+fn vs_skin_lean(in: Patch) -> Lean {
+    let s = skin(in);
+    var out: Lean;
+    out.clip = s.clip;
+    out.at = shadow_place(s.p, s.n);
+    out.uv = s.uv.xy;
+    out.n = s.n;
+    out.t = s.t;
+    out.v = normalize(g.eye.xyz - s.p);
+    out.air = vec2f(pool(s.p), s.uv.z);
+    out.colour = s.colour;
+    out.tint = s.tint;
+    out.m = s.m;
+    out.k = s.k;
+    return out;
+}
+
+@fragment
+fn fs_tissue_lean(in: Lean) -> @location(0) vec4f {
+    let f = flesh(in.uv, in.n, in.t, in.colour, in.tint);
+    let s = Surface(f.n, in.v, f.albedo, in.m, in.k, f.gloss, in.air.y);
+    return finish(shade(s, in.air.x, lit(in.at) * in.air.x));
+}
+
+@fragment
+fn fs_skin_lean(in: Lean) -> @location(0) vec4f {
+    let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
+    let s = Surface(normalize(in.n), in.v, albedo, in.m, in.k, 1.0, in.air.y);
+    return finish(shade(s, in.air.x, lit(in.at) * in.air.x));
 }

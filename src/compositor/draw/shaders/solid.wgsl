@@ -27,6 +27,10 @@ fn turned(q: vec4f, v: vec3f) -> vec3f {
 
 @vertex
 fn vs_solid(in: Corner) -> Solid {
+    return solid(in);
+}
+
+fn solid(in: Corner) -> Solid {
     let own = in.core * in.extents.xyz + in.normal * in.place.w;
     var out: Solid;
     out.p = turned(in.rotation, own) + in.place.xyz;
@@ -48,15 +52,84 @@ fn vs_solid_shadow(in: Corner) -> @builtin(position) vec4f {
     return vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, at.z, 1.0);
 }
 
+// Brushed around the axis: fine grooves scatter light along it, as long as they are wider than pixels.
+fn brushed(n: vec3f, own: vec3f, metal: f32) -> vec3f {
+    let groove = abs(fract(own.z * 1400.0) - 0.5) + abs(fract(own.z * 590.0 + own.x * 140.0) - 0.5) - 0.5;
+    let fade = saturate(1.0 - 2600.0 * abs(dpdx(own.z)) - 2600.0 * abs(dpdy(own.z)));
+    return normalize(n + vec3f(0.06, -0.04, 0.10) * (groove * metal * fade));
+}
+
 @fragment
 fn fs_solid(in: Solid) -> @location(0) vec4f {
     let n0 = normalize(in.n);
-    // brushed around the axis: fine grooves scatter light along it, as long as they are wider than pixels
-    let groove = abs(fract(in.own.z * 1400.0) - 0.5) + abs(fract(in.own.z * 590.0 + in.own.x * 140.0) - 0.5) - 0.5;
-    let fade = saturate(1.0 - 2600.0 * abs(dpdx(in.own.z)) - 2600.0 * abs(dpdy(in.own.z)));
-    let n = normalize(n0 + vec3f(0.06, -0.04, 0.10) * (groove * in.k.w * fade));
     let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
-    return finish(shade(Surface(in.p, n, n0, albedo, in.m, in.k, 1.0, 1.0)));
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit(shadow_place(in.p, n0)) * within;
+    return finish(shade(Surface(brushed(n0, in.own, in.k.w), v, albedo, in.m, in.k, 1.0, 1.0), within, share));
+}
+
+// A solid, lean: the pool of light and the place in the shadow map come from its corners.
+struct Lean {
+    @builtin(position) clip: vec4f,
+    @location(0) at: vec3f, // in the shadow map
+    @location(1) n: vec3f,
+    @location(2) v: vec3f, // to the eye
+    @location(3) own: vec3f,
+    @location(4) within: f32,
+    @location(5) @interpolate(flat) albedo: vec3f,
+    @location(6) @interpolate(flat) m: vec4f,
+    @location(7) @interpolate(flat) k: vec4f,
+}
+
+@vertex
+fn vs_solid_lean(in: Corner) -> Lean {
+    let s = solid(in);
+    var out: Lean;
+    out.clip = s.clip;
+    out.at = shadow_place(s.p, s.n);
+    out.n = s.n;
+    out.v = g.eye.xyz - s.p;
+    out.own = s.own;
+    out.within = pool(s.p);
+    out.albedo = mix(s.colour, s.tint.rgb, s.tint.a);
+    out.m = s.m;
+    out.k = s.k;
+    return out;
+}
+
+@fragment
+fn fs_solid_lean(in: Lean) -> @location(0) vec4f {
+    let n = brushed(normalize(in.n), in.own, in.k.w);
+    let s = Surface(n, normalize(in.v), in.albedo, in.m, in.k, 1.0, 1.0);
+    return finish(shade(s, in.within, lit(in.at) * in.within));
+}
+
+// A fixed box, lean: its cells are lit at their corners, in light and in shadow, and a pixel chooses.
+struct Slab {
+    @builtin(position) clip: vec4f,
+    @location(0) at: vec3f, // in the shadow map
+    @location(1) light: vec3f,
+    @location(2) dark: vec3f,
+}
+
+@vertex
+fn vs_slab(in: Corner) -> Slab {
+    let s = solid(in);
+    let within = pool(s.p);
+    let v = normalize(g.eye.xyz - s.p);
+    let surface = Surface(s.n, v, mix(s.colour, s.tint.rgb, s.tint.a), s.m, s.k, 1.0, 1.0);
+    var out: Slab;
+    out.clip = s.clip;
+    out.at = shadow_place(s.p, s.n);
+    out.light = finish(shade(surface, within, within)).rgb;
+    out.dark = finish(shade(surface, within, 0.0)).rgb;
+    return out;
+}
+
+@fragment
+fn fs_slab(in: Slab) -> @location(0) vec4f {
+    return vec4f(mix(in.dark, in.light, lit(in.at)), 1.0);
 }
 
 @fragment
