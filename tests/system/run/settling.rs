@@ -11,7 +11,12 @@ use std::time::Duration;
 const SIZE: Size = Size { width: 1600, height: 900 };
 
 /// Ranges of the picture wide enough for every target here to be inside them on the declared machine.
-const WIDE: [(&str, &str); 2] = [("object.intestine.picture_eps_m", "[0.0005, 0.2]"), ("object.intestine.n", "[1, 6]")];
+const WIDE: [(&str, &str); 3] = [
+    ("object.intestine.picture_eps_m", "[0.0005, 0.2]"),
+    ("object.intestine.n", "[1, 6]"),
+    // the scene's own margin of 0.3 leaves the set point of 60 Hz below what filling 1600 by 900 pixels is declared to cost
+    ("target.margin", "0.1"),
+];
 
 /// A built-in scene in virtual time.
 struct Play {
