@@ -4,6 +4,7 @@
 //! A [`Session`] is a scene in play; [`play_headless`] and [`play_in_window`] drive it. Never here: a law of control, physics.
 
 mod cast;
+mod error;
 mod governor;
 mod headless;
 mod outcome;
@@ -11,7 +12,8 @@ mod panels;
 mod session;
 mod window;
 
+pub use error::SessionError;
 pub use headless::{Drawing, End, Headless, play_headless};
 pub use outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
-pub use session::{Finished, Session, SessionError};
+pub use session::{Finished, Session};
 pub use window::{FRAMES_KEPT, GoOn, WindowFailure, WindowPlan, play_in_window};

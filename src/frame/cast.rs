@@ -3,8 +3,8 @@
 //! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
 //! Never here: time passing.
 
+use super::error::SessionError;
 use super::governor::RateGovernor;
-use super::session::SessionError;
 use crate::compositor::{Actor, Camera, Form, Look, Material, Prop, Seen, Stage};
 use crate::control::{Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits};
 use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};

@@ -3,8 +3,9 @@
 //! In: a session, an end, what draws. Out: an [`Outcome`], and a picture file where one is wanted.
 //! Never here: arguments, progress bars (the caller is told of every frame).
 
+use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
-use super::session::{Finished, Session, SessionError};
+use super::session::{Finished, Session};
 use crate::compositor::{Offscreen, RendererOptions, Size, Style};
 use std::path::PathBuf;
 use std::time::Duration;

@@ -4,8 +4,9 @@
 //! Never here: windows, files, arguments.
 
 use super::cast;
+use super::error::SessionError;
 use super::outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
-use crate::compositor::{Camera, GpuError, Hand, Picture, Seen, Size, Stage, States, Style};
+use crate::compositor::{Camera, Hand, Picture, Seen, Size, Stage, States, Style};
 use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
 use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
 use crate::scene::format::{ExecutorKind, LawKind, PolicyKind, StatesKind};
@@ -13,29 +14,6 @@ use crate::scene::{Probe, Scene};
 use metachron_agents::{AgentId, Body, Pull, Resolution, SimTime, Snapshot};
 use std::sync::Arc;
 use std::time::Duration;
-
-/// Why a scene could not be played, or not to its end.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SessionError {
-    /// A model refused its object.
-    #[error("object \"{name}\": {reason}")]
-    Build {
-        /// The object's name.
-        name: String,
-        /// What the model said.
-        reason: String,
-    },
-    /// The agents could not be started.
-    #[error(transparent)]
-    Run(#[from] runtime::RunError),
-    /// The adapter failed.
-    #[error("drawing failed")]
-    Draw(#[source] GpuError),
-    /// The picture could not be written.
-    #[error(transparent)]
-    Picture(GpuError),
-}
 
 /// A scene in play.
 pub struct Session {

@@ -2,9 +2,10 @@
 //!
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
+use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
 use super::panels::{self, Meter};
-use super::session::{Finished, Session, SessionError};
+use super::session::{Finished, Session};
 use crate::compositor::viewer::{
     Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
     run_window,
