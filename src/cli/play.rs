@@ -86,9 +86,11 @@ fn drawing(session: &Session, picture: bool, size: Size) -> anyhow::Result<Drawi
         }
         Err(error) => return Err(error.into()),
     };
+    if session.is_virtual() {
+        return Ok(Drawing::Last(Box::new(Offscreen::new(gpu, size, RendererOptions::STILL)?)));
+    }
     let options = RendererOptions::for_adapter(&gpu.info);
-    let screen = Box::new(Offscreen::new(gpu, size, options)?);
-    Ok(if session.is_virtual() { Drawing::Last(screen) } else { Drawing::Every(screen) })
+    Ok(Drawing::Every(Box::new(Offscreen::new(gpu, size, options)?)))
 }
 
 fn step(record: &FrameRecord, done: Option<f64>) -> Step {

@@ -23,9 +23,9 @@ pub enum End {
 pub enum Drawing {
     /// Nothing: a frame costs what the declared machine says, or nothing on real time.
     Nothing,
-    /// Every frame is drawn.
+    /// Every frame is drawn, in real time.
     Every(Box<Offscreen>),
-    /// Only the last frame is drawn, for its picture; costs are declared.
+    /// Only the last frame is drawn, for its picture, with all the time it takes; costs are declared.
     Last(Box<Offscreen>),
 }
 
@@ -87,10 +87,8 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, plan.style, None);
     let gpu = match &mut plan.drawing {
-        Drawing::Every(gpu) if !session.is_virtual() => {
-            gpu.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu
-        }
-        Drawing::Every(_) | Drawing::Last(_) | Drawing::Nothing => {
+        Drawing::Every(screen) => screen.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu,
+        Drawing::Last(_) | Drawing::Nothing => {
             session.spend_declared(plan.size);
             None
         }
@@ -101,8 +99,17 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
 
 /// The last frame once more, with all the time it takes.
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
-    let (Some(path), Drawing::Every(gpu) | Drawing::Last(gpu)) = (&plan.png, &plan.drawing) else { return Ok(()) };
-    let mut still = Offscreen::new(gpu.gpu().clone(), plan.size, RendererOptions::STILL).map_err(SessionError::Draw)?;
+    let Some(path) = &plan.png else { return Ok(()) };
+    let mut fresh;
+    let still = match &mut plan.drawing {
+        Drawing::Nothing => return Ok(()),
+        Drawing::Last(still) => still,
+        Drawing::Every(screen) => {
+            let gpu = screen.gpu().clone();
+            fresh = Offscreen::new(gpu, plan.size, RendererOptions::STILL).map_err(SessionError::Draw)?;
+            &mut fresh
+        }
+    };
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, plan.style, None);
     still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
