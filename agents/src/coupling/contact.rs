@@ -92,13 +92,24 @@ pub struct Contact {
     pub gap_m: f64,
     /// Coulomb friction coefficient, ≥ 0.
     pub friction: f64,
+    /// Speed at which the surfaces must part, m/s, ≥ 0: restitution times the speed of the approach. Zero for contact
+    /// that does not bounce.
+    pub rebound_m_s: f64,
+    /// Age of what is known of the other body, seconds, ≥ 0. A depth is taken back over this where it is longer than the
+    /// step: what has been pushed out already shows only that much later.
+    pub age_s: f64,
 }
 
 impl Contact {
     /// The normal velocity that the contact adds to the real one before it asks for u·n + bias ≥ 0 (eq. 3, 4).
     #[must_use]
     pub fn bias_m_s(&self, h: f64) -> f64 {
-        if self.gap_m >= 0.0 { self.gap_m / h } else { (self.gap_m * PUSH_OUT_SHARE / h).max(-PUSH_OUT_MAX_M_S) }
+        let bias = if self.gap_m >= 0.0 {
+            self.gap_m / h
+        } else {
+            (self.gap_m * PUSH_OUT_SHARE / h.max(self.age_s)).max(-PUSH_OUT_MAX_M_S)
+        };
+        if self.rebound_m_s > 0.0 { bias.min(-self.rebound_m_s) } else { bias }
     }
 
     /// The impulse nearest to `impulse` that the contact can give (eq. 7): no pull, friction inside its disc.
@@ -120,6 +131,11 @@ impl Contact {
 mod tests {
     use super::*;
 
+    fn at_rest(gap_m: f64, friction: f64) -> Contact {
+        let slots = Slots::default();
+        Contact { key: 0, slots, normal: DVec3::Z, gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 }
+    }
+
     #[test]
     fn scattering_is_the_transpose_of_gathering() {
         let mut slots = Slots::default();
@@ -136,7 +152,7 @@ mod tests {
 
     #[test]
     fn a_projected_impulse_never_pulls_and_stays_in_its_disc() {
-        let contact = Contact { key: 0, slots: Slots::default(), normal: DVec3::Z, gap_m: 0.0, friction: 0.5 };
+        let contact = at_rest(0.0, 0.5);
         assert_eq!(contact.project(DVec3::new(1.0, 0.0, -2.0)), DVec3::ZERO);
         assert_eq!(contact.project(DVec3::new(0.5, 0.0, 2.0)), DVec3::new(0.5, 0.0, 2.0));
         assert_eq!(contact.project(DVec3::new(4.0, 0.0, 2.0)), DVec3::new(1.0, 0.0, 2.0));
@@ -144,9 +160,23 @@ mod tests {
 
     #[test]
     fn a_gap_may_close_within_the_step_and_a_depth_opens_slowly() {
-        let at = |gap_m| Contact { key: 0, slots: Slots::default(), normal: DVec3::Z, gap_m, friction: 0.0 };
+        let at = |gap_m| at_rest(gap_m, 0.0);
         assert_eq!(at(0.004).bias_m_s(0.004), 1.0);
         assert_eq!(at(-0.004).bias_m_s(0.004), -PUSH_OUT_SHARE);
         assert_eq!(at(-1.0).bias_m_s(0.004), -PUSH_OUT_MAX_M_S);
+    }
+
+    #[test]
+    fn a_depth_comes_out_over_the_age_of_the_data_where_that_is_longer_than_the_step() {
+        let deep = Contact { age_s: 0.02, ..at_rest(-0.01, 0.0) };
+        assert_eq!(deep.bias_m_s(0.001), -0.01 * PUSH_OUT_SHARE / 0.02);
+        assert_eq!(deep.bias_m_s(0.04), -0.01 * PUSH_OUT_SHARE / 0.04);
+    }
+
+    #[test]
+    fn a_rebound_is_asked_for_whatever_the_gap() {
+        let bounce = |gap_m| Contact { rebound_m_s: 2.0, ..at_rest(gap_m, 0.0) };
+        assert_eq!(bounce(0.001).bias_m_s(0.001), -2.0);
+        assert_eq!(bounce(-0.001).bias_m_s(0.001), -2.0);
     }
 }

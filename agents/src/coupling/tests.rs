@@ -56,7 +56,15 @@ fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> 
         at.add_linear((key + 1) % slots, 0.3);
         at.add_angular((key + 2) % slots, noise.vector() * 0.2);
         let gap_m = noise.next() * 0.01;
-        Contact { key: u64::from(key), slots: at, normal: noise.vector().normalize(), gap_m, friction }
+        Contact {
+            key: u64::from(key),
+            slots: at,
+            normal: noise.vector().normalize(),
+            gap_m,
+            friction,
+            rebound_m_s: 0.0,
+            age_s: 0.0,
+        }
     };
     (0..count).map(&mut contact).collect()
 }
@@ -152,7 +160,7 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
     for (slot, weight) in [(0, 0.3), (1, 0.7), (2, -0.6), (3, -0.4)] {
         slots.add_linear(slot, weight);
     }
-    let contact = Contact { key: 1, slots, normal: DVec3::X, gap_m: 0.0, friction: 0.4 };
+    let contact = Contact { key: 1, slots, normal: DVec3::X, gap_m: 0.0, friction: 0.4, rebound_m_s: 0.0, age_s: 0.0 };
     let free: Vec<DVec3> =
         [-1.0, -1.0, 1.0, 1.0].iter().map(|&x| DVec3::new(x, 0.1, 0.0) + noise.vector() * 0.1).collect();
     let (velocities, solver) = after(&[contact], &free, &mut body, PATIENT);
@@ -171,7 +179,7 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
         .map(|i| {
             let mut slots = Slots::default();
             slots.add_linear(i, 1.0);
-            Contact { key: u64::from(i), slots, normal: DVec3::Z, gap_m: 0.0, friction }
+            Contact { key: u64::from(i), slots, normal: DVec3::Z, gap_m: 0.0, friction, rebound_m_s: 0.0, age_s: 0.0 }
         })
         .collect();
     let (mut velocities, mut solver, mut way) = ([DVec3::ZERO; N as usize], Solver::default(), 0.0);
@@ -216,7 +224,8 @@ fn a_warm_start_saves_most_of_the_answers() {
 fn contacts_that_stay_open_cost_no_answer() {
     let mut slots = Slots::default();
     slots.add_linear(0, 1.0);
-    let contacts = [Contact { key: 0, slots, normal: DVec3::Z, gap_m: 0.1, friction: 0.5 }];
+    let contacts =
+        [Contact { key: 0, slots, normal: DVec3::Z, gap_m: 0.1, friction: 0.5, rebound_m_s: 0.0, age_s: 0.0 }];
     let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
     let mut never = |_: &mut [DVec3]| unreachable!("nothing touches");
     let mut velocities = [DVec3::new(0.0, 0.0, -5.0)];
@@ -231,7 +240,8 @@ fn an_impulse_passes_to_the_next_of_kin() {
     slots.add_linear(0, 1.0);
     let mut solver = Solver::default();
     let mut press = |key: u64| {
-        let contacts = [Contact { key, slots, normal: DVec3::Z, gap_m: 0.0, friction: 0.5 }];
+        let contacts =
+            [Contact { key, slots, normal: DVec3::Z, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, age_s: 0.0 }];
         let mut velocities = [DVec3::new(0.1, 0.0, -1.0)];
         let problem = Problem { contacts: &contacts, kin: &[-1, 1], h_s: 0.01, mobilities: &[0.3], settings: PATIENT };
         solver.solve(&problem, &mut velocities, &mut body).iterations

@@ -186,7 +186,7 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
     }
     let [first, second] = meeting.segments.map(u64::from);
     let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(meeting.place);
-    Contact { key, slots, normal: meeting.normal, gap_m: meeting.gap_m, friction }
+    Contact { key, slots, normal: meeting.normal, gap_m: meeting.gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 }
 }
 
 /// Contact with a wall, at a node or inside a segment (eq. 21).
@@ -209,7 +209,15 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
     }
     let inside = u64::from(touch.share.is_some());
     let key = (u64::from(touch.wall) + 1) << 41 | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
-    Contact { key, slots, normal: touch.normal, gap_m: touch.gap_m, friction: (friction * touch.friction).sqrt() }
+    Contact {
+        key,
+        slots,
+        normal: touch.normal,
+        gap_m: touch.gap_m,
+        friction: (friction * touch.friction).sqrt(),
+        rebound_m_s: 0.0,
+        age_s: 0.0,
+    }
 }
 
 #[cfg(test)]
