@@ -3,6 +3,8 @@
 //! In: a step length and what the agent can see of the others ([`Surroundings`]). Out: a new state and what the step took.
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`crate::conformance`].
 
+use crate::coupling::{Form, Law, Link};
+use crate::rigid::RigidBody;
 use crate::{Anchor, Body, Resolution, SimSpan, SimTime, Snapshot};
 use glam::DVec3;
 use std::sync::Arc;
@@ -42,6 +44,44 @@ pub trait Agent: Send {
 
     /// Total mass in kilograms; zero for a model that has none.
     fn mass_kg(&self) -> f64;
+
+    /// The shape by which others touch it, for its whole life; `None` where nothing can.
+    fn form(&self) -> Option<Arc<Form>> {
+        None
+    }
+
+    /// The rigid body that this is, if it is one.
+    fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
+        None
+    }
+
+    /// Advances this agent and `others`, which have handed themselves over to it, as one world on its own clock.
+    ///
+    /// `apart` comes back with a number for each of `others`: zero where it stays in this world; else it has left, and equal
+    /// numbers still belong together.
+    ///
+    /// # Errors
+    /// [`StepError::Alone`] for a model that leads nobody; else as [`Agent::step`].
+    fn lead(
+        &mut self,
+        dt: SimSpan,
+        around: &Surroundings<'_>,
+        others: &mut [Companion<'_>],
+        apart: &mut Vec<u32>,
+    ) -> Result<StepReport, StepError> {
+        let _ = (dt, around, others, apart);
+        Err(StepError::Alone { model: self.model() })
+    }
+}
+
+/// An agent that steps in the world of another.
+pub struct Companion<'a> {
+    /// Who.
+    pub id: AgentId,
+    /// The agent.
+    pub agent: &'a mut dyn Agent,
+    /// What it sees.
+    pub around: Surroundings<'a>,
 }
 
 /// What a step took and what it led to.
@@ -78,6 +118,12 @@ pub enum StepError {
         /// The quantity that was lost first, and where.
         what: String,
     },
+    /// The model cannot step others in its world. State: untouched.
+    #[error("a {model} has no world that others could share")]
+    Alone {
+        /// The model's name.
+        model: &'static str,
+    },
 }
 
 /// The longest step any model takes, in seconds: past it a real-time agent has lost touch with its scene.
@@ -99,10 +145,12 @@ pub struct Surroundings<'a> {
     pub me: AgentId,
     /// The agent's own time at the start of the step.
     pub time: SimTime,
-    /// The newest snapshots of the agents it is linked to.
+    /// The agents it may touch or hold, that may touch or hold it, and those with which it has an account to settle.
     pub neighbours: &'a [Neighbour],
     /// Springs of the user's hand on this agent.
     pub hands: &'a [Pull],
+    /// Bilateral couplings with other agents.
+    pub links: &'a [Link],
 }
 
 /// The newest known state of another agent.
@@ -112,6 +160,20 @@ pub struct Neighbour {
     pub id: AgentId,
     /// Its newest published state.
     pub snapshot: Arc<Snapshot>,
+    /// Its shape; `None` where the two cannot touch.
+    pub form: Option<Arc<Form>>,
+    /// How the two act on each other where they touch.
+    pub law: Law,
+    /// Whether the agent that looks owns the pair ([`crate::coupling::owns`]).
+    pub owned: bool,
+}
+
+impl Neighbour {
+    /// An agent that is only looked at: it is neither touched nor owned.
+    #[must_use]
+    pub const fn seen(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
+        Self { id, snapshot, form: None, law: Law::Ledger, owned: false }
+    }
 }
 
 /// A spring from a moving point of space to a material point of an agent.
@@ -138,7 +200,7 @@ impl<'a> Surroundings<'a> {
     /// An empty world at `time`, for tests and for agents that see nobody.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
-        Self { me, time, neighbours: &[], hands: &[] }
+        Self { me, time, neighbours: &[], hands: &[], links: &[] }
     }
 
     /// Every spring on this agent: the user's hands, and the tools that hold it, their tips brought forward to `time`.

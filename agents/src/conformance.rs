@@ -146,7 +146,7 @@ struct Run<'a> {
 
 impl Run<'_> {
     fn step(&mut self, dt: SimSpan, hands: &[Pull]) -> Result<(), StepError> {
-        let around = Surroundings { me: ME, time: self.time, neighbours: self.around, hands };
+        let around = Surroundings { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
         self.agent.step(dt, &around)?;
         self.time += dt;
         Ok(())

@@ -15,7 +15,11 @@ mod snapshot;
 pub mod synthetic;
 mod time;
 
-pub use agent::{Agent, AgentId, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span};
+pub use agent::{
+    Agent, AgentId, Companion, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span,
+};
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
-pub use snapshot::{Anchor, Body, CurveState, Grasp, Grip, HASH_START, RigidState, Snapshot, ToolState};
+pub use snapshot::{
+    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, ToolState,
+};
 pub use time::{SimSpan, SimTime};

@@ -3,8 +3,10 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
+use crate::coupling::{Ledger, PairState};
+use crate::rod::CurveInertia;
 use crate::{AgentId, Resolution, SimTime};
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
 #[derive(Debug, Clone, Default)]
@@ -25,6 +27,50 @@ pub struct Snapshot {
     pub touches: Vec<AgentId>,
     /// Forces by which others hold this agent.
     pub grips: Vec<Grip>,
+    /// Whether the agent is at rest: others take it for immovable until they wake it.
+    pub at_rest: bool,
+    /// Its smooth acceleration, m/s²: without what couplings and blows did. Others expect it to go on like this.
+    pub acceleration: DVec3,
+    /// How it answers impulses.
+    pub inertia: Inertia,
+    /// The box around its matter; `None` where nothing of it can be touched.
+    pub bounds: Option<Bounds>,
+    /// What it has given to others, in couplings that it owns.
+    pub given: Vec<Ledger>,
+    /// What it has taken from others, in couplings that they own.
+    pub taken: Vec<Ledger>,
+    /// The couplings that it owns.
+    pub pairs: Vec<PairState>,
+    /// Rigid bodies that it has touched for so long that the two should share one clock.
+    pub bonds: Vec<AgentId>,
+}
+
+/// How a body answers impulses: its inverse mass, at the time of the snapshot.
+#[derive(Debug, Clone, Default)]
+pub enum Inertia {
+    /// Nothing moves it.
+    #[default]
+    Immovable,
+    /// A rigid body about its centre of mass.
+    Rigid {
+        /// 1/kg.
+        inverse_mass: f64,
+        /// 1/(kg·m²), world axes.
+        inverse_inertia: DMat3,
+    },
+    /// A tube.
+    Curve(CurveInertia),
+}
+
+/// Where matter is and how fast it may leave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// The lowest coordinates, metres.
+    pub low: DVec3,
+    /// The highest coordinates, metres.
+    pub high: DVec3,
+    /// No point moves faster, m/s.
+    pub speed_m_s: f64,
 }
 
 /// The state of an agent's matter; which one is fixed for an agent's life.
@@ -128,15 +174,25 @@ impl CurveState {
     /// `None` for a curve without nodes.
     #[must_use]
     pub fn point_at(&self, arc_m: f64) -> Option<(DVec3, DVec3)> {
-        let last = self.arc_m.len().checked_sub(1)?;
-        let right = self.arc_m.partition_point(|&s| s < arc_m).clamp(1.min(last), last);
-        let left = right.saturating_sub(1);
-        let length = self.arc_m[right] - self.arc_m[left];
-        let w = if length > 0.0 { ((arc_m - self.arc_m[left]) / length).clamp(0.0, 1.0) } else { 0.0 };
+        let (left, w) = self.locate(arc_m).or_else(|| (!self.positions.is_empty()).then_some((0, 0.0)))?;
+        let right = (left + 1).min(self.positions.len() - 1);
         Some((
             self.positions[left].lerp(self.positions[right], w),
             self.velocities[left].lerp(self.velocities[right], w),
         ))
+    }
+}
+
+impl CurveState {
+    /// The segment that holds the material point at rest arc length `arc_m`, and how far along it the point lies, 0 … 1;
+    /// clamped to the curve's ends. `None` for a curve without segments.
+    #[must_use]
+    pub fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
+        let last = self.arc_m.len().checked_sub(2)?;
+        let segment = self.arc_m.partition_point(|&s| s < arc_m).saturating_sub(1).min(last);
+        let length = self.arc_m[segment + 1] - self.arc_m[segment];
+        let share = if length > 0.0 { ((arc_m - self.arc_m[segment]) / length).clamp(0.0, 1.0) } else { 0.0 };
+        Some((segment, share))
     }
 }
 
@@ -196,7 +252,40 @@ impl Body {
     }
 }
 
+impl Inertia {
+    /// A tube's to write into, keeping its storage when this is one already.
+    pub fn curve_mut(&mut self) -> &mut CurveInertia {
+        if !matches!(self, Self::Curve(_)) {
+            *self = Self::Curve(CurveInertia::default());
+        }
+        match self {
+            Self::Curve(curve) => curve,
+            _ => unreachable!("made a curve above"),
+        }
+    }
+}
+
 impl Snapshot {
+    /// Empties what an agent without couplings leaves unsaid, keeping the storage.
+    pub fn clear(&mut self) {
+        self.touches.clear();
+        self.grips.clear();
+        (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
+        self.given.clear();
+        self.taken.clear();
+        self.pairs.clear();
+        self.bonds.clear();
+    }
+
+    /// Whether every number that others act on is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.body.is_finite()
+            && self.acceleration.is_finite()
+            && self.grips.iter().all(|grip| grip.force_n.is_finite())
+            && self.given.iter().all(Ledger::is_finite)
+    }
+
     /// Folds every bit of the state into `hash` (FNV-1a, 64 bits): equal hashes mean bit-identical runs.
     #[must_use]
     pub fn fold_hash(&self, hash: u64) -> u64 {

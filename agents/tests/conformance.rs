@@ -158,7 +158,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
     };
     let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let suite = Suite {
-        neighbours: vec![Neighbour { id: held, snapshot: Arc::new(seen) }],
+        neighbours: vec![Neighbour::seen(held, Arc::new(seen))],
         pull: Some(hand(Anchor::Local(DVec3::ZERO), DVec3::new(0.4, 0.1, 0.1))),
         absurd: absurd(Anchor::Local(DVec3::ZERO)),
         allocations: Some((&count, 0.0)),

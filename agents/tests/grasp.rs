@@ -74,8 +74,8 @@ impl Pair {
 
     fn run(&mut self, seconds: f64) {
         for _ in 0..(seconds / DT.as_secs_f64()).round() as u32 {
-            let tube = [Neighbour { id: TUBE, snapshot: Self::published(&self.tube, self.time) }];
-            let tool = [Neighbour { id: TOOL, snapshot: Self::published(&self.tool, self.time) }];
+            let tube = [Neighbour::seen(TUBE, Self::published(&self.tube, self.time))];
+            let tool = [Neighbour::seen(TOOL, Self::published(&self.tool, self.time))];
             let around = |me, neighbours| Surroundings { neighbours, ..Surroundings::alone(me, self.time) };
             self.rested = self.tube.step(DT, &around(TUBE, &tool)).unwrap().at_rest;
             self.tool.step(DT, &around(TOOL, &tube)).unwrap();

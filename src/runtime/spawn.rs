@@ -173,7 +173,7 @@ fn link(actors: &mut [Actor], at: usize, links: &[AgentId]) {
         }
     }
     let slots: Vec<_> = seen.iter().map(|id| Arc::clone(&actors[id.0 as usize].shared.slot)).collect();
-    let met = seen.iter().zip(&slots).map(|(&id, slot)| Neighbour { id, snapshot: slot.latest() });
+    let met = seen.iter().zip(&slots).map(|(&id, slot)| Neighbour::seen(id, slot.latest()));
     actors[at].neighbours = met.collect();
     actors[at].links = slots;
 }

@@ -176,7 +176,8 @@ impl Actor {
         self.look_around();
         let (dt, time) = (self.pace.dt(), self.pace.time());
         let resolution = self.agent.resolution();
-        let around = Surroundings { me: self.shared.id, time, neighbours: &self.neighbours, hands: &self.hands };
+        let around =
+            Surroundings { me: self.shared.id, time, neighbours: &self.neighbours, hands: &self.hands, links: &[] };
         let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
         self.write_snapshot(time + dt)?;
         self.pace.advance();
@@ -205,11 +206,10 @@ impl Actor {
     fn write_snapshot(&mut self, time: SimTime) -> Result<(), String> {
         let agent = &self.agent;
         let finite = self.writer.fill(|into| {
-            into.touches.clear();
-            into.grips.clear();
+            into.clear();
             agent.write_snapshot(into);
             into.time = time;
-            into.body.is_finite() && into.grips.iter().all(|g| g.force_n.is_finite())
+            into.is_finite()
         });
         let model = self.shared.model;
         if finite {

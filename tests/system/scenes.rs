@@ -50,14 +50,14 @@ impl Play {
             let mut snapshot = Snapshot::default();
             agent.write_snapshot(&mut snapshot);
             snapshot.time = self.time;
-            Neighbour { id: *id, snapshot: Arc::new(snapshot) }
+            Neighbour::seen(*id, Arc::new(snapshot))
         };
         self.states = self.agents.iter().map(state).collect();
     }
 
     fn step(&mut self, dt: SimSpan) {
         for (id, name, agent) in &mut self.agents {
-            let around = Surroundings { me: *id, time: self.time, neighbours: &self.states, hands: &[] };
+            let around = Surroundings { me: *id, time: self.time, neighbours: &self.states, hands: &[], links: &[] };
             agent.step(dt, &around).unwrap_or_else(|e| panic!("{name}: {e}"));
         }
         self.time += dt;

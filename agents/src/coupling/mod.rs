@@ -1,12 +1,22 @@
-//! What touching bodies do to each other: laws only, no state of any agent.
+//! What agents do to each other: contact laws, the ledger between different clocks, and one agent as another expects it.
 //!
-//! In: contacts, free velocities and how bodies answer impulses. Out: impulses. Never here: who touches whom (each model
-//! finds its own contacts), threads, time. Theory: `docs/theory/contact.md`.
+//! In: contacts, free velocities and how bodies answer impulses; what neighbours published. Out: impulses, and the account of
+//! them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
 
 mod contact;
+mod exchange;
+mod form;
+mod law;
+mod ledger;
+mod other;
 mod solver;
 
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
+pub use exchange::{Exchange, PairKind, PairState, acknowledged};
+pub use form::{Form, FormKind, Place, Placed, SolidForm, Touch, View};
+pub use law::{Law, Link, Standing, owns};
+pub use ledger::{Entry, Impulse, Ledger, Page, Site};
+pub use other::Other;
 pub use solver::{Problem, Response, Settings, Solver, SolverReport};
 
 #[cfg(test)]

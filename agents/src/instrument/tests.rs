@@ -36,7 +36,7 @@ fn tube(grips: Vec<Grip>) -> Neighbour {
         frames: vec![DQuat::IDENTITY; 2],
         radii_m: vec![0.01; 3],
     };
-    Neighbour { id: TUBE, snapshot: Arc::new(Snapshot { body: Body::Curve(curve), grips, ..Snapshot::default() }) }
+    Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), grips, ..Snapshot::default() }))
 }
 
 fn state(tool: &Instrument) -> ToolState {
@@ -64,7 +64,7 @@ impl Stage {
 
     fn step_with(&mut self, hands: &[Pull]) -> Result<StepReport, StepError> {
         let dt = SimSpan::from_secs_f64(DT_S).unwrap();
-        let around = Surroundings { me: ME, time: self.time, neighbours: &self.around, hands };
+        let around = Surroundings { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
         let report = self.tool.step(dt, &around)?;
         self.time += dt;
         Ok(report)

@@ -62,6 +62,11 @@ impl Factor {
         self.rows.len()
     }
 
+    /// Takes over another factor, into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.rows.clone_from(&other.rows);
+    }
+
     /// Factors the matrix; returns the first slot whose pivot is not positive definite, where there is one (eq. 16).
     pub fn factor(&mut self, rows: &[Row]) -> Result<(), usize> {
         self.rows.resize(rows.len(), Factored::ZERO);

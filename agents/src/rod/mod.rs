@@ -17,6 +17,7 @@ mod config;
 mod contact;
 mod division;
 mod holds;
+mod inertia;
 mod remesh;
 mod residual;
 mod rest;
@@ -32,6 +33,7 @@ mod turn;
 
 pub use check::TubeError;
 pub use division::{SEGMENTS_MAX, SEGMENTS_MIN};
+pub use inertia::CurveInertia;
 pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec};
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 

@@ -1,0 +1,225 @@
+//! What a coupled agent keeps of its couplings: the ledgers it writes, and copies of those it has taken from.
+//!
+//! In: what the neighbours published, and the impulses of contacts this agent owns. Out: what is new since the last reading,
+//! what is still on its way, and the part of a snapshot that others read. Never here: contacts, laws, how a body answers.
+//! Theory: docs/theory/coupling.md, eq. 1–4.
+
+use super::{Impulse, Ledger, Site};
+use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
+use glam::DVec3;
+
+/// How an agent's couplings act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PairKind {
+    /// Contact by impulse ledger.
+    #[default]
+    Ledger,
+    /// Contact by penalty forces from stale states.
+    Penalty,
+    /// Contact or link by wave variables.
+    Tlm,
+    /// A tool's hold.
+    Grasp,
+    /// A bilateral link of the scene.
+    Attachment,
+}
+
+impl PairKind {
+    /// The word of reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ledger => "ledger",
+            Self::Penalty => "penalty",
+            Self::Tlm => "tlm",
+            Self::Grasp => "grasp",
+            Self::Attachment => "attach",
+        }
+    }
+}
+
+/// What a coupling does now, published by its owner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairState {
+    /// The agent on the other side.
+    pub with: AgentId,
+    /// By which law.
+    pub kind: PairKind,
+    /// Places that touch or are held.
+    pub contacts: u32,
+    /// Mean force of the last step, newtons.
+    pub force_n: f64,
+    /// The deepest overlap seen in the last step, metres, ≥ 0.
+    pub penetration_m: f64,
+    /// The impulses given to the other side so far, magnitudes summed, N·s.
+    pub impulse_n_s: f64,
+    /// The impulse that the other side has not yet acknowledged, N·s.
+    pub in_flight_n_s: f64,
+    /// What is left in the energy tank, joules; `None` where the law keeps none.
+    pub tank_j: Option<f64>,
+    /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
+    pub parasitic_kg: f64,
+}
+
+impl PairState {
+    /// A coupling that has done nothing yet.
+    #[must_use]
+    pub const fn new(with: AgentId, kind: PairKind) -> Self {
+        Self {
+            with,
+            kind,
+            contacts: 0,
+            force_n: 0.0,
+            penetration_m: 0.0,
+            impulse_n_s: 0.0,
+            in_flight_n_s: 0.0,
+            tank_j: None,
+            parasitic_kg: 0.0,
+        }
+    }
+}
+
+/// A coupling that this agent owns.
+#[derive(Debug, Clone, PartialEq)]
+struct Owned {
+    ledger: Ledger,
+    state: PairState,
+    /// Linear impulse given in this step, N·s.
+    step_impulse: DVec3,
+    /// When it last did something.
+    active: SimTime,
+}
+
+/// The couplings of one agent.
+#[derive(Debug, Clone, Default)]
+pub struct Exchange {
+    owned: Vec<Owned>,
+    taken: Vec<Ledger>,
+    now: SimTime,
+}
+
+/// How long a coupling that does nothing is still published, seconds.
+const LINGER_S: f64 = 1.0;
+
+impl Exchange {
+    /// Begins a step: pages turn, and the step's sums start from nothing.
+    pub fn open(&mut self, around: &Surroundings<'_>) {
+        self.now = around.time;
+        for owned in &mut self.owned {
+            let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
+            let taken = other.and_then(|n| acknowledged(n, around.me));
+            owned.ledger.turn(taken, around.time);
+            owned.step_impulse = DVec3::ZERO;
+            (owned.state.contacts, owned.state.penetration_m) = (0, 0.0);
+        }
+    }
+
+    /// Takes what owners have given since the last reading: `apply` gets who, where, dJ, and t dJ − dS at the step's start.
+    ///
+    /// A reading that is not newer than the last one, or that is not finite, gives nothing.
+    pub fn take(&mut self, around: &Surroundings<'_>, mut apply: impl FnMut(AgentId, Site, Impulse, Impulse)) {
+        for neighbour in around.neighbours {
+            let Some(ledger) = neighbour.snapshot.given.iter().find(|l| l.with == around.me) else { continue };
+            let at = self.taken.iter().position(|t| t.with == neighbour.id);
+            let known = at.map(|at| &self.taken[at]);
+            if known.is_some_and(|k| k.revision >= ledger.revision) || !ledger.is_finite() {
+                continue;
+            }
+            ledger.since(known, around.time, |site, sum, carried| apply(neighbour.id, site, sum, carried));
+            let at = at.unwrap_or_else(|| {
+                self.taken.push(Ledger::new(neighbour.id));
+                self.taken.len() - 1
+            });
+            self.taken[at].copy_from(ledger);
+            self.taken[at].with = neighbour.id;
+        }
+    }
+
+    /// Gives `to` an impulse that acts `after_s` seconds into the step.
+    pub fn give(&mut self, to: AgentId, site: Site, after_s: f64, impulse: Impulse) {
+        let now = self.now;
+        let owned = self.owned_mut(to);
+        owned.ledger.give(site, now, after_s, impulse);
+        owned.step_impulse += impulse.linear;
+        owned.state.impulse_n_s += impulse.linear.length();
+        owned.active = now;
+    }
+
+    /// The state of the coupling with `to`, to be written on; it is made if there is none.
+    pub fn pair_mut(&mut self, to: AgentId) -> &mut PairState {
+        let now = self.now;
+        let owned = self.owned_mut(to);
+        owned.active = now;
+        &mut owned.state
+    }
+
+    /// The state of the coupling with `to`, where there is one.
+    #[must_use]
+    pub fn pair(&self, to: AgentId) -> Option<&PairState> {
+        self.owned.iter().find(|o| o.ledger.with == to).map(|o| &o.state)
+    }
+
+    /// What `other` has been given and had not taken in the snapshot that is seen: J − J_ack, and how far that has carried it
+    /// by the time `at`: (J − J_ack) t − (S − S_ack).
+    pub fn in_flight(&self, me: AgentId, other: &Neighbour, at: SimTime, visit: impl FnMut(Site, Impulse, Impulse)) {
+        if let Some(owned) = self.owned.iter().find(|o| o.ledger.with == other.id) {
+            owned.ledger.since(acknowledged(other, me), at, visit);
+        }
+    }
+
+    /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
+    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        for owned in &mut self.owned {
+            owned.state.force_n = owned.step_impulse.length() / dt_s;
+            let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
+            let mut on_its_way = DVec3::ZERO;
+            let taken = other.and_then(|n| acknowledged(n, around.me));
+            owned.ledger.since(taken, around.time, |_, sum, _| on_its_way += sum.linear);
+            owned.state.in_flight_n_s = on_its_way.length();
+        }
+    }
+
+    /// Writes the ledgers, the acknowledgements and the states of the pairs.
+    pub fn write(&self, into: &mut Snapshot) {
+        let lively = |owned: &&Owned| owned.state.in_flight_n_s > 0.0 || self.now.secs_after(owned.active) <= LINGER_S;
+        copy(self.owned.iter().filter(lively).map(|o| &o.ledger), &mut into.given);
+        copy(self.taken.iter(), &mut into.taken);
+        into.pairs.clear();
+        into.pairs.extend(self.owned.iter().filter(lively).map(|o| o.state));
+    }
+
+    /// Whether nothing was ever exchanged.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.owned.is_empty() && self.taken.is_empty()
+    }
+
+    fn owned_mut(&mut self, to: AgentId) -> &mut Owned {
+        let at = self.owned.iter().position(|o| o.ledger.with == to).unwrap_or_else(|| {
+            let state = PairState::new(to, PairKind::default());
+            let active = self.now;
+            self.owned.push(Owned { ledger: Ledger::new(to), state, step_impulse: DVec3::ZERO, active });
+            self.owned.len() - 1
+        });
+        &mut self.owned[at]
+    }
+}
+
+/// The copy that `other` keeps of what `me` has given it.
+#[must_use]
+pub fn acknowledged(other: &Neighbour, me: AgentId) -> Option<&Ledger> {
+    other.snapshot.taken.iter().find(|ledger| ledger.with == me)
+}
+
+/// Copies ledgers into storage that is there already.
+fn copy<'a>(from: impl Iterator<Item = &'a Ledger>, into: &mut Vec<Ledger>) {
+    let mut count = 0;
+    for ledger in from {
+        match into.get_mut(count) {
+            Some(place) => place.copy_from(ledger),
+            None => into.push(ledger.clone()),
+        }
+        count += 1;
+    }
+    into.truncate(count);
+}

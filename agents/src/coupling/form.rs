@@ -1,0 +1,149 @@
+//! What others must know of an agent's shape to touch it, and where it is.
+//!
+//! In: solids, tubes, tools. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
+//! Never here: how the nearest points are found ([`super::touch`]).
+
+use super::Slots;
+use crate::shape::{ShapeError, Solid, ToolShape};
+use glam::{DQuat, DVec3};
+use rapier3d::parry::shape::SharedShape;
+
+/// An agent's shape and skin.
+#[derive(Debug, Clone)]
+pub struct Form {
+    /// Its shape.
+    pub kind: FormKind,
+    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
+    pub friction: f64,
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger.
+    pub restitution: f64,
+}
+
+/// The kinds of shapes.
+#[derive(Debug, Clone)]
+pub enum FormKind {
+    /// A rigid solid.
+    Solid(SolidForm),
+    /// A tube: cone-capsules between nodes, at its own radius.
+    Chain,
+    /// A tool: its parts depend on how far its jaws are open.
+    Tool(ToolShape),
+}
+
+/// A solid as others touch it.
+#[derive(Clone)]
+pub struct SolidForm {
+    /// The solid.
+    pub solid: Solid,
+    /// The same for collision queries.
+    pub shape: SharedShape,
+    /// Its centre of mass in its own axes, metres.
+    pub com_local: DVec3,
+    /// No point is farther from the centre of mass, metres.
+    pub radius_m: f64,
+}
+
+/// Where a form is.
+#[derive(Debug, Clone, Copy)]
+pub enum View<'a> {
+    /// A solid: its centre of mass and its rotation.
+    Solid {
+        /// Centre of mass, metres.
+        position: DVec3,
+        /// From the shape's axes to the world's.
+        rotation: DQuat,
+    },
+    /// A tube: N + 1 nodes.
+    Chain {
+        /// Node positions, metres.
+        positions: &'a [DVec3],
+        /// Outer radius at each node, metres.
+        radii_m: &'a [f64],
+    },
+    /// A tool.
+    Tool {
+        /// The point between the jaws, metres.
+        tip: DVec3,
+        /// From the tool's axes to the world's.
+        rotation: DQuat,
+        /// Opening, 0 … 1.
+        jaw: f64,
+    },
+}
+
+/// A form at its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed<'a> {
+    /// What.
+    pub form: &'a Form,
+    /// Where.
+    pub view: View<'a>,
+}
+
+/// A point of a body's skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// A point in space, fixed to a solid or a tool.
+    Point(DVec3),
+    /// A point of a tube's skin.
+    Chain {
+        /// The segment.
+        segment: u32,
+        /// How far along it, 0 … 1.
+        share: f64,
+        /// The radius there, metres.
+        radius_m: f64,
+    },
+}
+
+/// A place where two forms touch, or may touch soon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Its name from step to step, unique among the places of the pair.
+    pub key: u64,
+    /// Unit normal, from b towards a.
+    pub normal: DVec3,
+    /// Distance of the skins, metres; below zero they overlap.
+    pub gap_m: f64,
+    /// The point of a.
+    pub on_a: Place,
+    /// The point of b.
+    pub on_b: Place,
+}
+
+impl std::fmt::Debug for SolidForm {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SolidForm").field("solid", &self.solid).finish_non_exhaustive()
+    }
+}
+
+impl SolidForm {
+    /// The form of a solid with its centre of mass at `com_local`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for a solid that is no shape.
+    pub fn new(solid: Solid, com_local: DVec3) -> Result<Self, ShapeError> {
+        let shape = solid.to_shared_shape()?;
+        let ball = shape.compute_local_bounding_sphere();
+        let radius_m = f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local);
+        Ok(Self { solid, shape, com_local, radius_m })
+    }
+}
+
+impl Place {
+    /// Adds `sign` times the velocity of this point to what `slots` gather. The body's slots begin at `base`: its centre's
+    /// velocity and its spin, or a tube's nodes and segments in turn. `towards` is the unit normal out of this body's skin.
+    pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, towards: DVec3, sign: f64) {
+        match *self {
+            Self::Point(point) => {
+                slots.add_linear(base, sign);
+                slots.add_angular(base + 1, (point - centre) * sign);
+            }
+            Self::Chain { segment, share, radius_m } => {
+                slots.add_linear(base + 2 * segment, sign * (1.0 - share));
+                slots.add_linear(base + 2 * segment + 2, sign * share);
+                slots.add_angular(base + 2 * segment + 1, towards * (radius_m * sign));
+            }
+        }
+    }
+}

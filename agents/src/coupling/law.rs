@@ -1,0 +1,94 @@
+//! Who owns a pair of agents, and by which law the two act on each other.
+
+use crate::{AgentId, Anchor};
+
+/// How two agents act on each other where they touch.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Law {
+    /// Impulses by the owner, booked in a ledger: the default.
+    #[default]
+    Ledger,
+    /// Each side pushes itself off the other's last known state, as most engines do: for comparison.
+    Penalty {
+        /// Stiffness of the contact, N/m, > 0; stable below 0.55 μ/τ² (docs/theory/coupling.md).
+        stiffness_n_m: f64,
+        /// Damping of the contact, N·s/m, ≥ 0.
+        damping_n_s_m: f64,
+        /// Whether the other's state is brought forward to one's own time.
+        extrapolate: bool,
+    },
+    /// Wave variables on a line between the two: passive whatever the delay, at the price of a mass k T².
+    Tlm {
+        /// Stiffness of the line, N/m, > 0.
+        stiffness_n_m: f64,
+        /// Damping beside it, N·s/m, ≥ 0.
+        damping_n_s_m: f64,
+    },
+    /// They pass through each other.
+    Off,
+}
+
+/// A lasting bilateral coupling between a point of this agent and one of another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    /// The agent on the other side.
+    pub other: AgentId,
+    /// The point of this agent.
+    pub here: Anchor,
+    /// The point of the other.
+    pub there: Anchor,
+    /// Stiffness, N/m, > 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+    /// The distance at which it pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// [`Law::Ledger`] or [`Law::Tlm`].
+    pub law: Law,
+}
+
+/// What decides who owns a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its number.
+    pub id: AgentId,
+    /// Its model's name.
+    pub model: &'static str,
+    /// The rate its scene wants, Hz.
+    pub rate_hz: f64,
+}
+
+/// Whether `me` owns the pair with `other`: the faster does, of equals a tube before anything else, then the lower number.
+/// A tool is led and owns nothing.
+#[must_use]
+pub fn owns(me: Standing, other: Standing) -> bool {
+    let led = |s: Standing| s.model == "instrument";
+    let tube = |s: Standing| s.model == "tube";
+    if led(me) || led(other) {
+        return led(other) && !led(me);
+    }
+    let faster = me.rate_hz.total_cmp(&other.rate_hz);
+    faster.then(tube(me).cmp(&tube(other))).then(other.id.cmp(&me.id)).is_gt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_every_pair_exactly_one_owns_unless_both_are_led() {
+        let all = ["tube", "rigid", "instrument"]
+            .into_iter()
+            .flat_map(|model| [60.0, 1000.0].map(|rate_hz| (model, rate_hz)));
+        let all: Vec<_> =
+            all.zip(0..).map(|((model, rate_hz), id)| Standing { id: AgentId(id), model, rate_hz }).collect();
+        for a in &all {
+            for b in all.iter().filter(|b| b.id != a.id) {
+                let both_led = a.model == "instrument" && b.model == "instrument";
+                assert_eq!(u32::from(owns(*a, *b)) + u32::from(owns(*b, *a)), u32::from(!both_led), "{a:?} {b:?}");
+            }
+        }
+        assert!(owns(all[1], all[0]), "the faster");
+        assert!(owns(all[0], all[2]), "the tube");
+    }
+}

@@ -1,0 +1,314 @@
+//! The ledger of a coupling: what its owner has given to one other agent, from the start, so that no reading can go wrong.
+//!
+//! In: impulses with the time they acted. Out: what has been given since an earlier reading. Counters are cumulative: a
+//! reading that is lost, late or made twice changes nothing (docs/theory/coupling.md, eq. 1–4). Never here: who touches whom.
+//!
+//! Sums of impulse and of impulse × time grow without end and would cancel badly; they are kept on pages, each with its own
+//! origin of time. A page is closed after a second and torn out once the other side has acknowledged all of it.
+
+use crate::{AgentId, SimTime};
+use glam::DVec3;
+use std::cmp::Ordering;
+use std::ops::{Add, AddAssign, Mul, Neg, Sub};
+
+/// An impulse on a body: N·s, and N·m·s about its centre of mass (about its own middle for a segment of a tube).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Impulse {
+    /// The change of linear momentum, N·s.
+    pub linear: DVec3,
+    /// The change of angular momentum, N·m·s.
+    pub angular: DVec3,
+}
+
+/// Where on a body an impulse acts.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Site {
+    /// A rigid body or a tool, as a whole.
+    Whole,
+    /// A tube at this rest arc length, metres: the linear part acts on its axis there, the angular part on the segment there.
+    Arc(f64),
+}
+
+/// What one site was given on one page.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Entry {
+    /// Which site.
+    pub site: Site,
+    /// J = Σ λ.
+    pub sum: Impulse,
+    /// S = Σ λ (t − origin), in seconds times the units of an impulse.
+    pub moment: Impulse,
+}
+
+/// A stretch of a ledger with its own origin of time.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Page {
+    /// Pages of a ledger are numbered from zero.
+    pub number: u64,
+    /// From when the times in [`Entry::moment`] count.
+    pub origin: SimTime,
+    /// What each site was given, by rising sites.
+    pub entries: Vec<Entry>,
+}
+
+/// What the owner of a coupling has given to the other side; the other side keeps a copy of what it has taken.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Ledger {
+    /// The agent on the other side.
+    pub with: AgentId,
+    /// Rises with every publication that differs from the one before.
+    pub revision: u64,
+    /// Pages not yet acknowledged and the one in use, by rising numbers: two at most.
+    pub pages: Vec<Page>,
+}
+
+/// How long a page is written on, seconds.
+const PAGE_S: f64 = 1.0;
+
+impl Impulse {
+    /// No impulse.
+    pub const ZERO: Self = Self { linear: DVec3::ZERO, angular: DVec3::ZERO };
+
+    /// Whether every number is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.linear.is_finite() && self.angular.is_finite()
+    }
+}
+
+impl Add for Impulse {
+    type Output = Self;
+    fn add(self, other: Self) -> Self {
+        Self { linear: self.linear + other.linear, angular: self.angular + other.angular }
+    }
+}
+
+impl AddAssign for Impulse {
+    fn add_assign(&mut self, other: Self) {
+        *self = *self + other;
+    }
+}
+
+impl Sub for Impulse {
+    type Output = Self;
+    fn sub(self, other: Self) -> Self {
+        self + -other
+    }
+}
+
+impl Neg for Impulse {
+    type Output = Self;
+    fn neg(self) -> Self {
+        Self { linear: -self.linear, angular: -self.angular }
+    }
+}
+
+impl Mul<f64> for Impulse {
+    type Output = Self;
+    fn mul(self, factor: f64) -> Self {
+        Self { linear: self.linear * factor, angular: self.angular * factor }
+    }
+}
+
+impl Site {
+    fn order(&self, other: &Self) -> Ordering {
+        match (self, other) {
+            (Self::Whole, Self::Whole) => Ordering::Equal,
+            (Self::Whole, Self::Arc(_)) => Ordering::Less,
+            (Self::Arc(_), Self::Whole) => Ordering::Greater,
+            (Self::Arc(a), Self::Arc(b)) => a.total_cmp(b),
+        }
+    }
+}
+
+impl Page {
+    fn find(&self, site: Site) -> Result<usize, usize> {
+        self.entries.binary_search_by(|entry| entry.site.order(&site))
+    }
+
+    fn add(&mut self, site: Site, after_origin_s: f64, impulse: Impulse) {
+        let at = self.find(site).unwrap_or_else(|at| {
+            self.entries.insert(at, Entry { site, sum: Impulse::ZERO, moment: Impulse::ZERO });
+            at
+        });
+        let entry = &mut self.entries[at];
+        entry.sum += impulse;
+        entry.moment += impulse * after_origin_s;
+    }
+}
+
+impl Ledger {
+    /// An empty ledger with the agent `with`.
+    #[must_use]
+    pub const fn new(with: AgentId) -> Self {
+        Self { with, revision: 0, pages: Vec::new() }
+    }
+
+    /// Books an impulse that acted `after_s` seconds after `time`.
+    pub fn give(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) {
+        if self.pages.is_empty() {
+            self.pages.push(Page { number: 0, origin: time, entries: Vec::new() });
+        }
+        let Some(page) = self.pages.last_mut() else { return };
+        let after_origin_s = time.secs_after(page.origin) + after_s;
+        page.add(site, after_origin_s, impulse);
+        self.revision += 1;
+    }
+
+    /// Tears out the pages that the other side has taken whole, and turns over one that is full.
+    ///
+    /// `taken` is the other side's copy, `None` where it has none yet. A full page is only turned when none waits before it:
+    /// a side that has stopped acknowledging costs two pages and no more.
+    pub fn turn(&mut self, taken: Option<&Self>, now: SimTime) {
+        let settled = |page: &Page| taken.and_then(|t| t.page(page.number)).is_some_and(|t| t.entries == page.entries);
+        if self.pages.len() > 1 && settled(&self.pages[0]) {
+            self.pages.remove(0);
+            self.revision += 1;
+        }
+        if let [page] = &self.pages[..]
+            && !page.entries.is_empty()
+            && now.secs_after(page.origin) > PAGE_S
+        {
+            let number = page.number + 1;
+            self.pages.push(Page { number, origin: now, entries: Vec::new() });
+            self.revision += 1;
+        }
+    }
+
+    /// What this ledger holds beyond `earlier` (`None`: beyond nothing): dJ, and dJ t − dS at the time `at`.
+    ///
+    /// A page that only `earlier` has was torn out because all of it was taken: it counts for nothing.
+    pub fn since(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
+        for page in &self.pages {
+            let known = earlier.and_then(|e| e.page(page.number));
+            let t = at.secs_after(page.origin);
+            for entry in &page.entries {
+                let had = known.and_then(|k| k.find(entry.site).ok().map(|i| k.entries[i]));
+                let (sum, moment) = match had {
+                    Some(had) => (entry.sum - had.sum, entry.moment - had.moment),
+                    None => (entry.sum, entry.moment),
+                };
+                if sum != Impulse::ZERO || moment != Impulse::ZERO {
+                    visit(entry.site, sum, sum * t - moment);
+                }
+            }
+        }
+    }
+
+    /// Whether `taken` holds all that this ledger does.
+    #[must_use]
+    pub fn is_settled(&self, taken: Option<&Self>) -> bool {
+        let mut settled = true;
+        self.since(taken, SimTime::ZERO, |_, _, _| settled = false);
+        settled
+    }
+
+    /// Whether every number is finite.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        self.pages.iter().flat_map(|p| &p.entries).all(|e| e.sum.is_finite() && e.moment.is_finite())
+    }
+
+    /// Copies `other` into the storage of this one.
+    pub(super) fn copy_from(&mut self, other: &Self) {
+        (self.with, self.revision) = (other.with, other.revision);
+        self.pages.truncate(other.pages.len());
+        let kept = self.pages.len();
+        for (mine, theirs) in self.pages.iter_mut().zip(&other.pages) {
+            (mine.number, mine.origin) = (theirs.number, theirs.origin);
+            mine.entries.clone_from(&theirs.entries);
+        }
+        self.pages.extend(other.pages[kept..].iter().cloned());
+    }
+
+    fn page(&self, number: u64) -> Option<&Page> {
+        self.pages.iter().find(|page| page.number == number)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn pushed(x: f64) -> Impulse {
+        Impulse { linear: DVec3::X * x, angular: DVec3::ZERO }
+    }
+
+    fn at(seconds: f64) -> SimTime {
+        SimTime::ZERO + crate::SimSpan::from_secs_f64(seconds).unwrap()
+    }
+
+    #[test]
+    fn a_difference_is_the_impulse_and_how_far_it_has_carried_since() {
+        let mut ledger = Ledger::new(AgentId(1));
+        ledger.give(Site::Whole, at(0.5), 0.25, pushed(2.0));
+        let mut seen = vec![];
+        ledger.since(None, at(2.0), |site, sum, carried| seen.push((site, sum.linear.x, carried.linear.x)));
+        assert_eq!(seen, [(Site::Whole, 2.0, 2.0 * (2.0 - 0.75))]);
+    }
+
+    #[test]
+    fn sums_do_not_lose_digits_over_a_day() {
+        let (mut given, mut taken) = (Ledger::new(AgentId(1)), Ledger::new(AgentId(0)));
+        let day = 86_400;
+        for second in 0..day {
+            let now = at(f64::from(second));
+            given.turn(Some(&taken), now);
+            given.give(Site::Whole, now, 0.0, pushed(0.1));
+            if second < day - 1 {
+                taken.copy_from(&given);
+            }
+        }
+        let mut carried = 0.0;
+        given.since(Some(&taken), at(f64::from(day)), |_, _, moved| carried += moved.linear.x);
+        assert!((carried - 0.1).abs() < 1e-15, "{carried}"); // one second of one impulse: roundings of 0.1
+        assert!(given.pages.len() <= 2 && given.pages.iter().all(|p| p.entries.len() == 1));
+    }
+
+    proptest! {
+        /// Whatever is lost, repeated or seen late, the other side ends with every impulse once, and with their times.
+        #[test]
+        fn every_schedule_delivers_each_impulse_once(
+            steps in prop::collection::vec((0.001_f64..0.4, -1.0_f64..1.0, 0_u8..4, 0_usize..5, 0_u8..3), 1..200),
+        ) {
+            let mut given = Ledger::new(AgentId(1));
+            let mut published = vec![given.clone()];
+            let mut acknowledged = vec![];
+            let mut taken: Option<Ledger> = None;
+            let (mut now, mut total, mut moment) = (0.0, 0.0, 0.0);
+            let (mut received, mut arrived) = (0.0, 0.0);
+            let mut take = |ledger: &Ledger, taken: &mut Option<Ledger>, now: f64| {
+                if taken.as_ref().is_some_and(|t| t.revision >= ledger.revision) {
+                    return; // an older reading
+                }
+                ledger.since(taken.as_ref(), at(now), |_, sum, moved| {
+                    received += sum.linear.x;
+                    arrived += sum.linear.x * now - moved.linear.x;
+                });
+                *taken = Some(ledger.clone());
+            };
+            for (gap, size, site, late, what) in steps {
+                now += gap;
+                // what the owner sees of the other side may be old
+                let seen: Option<&Ledger> = acknowledged.len().checked_sub(1 + late).and_then(|i| acknowledged.get(i));
+                given.turn(seen, at(now));
+                given.give(Site::Arc(f64::from(site)), at(now), 0.0, pushed(size));
+                total += size;
+                moment += size * now;
+                published.push(given.clone());
+                // the other side reads the newest, an old one, or nothing
+                let read = match what { 0 => None, 1 => published.last(), _ => published.get(published.len().saturating_sub(1 + late)) };
+                if let Some(ledger) = read {
+                    take(ledger, &mut taken, now);
+                    acknowledged.extend(taken.clone());
+                }
+            }
+            take(&given, &mut taken, now);
+            // a few hundred roundings of sums near 100, times near 80 s
+            prop_assert!((received - total).abs() < 1e-12 * 200.0, "{received} {total}");
+            prop_assert!((arrived - moment).abs() < 1e-9, "{arrived} {moment}");
+            prop_assert!(given.is_settled(taken.as_ref()));
+        }
+    }
+}

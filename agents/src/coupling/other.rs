@@ -1,0 +1,287 @@
+//! Another agent as its neighbour expects it: brought to the neighbour's own time, with the impulses that are on their way.
+//!
+//! In: the newest snapshot, however old, and the ledger of what it does not know yet. Out: positions, velocities in slots, and
+//! how it answers impulses; it goes on with its neighbour's substeps. Never here: which impulses it gets.
+//! Theory: docs/theory/coupling.md, eq. 5–7: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
+
+use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
+use crate::{AgentId, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// A neighbour at one's own time.
+#[derive(Debug, Clone, Default)]
+pub struct Other {
+    neighbour: Option<Neighbour>,
+    pose: Pose,
+    /// Velocities in slots: a rigid body's or tool's centre and spin; a tube's nodes and segments in turn.
+    velocities: Vec<DVec3>,
+    /// A tube's nodes.
+    positions: Vec<DVec3>,
+    /// Room for one answer.
+    answer: Vec<DVec3>,
+    age_s: f64,
+    held: bool,
+}
+
+/// Where a body of one piece is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Pose {
+    centre: DVec3,
+    rotation: DQuat,
+}
+
+impl Default for Pose {
+    fn default() -> Self {
+        Self { centre: DVec3::ZERO, rotation: DQuat::IDENTITY }
+    }
+}
+
+impl Other {
+    /// Takes in the newest state of `neighbour`, brought to `at`; whether it is one that can be touched or held.
+    ///
+    /// Storage is used again: nothing is allocated once the sizes settle.
+    pub fn meet(&mut self, neighbour: &Neighbour, around: &Surroundings<'_>, exchange: &Exchange, at: SimTime) -> bool {
+        let snapshot = &neighbour.snapshot;
+        self.neighbour = Some(neighbour.clone());
+        self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
+        self.age_s = at.secs_after(snapshot.time);
+        self.positions.clear();
+        self.velocities.clear();
+        let known = match &snapshot.body {
+            Body::Nothing => false,
+            Body::Rigid(body) => {
+                self.pose = Pose { centre: body.position, rotation: body.rotation };
+                self.velocities.extend([body.velocity, body.spin]);
+                true
+            }
+            Body::Tool(ToolState { tip, rotation, velocity, .. }) => {
+                self.pose = Pose { centre: *tip, rotation: *rotation };
+                self.velocities.extend([*velocity, DVec3::ZERO]);
+                true
+            }
+            Body::Curve(curve) => {
+                self.positions.extend_from_slice(&curve.positions);
+                self.interleave(&curve.velocities);
+                !self.positions.is_empty()
+            }
+        };
+        if known {
+            self.go_on(self.age_s);
+            self.deliver(neighbour, around.me, exchange, at);
+        }
+        known
+    }
+
+    /// Who.
+    #[must_use]
+    pub fn id(&self) -> Option<AgentId> {
+        self.neighbour.as_ref().map(|n| n.id)
+    }
+
+    /// The neighbour as it was seen.
+    #[must_use]
+    pub const fn neighbour(&self) -> Option<&Neighbour> {
+        self.neighbour.as_ref()
+    }
+
+    /// Its shape.
+    #[must_use]
+    pub fn form(&self) -> Option<&Arc<Form>> {
+        self.neighbour.as_ref().and_then(|n| n.form.as_ref())
+    }
+
+    /// How old its state was, seconds; negative where it was ahead.
+    #[must_use]
+    pub const fn age_s(&self) -> f64 {
+        self.age_s
+    }
+
+    /// Whether impulses do not move it: it is led, held, or at rest.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        self.held
+    }
+
+    /// Wakes a body that rests: from now on impulses move it.
+    pub fn wake(&mut self) {
+        self.held = self.neighbour.as_ref().is_none_or(|n| matches!(n.snapshot.inertia, Inertia::Immovable));
+    }
+
+    /// Its velocities in slots, m/s and rad/s.
+    #[must_use]
+    pub fn velocities(&self) -> &[DVec3] {
+        &self.velocities
+    }
+
+    /// The same, to be written on by a solve.
+    pub fn velocities_mut(&mut self) -> &mut [DVec3] {
+        &mut self.velocities
+    }
+
+    /// Its smooth acceleration, m/s²: none where impulses do not move it.
+    #[must_use]
+    pub fn acceleration(&self) -> DVec3 {
+        match &self.neighbour {
+            Some(neighbour) if !self.held => neighbour.snapshot.acceleration,
+            _ => DVec3::ZERO,
+        }
+    }
+
+    /// Where it is; `None` before the first [`Self::meet`] and for a body that has no shape.
+    #[must_use]
+    pub fn placed(&self) -> Option<Placed<'_>> {
+        let neighbour = self.neighbour.as_ref()?;
+        let Pose { centre, rotation } = self.pose;
+        let view = match &neighbour.snapshot.body {
+            Body::Nothing => return None,
+            Body::Rigid(_) => View::Solid { position: centre, rotation },
+            Body::Tool(tool) => View::Tool { tip: centre, rotation, jaw: tool.jaw },
+            Body::Curve(curve) => View::Chain { positions: &self.positions, radii_m: &curve.radii_m },
+        };
+        Some(Placed { form: neighbour.form.as_deref()?, view })
+    }
+
+    /// Adds `sign` times the velocity of the place of a contact to what `slots` gather; this body's slots begin at `base`.
+    pub fn join(&self, slots: &mut Slots, base: u32, place: &Place, towards: DVec3, sign: f64) {
+        place.join(slots, base, self.pose.centre, towards, sign);
+    }
+
+    /// Turns impulses, one a slot, into the velocities they cause: W of the coupling (eq. 7).
+    ///
+    /// # Panics
+    /// Where there are not as many as [`Self::velocities`].
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        let inertia = self.neighbour.as_ref().filter(|_| !self.held).map(|n| &n.snapshot.inertia);
+        match inertia {
+            Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
+                impulses[0] *= *inverse_mass;
+                impulses[1] = *inverse_inertia * impulses[1];
+            }
+            Some(Inertia::Curve(curve)) if curve.slots() == impulses.len() => curve.respond(impulses),
+            _ => impulses.fill(DVec3::ZERO),
+        }
+    }
+
+    /// Lets impulses, one a slot, act on it.
+    pub fn push(&mut self, impulses: &[DVec3]) {
+        let mut answer = std::mem::take(&mut self.answer);
+        answer.clear();
+        answer.extend_from_slice(impulses);
+        self.respond(&mut answer);
+        self.velocities.iter_mut().zip(&answer).for_each(|(v, dv)| *v += *dv);
+        self.answer = answer;
+    }
+
+    /// Lets `h` seconds pass: x + v h + a h²/2, v + a h.
+    pub fn go_on(&mut self, h: f64) {
+        let a = self.acceleration();
+        if self.positions.is_empty() {
+            let Pose { centre, rotation } = &mut self.pose;
+            *centre += self.velocities[0] * h + a * (0.5 * h * h);
+            *rotation = turned(*rotation, self.velocities[1] * h);
+            self.velocities[0] += a * h;
+            return;
+        }
+        for (x, v) in self.positions.iter_mut().zip(self.velocities.iter_mut().step_by(2)) {
+            *x += *v * h + a * (0.5 * h * h);
+            *v += a * h;
+        }
+    }
+
+    /// Books impulses, one a slot, that act `after_s` seconds into the step.
+    pub fn book(&self, exchange: &mut Exchange, after_s: f64, impulses: &[DVec3]) {
+        let Some(neighbour) = &self.neighbour else { return };
+        if self.held && !matches!(neighbour.snapshot.body, Body::Tool(_)) {
+            return; // a body at rest stands on something else, which takes the impulse
+        }
+        let Body::Curve(curve) = &neighbour.snapshot.body else {
+            let impulse = Impulse { linear: impulses[0], angular: impulses[1] };
+            if impulse != Impulse::ZERO {
+                exchange.give(neighbour.id, Site::Whole, after_s, impulse);
+            }
+            return;
+        };
+        for (slot, impulse) in impulses.iter().enumerate().filter(|(_, i)| **i != DVec3::ZERO) {
+            let (site, impulse) = if slot % 2 == 0 {
+                (curve.arc_m[slot / 2], Impulse { linear: *impulse, angular: DVec3::ZERO })
+            } else {
+                let middle = 0.5 * (curve.arc_m[slot / 2] + curve.arc_m[slot / 2 + 1]);
+                (middle, Impulse { linear: DVec3::ZERO, angular: *impulse })
+            };
+            exchange.give(neighbour.id, Site::Arc(site), after_s, impulse);
+        }
+    }
+
+    /// A tube's velocities in slots: nodes as published, segments as its inertia tells.
+    fn interleave(&mut self, nodes: &[DVec3]) {
+        let neighbour = self.neighbour.as_ref();
+        let spins = match neighbour.map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Curve(curve)) => &curve.spins[..],
+            _ => &[],
+        };
+        for (k, v) in nodes.iter().enumerate() {
+            self.velocities.push(*v);
+            if k + 1 < nodes.len() {
+                self.velocities.push(spins.get(k).copied().unwrap_or(DVec3::ZERO));
+            }
+        }
+    }
+
+    /// Adds what is on its way: W (J − J_ack) to the velocities, W ((J − J_ack) t − (S − S_ack)) to the positions.
+    fn deliver(&mut self, neighbour: &Neighbour, me: AgentId, exchange: &Exchange, at: SimTime) {
+        let slots = self.velocities.len();
+        let (mut sums, mut carried) = (std::mem::take(&mut self.answer), Vec::new());
+        sums.clear();
+        exchange.in_flight(me, neighbour, at, |site, sum, moved| {
+            if sums.is_empty() {
+                sums.resize(slots, DVec3::ZERO);
+                carried.resize(slots, DVec3::ZERO);
+            }
+            spread(neighbour, site, |slot, share, angular| {
+                let of = |impulse: Impulse| if angular { impulse.angular } else { impulse.linear } * share;
+                sums[slot] += of(sum);
+                carried[slot] += of(moved);
+            });
+        });
+        if !sums.is_empty() {
+            self.respond(&mut sums);
+            self.respond(&mut carried);
+            self.velocities.iter_mut().zip(&sums).for_each(|(v, dv)| *v += *dv);
+            self.shift(&carried);
+        }
+        self.answer = sums;
+    }
+
+    /// Moves by what each slot is carried.
+    fn shift(&mut self, by: &[DVec3]) {
+        if self.positions.is_empty() {
+            self.pose.centre += by[0];
+            self.pose.rotation = turned(self.pose.rotation, by[1]);
+        } else {
+            self.positions.iter_mut().zip(by.iter().step_by(2)).for_each(|(x, dx)| *x += *dx);
+        }
+    }
+}
+
+/// Which slots of `neighbour` an impulse at `site` acts on: (slot, share, whether it is the angular part).
+fn spread(neighbour: &Neighbour, site: Site, mut visit: impl FnMut(usize, f64, bool)) {
+    match (&neighbour.snapshot.body, site) {
+        (Body::Curve(curve), Site::Arc(arc_m)) => {
+            let Some((segment, share)) = curve.locate(arc_m) else { return };
+            visit(2 * segment, 1.0 - share, false);
+            visit(2 * segment + 2, share, false);
+            visit(2 * segment + 1, 1.0, true);
+        }
+        (Body::Curve(_), Site::Whole) | (_, Site::Arc(_)) => {}
+        (_, Site::Whole) => {
+            visit(0, 1.0, false);
+            visit(1, 1.0, true);
+        }
+    }
+}
+
+/// A rotation turned on by a small or large rotation vector in world axes.
+fn turned(rotation: DQuat, by: DVec3) -> DQuat {
+    if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
+}

@@ -1,0 +1,46 @@
+//! How a tube answers impulses: its factor, as others may know it.
+//!
+//! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
+
+use super::band::Factor;
+use glam::DVec3;
+
+/// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
+#[derive(Debug, Clone, Default)]
+pub struct CurveInertia {
+    factor: Factor,
+    held: [bool; 2],
+    /// How fast each segment turns, rad/s, world axes.
+    pub spins: Vec<DVec3>,
+}
+
+impl CurveInertia {
+    /// Takes over a factor and the velocities of all slots, into the storage that is here.
+    pub(super) fn copy_from(&mut self, factor: &Factor, held: [bool; 2], velocities: &[DVec3]) {
+        self.factor.copy_from(factor);
+        self.held = held;
+        self.spins.clear();
+        self.spins.extend(velocities.iter().skip(1).step_by(2));
+    }
+
+    /// How many slots it knows: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.
+    #[must_use]
+    pub fn slots(&self) -> usize {
+        self.factor.slots()
+    }
+
+    /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s).
+    ///
+    /// # Panics
+    /// Where there are not as many as [`Self::slots`].
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
+        let last = impulses.len().saturating_sub(1);
+        for (end, slot) in [(0, 0), (1, last)] {
+            if self.held[end] {
+                impulses[slot] = DVec3::ZERO;
+            }
+        }
+        self.factor.solve(impulses);
+    }
+}
