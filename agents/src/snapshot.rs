@@ -266,13 +266,12 @@ impl Inertia {
 }
 
 impl Snapshot {
-    /// Empties what an agent without couplings leaves unsaid, keeping the storage.
+    /// Empties what an agent may leave unsaid, keeping the storage. Ledgers stay for an agent that has some to write over:
+    /// theirs is storage within storage.
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
-        self.given.clear();
-        self.taken.clear();
         self.pairs.clear();
         self.bonds.clear();
     }

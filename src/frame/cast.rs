@@ -7,7 +7,7 @@ use super::error::SessionError;
 use super::governor::RateGovernor;
 use crate::compositor::{Actor, Camera, Form, Look, Material, Prop, Seen, Stage};
 use crate::control::{Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits};
-use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};
+use crate::runtime::{AgentSpawn, Faults, Governor, Machine, StepPrice, Watch};
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind};
 use crate::scene::{self, Member, Scene, Spec};
 use glam::DVec3;
@@ -51,6 +51,10 @@ fn spawn(scene: &Scene, member: &Member, share: f64) -> Result<AgentSpawn, Sessi
         dt_range: member.pace.dt_range,
         range: Some(member.simulation),
         links: member.links.clone(),
+        laws: Vec::new(),
+        attached: Vec::new(),
+        together: None,
+        faults: Faults::default(),
         watches: watches.collect(),
         governor: governor(member, share),
     })

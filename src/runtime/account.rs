@@ -73,6 +73,8 @@ pub struct AgentStats {
     pub energy_j: f64,
     /// Estimated error of the newest state, metres.
     pub residual_m: f64,
+    /// Who makes its turns, on his own thread and clock, because the two share a world; `None` where it makes them itself.
+    pub led_by: Option<AgentId>,
 }
 
 /// Times of up to [`LONGEST_US`], counted to 1 %.
@@ -209,6 +211,11 @@ impl Diary {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
         Self { steps: 0, misses: 0, late: Times::new(), work_s: None, window, first_window: true }
+    }
+
+    /// Steps written down so far.
+    pub const fn steps(&self) -> u64 {
+        self.steps
     }
 
     /// Writes a turn down.

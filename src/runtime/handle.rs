@@ -3,6 +3,7 @@
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
 use super::account::{AgentState, AgentStats, Gauges, Times};
+use super::island::Seating;
 use super::mailbox::{Command, Mailbox, SendError};
 use super::slot::LatestSlot;
 use super::switchboard::Switchboard;
@@ -23,6 +24,8 @@ pub(super) struct Shared {
     pub mail: Mailbox,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub board: Arc<Switchboard>,
+    /// Where agents come in that it shall lead, and where it comes back to itself; `None` where nobody leads anybody.
+    pub seating: Option<Seating>,
     /// Only readers touch it: the agent never waits for this lock.
     pub ages: Mutex<Times>,
     /// Empty for most agents. The agent alone writes, so that it never waits while it runs; readers look at the end.
@@ -131,6 +134,7 @@ impl AgentHandle {
             state: gauges.state(),
             energy_j: newest.energy_j,
             residual_m: newest.residual_m,
+            led_by: Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id),
         }
     }
 }

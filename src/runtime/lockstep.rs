@@ -10,12 +10,14 @@ use super::Run;
 use super::account::AgentStats;
 use super::cpu::CpuBatch;
 use super::handle::AgentHandle;
+use super::island::{Seating, empty_rooms, move_in};
 use super::machine::{Machine, duration};
 use super::pace::{Drive, Timeline};
 use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use super::switchboard::Switchboard;
-use super::turn::{Actor, Next};
+use super::turn::{Actor, Effort, Next};
 use cores::Cores;
+use metachron_agents::AgentId;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;
@@ -37,7 +39,8 @@ pub struct Lockstep {
 
 /// An agent and where it is in its turns.
 struct Life {
-    actor: Actor,
+    /// `None` while another leads it.
+    actor: Option<Box<Actor>>,
     phase: Phase,
     turns: u64,
 }
@@ -48,6 +51,7 @@ enum Phase {
     /// In a turn that began at this time.
     Busy(Duration),
     Resting,
+    Led,
     Parked,
 }
 
@@ -61,7 +65,11 @@ impl Lockstep {
     /// [`RunError`] for agents that cannot run as asked.
     pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
         let Company { actors, handles, board } = assemble(spawns)?;
-        let phase = |actor: &Actor| if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+        let phase = |actor: &Option<Box<Actor>>| match actor {
+            None => Phase::Led,
+            Some(actor) if actor.is_parked() => Phase::Parked,
+            Some(_) => Phase::Waiting,
+        };
         let lives = actors.into_iter().map(|actor| Life { phase: phase(&actor), actor, turns: 0 }).collect();
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
         let (due, batch) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default());
@@ -87,22 +95,35 @@ impl Lockstep {
     fn schedule(&mut self, whose: usize) {
         let life = &self.lives[whose];
         if life.phase == Phase::Waiting
-            && let Some(due) = life.actor.pace.due(&self.timeline)
+            && let Some(due) = life.actor.as_ref().and_then(|actor| actor.pace.due(&self.timeline))
         {
             self.due.push(Reverse((due.max(self.now), whose as u32)));
         }
     }
 
+    /// Looks after those who were summoned: sleepers that are woken, and agents that have come home.
     fn wake_sleepers(&mut self) {
         if !self.board.take_rung() {
             return;
         }
         for whose in 0..self.lives.len() {
             let life = &mut self.lives[whose];
-            if life.phase == Phase::Resting && life.actor.wakes(&self.timeline, self.now) {
-                life.phase = Phase::Waiting;
-                self.schedule(whose);
+            match (life.phase, &mut life.actor) {
+                (Phase::Resting, Some(actor)) => {
+                    if !actor.wakes(&self.timeline, self.now) {
+                        continue;
+                    }
+                    life.phase = Phase::Waiting;
+                }
+                (Phase::Led, _) => {
+                    let home = self.handles[whose].shared.seating.as_ref().and_then(Seating::come_home);
+                    let Some(actor) = home else { continue };
+                    life.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+                    life.actor = Some(actor);
+                }
+                _ => continue,
             }
+            self.schedule(whose);
         }
     }
 
@@ -140,10 +161,11 @@ impl Lockstep {
         self.batch.open();
         let started = Instant::now();
         let life = &mut self.lives[whose];
-        match life.actor.begin(&self.timeline, self.now) {
-            Some(work) => {
-                let model = life.actor.shared.model;
-                let seconds = self.machine.step_s(model, work, whose as u64, life.turns);
+        let Some(actor) = &mut life.actor else { return };
+        match actor.begin(&self.timeline, self.now) {
+            Some(Effort { work, steps }) => {
+                let model = actor.shared.model;
+                let seconds = f64::from(steps) * self.machine.step_s(model, work, whose as u64, life.turns);
                 self.cores.start(whose as u32, duration(seconds));
                 life.turns += 1;
                 life.phase = Phase::Busy(self.now);
@@ -157,22 +179,44 @@ impl Lockstep {
         self.batch.open();
         let started = Instant::now();
         let life = &mut self.lives[whose];
-        let Phase::Busy(since) = life.phase else { return };
+        let (Phase::Busy(since), Some(actor)) = (life.phase, &mut life.actor) else { return };
         let took = (self.now - since).as_secs_f64();
-        life.phase = match life.actor.finish(&self.timeline, self.now, took) {
-            Next::Due => Phase::Waiting,
+        let next = actor.finish(&self.timeline, self.now, took);
+        life.phase = match next {
+            Next::Due | Next::Join(_) => Phase::Waiting,
             Next::Rest => Phase::Resting,
             Next::Parked => Phase::Parked,
         };
         self.count_cpu(whose, started.elapsed());
+        if let Next::Join(leader) = next {
+            self.hand_over(whose, leader);
+        }
         self.schedule(whose);
     }
 
+    /// Hands an agent over to `leader`, if that takes it in now.
+    fn hand_over(&mut self, whose: usize, leader: AgentId) {
+        let life = &mut self.lives[whose];
+        life.actor = life.actor.take().and_then(|actor| move_in(actor, leader).err());
+        if life.actor.is_none() {
+            life.phase = Phase::Led;
+        }
+    }
+
     fn count_cpu(&mut self, whose: usize, wall: Duration) {
-        self.lives[whose].actor.unsettled += wall;
+        if let Some(actor) = &mut self.lives[whose].actor {
+            actor.count(wall);
+        }
         if self.batch.add(wall) {
             self.settle();
         }
+    }
+
+    /// Ends all lives, wherever they are.
+    fn end(&mut self) {
+        let actors = self.lives.drain(..).filter_map(|life| life.actor);
+        actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
+        empty_rooms(&self.handles, &self.timeline, self.now);
     }
 
     fn settle(&mut self) {
@@ -180,7 +224,14 @@ impl Lockstep {
             return;
         }
         let share = self.batch.close();
-        self.lives.iter_mut().filter(|l| !l.actor.unsettled.is_zero()).for_each(|l| l.actor.settle(share));
+        let actors = self.lives.iter_mut().filter_map(|life| life.actor.as_mut());
+        actors.filter(|actor| !actor.unsettled.is_zero()).for_each(|actor| actor.settle(share));
+    }
+}
+
+impl Drop for Lockstep {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 
@@ -225,7 +276,7 @@ impl Run for Lockstep {
     }
 
     fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
-        self.lives.iter_mut().for_each(|life| life.actor.close_account(&self.timeline, self.now));
+        self.end();
         self.handles.iter().map(AgentHandle::stats).collect()
     }
 }

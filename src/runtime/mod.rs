@@ -8,8 +8,12 @@
 mod account;
 mod clock;
 mod cpu;
+mod crowd;
+mod eyes;
+mod faults;
 mod governor;
 mod handle;
+mod island;
 mod lockstep;
 mod machine;
 mod mailbox;
@@ -25,6 +29,7 @@ mod watch;
 
 pub use account::{AgentState, AgentStats, Spread};
 pub use clock::{Clock, ManualClock, SystemClock};
+pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;

@@ -98,7 +98,18 @@ impl Pace {
 
     /// The step is done: the agent's time is a step further.
     pub fn advance(&mut self) {
-        self.time += self.dt;
+        self.advance_by(self.dt);
+    }
+
+    /// A step of `span` is done, whatever was wanted.
+    pub fn advance_by(&mut self, span: SimSpan) {
+        self.time += span;
+    }
+
+    /// Gives up `span`, as the one who makes this agent's turns did.
+    pub fn drop_span(&mut self, span: SimSpan) {
+        self.dropped += span;
+        self.time += span;
     }
 
     /// The agent wakes at wall time `wall`: the time it slept is behind it.

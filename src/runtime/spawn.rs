@@ -4,15 +4,20 @@
 //! Never here: threads, time passing.
 
 use super::account::{Diary, Gauges, Times};
+use super::crowd::Crowd;
+use super::eyes::{Peer, Peers};
+use super::faults::Faults;
 use super::governor::Governor;
 use super::handle::{AgentHandle, Shared};
+use super::island::{Company as Led, Seating, assign};
 use super::mailbox::Mailbox;
 use super::pace::Pace;
 use super::slot::SlotWriter;
 use super::switchboard::Switchboard;
 use super::turn::{Actor, Rhythm};
 use super::watch::{Trace, Watch};
-use metachron_agents::{Agent, AgentId, DT_MAX_S, Neighbour, ResolutionRange, SimSpan, SimTime, Snapshot};
+use metachron_agents::coupling::{Law, Link};
+use metachron_agents::{Agent, AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 
@@ -32,6 +37,15 @@ pub struct AgentSpawn {
     pub range: Option<ResolutionRange>,
     /// Whose newest states it sees. Its own number and repeats are left out.
     pub links: Vec<AgentId>,
+    /// How it and others act on each other where that is not [`Law::Ledger`]. One side says it; where both do, the one with
+    /// the lower number counts.
+    pub laws: Vec<(AgentId, Law)>,
+    /// Lasting couplings with others. One side says it; the other is told, and both see each other always.
+    pub attached: Vec<Link>,
+    /// An agent in whose world it steps from the first step on, or that steps in its world: the lower number leads.
+    pub together: Option<AgentId>,
+    /// How its life is disturbed on purpose.
+    pub faults: Faults,
     /// Points of it that are written down ([`AgentHandle::samples`]).
     pub watches: Vec<Watch>,
     /// Who steers its rate; `None` for an agent that keeps what it has.
@@ -81,6 +95,16 @@ pub enum RunError {
         /// The number it is linked to.
         link: u32,
     },
+    /// Faults that are none.
+    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must lie from 0 to below 1")]
+    BadFaults {
+        /// The agent's name.
+        name: String,
+        /// The jitter asked for.
+        jitter: f64,
+        /// The loss asked for.
+        loss: f64,
+    },
     /// The system gave no thread.
     #[error("no thread for agent \"{name}\": {source}")]
     NoThread {
@@ -93,28 +117,27 @@ pub enum RunError {
 
 /// The agents of a run, before anybody makes them step.
 pub(super) struct Company {
-    pub actors: Vec<Actor>,
+    /// Who makes turns of its own; an agent that is led from the start is in the company of its leader.
+    pub actors: Vec<Option<Box<Actor>>>,
     pub handles: Vec<AgentHandle>,
     pub board: Arc<Switchboard>,
 }
 
 /// Brings all agents into a run; each has published the state it starts from, at simulated time zero.
-pub(super) fn assemble(spawns: Vec<AgentSpawn>) -> Result<Company, RunError> {
+pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<Company, RunError> {
     let count = spawns.len();
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
+    attach_both_sides(&mut spawns);
     let board = Arc::new(Switchboard::new(count));
-    let mut links = Vec::with_capacity(count);
-    let mut actors = Vec::with_capacity(count);
-    for (spawn, id) in spawns.into_iter().zip(0..) {
-        links.push(spawn.links.clone());
-        actors.push(actor(AgentId(id), spawn, &board));
-    }
+    let (peers, writers) = peers(&mut spawns, &board);
+    let peers = Arc::new(peers);
+    let together: Vec<_> = spawns.iter().map(|spawn| spawn.together).collect();
+    let ids = (0..).map(AgentId);
+    let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
+    let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(Actor::introduce);
-    for (at, links) in links.iter().enumerate() {
-        link(&mut actors, at, links);
-    }
-    let handles = actors.iter().map(|a| AgentHandle { shared: Arc::clone(&a.shared) }).collect();
-    Ok(Company { actors, handles, board })
+    let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
+    Ok(Company { actors: assign(actors, &together), handles, board })
 }
 
 fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
@@ -127,53 +150,121 @@ fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
     if shortest == SimSpan::ZERO || shortest > longest || longest_s > DT_MAX_S {
         return Err(RunError::BadStep { name: name(), shortest_s, longest_s });
     }
-    match spawn.links.iter().find(|link| link.0 as usize >= agents) {
+    let Faults { jitter, loss, .. } = spawn.faults;
+    if !spawn.faults.is_sound() {
+        return Err(RunError::BadFaults { name: name(), jitter, loss });
+    }
+    let laws = spawn.laws.iter().map(|(id, _)| *id);
+    let mut others =
+        spawn.links.iter().copied().chain(laws).chain(spawn.attached.iter().map(|l| l.other)).chain(spawn.together);
+    match others.find(|other| other.0 as usize >= agents) {
         Some(link) => Err(RunError::BadLink { name: name(), link: link.0 }),
         None => Ok(()),
     }
 }
 
-fn actor(id: AgentId, spawn: AgentSpawn, board: &Arc<Switchboard>) -> Actor {
-    let writer = SlotWriter::new(Snapshot::default());
-    let shared = Shared {
+/// Tells both sides of every lasting coupling, and lets them see each other.
+fn attach_both_sides(spawns: &mut [AgentSpawn]) {
+    for at in 0..spawns.len() {
+        let me = AgentId(at as u32);
+        for link in spawns[at].attached.clone() {
+            let other = &mut spawns[link.other.0 as usize];
+            let back = Link { other: me, here: link.there, there: link.here, ..link };
+            if !other.attached.contains(&back) {
+                other.attached.push(back);
+            }
+            other.links.push(me);
+            spawns[at].links.push(link.other);
+        }
+    }
+}
+
+/// What is known of all from the start, and everybody's writer.
+fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+    let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
+    let seated = forms.iter().flatten().count() > 1 || spawns.iter().any(|spawn| spawn.together.is_some());
+    let mut writers = Vec::with_capacity(spawns.len());
+    let mut all = Vec::with_capacity(spawns.len());
+    for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
+        let writer = SlotWriter::new(Snapshot::default());
+        let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
+        writers.push(writer);
+        all.push(Peer { shared, form, laws: Vec::new() });
+    }
+    settle_laws(spawns, &mut all);
+    let crowd = meet_at_all(&all).then(|| Crowd::new(all.len()));
+    (Peers { all, crowd }, writers)
+}
+
+/// Whether any two of them could touch.
+fn meet_at_all(all: &[Peer]) -> bool {
+    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.form.is_some()).collect();
+    formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
+}
+
+/// Writes the law of every pair down on both sides.
+fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
+    for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
+        for &(other, law) in spawn.laws.iter().filter(|(other, _)| *other != me) {
+            for (a, b) in [(me, other), (other, me)] {
+                let laws = &mut all[a.0 as usize].laws;
+                if let Err(at) = laws.binary_search_by_key(&b, |(id, _)| *id) {
+                    laws.insert(at, (b, law));
+                }
+            }
+        }
+    }
+}
+
+fn shared(
+    id: AgentId,
+    spawn: &mut AgentSpawn,
+    (board, writer): (&Arc<Switchboard>, &SlotWriter<Snapshot>),
+    seated: bool,
+) -> Shared {
+    Shared {
         id,
-        name: spawn.name.into(),
+        name: std::mem::take(&mut spawn.name).into(),
         model: spawn.agent.model(),
         wanted_hz: spawn.rate_hz,
         gauges: Gauges::default(),
         mail: Mailbox::new(),
         slot: writer.slot(),
         board: Arc::clone(board),
+        seating: seated.then(Seating::new),
         ages: Mutex::new(Times::new()),
-        traces: Mutex::new(spawn.watches.into_iter().map(Trace::new).collect()),
-    };
+        traces: Mutex::new(spawn.watches.drain(..).map(Trace::new).collect()),
+    }
+}
+
+fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> Actor {
+    let me = &peers.all[id.0 as usize];
+    let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
+    for link in spawn.links {
+        if link != id && !links.contains(&link) {
+            links.push(link);
+        }
+    }
+    let others = peers.all.iter().filter(|other| other.shared.id != id && me.touches(other));
     Actor {
-        shared: Arc::new(shared),
+        shared: Arc::clone(&me.shared),
+        peers: Arc::clone(peers),
         agent: spawn.agent,
         pace: Pace::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
         dt_range: spawn.dt_range,
         range: spawn.range,
         governor: spawn.governor,
+        faults: spawn.faults,
         writer,
-        links: Vec::new(),
-        neighbours: Vec::new(),
+        eyes: peers.eyes(id, &links, others.map(|other| other.shared.id)),
+        links: spawn.attached,
         hands: Vec::with_capacity(1),
+        company: Led::default(),
         diary: Diary::new(),
         rhythm: Rhythm::default(),
         open: None,
+        withheld: false,
+        announced: Vec::new(),
         unsettled: Duration::ZERO,
     }
-}
-
-fn link(actors: &mut [Actor], at: usize, links: &[AgentId]) {
-    let mut seen: Vec<AgentId> = Vec::with_capacity(links.len());
-    for &id in links {
-        if id.0 as usize != at && !seen.contains(&id) {
-            seen.push(id);
-        }
-    }
-    let slots: Vec<_> = seen.iter().map(|id| Arc::clone(&actors[id.0 as usize].shared.slot)).collect();
-    let met = seen.iter().zip(&slots).map(|(&id, slot)| Neighbour::seen(id, slot.latest()));
-    actors[at].neighbours = met.collect();
-    actors[at].links = slots;
 }

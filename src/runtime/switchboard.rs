@@ -1,14 +1,15 @@
 //! Who sleeps and who wakes whom.
 //!
 //! In: wakes and touches from any thread. Out: a flag each agent looks at, and its thread unparked.
+//! An agent that another leads has no turns of its own: who wakes it wakes its leader, and the leader rests for all it leads.
 //! Never here: when an agent is due ([`super::pace`]), what it is told ([`super::mailbox`]).
 //!
-//! No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
+//! Leaders have lower numbers than those they lead, so that the way up always ends. No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
 //! first and looks at `resting` after. In one total order (SeqCst) at least one of the two sees the other.
 
 use metachron_agents::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
+use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::SeqCst};
 use std::thread::Thread;
 
 /// How long after the last touch an agent may not rest, simulated time: longer than the period of any toucher above 10 Hz,
@@ -16,20 +17,40 @@ use std::thread::Thread;
 const TOUCH_HOLD: SimSpan = SimSpan::from_nanos(100_000_000);
 
 /// The flags of one agent.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 struct Signal {
     resting: AtomicBool,
     woken: AtomicBool,
+    /// Who makes its turns, by number; [`NOBODY`] where it makes them itself.
+    leader: AtomicU32,
+    /// It makes no turns any more and takes nobody in.
+    closed: AtomicBool,
     /// Simulated nanoseconds of the last touch, plus one; zero for never.
     touched: AtomicU64,
     thread: OnceLock<Thread>,
+}
+
+/// No agent has this number.
+const NOBODY: u32 = u32::MAX;
+
+impl Default for Signal {
+    fn default() -> Self {
+        Self {
+            resting: AtomicBool::new(false),
+            woken: AtomicBool::new(false),
+            leader: AtomicU32::new(NOBODY),
+            closed: AtomicBool::new(false),
+            touched: AtomicU64::new(0),
+            thread: OnceLock::new(),
+        }
+    }
 }
 
 /// The flags of all agents of a run.
 #[derive(Debug)]
 pub(super) struct Switchboard {
     signals: Vec<Signal>,
-    /// Somebody at rest was woken: the lockstep loop looks for them.
+    /// Somebody was summoned: the lockstep loop looks for them.
     rung: AtomicBool,
     stop: AtomicBool,
 }
@@ -51,36 +72,97 @@ impl Switchboard {
         }
     }
 
+    /// Hands the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
+    pub fn follow(&self, id: AgentId, leader: Option<AgentId>) {
+        if let Some(signal) = self.signal(id) {
+            signal.leader.store(leader.map_or(NOBODY, |l| l.0), SeqCst);
+        }
+    }
+
+    /// Who makes the turns of `id` in the end; itself where nobody leads it.
+    pub fn leader(&self, id: AgentId) -> AgentId {
+        let mut at = id;
+        while let Some(next) = self.next_up(at) {
+            at = next;
+        }
+        at
+    }
+
+    fn next_up(&self, id: AgentId) -> Option<AgentId> {
+        let leader = self.signal(id)?.leader.load(SeqCst);
+        (leader < id.0).then_some(AgentId(leader))
+    }
+
+    /// `id` makes no turns any more.
+    pub fn close(&self, id: AgentId) {
+        if let Some(signal) = self.signal(id) {
+            signal.closed.store(true, SeqCst);
+        }
+    }
+
+    /// Whether `id` makes no turns any more.
+    pub fn is_closed(&self, id: AgentId) -> bool {
+        self.signal(id).is_some_and(|signal| signal.closed.load(SeqCst))
+    }
+
     /// `id` must not rest before its next turn; if it rests now, it wakes.
     pub fn wake(&self, id: AgentId) {
-        let Some(signal) = self.signal(id) else { return };
-        signal.woken.store(true, SeqCst);
-        if signal.resting.load(SeqCst) {
-            self.rung.store(true, SeqCst);
-            signal.thread.get().inspect(|t| t.unpark());
+        let mut at = Some(id);
+        while let Some(who) = at {
+            let Some(signal) = self.signal(who) else { return };
+            signal.woken.store(true, SeqCst);
+            if signal.resting.load(SeqCst) {
+                self.summon(who);
+            }
+            at = self.next_up(who);
         }
+    }
+
+    /// Makes the one who waits for `id` look at what has come for it.
+    pub fn summon(&self, id: AgentId) {
+        let Some(signal) = self.signal(id) else { return };
+        self.rung.store(true, SeqCst);
+        signal.thread.get().inspect(|t| t.unpark());
     }
 
     /// Another agent acts on `id` at simulated time `now`.
     pub fn touch(&self, id: AgentId, now: SimTime) {
         let Some(signal) = self.signal(id) else { return };
         signal.touched.fetch_max(now.as_nanos().saturating_add(1), SeqCst);
-        if signal.resting.load(SeqCst) {
+        if self.rests(id) {
             self.wake(id);
         }
     }
 
-    /// Goes to rest, unless somebody woke or touched `id` lately; whether it did.
-    pub fn try_rest(&self, id: AgentId, now: SimTime) -> bool {
+    /// Whether whoever makes the turns of `id` rests.
+    pub fn rests(&self, id: AgentId) -> bool {
+        self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(SeqCst))
+    }
+
+    /// Whether `id` was touched so lately, or woken, that it may not rest at `now`.
+    pub fn is_stirred(&self, id: AgentId, now: SimTime) -> bool {
+        self.signal(id).is_some_and(|signal| signal.woken.load(SeqCst) || signal.is_held(now))
+    }
+
+    /// Goes to rest, with all whose turns it makes, unless somebody woke or touched one of them lately; whether it did.
+    pub fn try_rest(&self, id: AgentId, led: impl Iterator<Item = AgentId>, now: SimTime) -> bool {
         let Some(signal) = self.signal(id) else { return false };
         signal.resting.store(true, SeqCst);
-        let touched = signal.touched.load(SeqCst);
-        let held = touched > 0 && SimTime::from_nanos(touched - 1) + TOUCH_HOLD > now;
-        if held || signal.woken.swap(false, SeqCst) {
-            signal.resting.store(false, SeqCst);
-            return false;
+        let mut disturbed = false;
+        for signal in std::iter::once(id).chain(led).filter_map(|id| self.signal(id)) {
+            disturbed |= signal.is_held(now) | signal.woken.swap(false, SeqCst);
         }
-        true
+        if disturbed {
+            signal.resting.store(false, SeqCst);
+        }
+        !disturbed
+    }
+
+    /// A turn of `id` begins: what it was woken for is looked after in this turn. To be said before looking.
+    pub fn heed(&self, id: AgentId) {
+        if let Some(signal) = self.signal(id) {
+            signal.woken.store(false, SeqCst);
+        }
     }
 
     /// Ends the rest of `id` if somebody woke it; whether somebody did.
@@ -93,7 +175,7 @@ impl Switchboard {
         true
     }
 
-    /// Whether anybody at rest was woken since the last call.
+    /// Whether anybody was summoned since the last call.
     pub fn take_rung(&self) -> bool {
         self.rung.load(SeqCst) && self.rung.swap(false, SeqCst)
     }
@@ -115,18 +197,30 @@ impl Switchboard {
     }
 }
 
+impl Signal {
+    /// Whether the last touch still keeps it awake.
+    fn is_held(&self, now: SimTime) -> bool {
+        let touched = self.touched.load(SeqCst);
+        touched > 0 && SimTime::from_nanos(touched - 1) + TOUCH_HOLD > now
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     const ME: AgentId = AgentId(0);
 
+    fn try_rest(board: &Switchboard, now: SimTime) -> bool {
+        board.try_rest(ME, std::iter::empty(), now)
+    }
+
     #[test]
     fn a_wake_before_the_rest_is_not_lost() {
         let board = Switchboard::new(1);
         board.wake(ME);
-        assert!(!board.try_rest(ME, SimTime::ZERO), "woken before it lay down");
-        assert!(board.try_rest(ME, SimTime::ZERO), "that wake is used up");
+        assert!(!try_rest(&board, SimTime::ZERO), "woken before it lay down");
+        assert!(try_rest(&board, SimTime::ZERO), "that wake is used up");
         board.wake(ME);
         assert!(board.take_rung());
         assert!(board.take_wake(ME));
@@ -137,10 +231,28 @@ mod tests {
     fn a_touched_agent_stays_awake_for_the_hold() {
         let board = Switchboard::new(1);
         board.touch(ME, SimTime::ZERO);
-        assert!(!board.try_rest(ME, SimTime::from_nanos(99_999_999)));
-        assert!(board.try_rest(ME, SimTime::from_nanos(100_000_000)));
+        assert!(!try_rest(&board, SimTime::from_nanos(99_999_999)));
+        assert!(try_rest(&board, SimTime::from_nanos(100_000_000)));
         board.touch(ME, SimTime::from_nanos(200_000_000));
         assert!(board.take_wake(ME));
+    }
+
+    #[test]
+    fn who_is_led_wakes_its_leader_and_the_leaders_leader() {
+        let board = Switchboard::new(3);
+        board.follow(AgentId(2), Some(AgentId(1)));
+        board.follow(AgentId(1), Some(ME));
+        assert_eq!(board.leader(AgentId(2)), ME);
+        let led = || [AgentId(1), AgentId(2)].into_iter();
+        assert!(board.try_rest(ME, led(), SimTime::ZERO));
+        board.wake(AgentId(2));
+        assert!(board.take_rung() && board.take_wake(ME));
+        assert!(!board.try_rest(ME, led(), SimTime::ZERO), "the wake of one it leads is its own");
+        assert!(board.try_rest(ME, led(), SimTime::ZERO));
+        board.touch(AgentId(1), SimTime::from_nanos(500_000_000));
+        assert!(board.take_wake(ME));
+        board.follow(AgentId(1), None);
+        assert_eq!(board.leader(AgentId(2)), AgentId(1));
     }
 
     #[test]

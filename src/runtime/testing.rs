@@ -1,11 +1,14 @@
 //! An agent without physics for the tests of this room: it counts, drifts towards its neighbours and fails on demand.
 
+use super::faults::Faults;
 use super::spawn::AgentSpawn;
 use glam::{DQuat, DVec3};
+use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site};
 use metachron_agents::{
-    Agent, AgentId, Body, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, Snapshot, StepError, StepReport,
-    Surroundings,
+    Agent, AgentId, Body, Bounds, Companion, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime,
+    Snapshot, StepError, StepReport, Surroundings,
 };
+use std::sync::{Arc, Mutex};
 
 /// What goes wrong at a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -17,6 +20,23 @@ pub(super) enum Fault {
     /// The model has a bug.
     Panic,
 }
+
+/// Whether two agents, by rising numbers, hang together at a time.
+pub(super) type Bond = fn(u32, u32, SimTime) -> bool;
+
+/// One step as it was made.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Made {
+    pub id: AgentId,
+    pub from: SimTime,
+    pub to: SimTime,
+    pub thread: String,
+    /// Whom it saw: those that could touch it, and those that it was to act on.
+    pub saw: Vec<(AgentId, bool)>,
+}
+
+/// All steps that were made, by anybody.
+pub(super) type Log = Arc<Mutex<Vec<Made>>>;
 
 /// The test agent.
 #[derive(Debug, Clone)]
@@ -32,13 +52,48 @@ pub(super) struct Dummy {
     pub resolution: Resolution,
     pub steps: u64,
     pub x: f64,
+    /// It has a form: a ball of this radius that flies along z with this speed.
+    pub ball: Option<(f64, f64)>,
+    /// With whom it hangs together.
+    pub bond: Option<Bond>,
+    /// It gives one newton second to everybody it owns a pair with, at each of the first so many steps.
+    pub gifts: u64,
+    /// Impulses along x it has taken, newton seconds.
+    pub taken: f64,
+    pub exchange: Exchange,
+    pub log: Option<Log>,
+    pub me: AgentId,
+    pub time: SimTime,
+    /// Where its matter is.
+    pub z: f64,
 }
 
 impl Dummy {
     /// One that takes `work` microseconds a step.
     pub fn new(work: f64) -> Self {
-        let resolution = Resolution { eps_m: 0.01, n: 1 };
-        Self { work, rest_from: None, fault: None, touches: None, resolution, steps: 0, x: 0.0 }
+        Self {
+            work,
+            rest_from: None,
+            fault: None,
+            touches: None,
+            resolution: Resolution { eps_m: 0.01, n: 1 },
+            steps: 0,
+            x: 0.0,
+            ball: None,
+            bond: None,
+            gifts: 0,
+            taken: 0.0,
+            exchange: Exchange::default(),
+            log: None,
+            me: AgentId(0),
+            time: SimTime::ZERO,
+            z: 0.0,
+        }
+    }
+
+    /// One that hangs together with others as `bond` says, and whose steps are written down in `log`.
+    pub fn mate(work: f64, bond: Bond, log: &Log) -> Self {
+        Self { ball: Some((0.1, 0.0)), bond: Some(bond), log: Some(Arc::clone(log)), ..Self::new(work) }
     }
 
     /// On its way into a run at this rate, its step fixed.
@@ -52,10 +107,50 @@ impl Dummy {
             dt_range: (dt, dt),
             range: Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) }),
             links: Vec::new(),
+            laws: Vec::new(),
+            attached: Vec::new(),
+            together: None,
+            faults: Faults::default(),
             watches: Vec::new(),
             governor: None,
         }
     }
+
+    fn write_down(&self, to: SimTime, around: &Surroundings<'_>) {
+        let Some(log) = &self.log else { return };
+        let thread = std::thread::current().name().unwrap_or_default().to_owned();
+        let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
+        log.lock().unwrap().push(Made { id: around.me, from: around.time, to, thread, saw });
+    }
+
+    fn trade(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        let taken = &mut self.taken;
+        self.exchange.open(around);
+        self.exchange.take(around, |_, _, impulse, _| *taken += impulse.linear.x);
+        if self.steps <= self.gifts {
+            for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
+                let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
+                self.exchange.give(other.id, Site::Whole, 0.0, push);
+            }
+        }
+        self.exchange.close(around, dt_s);
+    }
+}
+
+/// For each of `others`, its group: zero hangs together with the first of `all`.
+fn groups(bond: Bond, all: &[AgentId], time: SimTime) -> Vec<u32> {
+    let mut group: Vec<u32> = (0..all.len() as u32).collect();
+    for _ in all {
+        for (i, a) in all.iter().enumerate() {
+            for (j, b) in all.iter().enumerate() {
+                if a < b && bond(a.0, b.0, time) {
+                    let least = group[i].min(group[j]);
+                    (group[i], group[j]) = (least, least);
+                }
+            }
+        }
+    }
+    group.split_off(1)
 }
 
 impl Agent for Dummy {
@@ -64,12 +159,8 @@ impl Agent for Dummy {
     }
 
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
-        self.steps += 1;
         let dt_s = dt.as_secs_f64();
-        let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
-        let pulled = around.pulls().map(|p| p.target.x);
-        self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
-        match self.fault.filter(|(step, _)| *step == self.steps) {
+        match self.fault.filter(|(step, _)| *step == self.steps + 1) {
             Some((_, Fault::NotFinite)) => self.x = f64::NAN,
             Some((_, Fault::Diverged)) => {
                 return Err(StepError::Diverged { model: "synthetic", dt_s, what: "on demand".into() });
@@ -77,6 +168,14 @@ impl Agent for Dummy {
             Some((_, Fault::Panic)) => panic!("on demand"),
             None => {}
         }
+        self.steps += 1;
+        let met = around.neighbours.iter().filter_map(|n| n.snapshot.body.probe(0.0)).map(|(at, _)| at.x);
+        let pulled = around.pulls().map(|p| p.target.x);
+        self.x += dt_s * (1.0 + met.chain(pulled).map(|x| x - self.x).sum::<f64>());
+        self.trade(around, dt_s);
+        (self.me, self.time) = (around.me, around.time + dt);
+        self.z += dt_s * self.ball.map_or(0.0, |(_, speed_m_s)| speed_m_s);
+        self.write_down(self.time, around);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
     }
@@ -90,11 +189,21 @@ impl Agent for Dummy {
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        let position = DVec3::X * self.x;
+        let position = DVec3::new(self.x, 0.0, self.z);
         into.body = Body::Rigid(RigidState { position, rotation: DQuat::IDENTITY, ..RigidState::default() });
         into.steps = self.steps;
         into.resolution = Some(self.resolution);
         into.touches.extend(self.touches.filter(|(from, _)| self.steps >= *from).map(|(_, id)| id));
+        // where its matter is does not follow x, so that these tests place it
+        into.bounds = self.ball.map(|(radius_m, speed_m_s)| {
+            let (centre, half) = (DVec3::Z * self.z, DVec3::splat(radius_m));
+            Bounds { low: centre - half, high: centre + half, speed_m_s: speed_m_s.abs() }
+        });
+        self.exchange.write(into);
+        if let Some(bond) = self.bond {
+            let others = (0..16).filter(|k| *k != self.me.0);
+            into.bonds.extend(others.filter(|k| bond(self.me.0.min(*k), self.me.0.max(*k), self.time)).map(AgentId));
+        }
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {
@@ -103,5 +212,35 @@ impl Agent for Dummy {
 
     fn mass_kg(&self) -> f64 {
         0.0
+    }
+
+    fn form(&self) -> Option<Arc<Form>> {
+        self.ball.map(|_| Arc::new(Form { kind: FormKind::Chain, friction: 0.0, restitution: 0.0 }))
+    }
+
+    fn lead(
+        &mut self,
+        dt: SimSpan,
+        around: &Surroundings<'_>,
+        others: &mut [Companion<'_>],
+        apart: &mut Vec<u32>,
+    ) -> Result<StepReport, StepError> {
+        let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
+        let before = self.clone();
+        let mut report = match self.step(dt, around) {
+            Ok(report) => report,
+            Err(error) => {
+                *self = before;
+                return Err(error);
+            }
+        };
+        for other in others.iter_mut() {
+            let one = other.agent.step(dt, &other.around)?;
+            report.work += one.work;
+            report.at_rest &= one.at_rest;
+        }
+        let all: Vec<_> = std::iter::once(around.me).chain(others.iter().map(|o| o.id)).collect();
+        apart.extend(groups(bond, &all, around.time + dt));
+        Ok(report)
     }
 }

@@ -1,14 +1,16 @@
 //! A thread for each agent, real time: the default executor.
 //!
 //! In: agents and a [`Clock`]. Out: [`Run`]. A thread sleeps until its agent is due and is woken for a command, a touch, a
-//! changed timeline and the end; one whose agent rests sleeps without a timer, one whose agent has given up ends.
+//! changed timeline and the end; one whose agent rests or is led by another sleeps without a timer, one whose agent has given
+//! up ends.
 //! Never here: virtual time, declared costs.
 
 use super::Run;
 use super::account::AgentStats;
 use super::clock::Clock;
 use super::cpu::CpuBatch;
-use super::handle::AgentHandle;
+use super::handle::{AgentHandle, Shared};
+use super::island::{Seating, empty_rooms, move_in};
 use super::pace::{Drive, SharedTimeline, Timeline};
 use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use super::switchboard::Switchboard;
@@ -49,10 +51,10 @@ impl Threads {
         timeline.drive(Duration::ZERO, Drive::Pause);
         let (sender, ended) = channel();
         let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended };
-        for actor in actors {
+        for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
-            let id = actor.id();
-            let thread = run.spawn(actor, sender.clone())?;
+            let shared = Arc::clone(&run.handles[id.0 as usize].shared);
+            let thread = run.spawn(actor, shared, sender.clone())?;
             run.board.lives_on(id, thread.thread().clone());
             run.threads.push(Some(thread));
         }
@@ -60,15 +62,20 @@ impl Threads {
         Ok(run)
     }
 
-    fn spawn(&self, actor: Actor, ended: Sender<AgentId>) -> Result<JoinHandle<()>, RunError> {
-        let name = actor.shared.name.to_string();
+    fn spawn(
+        &self,
+        actor: Option<Box<Actor>>,
+        shared: Arc<Shared>,
+        ended: Sender<AgentId>,
+    ) -> Result<JoinHandle<()>, RunError> {
+        let name = shared.name.to_string();
         let stage =
             Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
-        let farewell = Farewell { id: actor.id(), ended };
+        let farewell = Farewell { id: shared.id, ended };
         let builder = thread::Builder::new().name(format!("agent:{}", name.replace('\0', "")));
         let body = move || {
             let _farewell = farewell;
-            stage.live(actor);
+            stage.live(actor, &shared);
         };
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
@@ -90,6 +97,7 @@ impl Threads {
             handle.shared.gauges.park(format!("its last step did not end within {} s", PATIENCE.as_secs()));
         }
         self.threads.clear();
+        empty_rooms(&self.handles, &self.timeline.read(), self.clock.now());
     }
 }
 
@@ -156,19 +164,52 @@ struct Stage {
 }
 
 impl Stage {
-    /// The life of an agent: turn after turn until it is asked to end, or gives up.
-    fn live(mut self, mut actor: Actor) {
+    /// The life of an agent: turn after turn until it is asked to end, or gives up. While another leads it, it is elsewhere.
+    fn live(mut self, mut here: Option<Box<Actor>>, shared: &Shared) {
+        while !shared.board.stopping() {
+            here = match here {
+                Some(actor) => match self.live_alone(actor) {
+                    Some(actor) if actor.is_parked() => return,
+                    moved => moved,
+                },
+                None => self.wait_for(shared.seating.as_ref()),
+            };
+        }
+        if let Some(mut actor) = here {
+            self.settle(&mut actor);
+            actor.close_account(&self.timeline.read(), self.clock.now());
+        }
+    }
+
+    /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or gives up.
+    fn live_alone(&mut self, mut actor: Box<Actor>) -> Option<Box<Actor>> {
         let board = Arc::clone(&actor.shared.board);
         let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
         while !board.stopping() {
             next = match next {
                 Next::Due => self.wait_or_turn(&mut actor),
                 Next::Rest => self.doze(&mut actor),
-                Next::Parked => break,
+                Next::Join(leader) => {
+                    self.settle(&mut actor);
+                    actor = move_in(actor, leader).err()?;
+                    Next::Due
+                }
+                Next::Parked => {
+                    self.settle(&mut actor);
+                    break;
+                }
             };
         }
-        self.settle(&mut actor);
-        actor.close_account(&self.timeline.read(), self.clock.now());
+        Some(actor)
+    }
+
+    /// Waits until the agent comes home.
+    fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<Actor>> {
+        let home = seating.and_then(Seating::come_home);
+        if home.is_none() {
+            thread::park();
+        }
+        home
     }
 
     /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which does no harm.
@@ -209,7 +250,7 @@ impl Stage {
             }
         };
         let wall = started.elapsed();
-        actor.unsettled += wall;
+        actor.count(wall);
         if self.batch.add(wall) {
             self.settle(actor);
         }

@@ -5,15 +5,20 @@
 //!
 //! Between the two an executor lets the turn's time pass: it did on a thread, lockstep charges it. A turn that fails, by an
 //! error of the model, a state that is not finite or a panic (a bug of ours), parks the agent with the reason; nothing of it is
-//! published and the others go on. Never here: threads, sleeping, events, any law of control.
+//! published and the others go on. Never here: threads, sleeping, events, any law of control, the turns of those an agent
+//! leads ([`super::island`]).
 
 use super::account::{Diary, Entry, SMOOTHING};
+use super::eyes::{Eyes, Peers};
+use super::faults::Faults;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
+use super::island::Company;
 use super::pace::{Pace, Start, Timeline};
-use super::slot::{LatestSlot, SlotWriter};
+use super::slot::SlotWriter;
+use metachron_agents::coupling::Link;
 use metachron_agents::{
-    Agent, AgentId, Neighbour, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
+    Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::Ordering::Relaxed;
@@ -23,18 +28,26 @@ use std::time::Duration;
 /// An agent and all it needs to live.
 pub(super) struct Actor {
     pub shared: Arc<Shared>,
+    pub peers: Arc<Peers>,
     pub agent: Box<dyn Agent>,
     pub pace: Pace,
     pub dt_range: (SimSpan, SimSpan),
     pub range: Option<ResolutionRange>,
     pub governor: Option<Box<dyn Governor>>,
+    pub faults: Faults,
     pub writer: SlotWriter<Snapshot>,
-    pub links: Vec<Arc<LatestSlot<Snapshot>>>,
-    pub neighbours: Vec<Neighbour>,
+    pub eyes: Eyes,
+    pub links: Vec<Link>,
     pub hands: Vec<Pull>,
+    /// Those whose turns it makes.
+    pub company: Company,
     pub diary: Diary,
     pub rhythm: Rhythm,
     pub open: Option<Open>,
+    /// The state that was written last is kept from being seen.
+    pub withheld: bool,
+    /// Up to which revision each ledger was announced to the one it is for.
+    pub announced: Vec<(AgentId, u64)>,
     /// Wall time of turns whose CPU time is not known yet.
     pub unsettled: Duration,
 }
@@ -42,10 +55,20 @@ pub(super) struct Actor {
 /// A turn between its begin and its finish.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Open {
-    start: Start,
-    report: StepReport,
-    dt: SimSpan,
-    resolution: Option<Resolution>,
+    pub start: Start,
+    pub dt: SimSpan,
+    pub resolution: Option<Resolution>,
+    /// Whether it could rest after this turn.
+    pub rests: bool,
+}
+
+/// What a turn that has begun takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effort {
+    /// Work of one step, in the model's unit.
+    pub work: f64,
+    /// How many such steps: one, and one more for every step of those it leads.
+    pub steps: u32,
 }
 
 /// What comes after a turn.
@@ -55,6 +78,8 @@ pub(super) enum Next {
     Due,
     /// Nothing until somebody wakes the agent.
     Rest,
+    /// It hands its turns over to this agent.
+    Join(AgentId),
     /// Nothing any more.
     Parked,
 }
@@ -93,23 +118,26 @@ impl Actor {
     /// Publishes the state the agent starts from, or parks it.
     pub fn introduce(&mut self) {
         let time = self.pace.time();
-        let written = contained(|| self.write_snapshot(time));
+        let written = contained(|| self.write_snapshot(time, false));
         match written {
             Ok(()) => drop(self.writer.publish()),
-            Err(reason) => self.shared.gauges.park(reason),
+            Err(reason) => self.park(reason),
         }
         self.diary.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Steps at wall time `wall`: the work it took in the model's unit, or `None` if it failed and is parked now.
-    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<f64> {
+    /// Steps at wall time `wall`, with all it leads: what that took, or `None` if it failed and is parked now.
+    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
+        self.shared.board.heed(self.id());
+        self.take_in();
         match contained(|| self.attempt(timeline, wall)) {
-            Ok(open) => {
+            Ok((open, effort)) => {
                 self.open = Some(open);
-                Some(open.report.work)
+                Some(effort)
             }
             Err(reason) => {
                 self.park(reason);
+                self.disband(timeline, wall);
                 None
             }
         }
@@ -119,72 +147,107 @@ impl Actor {
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
         let Some(open) = self.open.take() else { return Next::Parked };
         let now = timeline.sim_at(wall);
+        let mut published = self.conclude(&open, now, work_s);
+        published &= self.conclude_led(now, work_s);
+        if let Err(reason) = contained(|| self.consult(timeline, &open, work_s)) {
+            self.park(reason);
+            self.disband(timeline, wall);
+            return Next::Parked;
+        }
+        self.part();
+        if let Some(leader) = self.seek_leader() {
+            return Next::Join(leader);
+        }
+        // a state nobody could see is no state to rest in
+        if open.rests && published && self.lie_down(now) { Next::Rest } else { Next::Due }
+    }
+
+    /// Accounts for a step that has been made and shows it; whether its state can be seen.
+    pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
         let missed = now > self.pace.time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
         // first the account: who sees a state finds it accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
-        let published = self.writer.publish();
-        self.touch(now);
-        if let Err(reason) = contained(|| self.consult(timeline, &open, work_s)) {
-            self.park(reason);
-            return Next::Parked;
+        self.withheld = self.faults.loses(self.id(), self.diary.steps());
+        let published = !self.withheld && self.writer.publish();
+        if published {
+            self.announce(now);
         }
-        // a state nobody could see is no state to rest in
-        let at_rest = open.report.at_rest && published && self.hands.is_empty();
-        if at_rest && self.lie_down(now) { Next::Rest } else { Next::Due }
+        published
     }
 
-    /// Whether somebody has woken the agent from its rest; it is on its feet then, at the timeline's present.
+    /// Whether somebody has woken the agent from its rest; it is on its feet then, at the timeline's present, and all it leads.
     pub fn wakes(&mut self, timeline: &Timeline, wall: Duration) -> bool {
         if !self.shared.board.take_wake(self.id()) {
             return false;
         }
-        self.hold_watched(timeline.sim_at(wall));
-        self.pace.wake(timeline, wall);
-        self.rhythm = Rhythm::default();
-        self.diary.restart(timeline.sim_at(wall));
-        self.diary.pace(&self.shared.gauges, &self.pace);
-        self.shared.gauges.set_resting(false);
+        self.get_up(timeline, wall);
         true
+    }
+
+    /// Accounts for the time of a turn on the wall: those it leads share it.
+    pub fn count(&mut self, wall: Duration) {
+        let share = wall / (1 + self.company.len() as u32);
+        self.unsettled += share;
+        self.company.each(|seat| seat.unsettled += share);
     }
 
     /// Accounts for the CPU time of the turns since the last call: `share` of what they took on the wall.
     pub fn settle(&mut self, share: f64) {
         let nanos = (std::mem::take(&mut self.unsettled).as_nanos() as f64 * share) as u64;
         self.shared.gauges.cpu_nanos.fetch_add(nanos, Relaxed);
+        self.company.each(|seat| seat.settle(share));
     }
 
-    /// Brings the account up to date, at the end of a run: who rests has rested until now.
+    /// Brings the account up to date, at the end of a run: who rests has rested until now, and the last state is seen.
     pub fn close_account(&mut self, timeline: &Timeline, wall: Duration) {
+        self.show_withheld();
         if self.shared.gauges.is_resting() {
             self.hold_watched(timeline.sim_at(wall));
             self.pace.wake(timeline, wall);
             self.diary.pace(&self.shared.gauges, &self.pace);
         }
         self.diary.flush(&self.shared.gauges);
+        self.company.each(|seat| seat.close_account(timeline, wall));
     }
 
-    pub fn park(&self, reason: String) {
+    /// Gives up for good, for this reason.
+    pub fn park(&mut self, reason: String) {
+        self.show_withheld();
         self.diary.flush(&self.shared.gauges);
         self.shared.gauges.park(reason);
+        if let Some(crowd) = &self.peers.crowd {
+            crowd.stay(self.id());
+        }
+        self.shut_door();
     }
 
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Open, String> {
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Open, Effort), String> {
         self.take_commands();
         self.rhythm.beat(timeline, wall);
         let start = self.pace.begin(timeline, wall);
-        self.look_around();
-        let (dt, time) = (self.pace.dt(), self.pace.time());
+        let alone = self.gather(timeline, wall, &start);
+        let dt = self.faults.span(self.pace.dt(), self.id(), self.diary.steps());
         let resolution = self.agent.resolution();
-        let around =
-            Surroundings { me: self.shared.id, time, neighbours: &self.neighbours, hands: &self.hands, links: &[] };
-        let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
-        self.write_snapshot(time + dt)?;
-        self.pace.advance();
-        Ok(Open { start, report, dt, resolution })
+        let (report, led) = if self.company.is_empty() { (self.step(dt)?, 0) } else { self.lead(dt)? };
+        let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
+        let open = Open { start, dt, resolution, rests };
+        self.write_led(&open);
+        self.write_snapshot(self.pace.time() + dt, rests)?;
+        self.pace.advance_by(dt);
+        Ok((open, Effort { work: report.work, steps: 1 + led + alone }))
     }
 
-    fn take_commands(&mut self) {
+    /// Steps by itself.
+    pub fn step(&mut self, dt: SimSpan) -> Result<StepReport, String> {
+        let time = self.pace.time();
+        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, dt), &[]);
+        let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
+        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        self.agent.step(dt, &around).map_err(|e| e.to_string())
+    }
+
+    pub fn take_commands(&mut self) {
         if let Some(wanted) = self.shared.mail.take_retune() {
             self.retune(wanted);
         }
@@ -197,34 +260,37 @@ impl Actor {
         }
     }
 
-    fn look_around(&mut self) {
-        for (neighbour, slot) in self.neighbours.iter_mut().zip(&self.links) {
-            neighbour.snapshot = slot.latest();
-        }
+    /// Whether nothing from outside keeps the agent from resting at simulated time `now`.
+    pub fn is_let_alone(&self, now: SimTime) -> bool {
+        self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
     }
 
-    fn write_snapshot(&mut self, time: SimTime) -> Result<(), String> {
+    /// Writes the state at `time`, to be published later; `at_rest` where the agent means to rest in it.
+    pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
         let agent = &self.agent;
+        self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
             agent.write_snapshot(into);
-            into.time = time;
+            (into.time, into.at_rest) = (time, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;
-        if finite {
-            self.note_watched();
+        if let (true, Some(state)) = (finite, self.writer.filled()) {
+            self.eyes.stand(&self.peers, state);
+            let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
+            traces.iter_mut().for_each(|trace| trace.look(state));
             Ok(())
         } else {
             Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
         }
     }
 
-    /// Writes down the points that are watched.
-    fn note_watched(&self) {
-        let Some(state) = self.writer.filled() else { return };
-        let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-        traces.iter_mut().for_each(|trace| trace.look(state));
+    /// Shows a state that was kept from being seen: the last of a life never is.
+    fn show_withheld(&mut self) {
+        if std::mem::take(&mut self.withheld) {
+            self.writer.publish();
+        }
     }
 
     /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.
@@ -235,9 +301,27 @@ impl Actor {
     }
 
     /// Tells those this agent acts on, once they can see how.
-    fn touch(&self, now: SimTime) {
+    fn announce(&mut self, now: SimTime) {
         let newest = self.shared.slot.latest();
-        newest.touches.iter().filter(|id| **id != self.shared.id).for_each(|id| self.shared.board.touch(*id, now));
+        let board = &self.shared.board;
+        let leader = board.leader(self.shared.id);
+        let others = newest.touches.iter().filter(|id| board.leader(**id) != leader);
+        others.for_each(|id| board.touch(*id, now));
+        let Some(crowd) = &self.peers.crowd else { return };
+        for ledger in &newest.given {
+            let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);
+            if known.as_ref().is_some_and(|(_, revision)| *revision == ledger.revision) {
+                continue;
+            }
+            match known {
+                Some((_, revision)) => *revision = ledger.revision,
+                None => self.announced.push((ledger.with, ledger.revision)),
+            }
+            crowd.call(ledger.with, self.shared.id);
+            if board.rests(ledger.with) {
+                board.wake(ledger.with);
+            }
+        }
     }
 
     fn consult(&mut self, timeline: &Timeline, open: &Open, work_s: f64) -> Result<(), String> {
@@ -270,17 +354,38 @@ impl Actor {
     }
 
     fn lie_down(&mut self, now: SimTime) -> bool {
-        let rests = self.shared.board.try_rest(self.id(), now);
+        let led = self.company.ids();
+        let rests = self.shared.board.try_rest(self.id(), led, now);
         if rests {
-            self.diary.flush(&self.shared.gauges);
-            self.shared.gauges.set_resting(true);
+            self.rest_now();
         }
         rests
+    }
+
+    /// Rests, and all it leads.
+    fn rest_now(&mut self) {
+        self.diary.flush(&self.shared.gauges);
+        self.shared.gauges.set_resting(true);
+        if let Some(crowd) = &self.peers.crowd {
+            crowd.stay(self.id());
+        }
+        self.company.each(Actor::rest_now);
+    }
+
+    /// Goes on after a rest, at the timeline's present, and all it leads.
+    fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
+        self.hold_watched(timeline.sim_at(wall));
+        self.pace.wake(timeline, wall);
+        self.rhythm = Rhythm::default();
+        self.diary.restart(timeline.sim_at(wall));
+        self.diary.pace(&self.shared.gauges, &self.pace);
+        self.shared.gauges.set_resting(false);
+        self.company.each(|seat| seat.get_up(timeline, wall));
     }
 }
 
 /// Runs `part` of a turn; an error or a panic in it is the reason to park.
-fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     // the agent is not used again after a panic, so its broken promises are seen by nobody
     match catch_unwind(AssertUnwindSafe(part)) {
         Ok(result) => result,

@@ -1,0 +1,176 @@
+//! Where each agent's matter is, for all to read without waiting.
+//!
+//! In: one agent's box at a time, from the one who makes its turns. Out: whole boxes, or none where one is just being written:
+//! the reader must think the worst then. A version before and after the numbers tells (a seqlock in atomic words).
+//! Never here: who is near whom.
+
+use glam::DVec3;
+use metachron_agents::{Bounds, SimTime};
+use std::sync::atomic::{AtomicU64, Ordering, fence};
+
+/// A box around an agent's matter at one moment, and how fast it may grow in every direction since and before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Reach {
+    /// Least coordinates, metres.
+    pub low: DVec3,
+    /// Greatest coordinates, metres.
+    pub high: DVec3,
+    /// A speed that no point of it passes, m/s; zero at rest.
+    pub speed_m_s: f64,
+    /// The moment, in the agent's own time.
+    pub time: SimTime,
+}
+
+impl Reach {
+    pub fn new(bounds: &Bounds, speed_m_s: f64, time: SimTime) -> Self {
+        Self { low: bounds.low, high: bounds.high, speed_m_s, time }
+    }
+
+    /// The distance between two boxes, metres; zero where they overlap.
+    pub fn gap_m(&self, other: &Self) -> f64 {
+        (other.low - self.high).max(self.low - other.high).max(DVec3::ZERO).length()
+    }
+}
+
+/// What a reader finds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Seen {
+    /// Nothing was ever written.
+    Nowhere,
+    /// The newest whole writing.
+    There(Reach),
+    /// A writer stands in the middle of a writing.
+    Unsure,
+}
+
+/// One agent's reach in shared memory: a line of the cache of its own, so that writers do not disturb each other's readers.
+#[derive(Debug, Default)]
+#[repr(align(64))]
+pub(super) struct Berth {
+    /// Odd while the words are being written; zero before the first writing.
+    version: AtomicU64,
+    words: [AtomicU64; 5],
+}
+
+/// How often a reader looks again at a box that is just being written. A writing takes 10 ns.
+const TRIES: u32 = 8;
+
+impl Berth {
+    /// What was written last, for the one who writes.
+    pub fn mine(&self) -> Option<Reach> {
+        if let Seen::There(reach) = self.read() { Some(reach) } else { None }
+    }
+
+    /// Writes `reach`; from one thread at a time. Numbers are rounded outwards to 24 bits.
+    pub fn write(&self, reach: &Reach) {
+        let version = self.version.load(Ordering::Relaxed);
+        self.version.store(version.wrapping_add(1), Ordering::Relaxed);
+        fence(Ordering::Release);
+        for (word, value) in self.words.iter().zip(words(reach)) {
+            word.store(value, Ordering::Relaxed);
+        }
+        self.version.store(version.wrapping_add(2), Ordering::Release);
+    }
+
+    /// What was written last.
+    pub fn read(&self) -> Seen {
+        for _ in 0..TRIES {
+            let version = self.version.load(Ordering::Acquire);
+            if version == 0 {
+                return Seen::Nowhere;
+            }
+            let words = std::array::from_fn(|k| self.words[k].load(Ordering::Relaxed));
+            fence(Ordering::Acquire);
+            if version.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == version {
+                return Seen::There(reach(words));
+            }
+        }
+        Seen::Unsure
+    }
+}
+
+fn words(reach: &Reach) -> [u64; 5] {
+    let (low, high) = (reach.low, reach.high);
+    [
+        pair(down(low.x), down(low.y)),
+        pair(down(low.z), up(high.x)),
+        pair(up(high.y), up(high.z)),
+        u64::from(up(reach.speed_m_s).to_bits()),
+        reach.time.as_nanos(),
+    ]
+}
+
+fn reach([a, b, c, speed, time]: [u64; 5]) -> Reach {
+    let first = |word: u64| f64::from(f32::from_bits((word >> 32) as u32));
+    let second = |word: u64| f64::from(f32::from_bits(word as u32));
+    Reach {
+        low: DVec3::new(first(a), second(a), first(b)),
+        high: DVec3::new(second(b), first(c), second(c)),
+        speed_m_s: second(speed),
+        time: SimTime::from_nanos(time),
+    }
+}
+
+fn pair(first: f32, second: f32) -> u64 {
+    (u64::from(first.to_bits()) << 32) | u64::from(second.to_bits())
+}
+
+/// The greatest number of 24 bits that is not above `x`.
+fn down(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) > x { near.next_down() } else { near }
+}
+
+/// The least number of 24 bits that is not below `x`.
+fn up(x: f64) -> f32 {
+    let near = x as f32;
+    if f64::from(near) < x { near.next_up() } else { near }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::atomic::AtomicBool;
+
+    #[test]
+    fn what_is_read_holds_what_was_written() {
+        let berth = Berth::default();
+        assert_eq!(berth.read(), Seen::Nowhere);
+        let third = DVec3::new(1.0 / 3.0, -1.0 / 3.0, 1e-9);
+        let time = SimTime::from_nanos(u64::MAX - 1);
+        let written = Reach { low: -third, high: third * 2.0, speed_m_s: 0.1, time };
+        berth.write(&written);
+        let read = berth.mine().unwrap();
+        assert!(read.low.cmple(written.low).all() && read.high.cmpge(written.high).all());
+        assert!(read.speed_m_s >= 0.1 && read.time == time);
+        // 24 bits: half a unit in the last place of 1/3 and of 0.1
+        assert!((read.low - written.low).length() < 1e-7 && read.speed_m_s < 0.1 + 1e-8);
+    }
+
+    #[test]
+    fn a_reader_never_sees_half_of_a_writing() {
+        let berth = Berth::default();
+        let done = AtomicBool::new(false);
+        std::thread::scope(|scope| {
+            let reader = scope.spawn(|| {
+                let (mut last, mut reads) = (0.0, 0);
+                while !done.load(Ordering::Acquire) || reads == 0 {
+                    let Some(seen) = berth.mine() else { continue };
+                    let value = seen.low.x;
+                    assert_eq!((seen.low, seen.high), (DVec3::splat(value), DVec3::splat(value)), "torn");
+                    assert_eq!((seen.speed_m_s, seen.time), (value, SimTime::from_nanos(value as u64)), "torn");
+                    assert!(value >= last);
+                    (last, reads) = (value, reads + 1);
+                }
+            });
+            // whole numbers below 2²⁴ have 24 bits
+            for k in 1..=200_000_u32 {
+                let at = DVec3::splat(f64::from(k));
+                let time = SimTime::from_nanos(u64::from(k));
+                berth.write(&Reach { low: at, high: at, speed_m_s: f64::from(k), time });
+            }
+            done.store(true, Ordering::Release);
+            reader.join().unwrap();
+        });
+    }
+}

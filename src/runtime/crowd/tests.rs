@@ -1,0 +1,171 @@
+//! The broad phase against looking at every pair.
+
+use super::*;
+use glam::DVec3;
+use metachron_agents::SimSpan;
+use proptest::prelude::*;
+
+/// A ball that flies straight through each of its steps.
+#[derive(Debug, Clone)]
+struct Flyer {
+    time: SimTime,
+    dt: SimSpan,
+    at: DVec3,
+    velocity: DVec3,
+    radius_m: f64,
+    /// What it does at its next turns: keeps on (`None`), or flies with this velocity from there on.
+    plan: Vec<Option<[f64; 3]>>,
+}
+
+impl Flyer {
+    fn bounds(&self) -> Bounds {
+        let half = DVec3::splat(self.radius_m);
+        Bounds { low: self.at - half, high: self.at + half, speed_m_s: self.velocity.length() }
+    }
+
+    fn position_at(&self, time: SimTime) -> DVec3 {
+        self.at + self.velocity * time.secs_after(self.time)
+    }
+
+    /// The distance between the boxes at `time`, each as its last state lets expect.
+    fn gap_m(&self, other: &Self, time: SimTime) -> f64 {
+        let apart = (self.position_at(time) - other.position_at(time)).abs() - self.radius_m - other.radius_m;
+        apart.max(DVec3::ZERO).length()
+    }
+}
+
+/// Everybody's turns in the order of their times; `check` is told who has just looked, before each step.
+fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &Sight)) {
+    let crowd = Crowd::new(flyers.len());
+    let ids = || (0..flyers.len() as u32).map(AgentId);
+    let mut sights: Vec<_> = ids().map(|me| Sight::new(me, ids().filter(move |id| *id != me))).collect();
+    for (flyer, sight) in flyers.iter().zip(&mut sights) {
+        sight.stand(&crowd, Some(&flyer.bounds()), flyer.time);
+    }
+    let mut turn = 0;
+    while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
+        sights[who].look(&crowd, flyers[who].time, flyers[who].dt);
+        check(who, flyers, &sights[who]);
+        let flyer = &mut flyers[who];
+        flyer.at = flyer.position_at(flyer.time + flyer.dt);
+        flyer.time += flyer.dt;
+        let news = flyer.plan[turn % flyer.plan.len()];
+        flyer.velocity = news.map_or(flyer.velocity, DVec3::from_array);
+        sights[who].stand(&crowd, Some(&flyer.bounds()), flyer.time);
+        turn += 1;
+    }
+}
+
+fn flyer() -> impl Strategy<Value = Flyer> {
+    let place = prop::array::uniform3(-1.0_f64..1.0);
+    let speed = prop_oneof![Just(0.0), 0.0_f64..0.1, 0.0_f64..12.0];
+    let velocity = (prop::array::uniform3(-1.0_f64..1.0), speed)
+        .prop_map(|(towards, speed)| (DVec3::from_array(towards).normalize_or_zero() * speed).to_array());
+    let news = prop_oneof![4 => Just(None), 1 => velocity.prop_map(Some)];
+    let dt = prop::sample::select(vec![1_000_000_u64, 4_000_000, 16_666_667, 100_000_000]);
+    (place, dt, 0.005_f64..0.1, prop::collection::vec(news, 1..40)).prop_map(|(at, dt, radius_m, plan)| Flyer {
+        time: SimTime::ZERO,
+        dt: SimSpan::from_nanos(dt),
+        at: DVec3::from_array(at),
+        velocity: DVec3::ZERO,
+        radius_m,
+        plan,
+    })
+}
+
+proptest! {
+    #[test]
+    fn nobody_who_could_be_touched_within_a_step_is_missed(flyers in prop::collection::vec(flyer(), 2..9)) {
+        let mut flyers = flyers;
+        let mut seen = 0;
+        fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
+            let me = &all[who];
+            for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != who) {
+                let times = (0..=4).map(|q| me.time + SimSpan::from_nanos(me.dt.as_nanos() * q / 4));
+                let near = times.clone().any(|time| me.gap_m(other, time) <= 0.0);
+                let listed = sight.near().contains(&AgentId(k as u32));
+                assert!(listed || !near, "{who} misses {k} at {:?}", me.time);
+                seen += u32::from(listed);
+            }
+            assert!(sight.near().is_sorted());
+        });
+    }
+}
+
+#[test]
+fn who_is_far_is_never_looked_at_and_who_comes_is() {
+    let lattice = |k: u32| DVec3::new(f64::from(k % 10), f64::from(k / 10 % 10), f64::from(k / 100)) * 10.0;
+    let count = 1000;
+    let crowd = Crowd::new(count);
+    let ids = || (0..count as u32).map(AgentId);
+    let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
+    let mut sights: Vec<_> = ids().map(|me| Sight::new(me, ids().filter(move |id| *id != me))).collect();
+    let dt = SimSpan::from_nanos(4_000_000);
+    for (k, sight) in sights.iter_mut().enumerate() {
+        sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
+    }
+    let looks = |sights: &mut [Sight], now: SimTime| -> usize {
+        sights.iter_mut().map(|sight| sight.look(&crowd, now, dt)).sum()
+    };
+    assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
+    // 8 m at 2 · 0.0625 m/s is a minute
+    for turn in 1..=250_u64 {
+        let now = SimTime::from_nanos(turn * dt.as_nanos());
+        for (k, sight) in sights.iter_mut().enumerate() {
+            sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), now);
+        }
+        assert_eq!(looks(&mut sights, now), 0, "turn {turn}");
+    }
+    let now = SimTime::from_nanos(1_004_000_000);
+    sights[0].stand(&crowd, Some(&bounds(lattice(1) - DVec3::X * 2.0, 30.0)), now);
+    // everybody looks at the one who has become fast, and he at everybody
+    assert_eq!(looks(&mut sights, now), 2 * (count - 1));
+    assert_eq!((sights[1].near(), sights[0].near()), (&[AgentId(0)][..], &[AgentId(1)][..]));
+}
+
+#[test]
+fn a_log_that_has_run_over_means_everybody() {
+    let crowd = Crowd::new(3);
+    let mut sight = Sight::new(AgentId(0), [AgentId(1), AgentId(2)].into_iter());
+    let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
+    let dt = SimSpan::from_nanos(1_000_000);
+    sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
+    crowd.stand(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
+    sight.look(&crowd, SimTime::ZERO, dt);
+    assert!(sight.near().is_empty());
+    crowd.stand(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
+    for round in 0..LOG_LENGTH {
+        // faster and slower again, more than the log holds
+        crowd.stand(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
+    }
+    sight.look(&crowd, SimTime::ZERO, dt);
+    assert_eq!(sight.near(), [AgentId(1)]);
+}
+
+#[test]
+fn a_call_is_heard_once_by_the_one_it_is_for() {
+    let crowd = Crowd::new(200);
+    [130, 3, 64, 3].into_iter().for_each(|from| crowd.call(AgentId(7), AgentId(from)));
+    let heard = |id| {
+        let mut heard = Vec::new();
+        crowd.answer(AgentId(id), |caller| heard.push(caller.0));
+        heard
+    };
+    assert!(heard(8).is_empty());
+    assert_eq!(heard(7), [3, 64, 130]);
+    assert!(heard(7).is_empty());
+}
+
+#[test]
+fn what_is_said_of_a_speed_is_never_too_little_and_seldom_changes() {
+    let (mut said, mut changes) = (0.0, 0);
+    // up to 20 m/s and back in small steps
+    for k in 0..4000_u32 {
+        let speed = f64::from(k.min(4000 - k)) * 0.01;
+        let now = promise(speed, said);
+        assert!(now >= speed && now <= 10.0 * speed.max(SPEED_LEAST_M_S), "{now} for {speed}");
+        changes += u32::from(now != said);
+        said = now;
+    }
+    assert!(changes <= 20, "{changes}");
+}

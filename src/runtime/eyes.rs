@@ -1,0 +1,208 @@
+//! What an agent sees of the others: whom, and by which law they act on each other.
+//!
+//! In: the links and laws of the scene, the crowd. Out: [`Neighbour`]s with their newest states: first those it is linked to,
+//! always and in their order; then those near enough to touch, and those with which an account is not settled, by rising
+//! numbers. Nothing is allocated once the sizes settle. Never here: when an agent looks.
+
+use super::crowd::{Crowd, Sight};
+use super::handle::Shared;
+use super::slot::{LatestSlot, SlotWriter};
+use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, owns};
+use metachron_agents::{AgentId, Neighbour, SimSpan, SimTime, Snapshot};
+use std::sync::Arc;
+
+/// What is known of all agents of a run from the start.
+#[derive(Debug)]
+pub(super) struct Peers {
+    pub all: Vec<Peer>,
+    /// `None` where no two agents could touch: then nobody looks for anybody.
+    pub crowd: Option<Crowd>,
+}
+
+/// One agent, as the others know it.
+pub(super) struct Peer {
+    pub shared: Arc<Shared>,
+    pub form: Option<Arc<Form>>,
+    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the others.
+    pub laws: Vec<(AgentId, Law)>,
+}
+
+/// What an agent looks with.
+#[derive(Debug, Default)]
+pub(super) struct Eyes {
+    neighbours: Vec<Neighbour>,
+    /// One for each neighbour, in their order.
+    looks: Vec<Look>,
+    /// The first so many neighbours are links.
+    links: usize,
+    sight: Option<Sight>,
+    /// Whom it wants to see besides its links.
+    wanted: Vec<AgentId>,
+}
+
+/// How one neighbour is looked at.
+#[derive(Debug)]
+struct Look {
+    slot: Arc<LatestSlot<Snapshot>>,
+    /// It steps in the same world: that world, and no law, says what the two do to each other.
+    fellow: bool,
+}
+
+impl std::fmt::Debug for Peer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Peer").field("shared", &self.shared).field("laws", &self.laws).finish_non_exhaustive()
+    }
+}
+
+impl Peer {
+    fn standing(&self) -> Standing {
+        Standing { id: self.shared.id, model: self.shared.model, rate_hz: self.shared.wanted_hz }
+    }
+
+    fn law(&self, other: AgentId) -> Law {
+        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Ledger, |at| self.laws[at].1)
+    }
+
+    /// Whether the two could ever touch.
+    pub fn touches(&self, other: &Self) -> bool {
+        let (Some(mine), Some(theirs)) = (&self.form, &other.form) else { return false };
+        let led = |form: &Form| matches!(form.kind, FormKind::Tool(_));
+        !(led(mine) && led(theirs)) && self.law(other.shared.id) != Law::Off
+    }
+
+    /// `other` as this agent sees it.
+    fn meets(&self, other: &Self) -> Neighbour {
+        Neighbour {
+            id: other.shared.id,
+            snapshot: other.shared.slot.latest(),
+            form: if self.touches(other) { other.form.clone() } else { None },
+            law: self.law(other.shared.id),
+            owned: owns(self.standing(), other.standing()),
+        }
+    }
+}
+
+impl Peers {
+    pub fn get(&self, id: AgentId) -> Option<&Peer> {
+        self.all.get(id.0 as usize)
+    }
+
+    /// The eyes of `me`, who is linked to `links` and could touch `others`.
+    pub fn eyes(&self, me: AgentId, links: &[AgentId], others: impl Iterator<Item = AgentId>) -> Eyes {
+        let sight = self.crowd.is_some().then(|| Sight::new(me, others));
+        let mut eyes = Eyes { sight, ..Eyes::default() };
+        links.iter().for_each(|id| eyes.list(self, me, *id));
+        eyes.links = eyes.neighbours.len();
+        eyes
+    }
+}
+
+impl Eyes {
+    /// Those it sees, as they were when it last looked.
+    pub fn neighbours(&self) -> &[Neighbour] {
+        &self.neighbours
+    }
+
+    /// The state this agent has written last: it tells the crowd where that is.
+    pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
+        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
+            sight.stand(crowd, state.bounds.as_ref(), state.time);
+        }
+    }
+
+    /// Looks around before the step of `dt` from `now` of `me`, whose states `writer` writes and who shares a world with
+    /// `fellows` (by rising numbers).
+    pub fn look(
+        &mut self,
+        peers: &Peers,
+        me: &SlotWriter<Snapshot>,
+        (id, now, dt): (AgentId, SimTime, SimSpan),
+        fellows: &[AgentId],
+    ) {
+        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
+            sight.look(crowd, now, dt);
+            self.want(crowd, me, id, fellows);
+            self.list_wanted(peers, id);
+        }
+        for (neighbour, look) in self.neighbours.iter_mut().zip(&mut self.looks) {
+            let fellow = fellows.binary_search(&neighbour.id).is_ok();
+            if fellow != look.fellow {
+                look.fellow = fellow;
+                regard(neighbour, peers, id, fellow);
+            }
+            neighbour.snapshot = look.slot.latest();
+        }
+    }
+
+    /// Gathers whom it must see: who is near, who has called, and who is neither but has an account to settle.
+    fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &[AgentId]) {
+        let Self { neighbours, links, sight, wanted, looks } = self;
+        let (linked, near_once) = neighbours.split_at_mut(*links);
+        let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
+        wanted.clear();
+        let near = sight.iter().flat_map(|sight| sight.near().iter().copied());
+        wanted.extend(near.filter(|id| !is_linked(*id) && fellows.binary_search(id).is_err()));
+        let near = wanted.len();
+        for (neighbour, look) in near_once.iter_mut().zip(&looks[*links..]) {
+            if wanted[..near].binary_search(&neighbour.id).is_ok() {
+                continue;
+            }
+            neighbour.snapshot = look.slot.latest();
+            if !newest(me, |mine| is_settled(id, mine, neighbour)) {
+                wanted.push(neighbour.id);
+            }
+        }
+        crowd.answer(id, |caller| {
+            if !is_linked(caller) {
+                wanted.push(caller);
+            }
+        });
+        if wanted.len() > near {
+            wanted.sort_unstable();
+            wanted.dedup();
+        }
+    }
+
+    fn list_wanted(&mut self, peers: &Peers, me: AgentId) {
+        if self.neighbours[self.links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
+            return;
+        }
+        self.neighbours.truncate(self.links);
+        self.looks.truncate(self.links);
+        for at in 0..self.wanted.len() {
+            self.list(peers, me, self.wanted[at]);
+        }
+    }
+
+    fn list(&mut self, peers: &Peers, me: AgentId, id: AgentId) {
+        let (Some(mine), Some(theirs)) = (peers.get(me), peers.get(id)) else { return };
+        self.neighbours.push(mine.meets(theirs));
+        self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
+    }
+}
+
+/// Sees `neighbour` as a fellow of the same world, or again as a stranger.
+fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
+    if fellow {
+        (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
+    } else if let (Some(mine), Some(theirs)) = (peers.get(me), peers.get(neighbour.id)) {
+        *neighbour = mine.meets(theirs);
+    }
+}
+
+/// Whether all that the two have booked for each other has been taken.
+fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
+    let given = mine.given.iter().find(|ledger| ledger.with == other.id);
+    let received = other.snapshot.given.iter().find(|ledger| ledger.with == me);
+    let taken = mine.taken.iter().find(|ledger| ledger.with == other.id);
+    given.is_none_or(|ledger| ledger.is_settled(acknowledged(other, me)))
+        && received.is_none_or(|ledger| ledger.is_settled(taken))
+}
+
+/// The state that was written last, published or not.
+fn newest<R>(writer: &SlotWriter<Snapshot>, read: impl FnOnce(&Snapshot) -> R) -> R {
+    match writer.filled() {
+        Some(state) => read(state),
+        None => read(&writer.slot().latest()),
+    }
+}

@@ -1,0 +1,269 @@
+//! How agents move between their own turns and those of a leader.
+//!
+//! An agent moves whole: its model, its writer, its account, its ear. It comes in by the door of the one it follows, and comes
+//! back by its own home; whoever makes a leader's turns looks at the doors of all it leads, so that nobody waits at a door
+//! that is not looked at. A door that is shut sends everybody home again.
+//! Never here: steps.
+
+use super::super::handle::AgentHandle;
+use super::super::pace::Timeline;
+use super::super::turn::Actor;
+use crossbeam::queue::ArrayQueue;
+use metachron_agents::{AgentId, Companion, SimTime};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Where agents come and go.
+#[derive(Debug)]
+pub(in super::super) struct Seating {
+    door: ArrayQueue<Box<Actor>>,
+    home: ArrayQueue<Box<Actor>>,
+}
+
+/// So many can wait at one door; others try again after their next turn.
+const DOOR_PLACES: usize = 16;
+
+/// Those an agent leads.
+#[derive(Default)]
+pub(in super::super) struct Company {
+    /// By rising numbers.
+    pub(super) seats: Vec<Seat>,
+    /// All that step as one in this turn, by rising numbers.
+    pub(super) fellows: Vec<AgentId>,
+    /// What became of them, as the model says it.
+    pub(super) apart: Vec<u32>,
+    /// Storage, empty between turns.
+    pub(super) companions: Vec<Companion<'static>>,
+}
+
+/// One that is led.
+pub(super) struct Seat {
+    pub actor: Box<Actor>,
+    /// Zero while it stays; else it leaves, with those of the same number.
+    pub apart: u32,
+}
+
+impl Seating {
+    pub fn new() -> Self {
+        Self { door: ArrayQueue::new(DOOR_PLACES), home: ArrayQueue::new(1) }
+    }
+
+    /// The agent, if it has come home.
+    pub fn come_home(&self) -> Option<Box<Actor>> {
+        self.home.pop()
+    }
+}
+
+impl Company {
+    pub fn is_empty(&self) -> bool {
+        self.seats.is_empty()
+    }
+
+    pub fn len(&self) -> usize {
+        self.seats.len()
+    }
+
+    pub fn ids(&self) -> impl Iterator<Item = AgentId> {
+        self.seats.iter().map(|seat| seat.actor.id())
+    }
+
+    pub fn each(&mut self, mut visit: impl FnMut(&mut Actor)) {
+        self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor));
+    }
+
+    /// Those at `time`.
+    pub(super) fn at(&self, time: SimTime) -> impl Iterator<Item = &Seat> {
+        self.seats.iter().filter(move |seat| seat.actor.pace.time() == time)
+    }
+
+    pub(super) fn gather_fellows(&mut self, leader: AgentId, time: SimTime) {
+        let Self { seats, fellows, .. } = self;
+        fellows.clear();
+        fellows.push(leader);
+        fellows.extend(seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
+        fellows.sort_unstable();
+    }
+
+    /// Notes for those at `time` what the model said became of them.
+    pub(super) fn note_apart(&mut self, time: SimTime) {
+        let said = self.apart.iter().copied().chain(std::iter::repeat(0));
+        let seats = self.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time);
+        seats.zip(said).for_each(|(seat, apart)| seat.apart = apart);
+    }
+
+    /// Sends home those that have given up.
+    pub(super) fn dismiss_parked(&mut self) {
+        self.seats.extract_if(.., |seat| seat.actor.is_parked()).for_each(|seat| seat.actor.go_home());
+    }
+
+    /// Takes in `actor` and all it leads.
+    fn admit(&mut self, mut actor: Box<Actor>) {
+        self.seats.append(&mut actor.company.seats);
+        self.seats.push(Seat { actor, apart: 0 });
+        self.seats.sort_unstable_by_key(|seat| seat.actor.id());
+    }
+}
+
+impl Actor {
+    /// Takes in those who wait at its door and at the doors of those it leads.
+    pub fn take_in(&mut self) {
+        let mut at = 0;
+        while let Some(actor) = self.knock() {
+            self.admit(actor);
+        }
+        // who comes in may have somebody at the door himself
+        while at < self.company.len() {
+            let arrived = self.company.seats[at].actor.knock();
+            at = if let Some(actor) = arrived {
+                self.admit(actor);
+                0
+            } else {
+                at + 1
+            };
+        }
+    }
+
+    /// Somebody who waits at its door.
+    fn knock(&self) -> Option<Box<Actor>> {
+        self.shared.seating.as_ref()?.door.pop()
+    }
+
+    fn admit(&mut self, actor: Box<Actor>) {
+        let (me, board) = (self.id(), Arc::clone(&self.shared.board));
+        std::iter::once(actor.id()).chain(actor.company.ids()).for_each(|id| board.follow(id, Some(me)));
+        self.company.admit(actor);
+    }
+
+    /// Sends home those who have lost touch with it.
+    pub fn part(&mut self) {
+        let leaving = self.company.seats.extract_if(.., |seat| seat.apart != 0);
+        let mut leaving: Vec<Seat> = leaving.collect();
+        leaving.sort_unstable_by_key(|seat| (seat.apart, seat.actor.id()));
+        send_home(leaving);
+    }
+
+    /// Shows the last states of those it leads and sends them home, for it has given up.
+    pub fn disband(&mut self, timeline: &Timeline, wall: Duration) {
+        self.conclude_led(timeline.sim_at(wall), 0.0);
+        self.scatter();
+    }
+
+    /// Sends home all it leads, each by itself: who belongs together finds together again.
+    pub(super) fn scatter(&mut self) {
+        self.company.seats.drain(..).for_each(|seat| seat.actor.go_home());
+    }
+
+    /// Takes nobody in any more.
+    pub fn shut_door(&self) {
+        self.shared.board.close(self.id());
+        while let Some(actor) = self.knock() {
+            actor.go_home();
+        }
+    }
+
+    /// Makes its own turns again, and those of all it leads.
+    fn go_home(mut self: Box<Self>) {
+        let (id, shared) = (self.id(), Arc::clone(&self.shared));
+        self.company.ids().for_each(|led| shared.board.follow(led, Some(id)));
+        shared.board.follow(id, None);
+        self.settle(1.0);
+        if let Some(seating) = &shared.seating {
+            // its place is free: there is only one of it
+            drop(seating.home.push(self));
+        }
+        shared.board.summon(id);
+    }
+
+    /// Whom it should hand its turns to: the leader with the lowest number of those that it, or one it leads, is bonded with.
+    pub fn seek_leader(&self) -> Option<AgentId> {
+        self.shared.seating.as_ref()?;
+        let led = self.company.seats.iter().map(|seat| &*seat.actor);
+        let leaders = std::iter::once(self).chain(led).filter_map(Actor::bonded_leader);
+        leaders.min().filter(|leader| *leader < self.id())
+    }
+
+    /// The leader with the lowest number of those this agent is bonded with, whichever side says so.
+    fn bonded_leader(&self) -> Option<AgentId> {
+        let (me, board) = (self.id(), &self.shared.board);
+        let newest = self.shared.slot.latest();
+        let said = newest.bonds.iter().copied();
+        let heard = self.eyes.neighbours().iter().filter(|n| n.snapshot.bonds.contains(&me)).map(|n| n.id);
+        let open =
+            |id: &AgentId| !board.is_closed(*id) && self.peers.get(*id).is_some_and(|p| p.shared.seating.is_some());
+        said.chain(heard).map(|id| board.leader(id)).filter(open).min()
+    }
+}
+
+/// Sends home groups of equal number, each led by its lowest.
+fn send_home(leaving: Vec<Seat>) {
+    let mut leaving = leaving.into_iter().peekable();
+    while let Some(Seat { actor: mut leader, apart }) = leaving.next() {
+        while let Some(next) = leaving.next_if(|seat| seat.apart == apart) {
+            leader.company.admit(next.actor);
+        }
+        leader.go_home();
+    }
+}
+
+/// Hands `actor`, and all it leads, over to `leader`; gives it back if that takes nobody in now.
+pub(in super::super) fn move_in(actor: Box<Actor>, leader: AgentId) -> Result<(), Box<Actor>> {
+    let (id, board, peers) = (actor.id(), Arc::clone(&actor.shared.board), Arc::clone(&actor.peers));
+    let Some(seating) = peers.get(leader).and_then(|peer| peer.shared.seating.as_ref()) else { return Err(actor) };
+    board.follow(id, Some(leader));
+    if let Err(actor) = seating.door.push(actor) {
+        board.follow(id, None);
+        return Err(actor);
+    }
+    // the door may have been shut just before: one of the two sides sees who is left outside
+    if board.is_closed(leader) {
+        while let Some(actor) = seating.door.pop() {
+            actor.go_home();
+        }
+    }
+    board.wake(leader);
+    Ok(())
+}
+
+/// Seats agents that belong `together` before the first step: for each place in the list, the agent that makes turns of its own.
+pub(in super::super) fn assign(actors: Vec<Actor>, together: &[Option<AgentId>]) -> Vec<Option<Box<Actor>>> {
+    let leaders = leaders(together);
+    let mut places: Vec<_> = actors.into_iter().map(|actor| Some(Box::new(actor))).collect();
+    for (at, leader) in leaders.into_iter().enumerate().filter(|(at, leader)| at != leader) {
+        let parked = |place: &Option<Box<Actor>>| place.as_ref().is_none_or(|actor| actor.is_parked());
+        if !parked(&places[at])
+            && !parked(&places[leader])
+            && let Some(actor) = places[at].take()
+            && let Some(leader) = &mut places[leader]
+        {
+            leader.admit(actor);
+        }
+    }
+    places
+}
+
+/// For each place the lowest number of all that hang together with it.
+fn leaders(together: &[Option<AgentId>]) -> Vec<usize> {
+    let mut up: Vec<usize> = (0..together.len()).collect();
+    let top = |up: &[usize], mut at: usize| {
+        while up[at] != at {
+            at = up[at];
+        }
+        at
+    };
+    for (at, other) in together.iter().enumerate() {
+        let Some(other) = other.map(|id| id.0 as usize).filter(|other| *other < together.len()) else { continue };
+        let (a, b) = (top(&up, at), top(&up, other));
+        up[a.max(b)] = a.min(b);
+    }
+    (0..together.len()).map(|at| top(&up, at)).collect()
+}
+
+/// Ends the lives of those who wait at doors or have come home when nobody looks any more.
+pub(in super::super) fn empty_rooms(handles: &[AgentHandle], timeline: &Timeline, now: Duration) {
+    let seatings = handles.iter().filter_map(|handle| handle.shared.seating.as_ref());
+    for seating in seatings {
+        while let Some(mut actor) = seating.door.pop().or_else(|| seating.home.pop()) {
+            actor.close_account(timeline, now);
+        }
+    }
+}

@@ -1,0 +1,294 @@
+//! Agents that are led lose no step and make none twice, wherever they are.
+
+use super::super::lockstep::Lockstep;
+use super::super::testing::{Bond, Dummy, Fault, Log, Made};
+use super::super::{
+    AgentHandle, AgentSpawn, AgentState, AgentStats, Clock, Command, Machine, Run, SystemClock, Threads, Watch,
+    state_hash,
+};
+use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use std::sync::{Arc, PoisonError};
+use std::thread;
+use std::time::{Duration, Instant};
+
+const fn ms(n: u64) -> Duration {
+    Duration::from_millis(n)
+}
+
+fn always(_: u32, _: u32, _: SimTime) -> bool {
+    true
+}
+
+fn never(_: u32, _: u32, _: SimTime) -> bool {
+    false
+}
+
+/// Hangs together in windows of 40 ms, one pair in three, at random.
+fn now_and_then(a: u32, b: u32, time: SimTime) -> bool {
+    let window = time.as_nanos() / 40_000_000;
+    let mixed = (window * 0x9e37_79b9 + u64::from(a) * 0x85eb_ca6b + u64::from(b) * 0xc2b2_ae35)
+        .wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    (mixed >> 40).is_multiple_of(3)
+}
+
+const RATES: [f64; 6] = [240.0, 1000.0, 60.0, 240.0, 37.0, 500.0];
+
+fn mates(bond: Bond, log: &Log) -> Vec<AgentSpawn> {
+    RATES.iter().map(|hz| named(Dummy::mate(20.0, bond, log).at(*hz), *hz)).collect()
+}
+
+fn named(mut spawn: AgentSpawn, hz: f64) -> AgentSpawn {
+    spawn.watches = vec![Watch { at: 0.0, every: SimSpan::from_nanos(10_000_000) }];
+    spawn.name = format!("mate at {hz}");
+    spawn
+}
+
+fn lockstep(spawns: Vec<AgentSpawn>, machine: Machine) -> Box<Lockstep> {
+    Box::new(Lockstep::start(spawns, machine).unwrap())
+}
+
+fn steps_of(log: &Log, id: u32) -> Vec<Made> {
+    log.lock().unwrap_or_else(PoisonError::into_inner).iter().filter(|made| made.id == AgentId(id)).cloned().collect()
+}
+
+/// Every step of everybody begins where the one before ended, or later by what was dropped or rested; none is missing.
+fn assert_whole(log: &Log, stats: &[AgentStats], handles: &[AgentHandle]) {
+    for (agent, handle) in stats.iter().zip(handles) {
+        let steps = steps_of(log, agent.id.0);
+        assert_eq!(steps.len() as u64, agent.steps, "{}", agent.name);
+        assert_eq!(handle.latest().steps, agent.steps, "the last state is seen");
+        assert!(steps.windows(2).all(|w| w[1].from >= w[0].to), "{}: a step made twice", agent.name);
+        let made: u64 = steps.iter().map(|s| s.to.since(s.from).as_nanos()).sum();
+        let end = steps.last().map_or(0, |s| s.to.as_nanos());
+        let gaps = agent.dropped.as_nanos() + agent.rested.as_nanos();
+        assert!(made + gaps >= end, "{}: {made} + {gaps} of {end}", agent.name);
+    }
+}
+
+/// Plays in slices of 3 ms and counts how often anybody's leader changed.
+fn play_counting(run: &mut dyn Run, until_ms: u64) -> usize {
+    let led = |run: &dyn Run| run.agents().iter().map(|a| a.stats().led_by).collect::<Vec<_>>();
+    let (mut before, mut changes) = (led(run), 0);
+    for slice in 1..=until_ms / 3 {
+        run.wait_until(ms(slice * 3));
+        let now = led(run);
+        changes += before.iter().zip(&now).filter(|(a, b)| a != b).count();
+        before = now;
+    }
+    changes
+}
+
+#[test]
+fn a_thousand_moves_lose_no_step_and_make_none_twice() {
+    let log = Log::default();
+    let mut run = lockstep(mates(now_and_then, &log), Machine::two_cores_software());
+    let changes = play_counting(&mut *run, 15_000);
+    assert!(changes > 1000, "{changes} changes of leaders");
+    let handles = run.agents().to_vec();
+    let stats = run.shutdown();
+    assert_whole(&log, &stats, &handles);
+    for (agent, handle) in stats.iter().zip(&handles) {
+        assert_eq!(agent.state, AgentState::Running, "{}", agent.name);
+        assert_eq!(agent.dropped, SimSpan::ZERO, "{}", agent.name);
+        let end = handle.latest().time.as_secs_f64();
+        // a slow leader and a slow agent on its way: two of the longest periods behind at most
+        assert!((14.94..15.06).contains(&end), "{} has come to {end} s", agent.name);
+        assert_eq!(Arc::strong_count(&handle.shared), 1, "{} is still somewhere", agent.name);
+        let samples = handle.samples(0);
+        assert!(samples.windows(2).all(|w| w[1].0 > w[0].0) && samples.len() > 500, "watched wherever it is");
+    }
+}
+
+#[test]
+fn led_runs_are_equal_to_the_bit_with_noise_on() {
+    let play = |seed| {
+        let machine = Machine { noise_sd: 0.2, seed, ..Machine::two_cores_software() };
+        let log = Log::default();
+        let mut run = lockstep(mates(now_and_then, &log), machine);
+        run.wait_until(ms(3000));
+        let hash = state_hash(run.agents());
+        drop(run);
+        let log = log.lock().unwrap();
+        (hash, log.iter().map(|made| (made.id, made.from, made.to)).collect::<Vec<_>>())
+    };
+    assert_eq!(play(3), play(3));
+    assert_ne!(play(3), play(4));
+}
+
+#[test]
+fn those_who_hang_together_step_at_their_leaders_times() {
+    let log = Log::default();
+    let mut run = lockstep(mates(always, &log), Machine::two_cores_software());
+    run.wait_until(ms(1000));
+    let leaders: Vec<_> = run.agents().iter().map(|a| a.stats().led_by).collect();
+    assert_eq!(leaders[0], None);
+    assert!(leaders[1..].iter().all(|l| *l == Some(AgentId(0))), "{leaders:?}");
+    let times: Vec<_> = run.agents().iter().map(|a| a.latest().time).collect();
+    assert!(times.iter().all(|t| *t == times[0]), "{times:?}");
+    let stats = run.shutdown();
+    assert!(stats.iter().all(|s| s.cpu_s > 0.0));
+    // 240 Hz for all; the others' own steps before they came
+    let late = |id| steps_of(&log, id).iter().filter(|s| s.from >= SimTime::from_nanos(500_000_000)).count();
+    assert!((0..6).all(|id| (119..=121).contains(&late(id))), "{:?}", [late(0), late(1), late(2)]);
+}
+
+#[test]
+fn a_led_step_costs_what_its_members_cost() {
+    let log = Log::default();
+    // 3 ms each: six of them need 18 ms of each 4.17, alone on two cores 4.5
+    let spawns = (0..6).map(|_| Dummy::mate(3000.0, always, &log).at(240.0)).collect();
+    let mut run = lockstep(spawns, Machine::two_cores_software());
+    run.wait_until(ms(10_000));
+    let steps = run.shutdown()[0].steps;
+    // 18 ms a turn on one core, once all have come
+    assert!((540..=575).contains(&steps), "{steps}");
+}
+
+#[test]
+fn who_belongs_together_is_led_before_the_first_step() {
+    let log = Log::default();
+    let mut spawns = mates(always, &log);
+    // a chain of pairs, told from either side
+    spawns[1].together = Some(AgentId(2));
+    spawns[4].together = Some(AgentId(1));
+    spawns[5].together = Some(AgentId(5));
+    let run = lockstep(spawns, Machine::two_cores_software());
+    let leaders: Vec<_> = run.agents().iter().map(|a| a.stats().led_by.map(|id| id.0)).collect();
+    assert_eq!(leaders, [None, None, Some(1), None, Some(1), None]);
+    drop(run);
+    assert!(log.lock().unwrap().is_empty());
+}
+
+#[test]
+fn an_island_rests_as_one_and_wakes_as_one() {
+    let log = Log::default();
+    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+    let mut run = lockstep([250.0, 250.0, 125.0].map(sleepy).into(), Machine::two_cores_software());
+    run.wait_until(ms(1000));
+    assert!(run.agents().iter().all(|a| a.state() == AgentState::Resting && a.latest().at_rest));
+    let steps = |run: &Lockstep| run.agents().iter().map(|a| a.stats().steps).collect::<Vec<_>>();
+    let before = steps(&run);
+    // the one that is led last is told something: its leader wakes for it
+    run.send(AgentId(2), Command::Retune(Resolution { eps_m: 0.05, n: 1 })).unwrap();
+    run.wait_until(ms(1200));
+    let after = steps(&run);
+    assert!(before.iter().zip(&after).all(|(b, a)| a > b && a - b <= 2), "{before:?} {after:?}");
+    assert_eq!(run.agents()[2].latest().resolution.unwrap().eps_m, 0.05);
+    assert!(run.agents().iter().all(|a| a.state() == AgentState::Resting));
+    let handles = run.agents().to_vec();
+    let stats = run.shutdown();
+    assert_whole(&log, &stats, &handles);
+    assert!(stats.iter().all(|s| s.rested > SimSpan::from_nanos(900_000_000) && s.dropped == SimSpan::ZERO));
+}
+
+#[test]
+fn a_touch_of_one_that_is_led_wakes_the_island() {
+    let log = Log::default();
+    let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+    let toucher = Dummy { touches: Some((101, AgentId(1))), ..Dummy::new(20.0) };
+    let spawns = vec![sleepy(250.0), sleepy(250.0), toucher.at(100.0)];
+    let mut run = lockstep(spawns, Machine::two_cores_software());
+    run.wait_until(ms(1000));
+    assert_eq!(run.agents()[0].state(), AgentState::Resting);
+    run.wait_until(ms(1500));
+    assert!(run.agents().iter().all(|a| a.state() == AgentState::Running));
+    assert!(!run.agents()[1].latest().at_rest, "who is touched must not be taken for immovable");
+}
+
+#[test]
+fn a_broken_member_is_parked_alone_and_the_others_go_on() {
+    for fault in [Fault::NotFinite, Fault::Diverged, Fault::Panic] {
+        for broken in 0..3_u32 {
+            let log = Log::default();
+            let mate = |id| Dummy { fault: (id == broken).then_some((60, fault)), ..Dummy::mate(20.0, always, &log) };
+            let mut run = lockstep((0..3).map(|id| mate(id).at(250.0)).collect(), Machine::two_cores_software());
+            run.wait_until(ms(2000));
+            let states: Vec<_> = run.agents().iter().map(AgentHandle::state).collect();
+            let parked = states.iter().filter(|s| matches!(s, AgentState::Parked(_))).count();
+            // a panic is a bug of ours: it is its leader's, and then its own
+            assert!(parked == 1 || fault == Fault::Panic && parked <= 3, "{fault:?} of {broken}: {states:?}");
+            assert!(matches!(states[broken as usize], AgentState::Parked(_)), "{fault:?} of {broken}: {states:?}");
+            for (id, agent) in run.agents().iter().enumerate().filter(|(id, _)| states[*id] == AgentState::Running) {
+                let newest = agent.latest();
+                assert!(newest.body.is_finite() && newest.time.as_secs_f64() > 1.99, "{fault:?} of {broken}: {id}");
+            }
+            let kept = run.agents().to_vec();
+            drop(run);
+            assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+        }
+    }
+}
+
+fn eventually(what: &str, done: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !done() {
+        assert!(Instant::now() < deadline, "never happened: {what}");
+        thread::yield_now();
+    }
+}
+
+fn threads(spawns: Vec<AgentSpawn>) -> Box<Threads> {
+    Box::new(Threads::start(spawns, Arc::new(SystemClock::new()) as Arc<dyn Clock>).unwrap())
+}
+
+#[test]
+fn on_threads_agents_come_and_go_and_no_step_is_lost() {
+    let log = Log::default();
+    let run = threads(mates(now_and_then, &log));
+    let moves = |log: &Log| {
+        let log = log.lock().unwrap();
+        (0..6)
+            .map(|id| {
+                let threads: Vec<_> = log.iter().filter(|m| m.id == AgentId(id)).map(|m| &m.thread).collect();
+                threads.windows(2).filter(|w| w[0] != w[1]).count()
+            })
+            .sum::<usize>()
+    };
+    eventually("a hundred moves between threads", || moves(&log) >= 100);
+    let handles = run.agents().to_vec();
+    let stats = run.shutdown();
+    assert_whole(&log, &stats, &handles);
+    assert!(handles.iter().all(|a| Arc::strong_count(&a.shared) == 1), "every thread has let go of every agent");
+    let number = |name: &str| RATES.iter().position(|hz| name == format!("agent:mate at {hz}")).unwrap();
+    for made in log.lock().unwrap().iter() {
+        // 0 and 3 have one name
+        assert!(number(&made.thread) <= made.id.0 as usize, "{made:?}: a leader has a lower number");
+    }
+}
+
+#[test]
+fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
+    for drop_it in [true, false] {
+        let log = Log::default();
+        let run = threads(mates(always, &log));
+        let kept = run.agents().to_vec();
+        eventually("all are led by the first", || kept[1..].iter().all(|a| a.stats().led_by == Some(AgentId(0))));
+        let steps = kept[5].stats().steps;
+        kept[5].send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
+        eventually("a command reaches who is led", || kept[5].latest().resolution.is_some_and(|r| r.eps_m == 0.07));
+        assert!(kept[5].stats().steps >= steps);
+        if drop_it {
+            drop(run);
+        } else {
+            let stats = run.shutdown();
+            assert_whole(&log, &stats, &kept);
+        }
+        assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
+    }
+}
+
+#[test]
+fn a_panic_in_a_led_turn_on_threads_stops_nobody_else() {
+    let log = Log::default();
+    let mate = |id| Dummy { fault: (id == 1).then_some((50, Fault::Panic)), ..Dummy::mate(20.0, always, &log) };
+    let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
+    spawns.push(Dummy::mate(20.0, never, &log).at(500.0));
+    let run = threads(spawns);
+    eventually("the panic", || matches!(run.agents()[1].state(), AgentState::Parked(_)));
+    let before = run.agents()[2].stats().steps;
+    let stopped = || matches!(run.agents()[2].state(), AgentState::Parked(_));
+    eventually("the others go on", || run.agents()[2].stats().steps > before + 20 || stopped());
+    let before = run.agents()[3].stats().steps;
+    eventually("and strangers", || run.agents()[3].stats().steps > before + 20);
+    drop(run);
+}
