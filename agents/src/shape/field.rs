@@ -17,6 +17,18 @@ pub(crate) struct Touch {
     pub distance_m: f64,
 }
 
+impl Touch {
+    /// Whether the place at which the `ball` inside a span touches lies behind this one, which the span's `end` touches already
+    /// (eq. 13).
+    pub fn hides(self, end: Ball, ball: Ball, touch: Self) -> bool {
+        let wall = end.centre - self.normal * self.distance_m;
+        let place = ball.centre - touch.normal * touch.distance_m;
+        self.distance_m <= end.radius_m
+            && (place - wall).dot(self.normal) <= 0.0
+            && self.normal.dot(touch.normal) > FLAT
+    }
+}
+
 /// The most places at which one ball touches one obstacle: a corner of a room has three.
 pub(crate) const TOUCHES_MAX: usize = 4;
 
@@ -87,8 +99,20 @@ enum Kind {
     Mesh(std::boxed::Box<MeshField>),
 }
 
+/// The lowest point inside a span.
+struct Lowest {
+    share: f64,
+    touch: Touch,
+    /// Where the tangents meet: the gap is nowhere below it, metres.
+    floor_m: f64,
+}
+
+/// Normals whose cosine is above this tell of the same wall: 0.8°.
+const FLAT: f64 = 0.9999;
 /// Halvings of the search for the lowest point of a span: tangents meet much faster on smooth shapes.
 const SPAN_TRIES: usize = 16;
+/// How near the floor under the tangents the lowest point must come, as a share of the span.
+const LOWEST_SHARE: f64 = 1e-6;
 /// How close to an end of a span its lowest point belongs to that end's own ball, as a share of the span.
 const SPAN_END_SHARE: f64 = 0.02;
 
@@ -98,10 +122,21 @@ impl Field {
     /// # Errors
     /// [`ShapeError`] where [`Solid::to_shared_shape`] would give one.
     pub fn new(obstacle: &Obstacle) -> Result<Self, ShapeError> {
-        obstacle.solid.check()?;
-        let rotation = obstacle.rotation.normalize();
-        let in_world = |p: &DVec3| obstacle.position + rotation * *p;
-        let kind = match &obstacle.solid {
+        Self::placed(&obstacle.solid, obstacle.position, obstacle.rotation.normalize())
+    }
+
+    /// The field of a solid in its own axes, for solids that move.
+    ///
+    /// # Errors
+    /// Like [`Field::new`].
+    pub fn of(solid: &Solid) -> Result<Self, ShapeError> {
+        Self::placed(solid, DVec3::ZERO, DQuat::IDENTITY)
+    }
+
+    fn placed(solid: &Solid, position: DVec3, rotation: DQuat) -> Result<Self, ShapeError> {
+        solid.check()?;
+        let in_world = |p: &DVec3| position + rotation * *p;
+        let kind = match solid {
             Solid::Ball { radius_m } => Kind::Ball(*radius_m),
             Solid::Box { half_extents_m } => Kind::Box(*half_extents_m),
             Solid::Capsule { radius_m, half_height_m } => Kind::Capsule(*radius_m, *half_height_m),
@@ -118,7 +153,7 @@ impl Field {
                 Kind::Mesh(MeshField::new(mesh).into())
             }
         };
-        Ok(Self { kind, position: obstacle.position, rotation })
+        Ok(Self { kind, position, rotation })
     }
 
     /// Where `point` is within `reach_m` of the surface, nearest place first.
@@ -164,13 +199,39 @@ impl Field {
     pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
         let (share, touch) = match &self.kind {
             Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m)?,
-            _ => self.lowest(ends, reach_m)?,
+            _ => self.lowest(ends, reach_m).map(|lowest| (lowest.share, lowest.touch))?,
         };
         (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(&share).then_some((share, touch))
     }
 
+    /// A lower bound of the gap to a whole span, with the normal of the place that comes nearest; `None` beyond `reach_m`.
+    ///
+    /// Exact to a millionth of the span's length for a convex primitive. To a mesh the whole span has its widest radius, and
+    /// where it overlaps the bound is up to half a span deeper than need be.
+    pub fn gap_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<Touch> {
+        let at_end = |ball: Ball| {
+            let near = self.touches(ball.centre, ball.radius_m + reach_m).iter().next()?;
+            Some(Touch { distance_m: near.distance_m - ball.radius_m, ..near })
+        };
+        let inside = if let Kind::Mesh(mesh) = &self.kind {
+            let radius_m = ends[0].radius_m.max(ends[1].radius_m);
+            let near = mesh.nearest_to_span(ends.map(|e| e.centre), reach_m + radius_m);
+            near.map(|near| Touch { distance_m: near.distance_m - radius_m, ..near })
+        } else {
+            self.lowest(ends, reach_m).map(|lowest| Touch { distance_m: lowest.floor_m, ..lowest.touch })
+        };
+        let length_m = ends[0].centre.distance(ends[1].centre);
+        let near = [at_end(ends[0]), at_end(ends[1]), inside].into_iter().flatten();
+        let least = near.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))?;
+        // inside a mesh a place between the ends may be deeper than both
+        let narrow_m = ends[0].radius_m.min(ends[1].radius_m);
+        let is_deep = matches!(self.kind, Kind::Mesh(_)) && least.distance_m <= -narrow_m;
+        let slack_m = if is_deep { 0.5 * length_m } else { LOWEST_SHARE * length_m };
+        Some(Touch { distance_m: least.distance_m - slack_m, ..least })
+    }
+
     /// The lowest point of the convex function gap(s) inside a span, where tangents meet (eq. 14).
-    fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+    fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<Lowest> {
         let along = ends[1].centre - ends[0].centre;
         let at = |s: f64| {
             let ball = ends[0].toward(ends[1], s);
@@ -179,7 +240,7 @@ impl Field {
             (s, touch.distance_m - ball.radius_m, slope, touch)
         };
         let (mut left, mut right) = (at(0.0), at(1.0));
-        let tolerance = 1e-6 * along.length();
+        let tolerance = LOWEST_SHARE * along.length();
         let mut best = None;
         for _ in 0..SPAN_TRIES {
             if left.2 >= -tolerance || right.2 <= tolerance {
@@ -191,7 +252,10 @@ impl Field {
                 return None;
             }
             let middle = at(meet.clamp(left.0, right.0));
-            best = Some((middle.0, middle.3)).filter(|_| middle.1 <= reach_m);
+            // where the slope is nothing the tangents of the ends say nothing any more
+            let floor = if middle.2.abs() <= tolerance { middle.1 } else { floor };
+            let here = Lowest { share: middle.0, touch: middle.3, floor_m: floor };
+            best = Some(here).filter(|_| middle.1 <= reach_m);
             if middle.1 - floor < tolerance {
                 break;
             }

@@ -127,9 +127,7 @@ impl MeshField {
         let (middle, half) = ((a + b) * 0.5, (b - a).abs() * 0.5 + DVec3::splat(widest));
         let mut best: Option<(f64, f64, Touch)> = None;
         self.edge_tree.traverse(|node| {
-            let apart = (middle - (node.mins() + node.maxs()).as_dvec3() * 0.5).abs()
-                - (node.maxs() - node.mins()).as_dvec3() * 0.5;
-            if apart.cmpgt(half).any() {
+            if misses(node, middle, half) {
                 return TraversalAction::Prune;
             }
             if let Some(leaf) = node.leaf_data()
@@ -144,6 +142,37 @@ impl MeshField {
         });
         best.map(|(_, share, touch)| (share, touch))
     }
+
+    /// How far the surface is from a segment, and the way out from the surface; 0 where the segment goes through it.
+    pub fn nearest_to_span(&self, span: [DVec3; 2], reach_m: f64) -> Option<Touch> {
+        let [a, b] = span;
+        let (middle, half) = ((a + b) * 0.5, (b - a).abs() * 0.5);
+        let mut best: Option<Touch> = None;
+        self.face_tree.traverse(|node| {
+            let bound_m = best.map_or(reach_m, |b| b.distance_m);
+            if misses(node, middle, half + DVec3::splat(bound_m)) {
+                return TraversalAction::Prune;
+            }
+            if let Some(leaf) = node.leaf_data() {
+                let face = &self.faces[leaf as usize];
+                let (on_span, on_face) = face.near_span(span);
+                let distance_m = on_span.distance(on_face);
+                if distance_m <= bound_m {
+                    let normal = (on_span - on_face).try_normalize().unwrap_or(face.normal);
+                    best = Some(Touch { normal, distance_m });
+                }
+            }
+            TraversalAction::Continue
+        });
+        best
+    }
+}
+
+/// Whether a box around a span, `half` to each side of `middle`, misses the box of a node.
+fn misses(node: &BvhNode, middle: DVec3, half: DVec3) -> bool {
+    let apart =
+        (middle - (node.mins() + node.maxs()).as_dvec3() * 0.5).abs() - (node.maxs() - node.mins()).as_dvec3() * 0.5;
+    apart.cmpgt(half).any()
 }
 
 impl Face {
@@ -153,6 +182,28 @@ impl Face {
         let distance = way.length();
         let side = if distance > 0.0 { way.dot(self.normal) / distance } else { 1.0 };
         Place { point, distance, side, normal: self.normal }
+    }
+
+    /// The nearest points of a segment and this triangle: the segment's, and the triangle's.
+    fn near_span(&self, span: [DVec3; 2]) -> (DVec3, DVec3) {
+        let [a, b] = span;
+        let (high, low) = ((a - self.corners[0]).dot(self.normal), (b - self.corners[0]).dot(self.normal));
+        if high * low < 0.0 {
+            let cut = a.lerp(b, high / (high - low));
+            let foot = near_triangle(cut, self.corners);
+            if cut.distance_squared(foot) <= SAME_SHARE * SAME_SHARE * a.distance_squared(b) {
+                return (cut, foot);
+            }
+        }
+        let ends = [(a, near_triangle(a, self.corners)), (b, near_triangle(b, self.corners))];
+        let edges = [0, 1, 2].map(|i| {
+            let edge = [self.corners[i], self.corners[(i + 1) % 3]];
+            let (s, t) = near_segments(span, edge);
+            (a.lerp(b, s), edge[0].lerp(edge[1], t))
+        });
+        let apart = |(p, q): (DVec3, DVec3)| p.distance_squared(q);
+        let nearer = |best, next| if apart(next) < apart(best) { next } else { best };
+        edges.into_iter().fold(nearer(ends[0], ends[1]), nearer)
     }
 }
 

@@ -3,17 +3,20 @@
 mod convert;
 mod curve;
 pub(crate) mod field;
+mod grid;
 mod mesh;
 mod mesh_field;
 mod near;
 pub mod patch;
 mod primitive;
 mod solid;
+pub(crate) mod strand;
 mod tool;
 
 pub use convert::ShapeError;
-pub(crate) use convert::{Triangles, hull_triangles, is_closed, mesh_triangles};
+pub(crate) use convert::{Triangles, bounds, hull_triangles, is_closed, mesh_triangles};
 pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
+pub(crate) use grid::Grid;
 pub use mesh::{creased_mesh, hull_mesh};
 pub(crate) use near::near_segments;
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};

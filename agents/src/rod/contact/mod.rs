@@ -4,7 +4,6 @@
 //! Out: velocities that keep the skin apart. Never here: the rod's elasticity. Theory: `docs/theory/contact.md`.
 
 mod act;
-mod grid;
 mod pairs;
 mod walls;
 

@@ -3,8 +3,9 @@
 //! In: the skin of a tube and how it moves. Out: near pairs of segments and where they are nearest.
 //! Never here: forces. Theory: `docs/theory/contact.md`, eq. 15–18.
 
-use super::{Skin, grid::Grid};
-use crate::shape::near_segments;
+use super::Skin;
+use crate::shape::strand::{facing, foot};
+use crate::shape::{Grid, near_segments};
 use glam::DVec3;
 use std::f64::consts::PI;
 
@@ -205,14 +206,14 @@ pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, vis
             visit(meeting);
         }
     };
-    if let Some(t) = foot(skin, i, j) {
+    if let Some(t) = foot(skin.positions[i], skin.positions, j) {
         try_at(0, [0.0, t]);
     }
-    if let Some(s) = foot(skin, j, i) {
+    if let Some(s) = foot(skin.positions[j], skin.positions, i) {
         try_at(1, [s, 0.0]);
     }
     if j + 1 == skin.segments()
-        && let Some(s) = foot(skin, j + 1, i)
+        && let Some(s) = foot(skin.positions[j + 1], skin.positions, i)
     {
         try_at(2, [s, 1.0]);
     }
@@ -224,21 +225,6 @@ pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, vis
     }
 }
 
-/// The share of `segment` at which a node has its foot. Each foot on a chain is told by one segment: at a joint that sticks
-/// out by the later one, past an end of the chain by the last one there.
-fn foot(skin: &Skin<'_>, node: usize, segment: usize) -> Option<f64> {
-    let share = |k: usize| {
-        let (a, b) = (skin.positions[k], skin.positions[k + 1]);
-        (skin.positions[node] - a).dot(b - a) / (b - a).length_squared()
-    };
-    let here = share(segment);
-    if here >= 1.0 {
-        return (segment + 1 == skin.segments()).then_some(1.0);
-    }
-    let ours = here >= 0.0 || segment == 0 || share(segment - 1) >= 1.0;
-    ours.then_some(here.max(0.0))
-}
-
 /// Where two segments are nearest (eq. 18).
 pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
     let [a, b] = segments.map(|k| [skin.positions[k as usize], skin.positions[k as usize + 1]]);
@@ -248,19 +234,7 @@ pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
 
 /// The meeting of two given points.
 fn at(skin: &Skin<'_>, segments: [u32; 2], place: u32, shares: [f64; 2]) -> Meeting {
-    let ball = |side: usize| {
-        let k = segments[side] as usize;
-        skin.ball(k).toward(skin.ball(k + 1), shares[side])
-    };
-    let (a, b) = (ball(0), ball(1));
-    let way = a.centre - b.centre;
-    let distance = way.length();
-    // axes that cross have no way between them: across both is as good as any
-    let across = || {
-        let [u, v] = segments.map(|k| skin.positions[k as usize + 1] - skin.positions[k as usize]);
-        u.cross(v).try_normalize().unwrap_or_else(|| u.normalize_or(DVec3::Z).any_orthonormal_vector())
-    };
-    let normal = if distance > 1e-9 { way / distance } else { across() };
-    let radii_m = [a.radius_m, b.radius_m];
-    Meeting { segments, place, shares, normal, gap_m: distance - a.radius_m - b.radius_m, radii_m }
+    let [a, b] = segments.map(|k| [skin.ball(k as usize), skin.ball(k as usize + 1)]);
+    let (facing, radii_m) = facing(a, b, shares);
+    Meeting { segments, place, shares, normal: facing.normal, gap_m: facing.distance_m, radii_m }
 }

@@ -193,14 +193,7 @@ impl Wall {
 
     /// Whether the place at which a span touches lies behind what one of its nodes touches already (eq. 13).
     fn hides(&self, skin: &Skin<'_>, node: usize, ball: Ball, touch: Touch) -> bool {
-        self.near[node].is_some_and(|near| {
-            let end = skin.ball(node);
-            let wall = end.centre - near.normal * near.distance_m;
-            let place = ball.centre - touch.normal * touch.distance_m;
-            near.distance_m <= end.radius_m
-                && (place - wall).dot(near.normal) <= 0.0
-                && near.normal.dot(touch.normal) > FLAT
-        })
+        self.near[node].is_some_and(|near| near.hides(skin.ball(node), ball, touch))
     }
 
     fn touch(&self, index: usize, share: Option<f64>, touch: Touch, (place, radius_m): (u32, f64)) -> WallTouch {
@@ -216,6 +209,3 @@ impl Wall {
         }
     }
 }
-
-/// Normals whose cosine is above this tell of the same wall: 0.8°.
-const FLAT: f64 = 0.9999;

@@ -6,7 +6,7 @@ use glam::{DVec3, IVec3};
 
 /// The grid: points sorted by the hash of their cell.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Grid {
+pub(crate) struct Grid {
     cells: Vec<IVec3>,
     /// Where each bucket starts in `sorted`; one entry more than buckets.
     starts: Vec<u32>,
