@@ -10,6 +10,7 @@ mod law;
 mod ledger;
 mod other;
 mod solver;
+pub mod touch;
 
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
 pub use exchange::{Exchange, PairKind, PairState, acknowledged};

@@ -1,0 +1,144 @@
+//! Boxes, cylinders and hulls against projections, sampling and each other.
+
+use super::*;
+
+const HALF: [DVec3; 2] = [DVec3::new(0.1, 0.15, 0.2), DVec3::new(0.05, 0.2, 0.08)];
+
+/// The distance of two boxes that are apart: alternating projections, in double precision.
+fn apart(p: (DVec3, DQuat), q: (DVec3, DQuat)) -> f64 {
+    let onto = |x: DVec3, (position, rotation): (DVec3, DQuat), half: DVec3| {
+        position + rotation * (rotation.conjugate() * (x - position)).clamp(-half, half)
+    };
+    let mut x = p.0;
+    let mut y = onto(x, q, HALF[1]);
+    for _ in 0..20_000 {
+        x = onto(y, p, HALF[0]);
+        y = onto(x, q, HALF[1]);
+    }
+    x.distance(y)
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+
+    #[test]
+    fn boxes_are_as_far_as_projections_say(way in vector(1.0), far in 0.25..0.6, r in turn(), s in turn()) {
+        let (first, second) = (cuboid(HALF[0]), cuboid(HALF[1]));
+        let q = way.normalize_or(DVec3::X) * far;
+        let expected = apart((DVec3::ZERO, r), (q, s));
+        prop_assume!(expected > 1e-3);
+        let (normal, gap_m) = nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), 1.0).unwrap();
+        prop_assert!(gap_m <= expected && gap_m > expected - 1e-5, "{gap_m} and {expected}");
+        prop_assert!((normal.length() - 1.0).abs() < 1e-12);
+        prop_assert!(nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), expected * 0.99 - 1e-5).is_none());
+    }
+
+    #[test]
+    fn boxes_that_overlap_are_parted_along_the_normal(way in vector(1.0), far in 0.0..0.2, r in turn(), s in turn()) {
+        let (first, second) = (cuboid(HALF[0]), cuboid(HALF[1]));
+        let q = way * far;
+        let found = all(&at(&first, DVec3::ZERO, r), &at(&second, q, s), 1e-3);
+        prop_assume!(!found.is_empty());
+        let deepest = lowest(&found);
+        prop_assert!(found.iter().all(|touch| adds_up(touch, &[], &[])));
+        // moved out by the depth they no longer overlap, and half way they still do
+        let moved = |share: f64| {
+            let p = deepest.normal * (-deepest.gap_m * share);
+            all(&at(&first, p, r), &at(&second, q, s), 1e-3)
+        };
+        prop_assert!(moved(1.0).iter().all(|touch| touch.gap_m > -1e-6));
+        prop_assert!(deepest.gap_m > -1e-3 || lowest(&moved(0.5)).gap_m < 0.0);
+    }
+
+    #[test]
+    fn a_hull_touches_like_the_box_it_is(way in vector(1.0), far in 0.1..0.35, r in turn(), s in turn()) {
+        let (smooth, faces, other) = (cuboid(HALF[0]), hull(HALF[0]), cuboid(HALF[1]));
+        let q = way.normalize_or(DVec3::X) * far;
+        let (a, b) = (at(&smooth, DVec3::ZERO, r), at(&faces, DVec3::ZERO, r));
+        let other = at(&other, q, s);
+        match (nearest(&a, &other, 0.05), nearest(&b, &other, 0.05)) {
+            (Some((_, p)), Some((_, q))) if p > 0.0 => prop_assert!((p - q).abs() < 1e-5, "{p} and {q}"),
+            (Some((_, p)), None) | (None, Some((_, p))) => prop_assert!(p > 0.05 - 1e-5),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn no_sampled_points_are_nearer_than_the_gap(q in vector(0.4), r in turn(), s in turn()) {
+        let (first, second) = (cylinder(0.1, 0.15), hull(HALF[1]));
+        let (a, b) = (at(&first, DVec3::ZERO, r), at(&second, q, s));
+        let mut least = f64::INFINITY;
+        for i in 0..12 {
+            let angle = f64::from(i) * std::f64::consts::TAU / 12.0;
+            for z in [-0.15, -0.05, 0.05, 0.15] {
+                let p = r * DVec3::new(0.1 * libm::cos(angle), 0.1 * libm::sin(angle), z);
+                let inside = s.conjugate() * (p - q);
+                least = least.min(inside.distance(inside.clamp(-HALF[1], HALF[1])));
+            }
+        }
+        let found = nearest(&a, &b, 1.0).expect("all is within reach");
+        prop_assert!(found.1 <= least, "{} and {least}", found.1);
+    }
+}
+
+#[test]
+fn a_box_on_a_box_rests_on_four_corners_even_far_from_the_origin() {
+    let (small, large) = (cuboid(DVec3::splat(0.05)), cuboid(DVec3::new(0.5, 0.5, 0.05)));
+    for origin in [DVec3::ZERO, DVec3::new(5e3, -3e3, 1e3)] {
+        for turned in [0.0, 0.3, std::f64::consts::FRAC_PI_4] {
+            let up = origin + DVec3::new(0.1, 0.05, 0.1001);
+            let found =
+                all(&at(&small, up, DQuat::from_rotation_z(turned)), &at(&large, origin, DQuat::IDENTITY), 1e-3);
+            assert_eq!(found.len(), 4, "{found:?}");
+            for touch in &found {
+                assert!((touch.normal - DVec3::Z).length() < 1e-6); // single precision
+                assert!((touch.gap_m - 1e-4).abs() < 1e-7, "{}", touch.gap_m); // eps of coordinates below 1
+            }
+        }
+    }
+}
+
+#[test]
+fn boxes_that_match_exactly_touch_at_each_corner_once() {
+    let form = cuboid(DVec3::splat(0.05));
+    let found = all(&at(&form, DVec3::Z * 0.1, DQuat::IDENTITY), &at(&form, DVec3::ZERO, DQuat::IDENTITY), 1e-3);
+    assert_eq!(found.len(), 4, "{found:?}");
+}
+
+#[test]
+fn a_lying_cylinder_touches_a_box_along_its_side_and_a_standing_one_at_its_rim() {
+    let (round, block) = (cylinder(0.05, 0.1), cuboid(DVec3::new(0.5, 0.5, 0.1)));
+    let lying = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let floor = at(&block, DVec3::ZERO, DQuat::IDENTITY);
+    let side = all(&at(&round, DVec3::Z * 0.15, lying), &floor, 1e-3);
+    let span = |found: &[Touch]| {
+        let points = found.iter().map(|touch| axis(touch.on_a, &[]).0);
+        crate::shape::bounds(&points.collect::<Vec<_>>())
+    };
+    assert!(side.len() >= 2 && (span(&side).1.y - 0.1).abs() < 1e-5 && (span(&side).0.y + 0.1).abs() < 1e-5);
+    let standing = all(&at(&round, DVec3::Z * 0.2, DQuat::IDENTITY), &floor, 1e-3);
+    assert!(standing.len() >= 4 && standing.iter().all(|touch| touch.gap_m.abs() < 1e-6), "{standing:?}");
+    assert!((span(&standing).1 - span(&standing).0).length() > 0.09);
+}
+
+#[test]
+fn a_compound_touches_with_each_of_its_parts() {
+    let Form { kind, .. } = cuboid(DVec3::new(0.2, 0.05, 0.05));
+    let FormKind::Solid(SolidForm { solid: table, .. }) = kind else { unreachable!() };
+    // two feet, 0.2 m apart
+    let foot = |x: f32| {
+        let at = rapier3d::parry::math::Pose::from_parts(glam::Vec3::new(x, 0.0, 0.0), Default::default());
+        (at, rapier3d::parry::shape::SharedShape::cuboid(0.02, 0.05, 0.05))
+    };
+    let shape = rapier3d::parry::shape::SharedShape::compound(vec![foot(-0.1), foot(0.1)]);
+    let kind =
+        FormKind::Solid(SolidForm { solid: table, shape, com_local: DVec3::new(0.0, 0.0, 0.01), radius_m: 0.25 });
+    let feet = Form { kind, friction: 0.0, restitution: 0.0 };
+    let floor = cuboid(DVec3::new(0.5, 0.5, 0.05));
+    let standing = at(&feet, DVec3::Z * 0.11, DQuat::IDENTITY);
+    let found = all(&standing, &at(&floor, DVec3::ZERO, DQuat::IDENTITY), 1e-3);
+    assert_eq!(found.len(), 8, "{found:?}");
+    assert!(found.iter().all(|touch| touch.gap_m.abs() < 1e-7));
+    let (normal, gap_m) = nearest(&standing, &at(&floor, DVec3::ZERO, DQuat::IDENTITY), 0.1).unwrap();
+    assert!(normal.z > 1.0 - 1e-6 && gap_m.abs() < 5e-6);
+}
