@@ -4,6 +4,7 @@
 //! what is still on its way, and the part of a snapshot that others read. Never here: contacts, laws, how a body answers.
 //! Theory: docs/theory/coupling.md, eq. 1–4.
 
+use super::laws::Wave;
 use super::{Impulse, Ledger, Site};
 use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
@@ -59,6 +60,8 @@ pub struct PairState {
     pub tank_j: Option<f64>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
     pub parasitic_kg: f64,
+    /// What this end of a line sends; with wave variables both sides publish the pair.
+    pub wave: Option<Wave>,
 }
 
 impl PairState {
@@ -75,6 +78,7 @@ impl PairState {
             in_flight_n_s: 0.0,
             tank_j: None,
             parasitic_kg: 0.0,
+            wave: None,
         }
     }
 }
@@ -170,7 +174,9 @@ impl Exchange {
     /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
     pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         for owned in &mut self.owned {
-            owned.state.force_n = owned.step_impulse.length() / dt_s;
+            if !matches!(owned.state.kind, PairKind::Penalty | PairKind::Tlm) {
+                owned.state.force_n = owned.step_impulse.length() / dt_s;
+            }
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
             let mut on_its_way = DVec3::ZERO;
             let taken = other.and_then(|n| acknowledged(n, around.me));

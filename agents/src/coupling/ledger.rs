@@ -289,7 +289,7 @@ mod tests {
                 *taken = Some(ledger.clone());
             };
             for (gap, size, site, late, what) in steps {
-                now += gap;
+                now = at(now + gap).as_secs_f64(); // times are whole nanoseconds
                 // what the owner sees of the other side may be old
                 let seen: Option<&Ledger> = acknowledged.len().checked_sub(1 + late).and_then(|i| acknowledged.get(i));
                 given.turn(seen, at(now));

@@ -7,6 +7,7 @@ mod contact;
 mod exchange;
 mod form;
 mod law;
+pub mod laws;
 mod ledger;
 mod other;
 mod solver;
@@ -20,5 +21,7 @@ pub use ledger::{Entry, Impulse, Ledger, Page, Site};
 pub use other::Other;
 pub use solver::{Problem, Response, Settings, Solver, SolverReport};
 
+#[cfg(test)]
+pub(crate) mod harness;
 #[cfg(test)]
 mod tests;

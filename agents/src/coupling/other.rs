@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 5–7: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
-use crate::{AgentId, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
+use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -42,13 +42,24 @@ impl Other {
     ///
     /// Storage is used again: nothing is allocated once the sizes settle.
     pub fn meet(&mut self, neighbour: &Neighbour, around: &Surroundings<'_>, exchange: &Exchange, at: SimTime) -> bool {
+        let known = self.see(neighbour);
+        if known {
+            self.age_s = at.secs_after(neighbour.snapshot.time);
+            self.go_on(self.age_s);
+            self.deliver(neighbour, around.me, exchange, at);
+        }
+        known
+    }
+
+    /// Takes in the newest state of `neighbour` as it was published; whether it is one that can be touched or held.
+    pub fn see(&mut self, neighbour: &Neighbour) -> bool {
         let snapshot = &neighbour.snapshot;
         self.neighbour = Some(neighbour.clone());
         self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
-        self.age_s = at.secs_after(snapshot.time);
+        self.age_s = 0.0;
         self.positions.clear();
         self.velocities.clear();
-        let known = match &snapshot.body {
+        match &snapshot.body {
             Body::Nothing => false,
             Body::Rigid(body) => {
                 self.pose = Pose { centre: body.position, rotation: body.rotation };
@@ -65,12 +76,7 @@ impl Other {
                 self.interleave(&curve.velocities);
                 !self.positions.is_empty()
             }
-        };
-        if known {
-            self.go_on(self.age_s);
-            self.deliver(neighbour, around.me, exchange, at);
         }
-        known
     }
 
     /// Who.
@@ -145,6 +151,42 @@ impl Other {
     /// Adds `sign` times the velocity of the place of a contact to what `slots` gather; this body's slots begin at `base`.
     pub fn join(&self, slots: &mut Slots, base: u32, place: &Place, towards: DVec3, sign: f64) {
         place.join(slots, base, self.pose.centre, towards, sign);
+    }
+
+    /// Where a material point is and how it moves; `None` where there is no such point.
+    #[must_use]
+    pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
+        let place = self.place(anchor)?;
+        let mut slots = Slots::default();
+        self.join(&mut slots, 0, &place, DVec3::ZERO, 1.0);
+        let position = match place {
+            Place::Point(point) => point,
+            Place::Chain { segment, share, .. } => {
+                let [a, b] = [segment, segment + 1].map(|node| self.positions[node as usize]);
+                a.lerp(b, share)
+            }
+        };
+        Some((position, slots.velocity(&self.velocities)))
+    }
+
+    /// Adds the velocity of a material point to what `slots` gather; this body's slots begin at zero.
+    pub fn hold(&self, slots: &mut Slots, anchor: Anchor) {
+        if let Some(place) = self.place(anchor) {
+            self.join(slots, 0, &place, DVec3::ZERO, 1.0);
+        }
+    }
+
+    fn place(&self, anchor: Anchor) -> Option<Place> {
+        match (&self.neighbour.as_ref()?.snapshot.body, anchor) {
+            (Body::Curve(curve), Anchor::Arc(arc_m)) => {
+                let (segment, share) = curve.locate(arc_m)?;
+                Some(Place::Chain { segment: segment as u32, share, radius_m: 0.0 })
+            }
+            (Body::Rigid(_) | Body::Tool(_), Anchor::Local(local)) => {
+                Some(Place::Point(self.pose.centre + self.pose.rotation * local))
+            }
+            _ => None,
+        }
     }
 
     /// Turns impulses, one a slot, into the velocities they cause: W of the coupling (eq. 7).

@@ -1,40 +1,58 @@
 //! The agent: one step of a rigid body, told as a contents page.
 //!
-//! In: a span and what pulls. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
+//! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
-use super::clearance::Fall;
+use super::company::Company;
 use super::mass::Spread;
+use super::meeting::Meeting;
 use super::motion::Motion;
+use super::obstacles::Obstacles;
+use super::sided::Sided;
+use super::ties::Ties;
 use super::world::World;
 use super::{RigidError, RigidSpec, springs};
+use crate::coupling::{Form, FormKind, SolidForm};
+use crate::shape::Solid;
 use crate::{
-    Agent, Body, Grip, Pull, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, Surroundings, check_span,
+    Agent, Body, Grip, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, Surroundings, check_span,
 };
 use glam::DVec3;
+use std::sync::Arc;
 
 /// A rigid body that lives by its own steps.
 pub struct RigidBody {
-    spread: Spread,
-    gravity: DVec3,
-    may_sleep: bool,
-    motion: Motion,
-    world: World,
+    pub(super) spread: Spread,
+    pub(super) gravity: DVec3,
+    pub(super) may_sleep: bool,
+    pub(super) motion: Motion,
+    /// The fixed solids, for flights and for contact with them alone.
+    pub(super) world: World,
+    /// The same as forms, for contact with them and others at once.
+    pub(super) obstacles: Obstacles,
+    /// Whom it meets.
+    pub(super) company: Company,
+    pub(super) meeting: Meeting,
+    pub(super) sided: Sided,
     /// Whether the last event was a touch that has not ended.
-    touching: bool,
-    calm_s: f64,
-    steps: u64,
-    grips: Vec<Grip>,
-    pulls: Vec<Pull>,
+    pub(super) touching: bool,
+    /// Whether nothing but contact happened since the step began.
+    pub(super) steady: bool,
+    /// The velocity after what was received at the step's start, and what couplings of its own have added since, m/s.
+    pub(super) begun: DVec3,
+    pub(super) coupled: DVec3,
+    /// The velocity that was received at the step's start, m/s.
+    pub(super) received: DVec3,
+    /// What others may expect, m/s².
+    pub(super) acceleration: DVec3,
+    pub(super) at_rest: bool,
+    pub(super) calm_s: f64,
+    pub(super) steps: u64,
+    pub(super) grips: Vec<Grip>,
+    pub(super) ties: Ties,
 }
 
 /// A stretch of contact or of a spring's pull is solved in parts no longer than this, seconds.
 const PART_MAX_S: f64 = 1.0 / 240.0;
-/// A touching body has left when it would fly for at least this long, seconds.
-const LEAVE_S: f64 = 4e-3;
-/// A flight shorter than this is a touch, seconds.
-const TOUCH_S: f64 = 1e-7;
-/// After this many flights and blows within one part the contact solver carries the body to the part's end.
-const EVENTS_MAX: u32 = 64;
 /// A body that touches something and moves slower than this everywhere is calm, m/s: above the solver's own jitter
 /// (measured: below 1e-4 m/s for a box of 1 m at rest), below what an eye sees.
 const CALM_M_S: f64 = 2e-3;
@@ -60,17 +78,28 @@ impl RigidBody {
         };
         motion.set_spin(&spread, spec.spin);
         let world = World::new(&spec, &spread)?;
+        let form = form_of(&spec, &spread, &world);
         Ok(Self {
             spread,
             gravity: spec.gravity,
             may_sleep: spec.sleep,
             motion,
             world,
+            obstacles: Obstacles::new(&spec.obstacles)?,
+            company: Company::new(Arc::new(form)),
+            meeting: Meeting::default(),
+            sided: Sided::default(),
             touching: false,
+            steady: false,
+            begun: spec.velocity,
+            coupled: DVec3::ZERO,
+            received: DVec3::ZERO,
+            acceleration: spec.gravity,
+            at_rest: false,
             calm_s: 0.0,
             steps: 0,
             grips: Vec::with_capacity(4),
-            pulls: Vec::with_capacity(4),
+            ties: Ties::default(),
         })
     }
 
@@ -84,8 +113,12 @@ impl RigidBody {
 
     /// Advances by `h` seconds, springs first: pull, then fly and touch.
     fn part(&mut self, h: f64) -> Result<(), &'static str> {
-        let pulled = springs::pull(&mut self.motion, &self.spread, (&self.pulls, self.gravity), h, &mut self.grips);
+        self.ties.aim(&self.company);
+        let ties = (&mut self.ties.all[..], self.gravity);
+        let pulled = springs::pull(&mut self.motion, &self.spread, ties, h, &mut self.grips);
         if pulled {
+            self.ties.give(&mut self.company, h);
+            self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
         }
         if !self.motion.is_sane(&self.spread) {
@@ -95,37 +128,10 @@ impl RigidBody {
         self.advance(h, if pulled { DVec3::ZERO } else { self.gravity })
     }
 
-    /// Flies, takes blows and stays in contact for `h` seconds in all.
-    fn advance(&mut self, h: f64, gravity: DVec3) -> Result<(), &'static str> {
-        let mut left = h;
-        for _ in 0..EVENTS_MAX {
-            let fall = Fall { gravity, spin_max: self.motion.spin_max(&self.spread) };
-            let horizon = if self.touching { left.max(LEAVE_S) } else { left };
-            let free = self.world.free_time(&self.motion, fall, horizon);
-            if self.touching && free < LEAVE_S {
-                return self.world.contact(&mut self.motion, &self.spread, left, gravity);
-            }
-            self.touching = free < left && free < TOUCH_S;
-            if self.touching {
-                self.world.blow(&mut self.motion, &self.spread)?;
-                continue;
-            }
-            let span = free.min(left);
-            self.motion.fly(&self.spread, gravity, span);
-            self.world.flew();
-            left -= span;
-            if left <= 0.0 {
-                return if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it flew out of reach") };
-            }
-        }
-        self.touching = true;
-        self.world.contact(&mut self.motion, &self.spread, left, gravity)
-    }
-
     /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.
-    fn parts(&self, dt: f64) -> u32 {
-        let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
-        let free = self.pulls.is_empty() && self.world.free_time(&self.motion, fall, dt) >= dt;
+    fn parts(&mut self, dt: f64) -> u32 {
+        let alone = self.ties.is_empty() && !self.company.has_tubes();
+        let free = alone && self.free_times(self.gravity, dt).into_iter().all(|free| free >= dt);
         if free { 1 } else { (dt / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32 }
     }
 
@@ -134,14 +140,15 @@ impl RigidBody {
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
         let still = self.motion.velocity == DVec3::ZERO && self.motion.angular == DVec3::ZERO;
         let held = self.touching && self.motion.velocity.length() + swing < CALM_M_S;
-        let calm = self.pulls.is_empty() && (held || (still && self.gravity == DVec3::ZERO));
+        let calm = self.ties.is_empty() && (held || (still && self.gravity == DVec3::ZERO));
+        let calm = calm && self.company.is_calm(CALM_M_S);
         self.calm_s = if calm { self.calm_s + dt } else { 0.0 };
-        let at_rest = self.may_sleep && self.calm_s >= REST_S;
-        if at_rest {
+        self.at_rest = self.may_sleep && self.calm_s >= REST_S;
+        if self.at_rest {
             (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
             self.world.moved();
         }
-        at_rest
+        self.at_rest
     }
 }
 
@@ -154,8 +161,9 @@ impl Agent for RigidBody {
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         let (before, touching) = (self.motion, self.touching);
-        self.pulls.clear();
-        self.pulls.extend(around.pulls());
+        self.receive(around, &[]);
+        self.push_alone(around, dt_s);
+        self.ties.gather(around, &self.company);
         self.grips.clear();
         let parts = self.parts(dt_s);
         for _ in 0..parts {
@@ -168,6 +176,7 @@ impl Agent for RigidBody {
         }
         self.steps += 1;
         let at_rest = self.rest(dt_s);
+        self.settle(around, dt_s);
         Ok(StepReport { work: 1.0, substeps: parts, at_rest })
     }
 
@@ -177,6 +186,14 @@ impl Agent for RigidBody {
 
     /// A rigid body has no samples to spread: nothing changes.
     fn retune(&mut self, _wanted: Resolution) {}
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.company.form.clone())
+    }
+
+    fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
+        Some(self)
+    }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
         into.steps = self.steps;
@@ -189,7 +206,7 @@ impl Agent for RigidBody {
         });
         into.energy_j = self.motion.energy_j(&self.spread, self.gravity);
         into.residual_m = self.residual_m();
-        into.touches.clear();
+        self.write_coupling(into);
         into.grips.clear();
         into.grips.extend_from_slice(&self.grips);
     }
@@ -214,4 +231,15 @@ impl RigidBody {
             size * f64::EPSILON
         }
     }
+}
+
+/// The shape of `spec` as others touch it: what its own contact solver collides with.
+fn form_of(spec: &RigidSpec, spread: &Spread, world: &World) -> Form {
+    let (shape, radius_m) = (world.mover.shape.clone(), world.mover.radius_m);
+    let solid = match &spec.solid {
+        Solid::Mesh { points_m, .. } if world.mover.is_convex() => Solid::Hull { points_m: points_m.clone() },
+        solid => solid.clone(),
+    };
+    let kind = FormKind::Solid(SolidForm { solid, shape, com_local: spread.com, radius_m });
+    Form { kind, friction: spec.friction, restitution: spec.restitution }
 }

@@ -76,6 +76,16 @@ impl Mover {
         Ok(Self { shape, com: body.com, convex, radius_m, swing_m })
     }
 
+    /// Whether it is convex.
+    pub(super) const fn is_convex(&self) -> bool {
+        self.convex
+    }
+
+    /// Whether it is a ball.
+    pub(super) const fn is_ball(&self) -> bool {
+        self.swing_m == 0.0
+    }
+
     /// The gap at which this body counts as touching, metres.
     pub(super) fn skin_m(&self) -> f64 {
         (SKIN_SHARE * self.radius_m).min(SKIN_MAX_M)
@@ -191,7 +201,7 @@ impl Fall {
 }
 
 /// The first t > 0 at which ½ b t² + a t = d, with b ≥ 0; a gap that is closed counts as zero.
-fn first_root(a: f64, b: f64, d: f64) -> f64 {
+pub(super) fn first_root(a: f64, b: f64, d: f64) -> f64 {
     let d = d.max(0.0);
     let under = a * a + 2.0 * b * d;
     if a > 0.0 {

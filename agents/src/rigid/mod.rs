@@ -1,22 +1,32 @@
 //! A rigid body as an agent: exact flight in double precision, contacts in a rapier3d world of its own.
 //!
-//! In: a [`RigidSpec`], steps, springs that pull. Out: the body's motion about its centre of mass.
-//! Never here: other moving bodies; a body only meets the fixed solids of its spec.
+//! In: a [`RigidSpec`], steps, what is around. Out: the body's motion about its centre of mass, and what it gives to others.
+//! Never here: the state of another agent; a body meets others as they were last seen (docs/theory/coupling.md).
 //!
 //! Between touches a body follows its parabola in closed form and turns by a splitting that keeps the angular momentum
 //! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds how long that may
 //! last. At a touch the blow is solved as if it took no time, so bounce heights do not depend on the step either; a body
 //! that stays in touch is carried by the contact solver (`world.rs`, single precision, 4 small passes in at most 1/240 s).
-//! Springs are implicit (`springs.rs`).
+//! Where it meets others, a blow or a stretch of contact is solved with them and the fixed solids at once, in double
+//! precision (`meeting.rs`). Springs are implicit (`springs.rs`).
 //!
 //! Two rules hold for every pair: friction is the geometric mean of both coefficients, restitution the larger of both.
 
 mod body;
 mod clearance;
+mod company;
+mod couple;
+mod flight;
 mod mass;
+mod meeting;
 mod motion;
+mod obstacles;
+mod pair;
+mod places;
+mod sided;
 mod spec;
 mod springs;
+mod ties;
 mod world;
 
 pub use body::RigidBody;

@@ -7,7 +7,7 @@
 //! energy does not drift, whatever the length of the flight.
 
 use super::mass::Spread;
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 
 /// Where a rigid body is and how it moves, about its centre of mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,6 +51,12 @@ impl Motion {
     pub(super) fn inertia_times(&self, body: &Spread, w: DVec3) -> DVec3 {
         let to_world = self.rotation * body.axes;
         to_world * ((to_world.conjugate() * w) * body.moments)
+    }
+
+    /// The inverses of the mass, 1/kg, and of the inertia tensor in world axes, 1/(kg·m²).
+    pub(super) fn inverse_inertia(&self, body: &Spread) -> (f64, DMat3) {
+        let to_world = DMat3::from_quat(self.rotation * body.axes);
+        (body.mass_kg.recip(), to_world * DMat3::from_diagonal(body.moments.recip()) * to_world.transpose())
     }
 
     /// The fastest the body can come to spin with its angular momentum, rad/s.

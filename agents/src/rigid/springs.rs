@@ -1,4 +1,4 @@
-//! Springs that pull a rigid body: linearly implicit, stable at any stiffness.
+//! Springs that pull a rigid body: linearly implicit, stable at any stiffness, whatever the other end weighs.
 //!
 //! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring.
 //! Never here: contacts; positions stay.
@@ -11,41 +11,61 @@
 use super::mass::Spread;
 use super::motion::Motion;
 use crate::{Anchor, Grip, Pull};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
-/// A spring on this body: only an anchor in the body's own axes is a point of it.
-fn arm(pull: &Pull, motion: &Motion) -> Option<DVec3> {
-    match pull.anchor {
-        Anchor::Local(local) => Some(motion.rotation * local),
-        Anchor::Arc(_) => None,
+/// A spring on this body, and how its other end yields.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tie {
+    /// The spring; its target is where the other end is now.
+    pub pull: Pull,
+    /// The distance at which it pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// Inverse mass of the other end, 1/kg; zero where that end is led.
+    pub yields: DMat3,
+    /// The impulse it gave this body in the last part, N·s.
+    pub impulse: DVec3,
+}
+
+impl Tie {
+    /// A spring whose other end is led.
+    pub(super) const fn led(pull: Pull) -> Self {
+        Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO }
+    }
+
+    /// Where on the body it pulls, from the centre of mass: only an anchor in the body's own axes is a point of it.
+    pub(super) fn arm(&self, motion: &Motion) -> Option<DVec3> {
+        match self.pull.anchor {
+            Anchor::Local(local) => Some(motion.rotation * local),
+            Anchor::Arc(_) => None,
+        }
     }
 }
 
-/// Changes the velocities by gravity and the springs over `h` seconds and writes each spring's force.
+/// Changes the velocities by gravity and the springs over `h` seconds; writes each spring's impulse, and its force for those
+/// who hold the body.
 ///
 /// Nothing is written and `false` returned where no spring holds a point of this body.
 pub(super) fn pull(
     motion: &mut Motion,
     body: &Spread,
-    around: (&[Pull], DVec3),
+    (ties, gravity): (&mut [Tie], DVec3),
     h: f64,
     grips: &mut Vec<Grip>,
 ) -> bool {
-    let (pulls, gravity) = around;
-    if !pulls.iter().any(|p| arm(p, motion).is_some()) {
+    if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
         return false;
     }
     let spin = motion.spin(body);
     let mut change = [0.0; 6];
     for pass in 0..2 {
         let mut system = System::mass(motion, body, gravity * h);
-        for pull in pulls {
-            let Some(r) = arm(pull, motion) else { continue };
+        for tie in ties.iter() {
+            let Some(r) = tie.arm(motion) else { continue };
             let point_velocity = motion.velocity + spin.cross(r);
-            let spring = Spring::new(pull, motion.position + r, point_velocity, h);
+            let spring = Spring::new(tie, motion.position + r, point_velocity, h);
             system.add_spring(r, spring.resistance, spring.impulse);
             if pass > 0 {
-                let force = (spring.impulse - spring.resistance * point(change, r)) / h;
+                let force = spring.after(change, r) / h;
                 let stiffness = r.dot(force).max(0.0);
                 system.add_turning(r, h * h * stiffness, spin);
             }
@@ -53,11 +73,11 @@ pub(super) fn pull(
         change = system.solve();
     }
     grips.clear();
-    for pull in pulls {
-        let Some(r) = arm(pull, motion) else { continue };
-        let spring = Spring::new(pull, motion.position + r, motion.velocity + spin.cross(r), h);
-        let force_n = (spring.impulse - spring.resistance * point(change, r)) / h;
-        grips.push(Grip { by: pull.by, force_n });
+    for tie in ties.iter_mut() {
+        let Some(r) = tie.arm(motion) else { continue };
+        let spring = Spring::new(tie, motion.position + r, motion.velocity + spin.cross(r), h);
+        tie.impulse = spring.after(change, r);
+        grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
     motion.velocity += DVec3::new(change[0], change[1], change[2]);
     let spin_change = DVec3::new(change[3], change[4], change[5]);
@@ -68,14 +88,34 @@ pub(super) fn pull(
 /// A spring over one step: impulse = `impulse` − `resistance` × change of the point's velocity.
 struct Spring {
     impulse: DVec3,
-    resistance: f64,
+    resistance: DMat3,
 }
 
 impl Spring {
-    fn new(pull: &Pull, point: DVec3, velocity: DVec3, h: f64) -> Self {
-        let (k, c) = (pull.stiffness_n_m, pull.damping_n_s_m);
-        let slip = pull.target_velocity - velocity;
-        Self { impulse: h * (k * (pull.target + h * slip - point) + c * slip), resistance: h * (h * k + c) }
+    /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W makes R to (1 + R W)⁻¹ R.
+    fn new(tie: &Tie, point: DVec3, velocity: DVec3, h: f64) -> Self {
+        let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
+        let slip = tie.pull.target_velocity - velocity;
+        let (impulse, resistance) = if tie.rest_m > 0.0 {
+            let along = (tie.pull.target - point).normalize_or(DVec3::Z);
+            let stretch = (tie.pull.target - point).length() - tie.rest_m;
+            let closing = slip.dot(along);
+            let size = h * (k * (stretch + h * closing) + c * closing);
+            (along * size, DMat3::from_cols(along * along.x, along * along.y, along * along.z))
+        } else {
+            (h * (k * (tie.pull.target + h * slip - point) + c * slip), DMat3::IDENTITY)
+        };
+        let resistance = resistance * (h * (h * k + c));
+        if tie.yields == DMat3::ZERO {
+            return Self { impulse, resistance };
+        }
+        let softer = (DMat3::IDENTITY + resistance * tie.yields).inverse();
+        Self { impulse: softer * impulse, resistance: softer * resistance }
+    }
+
+    /// The impulse where the body's velocities change so, at a point `r` from its centre.
+    fn after(&self, change: [f64; 6], r: DVec3) -> DVec3 {
+        self.impulse - self.resistance * point(change, r)
     }
 }
 
@@ -102,17 +142,17 @@ impl System {
         Self { matrix, right: [p.x, p.y, p.z, 0.0, 0.0, 0.0] }
     }
 
-    fn add_spring(&mut self, r: DVec3, resistance: f64, impulse: DVec3) {
+    fn add_spring(&mut self, r: DVec3, resistance: DMat3, impulse: DVec3) {
         // the rows of Gᵀ: forces pass as they are, torques as r ×
-        let rows: [[f64; 3]; 6] = std::array::from_fn(|i| match i {
-            0..3 => DVec3::AXES[i].to_array(),
-            _ => DVec3::AXES[i - 3].cross(r).to_array(),
+        let rows: [DVec3; 6] = std::array::from_fn(|i| match i {
+            0..3 => DVec3::AXES[i],
+            _ => DVec3::AXES[i - 3].cross(r),
         });
         for i in 0..6 {
             for j in 0..6 {
-                self.matrix[i][j] += resistance * (0..3).map(|k| rows[i][k] * rows[j][k]).sum::<f64>();
+                self.matrix[i][j] += rows[i].dot(resistance * rows[j]);
             }
-            self.right[i] += (0..3).map(|k| rows[i][k] * impulse[k]).sum::<f64>();
+            self.right[i] += rows[i].dot(impulse);
         }
     }
 
@@ -167,7 +207,7 @@ mod tests {
         };
         let build = || {
             let mut system = System::mass(&motion, &body, DVec3::Z);
-            system.add_spring(DVec3::new(0.1, -0.2, 0.3), 40.0, DVec3::new(1.0, 2.0, 3.0));
+            system.add_spring(DVec3::new(0.1, -0.2, 0.3), DMat3::IDENTITY * 40.0, DVec3::new(1.0, 2.0, 3.0));
             system.add_turning(DVec3::new(0.1, -0.2, 0.3), 0.5, DVec3::ONE);
             system
         };

@@ -8,6 +8,8 @@ use crate::{
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
+mod coupling;
+mod laws;
 mod surfaces;
 
 const G: f64 = 9.81;

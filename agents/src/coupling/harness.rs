@@ -1,0 +1,210 @@
+//! Agents with different clocks on one thread, for tests of couplings: whoever's time is earliest steps next.
+//!
+//! In: agents, their rates, laws and links; faults on purpose. Out: their snapshots, and sums at a common time with the
+//! impulses that are still on their way. Never here: threads, pacing, wall time.
+
+use super::{Impulse, Law, Link, Standing, acknowledged, owns};
+use crate::{Agent, AgentId, Body, Inertia, Neighbour, Pull, RigidState, SimSpan, SimTime, Snapshot, Surroundings};
+use glam::{DMat3, DQuat, DVec3};
+use std::sync::Arc;
+
+/// What goes wrong between agents.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(crate) struct Faults {
+    /// Each step is longer or shorter by up to this share.
+    pub jitter: f64,
+    /// The share of publications that nobody ever sees.
+    pub loss: f64,
+    /// A reader sees a state up to this many publications old, never mind what it saw before.
+    pub late: usize,
+    /// Where the random numbers start.
+    pub seed: u64,
+}
+
+/// Agents that see each other.
+pub(crate) struct Stage {
+    actors: Vec<Actor>,
+    laws: Vec<(AgentId, AgentId, Law)>,
+    faults: Faults,
+    noise: u64,
+}
+
+struct Actor {
+    agent: Box<dyn Agent>,
+    rate_hz: f64,
+    time: SimTime,
+    published: Vec<Arc<Snapshot>>,
+    hands: Vec<Pull>,
+    links: Vec<Link>,
+}
+
+/// A rigid body at a time that is not its own.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Settled {
+    pub state: RigidState,
+    pub mass_kg: f64,
+    pub inertia: DMat3,
+}
+
+impl Settled {
+    pub(crate) fn kinetic_j(&self) -> f64 {
+        let spin = self.state.spin;
+        0.5 * (self.mass_kg * self.state.velocity.length_squared() + spin.dot(self.inertia * spin))
+    }
+
+    /// Linear momentum, and angular momentum about the origin.
+    pub(crate) fn momentum(&self) -> (DVec3, DVec3) {
+        let linear = self.state.velocity * self.mass_kg;
+        (linear, self.state.position.cross(linear) + self.inertia * self.state.spin)
+    }
+}
+
+impl Stage {
+    pub(crate) fn new(faults: Faults) -> Self {
+        let noise = faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
+        Self { actors: vec![], laws: vec![], faults, noise }
+    }
+
+    /// Adds an agent that steps `rate_hz` times a second.
+    pub(crate) fn add(&mut self, agent: impl Agent + 'static, rate_hz: f64) -> AgentId {
+        let mut snapshot = Snapshot::default();
+        agent.write_snapshot(&mut snapshot);
+        let published = vec![Arc::new(snapshot)];
+        let (hands, links) = (vec![], vec![]);
+        self.actors.push(Actor { agent: Box::new(agent), rate_hz, time: SimTime::ZERO, published, hands, links });
+        AgentId(self.actors.len() as u32 - 1)
+    }
+
+    pub(crate) fn law(&mut self, a: AgentId, b: AgentId, law: Law) {
+        self.laws.push((a, b, law));
+    }
+
+    pub(crate) fn hold(&mut self, id: AgentId, hand: Pull) {
+        self.actors[id.0 as usize].hands.push(hand);
+    }
+
+    /// Links `of` with the link's other end; both know it.
+    pub(crate) fn link(&mut self, of: AgentId, link: Link) {
+        self.actors[of.0 as usize].links.push(link);
+        let back = Link { other: of, here: link.there, there: link.here, ..link };
+        self.actors[link.other.0 as usize].links.push(back);
+    }
+
+    /// The newest state of an agent, seen or not.
+    pub(crate) fn newest(&self, id: AgentId) -> &Snapshot {
+        self.actors[id.0 as usize].published.last().expect("published when it was added")
+    }
+
+    /// Changes what others see of an agent.
+    pub(crate) fn spoil(&mut self, id: AgentId, change: impl FnOnce(&mut Snapshot)) {
+        let last = self.actors[id.0 as usize].published.last_mut().expect("published when it was added");
+        change(Arc::make_mut(last));
+    }
+
+    /// Changes what goes wrong from now on.
+    pub(crate) fn set_faults(&mut self, faults: Faults) {
+        self.faults = faults;
+    }
+
+    /// Steps everybody up to `seconds`, and looks at the stage after every step.
+    pub(crate) fn run(&mut self, seconds: f64, mut look: impl FnMut(&Self)) {
+        loop {
+            let next = (0..self.actors.len()).min_by_key(|&i| self.actors[i].time).expect("an agent");
+            if self.actors[next].time.as_secs_f64() >= seconds {
+                return;
+            }
+            self.step(next);
+            look(self);
+        }
+    }
+
+    fn step(&mut self, i: usize) {
+        let me = AgentId(i as u32);
+        let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
+        let dt = SimSpan::from_secs_f64(stretch / self.actors[i].rate_hz).expect("a rate");
+        let neighbours: Vec<_> =
+            (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(me, AgentId(j as u32))).collect();
+        let lost = self.random() < self.faults.loss;
+        let actor = &mut self.actors[i];
+        let around =
+            Surroundings { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        actor.agent.step(dt, &around).expect("a step that succeeds");
+        actor.time += dt;
+        let mut snapshot = Snapshot::default();
+        actor.agent.write_snapshot(&mut snapshot);
+        snapshot.time = actor.time;
+        if !lost {
+            actor.published.push(Arc::new(snapshot));
+        }
+        let keep = self.faults.late + 2;
+        let surplus = self.actors[i].published.len().saturating_sub(keep);
+        self.actors[i].published.drain(..surplus);
+    }
+
+    /// How `me` sees another.
+    fn sight(&mut self, me: AgentId, id: AgentId) -> Neighbour {
+        let late = (self.random() * (self.faults.late as f64 + 1.0)) as usize;
+        let actor = &self.actors[id.0 as usize];
+        let newest = actor.published.len() - 1;
+        let snapshot = actor.published[newest.saturating_sub(late)].clone();
+        let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
+        let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
+        let owned = owns(self.standing(me), self.standing(id));
+        Neighbour { id, snapshot, form: actor.agent.form(), law, owned }
+    }
+
+    fn standing(&self, id: AgentId) -> Standing {
+        let actor = &self.actors[id.0 as usize];
+        Standing { id, model: actor.agent.model(), rate_hz: actor.rate_hz }
+    }
+
+    /// Everything that others have given to `id` and its own newest state does not know.
+    pub(crate) fn on_their_way(&self, id: AgentId, at: SimTime, mut visit: impl FnMut(Impulse, Impulse)) {
+        let newest = self.newest(id);
+        for other in (0..self.actors.len()).map(|j| AgentId(j as u32)).filter(|j| *j != id) {
+            let seen = Neighbour::seen(other, Arc::new(newest.clone()));
+            for ledger in self.newest(other).given.iter().filter(|ledger| ledger.with == id) {
+                ledger.since(acknowledged(&seen, other), at, |_, sum, carried| visit(sum, carried));
+            }
+        }
+    }
+
+    /// A rigid body at `seconds`, with everything that is on its way to it.
+    pub(crate) fn settled(&self, id: AgentId, seconds: f64) -> Settled {
+        let newest = self.newest(id);
+        let (Body::Rigid(mut state), Inertia::Rigid { inverse_mass, inverse_inertia }) =
+            (newest.body.clone(), newest.inertia.clone())
+        else {
+            panic!("a rigid body");
+        };
+        let at = SimTime::ZERO + SimSpan::from_secs_f64(seconds).expect("a time");
+        let left = at.secs_after(newest.time);
+        state.position += state.velocity * left + newest.acceleration * (0.5 * left * left);
+        state.velocity += newest.acceleration * left;
+        state.rotation = DQuat::from_scaled_axis(state.spin * left) * state.rotation;
+        self.on_their_way(id, at, |sum, carried| {
+            state.velocity += sum.linear * inverse_mass;
+            state.position += carried.linear * inverse_mass;
+            state.spin += inverse_inertia * sum.angular;
+        });
+        Settled { state, mass_kg: inverse_mass.recip(), inertia: inverse_inertia.inverse() }
+    }
+
+    /// The linear momentum of everybody, with everything that is on its way.
+    pub(crate) fn momentum(&self) -> DVec3 {
+        let mut total = DVec3::ZERO;
+        for (i, actor) in self.actors.iter().enumerate() {
+            total += actor.agent.momentum().0;
+            self.on_their_way(AgentId(i as u32), actor.time, |sum, _| total += sum.linear);
+        }
+        total
+    }
+
+    /// A number in 0 … 1.
+    fn random(&mut self) -> f64 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        (self.noise >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}

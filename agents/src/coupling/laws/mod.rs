@@ -1,0 +1,10 @@
+//! Laws of contact beside the ledger, for comparison and for links that need no inverse mass.
+//!
+//! In: places, velocities, what the other side published. Out: forces on one side. Both sides act on themselves alone.
+//! Never here: who touches whom, any agent's state. Theory: docs/theory/coupling.md.
+
+mod penalty;
+mod tlm;
+
+pub use penalty::push_off_n;
+pub use tlm::{Line, Wave};

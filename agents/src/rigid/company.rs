@@ -1,0 +1,272 @@
+//! The agents that a rigid body meets, each brought to the body's own time.
+//!
+//! In: what the body sees at the start of a step. Out: how long it can fly before it may touch one of them (conservative
+//! advancement, MIR96, in the frame of the other); who touched whom for how long. Never here: what happens at a touch
+//! ([`super::meeting`]), fixed solids ([`super::clearance`]).
+
+use super::clearance::{Fall, Mover, first_root};
+use super::motion::Motion;
+use super::pair::Pairs;
+use crate::coupling::touch::{TouchRoom, gap};
+use crate::coupling::{Exchange, Form, FormKind, Impulse, Law, Other, Placed, View};
+use crate::shape::Solid;
+use crate::{AgentId, Body, Inertia, Neighbour, Surroundings};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// Whom a body meets, and what it has with each.
+pub(super) struct Company {
+    /// What is given and taken.
+    pub exchange: Exchange,
+    /// What is remembered of each pair from step to step.
+    pub pairs: Pairs,
+    /// Room for searches.
+    pub room: TouchRoom,
+    /// The body's own shape, as others know it.
+    pub form: Arc<Form>,
+    /// Who the body is.
+    pub me: AgentId,
+    /// Seconds since the step began.
+    pub after_s: f64,
+    guests: Vec<Guest>,
+    /// How many of `guests` are in use; the rest is storage.
+    count: usize,
+}
+
+/// An agent that is met in this step.
+#[derive(Default)]
+pub(super) struct Guest {
+    /// It, at the body's own time.
+    pub other: Other,
+    /// Whether contact with it is to be found and solved here.
+    pub touchable: bool,
+    /// Coulomb friction coefficient of the pair.
+    pub friction: f64,
+    /// Restitution of the pair.
+    pub restitution: f64,
+    /// The gap at which the two count as touching, metres.
+    pub skin_m: f64,
+    /// Its farthest point from its centre, metres; infinite where that is not known.
+    radius_m: f64,
+    /// No point of its surface moves faster along a normal than its spin times this, metres.
+    swing_m: f64,
+    convex: bool,
+    chain: bool,
+}
+
+/// The gap at which two balls touch, as a share of the radius: their distance is known to rounding.
+const BALL_SKIN_SHARE: f64 = 1e-9;
+
+impl Company {
+    /// The company of a body of this shape: nobody yet.
+    pub(super) fn new(form: Arc<Form>) -> Self {
+        Self {
+            exchange: Exchange::default(),
+            pairs: Pairs::default(),
+            room: TouchRoom::default(),
+            form,
+            me: AgentId(0),
+            after_s: 0.0,
+            guests: Vec::new(),
+            count: 0,
+        }
+    }
+
+    /// Brings everybody that this body meets to the start of the step, but for `fellows`, who share its world.
+    pub(super) fn gather(&mut self, around: &Surroundings<'_>, mover: &Mover, fellows: &[AgentId]) {
+        (self.me, self.count, self.after_s) = (around.me, 0, 0.0);
+        for neighbour in around.neighbours {
+            if fellows.contains(&neighbour.id) || !is_met(neighbour, around) {
+                continue;
+            }
+            if self.guests.len() == self.count {
+                self.guests.push(Guest::default());
+            }
+            let guest = &mut self.guests[self.count];
+            let stale = matches!(neighbour.law, Law::Penalty { extrapolate: false, .. });
+            let known = if stale {
+                guest.other.see(neighbour)
+            } else {
+                guest.other.meet(neighbour, around, &self.exchange, around.time)
+            };
+            if known {
+                guest.learn(neighbour, &self.form, mover);
+                guest.touchable &= !holds(neighbour, around.me); // jaws pass through what they hold
+                self.count += 1;
+                if let Some(pair) = self.pairs.get(neighbour.id) {
+                    pair.correct(guest.other.velocities());
+                }
+            }
+        }
+    }
+
+    /// Ends a step of `dt` seconds: how long pairs have touched, how everybody should move next, and the accounts.
+    pub(super) fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+        for guest in &self.guests[..self.count] {
+            let Some(neighbour) = guest.other.neighbour() else { continue };
+            if let Some(pair) = self.pairs.get(neighbour.id) {
+                let mut on_their_way = Impulse::ZERO;
+                self.exchange.in_flight(around.me, neighbour, around.time, |_, sum, _| on_their_way += sum);
+                pair.expect(guest.other.velocities(), on_their_way);
+            }
+        }
+        self.pairs.close(dt);
+        self.exchange.close(around, dt);
+        self.count = 0;
+    }
+
+    /// Whether everybody that is touched moves slower than `calm_m_s`.
+    pub(super) fn is_calm(&self, calm_m_s: f64) -> bool {
+        let touched = |guest: &&Guest| guest.id().is_some_and(|id| self.pairs.touched().any(|with| with == id));
+        self.guests().iter().filter(touched).all(|guest| guest.speed_m_s() < calm_m_s)
+    }
+
+    /// Everybody that is met.
+    pub(super) fn guests(&self) -> &[Guest] {
+        &self.guests[..self.count]
+    }
+
+    /// Everything that a solve needs, each part for itself.
+    pub(super) fn split(&mut self) -> (&mut [Guest], &mut Exchange, &mut Pairs, &mut TouchRoom, &Arc<Form>) {
+        let Self { guests, count, exchange, pairs, room, form, .. } = self;
+        (&mut guests[..*count], exchange, pairs, room, form)
+    }
+
+    /// Seconds of flight, at most `horizon`, during which the body certainly touches nobody but tubes.
+    ///
+    /// Tubes do not bounce: contact with them is foreseen from part to part instead.
+    pub(super) fn free_time(&mut self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
+        let Self { guests, count, room, form, .. } = self;
+        let me = placed(form, motion);
+        let apart = guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain);
+        apart.fold(horizon, |free, guest| free.min(guest.free_time(&me, (mover, motion, fall), free, room)))
+    }
+
+    /// Whether a tube is met.
+    pub(super) fn has_tubes(&self) -> bool {
+        self.guests().iter().any(|guest| guest.touchable && guest.chain)
+    }
+
+    /// Lets `h` seconds pass for everybody.
+    pub(super) fn go_on(&mut self, h: f64) {
+        self.guests[..self.count].iter_mut().for_each(|guest| guest.other.go_on(h));
+        self.after_s += h;
+    }
+}
+
+/// The body itself, for a search.
+pub(super) fn placed<'a>(form: &'a Form, motion: &Motion) -> Placed<'a> {
+    Placed { form, view: View::Solid { position: motion.position, rotation: motion.rotation } }
+}
+
+/// Whether `neighbour` has to be brought to the body's own time: the body owns contact or a link with it, or is held by it.
+fn is_met(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    let touched = neighbour.form.is_some() && neighbour.law != Law::Off;
+    let linked = || around.links.iter().any(|link| link.other == neighbour.id);
+    // by other laws than the ledger each side acts on itself
+    let alone = matches!(neighbour.law, Law::Penalty { .. } | Law::Tlm { .. })
+        || around.links.iter().any(|link| link.other == neighbour.id && matches!(link.law, Law::Tlm { .. }));
+    let owned = neighbour.owned || alone;
+    ((owned && (touched || linked())) || holds(neighbour, around.me)) && neighbour.snapshot.is_finite()
+}
+
+/// Whether `neighbour` is a tool that holds `me`.
+fn holds(neighbour: &Neighbour, me: AgentId) -> bool {
+    matches!(&neighbour.snapshot.body, Body::Tool(tool) if tool.grasp.is_some_and(|grasp| grasp.target == me))
+}
+
+impl Guest {
+    /// Takes in what does not change while the step lasts.
+    fn learn(&mut self, neighbour: &Neighbour, mine: &Form, mover: &Mover) {
+        self.touchable = neighbour.owned && neighbour.law == Law::Ledger && neighbour.form.is_some();
+        let Some(form) = &neighbour.form else { return };
+        self.friction = (mine.friction * form.friction).sqrt();
+        self.restitution = mine.restitution.max(form.restitution);
+        (self.skin_m, self.convex, self.chain) = (mover.skin_m(), false, false);
+        (self.radius_m, self.swing_m) = (f64::INFINITY, 0.0);
+        match &form.kind {
+            FormKind::Solid(solid) => {
+                let ball = matches!(solid.solid, Solid::Ball { .. });
+                self.convex = !matches!(solid.solid, Solid::Mesh { .. });
+                (self.radius_m, self.swing_m) = (solid.radius_m, if ball { 0.0 } else { solid.radius_m });
+                if ball && mover.is_ball() {
+                    self.skin_m = BALL_SKIN_SHARE * mover.radius_m;
+                }
+            }
+            FormKind::Chain => (self.chain, self.restitution) = (true, 0.0),
+            FormKind::Tool(_) => {}
+        }
+    }
+
+    /// Who it is.
+    pub(super) fn id(&self) -> Option<AgentId> {
+        self.other.id()
+    }
+
+    /// Whether it is a rigid body that moves.
+    pub(super) fn is_rigid(&self) -> bool {
+        let inertia = self.other.neighbour().map(|neighbour| &neighbour.snapshot.inertia);
+        matches!(inertia, Some(Inertia::Rigid { .. })) && !self.other.is_held()
+    }
+
+    /// Writes a scale of the inverse mass of each of its slots; a tube's are told by its contacts.
+    pub(super) fn scale(&self, mobilities: &mut [f64]) {
+        let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);
+        if let (Some(Inertia::Rigid { inverse_mass, inverse_inertia: turning }), [linear, angular]) =
+            (inertia, mobilities)
+        {
+            *linear = *inverse_mass;
+            *angular = (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0;
+        }
+    }
+
+    /// The speed of its fastest point, m/s; a tool's turning left out.
+    pub(super) fn speed_m_s(&self) -> f64 {
+        let slots = self.other.velocities();
+        if self.chain {
+            return slots.iter().step_by(2).map(|v| v.length()).fold(0.0, f64::max);
+        }
+        slots[0].length() + slots[1].length() * if self.radius_m.is_finite() { self.radius_m } else { 0.0 }
+    }
+
+    /// Whether it is a tube.
+    pub(super) const fn is_chain(&self) -> bool {
+        self.chain
+    }
+
+    /// How fast any point of it can come nearer to a body that moves with `velocity`, its own swing left out, m/s.
+    pub(super) fn approach_m_s(&self, velocity: DVec3) -> f64 {
+        let slots = self.other.velocities();
+        if self.chain {
+            return slots.iter().step_by(2).map(|v| v.distance(velocity)).fold(0.0, f64::max);
+        }
+        slots[0].distance(velocity) + slots[1].length() * self.swing_m
+    }
+
+    /// Seconds of flight during which the body certainly does not touch this guest, at most `horizon`.
+    fn free_time(
+        &self,
+        me: &Placed<'_>,
+        (mover, motion, fall): (&Mover, &Motion, Fall),
+        horizon: f64,
+        room: &mut TouchRoom,
+    ) -> f64 {
+        let Some(it) = self.other.placed() else { return horizon };
+        let slots = self.other.velocities();
+        let (velocity, pull) = (motion.velocity - slots[0], fall.gravity - self.other.acceleration());
+        let swing = fall.spin_max * mover.swing_m + slots[1].length() * self.swing_m;
+        let reach = (velocity.length() + swing) * horizon + 0.5 * pull.length() * horizon * horizon;
+        if let View::Solid { position, .. } = it.view
+            && position.distance(motion.position) > mover.radius_m + self.radius_m + reach + self.skin_m
+        {
+            return horizon;
+        }
+        let Some((normal, gap_m)) = gap(me, &it, reach + self.skin_m, room) else { return horizon };
+        let (a, b) = if self.convex && mover.is_convex() {
+            (swing - normal.dot(velocity), (-normal.dot(pull)).max(0.0))
+        } else {
+            (swing + velocity.length(), pull.length())
+        };
+        first_root(a, b, gap_m - self.skin_m).min(horizon)
+    }
+}

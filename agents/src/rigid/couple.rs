@@ -1,0 +1,124 @@
+//! What a body takes from others and shows to them.
+//!
+//! In: ledgers of those who own a contact with it. Out: its motion with their impulses in it, contacts of its own solved for a
+//! world that moves it, and the part of its snapshot that others couple by. Never here: how contacts are solved
+//! ([`super::meeting`]). Theory: docs/theory/coupling.md.
+
+use super::RigidBody;
+use super::clearance::Fall;
+use super::meeting::{Me, Scope};
+use super::motion::Motion;
+use crate::coupling::Impulse;
+use crate::{AgentId, Bounds, Inertia, Snapshot, Surroundings};
+use glam::DVec3;
+
+/// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
+/// a single hard step must not send it flying in others' eyes.
+const EXPECTED_G: f64 = 3.0;
+
+impl RigidBody {
+    /// Begins a step: takes what the owners of its contacts gave, and brings everybody that it meets to its own time.
+    ///
+    /// `fellows` share a world with this body: what is between them is not coupled.
+    pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId]) {
+        let Self { motion, spread, company, .. } = self;
+        let before = motion.velocity;
+        company.exchange.open(around);
+        company.pairs.open();
+        let mut carried = None;
+        company.exchange.take(around, |_, _, sum, way| {
+            motion.velocity += sum.linear / spread.mass_kg;
+            motion.angular += sum.angular;
+            carried = Some(carried.unwrap_or(Impulse::ZERO) + way);
+        });
+        if let Some(carried) = carried {
+            self.shift(carried);
+            self.world.moved();
+        }
+        self.received = self.motion.velocity - before;
+        self.company.gather(around, &self.world.mover, fellows);
+        (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
+    }
+
+    /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
+    pub fn push_alone(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let Self { motion, spread, company, sided, gravity, .. } = self;
+        if company.guests().is_empty() {
+            return;
+        }
+        let before = motion.velocity;
+        sided.act((motion, spread), company, around, (dt, *gravity));
+        if self.motion.velocity != before {
+            self.coupled += self.motion.velocity - before;
+            self.world.moved();
+        }
+    }
+
+    /// Solves the contacts that this body owns over the next `h` seconds for a world that moves it and has its gravity: the
+    /// velocities change, nothing moves but the others. Comes after [`Self::receive`], as often as the step has parts.
+    pub fn meet(&mut self, h: f64) {
+        let Self { motion, spread, world, company, meeting, obstacles, gravity, .. } = self;
+        let scope = Scope { solids: true, fixed: false };
+        let before = motion.velocity;
+        let mut me = Me { motion, spread, mover: &world.mover };
+        if meeting.press(&mut me, company, (obstacles, scope), (h, *gravity)).is_some() {
+            self.motion.velocity -= self.gravity * h;
+            self.coupled += self.motion.velocity - before;
+            self.world.moved();
+        }
+        self.company.go_on(h);
+    }
+
+    /// Ends a step of `dt` seconds: what was given is booked, and the acceleration that others may expect is known.
+    pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
+        self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
+        self.company.settle(around, dt);
+    }
+
+    /// What holds a body up in lasting contact, beside gravity and couplings, m/s²; nothing in flight.
+    ///
+    /// What merely took back the impulses that were received in this step is left out: it will take back the next ones too,
+    /// but only those.
+    fn support(&self, dt: f64) -> DVec3 {
+        let held = self.touching || !self.ties.is_empty();
+        if !(self.steady && held) {
+            return DVec3::ZERO;
+        }
+        let measured = (self.motion.velocity - self.begun - self.coupled) / dt - self.gravity;
+        let received = self.received / dt;
+        let taken_back = -(measured + self.gravity).dot(received) / received.length_squared();
+        if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
+    }
+
+    /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
+    fn shift(&mut self, carried: Impulse) {
+        let Self { motion, spread, world, .. } = self;
+        let mut way = Motion { velocity: carried.linear / spread.mass_kg, angular: carried.angular, ..*motion };
+        let all_at_once = Fall { gravity: DVec3::ZERO, spin_max: way.spin_max(spread) };
+        let share = world.free_time(&way, all_at_once, 1.0);
+        way.fly(spread, DVec3::ZERO, share);
+        (motion.position, motion.rotation) = (way.position, way.rotation);
+    }
+
+    /// Writes what others couple by.
+    pub(super) fn write_coupling(&self, into: &mut Snapshot) {
+        let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
+        let radius_m = self.world.mover.radius_m;
+        let swing = radius_m * self.motion.spin(&self.spread).length();
+        into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
+        into.bounds = Some(Bounds {
+            low: self.motion.position - radius_m,
+            high: self.motion.position + radius_m,
+            speed_m_s: self.motion.velocity.length() + swing,
+        });
+        (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
+        self.company.exchange.write(into);
+        into.touches.clear();
+        into.bonds.clear();
+        if !self.at_rest {
+            into.touches.extend(self.company.pairs.touched());
+            into.bonds.extend(self.company.pairs.bonds());
+        }
+    }
+}

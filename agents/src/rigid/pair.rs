@@ -1,0 +1,164 @@
+//! What a body remembers of each agent that it touches: since when, and the energy that their coupling may still add.
+//!
+//! In: what each solve did. Out: who is bonded, how far push-out and bounces have to fade. Never here: impulses.
+//!
+//! The tank counts what the coupling added on both sides: the work of each impulse against the mean of the relative velocity
+//! before and after it, and, where the other side turned out to move differently from what was expected while impulses were
+//! on their way, their work on that difference. What contact takes fills it, push-out and wrong guesses empty it.
+
+use crate::AgentId;
+use crate::coupling::Impulse;
+use glam::DVec3;
+
+/// All pairs that have touched lately.
+#[derive(Default)]
+pub(super) struct Pairs(Vec<Pair>);
+
+/// A body and one other agent.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Pair {
+    /// The other.
+    pub with: AgentId,
+    /// How long the two have pressed on each other, short breaks counted, seconds.
+    pub lasting_s: f64,
+    /// Whether they touch in this step.
+    pub touched: bool,
+    /// Whether they press on each other in this step.
+    pub pressed: bool,
+    /// Whether the other is a rigid body that could share a world with this one.
+    pub rigid: bool,
+    /// What is left in the tank, joules.
+    pub tank_j: f64,
+    /// What the tank held at the start, joules.
+    reserve_j: f64,
+    /// How the other was expected to move at the end of the step, m/s and rad/s, with which impulses on their way to it.
+    expected: Option<([DVec3; 2], Impulse)>,
+    loose_s: f64,
+    idle_s: f64,
+}
+
+/// The speed whose energy a tank holds at the start, m/s: what a push-out of a few parts may spend before it fades.
+const RESERVE_M_S: f64 = 0.1;
+/// Contact that has lasted this long may share one clock, seconds.
+const BOND_S: f64 = 0.1;
+/// Bodies that do not press on each other for this long have parted, seconds: a state seen late makes contact stutter.
+const BREAK_S: f64 = 0.05;
+/// An empty tank is full again after this, seconds: a watchdog that never forgave would let bodies sink for good.
+const REFILL_S: f64 = 1.0;
+/// A pair that has not touched for this long is forgotten, seconds.
+const FORGET_S: f64 = 2.0;
+
+impl Pairs {
+    /// The memory of the pair with `with`; a new one for a pair whose reduced mass is `mass_kg`.
+    pub(super) fn of(&mut self, with: AgentId, mass_kg: f64) -> &mut Pair {
+        let at = self.0.iter().position(|pair| pair.with == with).unwrap_or_else(|| {
+            self.0.push(Pair::new(with, 0.5 * mass_kg * RESERVE_M_S * RESERVE_M_S));
+            self.0.len() - 1
+        });
+        &mut self.0[at]
+    }
+
+    /// The memory of a pair that has touched.
+    pub(super) fn get(&mut self, with: AgentId) -> Option<&mut Pair> {
+        self.0.iter_mut().find(|pair| pair.with == with)
+    }
+
+    /// Begins a step.
+    pub(super) fn open(&mut self) {
+        self.0.iter_mut().for_each(|pair| (pair.touched, pair.pressed) = (false, false));
+    }
+
+    /// Ends a step of `dt` seconds.
+    pub(super) fn close(&mut self, dt: f64) {
+        for pair in &mut self.0 {
+            pair.loose_s = if pair.pressed { 0.0 } else { pair.loose_s + dt };
+            pair.lasting_s = if pair.loose_s < BREAK_S { pair.lasting_s + dt } else { 0.0 };
+            let missing = (pair.reserve_j - pair.tank_j).max(0.0);
+            pair.tank_j += missing.min(pair.reserve_j * dt / REFILL_S);
+            pair.idle_s = if pair.touched { 0.0 } else { pair.idle_s + dt };
+        }
+        self.0.retain(|pair| pair.idle_s < FORGET_S);
+    }
+
+    /// Rigid bodies whose contact has lasted.
+    pub(super) fn bonds(&self) -> impl Iterator<Item = AgentId> + '_ {
+        self.0.iter().filter(|pair| pair.rigid && pair.lasting_s > BOND_S).map(|pair| pair.with)
+    }
+
+    /// Who was touched in the last step.
+    pub(super) fn touched(&self) -> impl Iterator<Item = AgentId> + '_ {
+        self.0.iter().filter(|pair| pair.touched).map(|pair| pair.with)
+    }
+}
+
+impl Pair {
+    fn new(with: AgentId, reserve_j: f64) -> Self {
+        Self {
+            with,
+            lasting_s: 0.0,
+            touched: false,
+            pressed: false,
+            rigid: false,
+            tank_j: reserve_j,
+            reserve_j,
+            expected: None,
+            loose_s: BREAK_S,
+            idle_s: 0.0,
+        }
+    }
+
+    /// How much of push-out and bounce the tank still allows, 0 … 1: all of it until half the reserve is spent.
+    pub(super) fn fade(&self) -> f64 {
+        (2.0 * self.tank_j / self.reserve_j).clamp(0.0, 1.0)
+    }
+
+    /// Books the energy that a solve added, joules.
+    pub(super) fn spend(&mut self, work_j: f64) {
+        self.tank_j -= work_j;
+    }
+
+    /// How the other should move when the next step begins, with the impulses `on_their_way` to it.
+    pub(super) fn expect(&mut self, velocities: &[DVec3], on_their_way: Impulse) {
+        self.expected = if let [velocity, spin] = *velocities { Some(([velocity, spin], on_their_way)) } else { None };
+    }
+
+    /// Books the work of what was on its way on the difference between how the other moves and what was expected.
+    pub(super) fn correct(&mut self, velocities: &[DVec3]) {
+        let Some(([velocity, spin], impulse)) = self.expected.take() else { return };
+        if let [now, now_spin] = *velocities {
+            self.tank_j -= impulse.linear.dot(now - velocity) + impulse.angular.dot(now_spin - spin);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_tank_fades_only_when_more_was_added_than_taken() {
+        let mut pairs = Pairs::default();
+        let pair = pairs.of(AgentId(1), 2.0); // 0.01 J
+        pair.spend(-1.0);
+        pair.spend(1.0);
+        assert!((pair.fade() - 1.0).abs() < 1e-12);
+        pair.spend(0.0075);
+        assert!((pair.fade() - 0.5).abs() < 1e-12); // rounding of numbers near 1
+        pair.spend(1.0);
+        assert_eq!(pair.fade(), 0.0);
+    }
+
+    #[test]
+    fn a_bond_needs_contact_that_presses_and_outlives_a_stutter() {
+        let mut pairs = Pairs::default();
+        let mut step = |pressed| {
+            pairs.open();
+            let pair = pairs.of(AgentId(4), 1.0);
+            (pair.rigid, pair.touched, pair.pressed) = (true, true, pressed);
+            pairs.close(0.03);
+            pairs.bonds().count()
+        };
+        assert_eq!([true, false, true, true].map(&mut step), [0, 0, 0, 1], "0.12 s with a stutter");
+        assert_eq!([false, false, true].map(&mut step), [1, 0, 0], "0.06 s apart");
+    }
+}

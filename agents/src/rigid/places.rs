@@ -1,0 +1,140 @@
+//! Where a body touches or may touch within a part: the contacts of a solve.
+//!
+//! In: the body and everything around it, laid out in slots. Out: contacts, each with whom it is. Never here: their solution
+//! ([`super::meeting`]).
+
+use super::company::{Company, Guest, placed};
+use super::meeting::{Found, Me, Meeting};
+use super::obstacles::Obstacles;
+use crate::coupling::touch::touches;
+use crate::coupling::{Contact, Place, Slots, Touch};
+use glam::DVec3;
+
+/// A contact farther than this from closing within the part is left out, metres.
+const SLACK_M: f64 = 1e-5;
+/// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by.
+const BOUND_SHARE: f64 = 2e-5;
+/// The share of push-out that an empty tank leaves: without any, bodies that lie on each other would sink for good.
+const PUSH_OUT_LEAST: f64 = 0.25;
+
+impl Meeting {
+    /// Places within the skin of everything, for a blow.
+    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &Obstacles) {
+        let (guests, _, pairs, room, form) = company.split();
+        let mine = placed(form, me.motion);
+        let past = BOUND_SHARE * me.mover.radius_m;
+        for (i, guest) in guests.iter().enumerate().filter(|(_, guest)| guest.touchable && !guest.is_chain()) {
+            let Some(it) = guest.other.placed() else { continue };
+            touches(&mine, &it, 2.0 * guest.skin_m + past, room, &mut self.touches);
+            let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
+            let bounce = guest.restitution * fade;
+            self.take_up(me, Some((i, guest)), (guest.friction, bounce));
+        }
+        for (solid, skin) in fixed.iter() {
+            touches(&mine, &solid, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
+            let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution));
+            self.take_up(me, None, law);
+        }
+        for found in &mut self.found {
+            (found.contact.gap_m, found.contact.age_s) = (0.0, 0.0);
+        }
+    }
+
+    /// Places that may close within `h` seconds: with tubes, and with the rest where `solids` take part.
+    pub(super) fn find_presses(
+        &mut self,
+        me: &Me<'_>,
+        company: &mut Company,
+        (h, gravity): (f64, DVec3),
+        solids: bool,
+    ) {
+        let after_s = company.after_s;
+        let (guests, _, pairs, room, form) = company.split();
+        let mine = placed(form, me.motion);
+        for (i, guest) in guests.iter().enumerate().filter(|(_, g)| g.touchable && (solids || g.is_chain())) {
+            let Some(it) = guest.other.placed() else { continue };
+            let pull = (gravity - guest.other.acceleration()).length();
+            let swing = self.before[1].length() * me.mover.swing_m;
+            let closing = guest.approach_m_s(me.motion.velocity) + swing + pull * h;
+            touches(&mine, &it, closing * h + SLACK_M, room, &mut self.touches);
+            let from = self.found.len();
+            self.take_up(me, Some((i, guest)), (guest.friction, 0.0));
+            self.keep_closing(from, h);
+            let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
+            let age_s = guest.other.age_s().abs() + after_s;
+            for found in &mut self.found[from..] {
+                found.contact.age_s = age_s;
+                let depth = found.contact.gap_m;
+                found.contact.gap_m = if depth < 0.0 { depth * fade.max(PUSH_OUT_LEAST) } else { depth };
+            }
+        }
+    }
+
+    /// Places with fixed solids that may close within `h` seconds.
+    pub(super) fn find_fixed(
+        &mut self,
+        me: &Me<'_>,
+        company: &mut Company,
+        fixed: &Obstacles,
+        (h, gravity): (f64, DVec3),
+    ) {
+        let (_, _, _, room, form) = company.split();
+        let mine = placed(form, me.motion);
+        let swing = self.before[1].length() * me.mover.swing_m;
+        let reach = (me.motion.velocity.length() + swing + gravity.length() * h) * h + SLACK_M;
+        for (solid, skin) in fixed.iter() {
+            touches(&mine, &solid, reach, room, &mut self.touches);
+            let from = self.found.len();
+            self.take_up(me, None, ((form.friction * skin.friction).sqrt(), 0.0));
+            self.keep_closing(from, h);
+        }
+    }
+
+    /// Turns the places that were found into contacts.
+    fn take_up(&mut self, me: &Me<'_>, guest: Option<(usize, &Guest)>, (friction, bounce): (f64, f64)) {
+        for touch in &self.touches {
+            let mut slots = Slots::default();
+            let (mine, theirs) = halfway(touch);
+            mine.join(&mut slots, 0, me.motion.position, -touch.normal, 1.0);
+            if let Some((i, guest)) = guest {
+                guest.other.join(&mut slots, self.bases[i], &theirs, touch.normal, -1.0);
+            }
+            let approach_m_s = -slots.velocity(&self.velocities).dot(touch.normal);
+            let rebound_m_s = (bounce * approach_m_s).max(0.0);
+            let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
+            let key = mixed(touch.key ^ mixed(with));
+            let (normal, gap_m) = (touch.normal, touch.gap_m);
+            let contact = Contact { key, slots, normal, gap_m, friction, rebound_m_s, age_s: 0.0 };
+            self.found.push(Found { contact, guest: guest.map(|(i, _)| i), approach_m_s });
+        }
+    }
+
+    /// Drops what was found since `from` and cannot close within `h` seconds.
+    fn keep_closing(&mut self, from: usize, h: f64) {
+        let mut at = 0;
+        self.found.retain(|found| {
+            at += 1;
+            at <= from || found.contact.gap_m - found.approach_m_s * h < SLACK_M
+        });
+    }
+}
+
+/// Both sides' places, brought to the middle of the gap: force and torque then balance exactly.
+pub(super) fn halfway(touch: &Touch) -> (Place, Place) {
+    let half = 0.5 * touch.gap_m;
+    match (touch.on_a, touch.on_b) {
+        (Place::Point(a), Place::Point(b)) => (Place::Point(0.5 * (a + b)), Place::Point(0.5 * (a + b))),
+        (Place::Point(a), Place::Chain { segment, share, radius_m }) => {
+            (Place::Point(a - touch.normal * half), Place::Chain { segment, share, radius_m: radius_m + half })
+        }
+        places => places,
+    }
+}
+
+/// Mixes the bits of a name (SplitMix64), so that names of many pairs do not collide.
+const fn mixed(name: u64) -> u64 {
+    let name = name.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    let name = (name ^ (name >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    let name = (name ^ (name >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    name ^ (name >> 31)
+}

@@ -1,0 +1,227 @@
+//! Laws by which a body acts on itself alone: penalty contact and wave variables.
+//!
+//! In: the body at the start of a step, others as they are known. Out: impulses on the body, and what its ends of lines send.
+//! Never here: the laws themselves ([`crate::coupling::laws`]), the other side: it does the same for itself.
+
+use super::company::{Company, Guest, placed};
+use super::mass::Spread;
+use super::motion::Motion;
+use super::places::halfway;
+use crate::coupling::laws::{Line, push_off_n};
+use crate::coupling::touch::touches;
+use crate::coupling::{Law, PairKind, Slots, Touch};
+use crate::{AgentId, Anchor, SimTime, Surroundings};
+use glam::{DMat3, DVec3};
+
+/// What a body keeps of the laws by which it acts on itself.
+#[derive(Default)]
+pub(super) struct Sided {
+    lines: Vec<(AgentId, Line)>,
+    touches: Vec<Touch>,
+    velocities: Vec<DVec3>,
+    given: Vec<DVec3>,
+}
+
+/// The step in which a body acts on itself.
+#[derive(Clone, Copy)]
+struct Span {
+    at: SimTime,
+    dt_s: f64,
+    gravity: DVec3,
+}
+
+impl Sided {
+    /// Changes the velocities by the impulses of a step of `dt_s` seconds, by all such laws.
+    pub(super) fn act(
+        &mut self,
+        (motion, spread): (&mut Motion, &Spread),
+        company: &mut Company,
+        around: &Surroundings<'_>,
+        (dt_s, gravity): (f64, DVec3),
+    ) {
+        let span = Span { at: around.time, dt_s, gravity };
+        for i in 0..company.guests().len() {
+            let Some(law) = company.guests()[i].other.neighbour().map(|n| n.law) else { continue };
+            match law {
+                Law::Penalty { stiffness_n_m, damping_n_s_m, .. } => {
+                    self.push_off((motion, spread), (company, i), (stiffness_n_m, damping_n_s_m), span);
+                }
+                Law::Tlm { stiffness_n_m, damping_n_s_m } => {
+                    self.lean((motion, spread), (company, i), (stiffness_n_m, damping_n_s_m), span);
+                }
+                Law::Ledger | Law::Off => {}
+            }
+        }
+        for link in around.links {
+            let Law::Tlm { stiffness_n_m, .. } = link.law else { continue };
+            let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
+            if let (Some(i), Anchor::Local(local)) = (guest, link.here) {
+                self.draw((motion, spread), (company, i), (stiffness_n_m, local), span);
+            }
+        }
+    }
+
+    /// Penalty contact with guest `i`.
+    fn push_off(
+        &mut self,
+        (motion, spread): (&mut Motion, &Spread),
+        (company, i): (&mut Company, usize),
+        law: (f64, f64),
+        span: Span,
+    ) {
+        self.find((motion, spread), (company, i));
+        let (mut force, mut depth_m, mut places) = (DVec3::ZERO, 0.0_f64, 0);
+        self.given.clear();
+        self.given.resize(self.velocities.len(), DVec3::ZERO);
+        for touch in self.touches.iter().filter(|touch| touch.gap_m < 0.0) {
+            let guest = &company.guests()[i];
+            let slots = slots_of(touch, motion, guest);
+            let velocity = slots.velocity(&self.velocities);
+            let push = push_off_n((touch.gap_m, touch.normal, velocity), law, guest.friction);
+            slots.scatter(push * span.dt_s, &mut self.given);
+            force += push;
+            depth_m = depth_m.max(-touch.gap_m);
+            places += 1;
+        }
+        motion.velocity += self.given[0] / spread.mass_kg;
+        motion.angular += self.given[1];
+        if places > 0 {
+            tell(company, i, PairKind::Penalty, (force, depth_m, places, span.dt_s));
+        }
+    }
+
+    /// Contact with guest `i` by wave variables, at the deepest place: a line along the normal that only pushes.
+    fn lean(
+        &mut self,
+        (motion, spread): (&mut Motion, &Spread),
+        (company, i): (&mut Company, usize),
+        (stiffness, damping): (f64, f64),
+        span: Span,
+    ) {
+        let arriving = self.listen((company, i), stiffness, span);
+        self.find((motion, spread), (company, i));
+        let deepest = self.touches.iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).filter(|touch| touch.gap_m < 0.0);
+        let Some(touch) = deepest.copied() else { return self.answer((company, i), None, span) };
+        let slots = slots_of(&touch, motion, &company.guests()[i]);
+        let normal = touch.normal;
+        let velocity = slots.velocity(&self.velocities);
+        self.velocities[2..].fill(DVec3::ZERO);
+        let own = slots.velocity(&self.velocities).dot(normal) + span.gravity.dot(normal) * span.dt_s;
+        let (z, c) = (self.line(company.guests()[i].id(), stiffness).impedance(), arriving.dot(normal));
+        let yields = answer_of(motion, spread, &only_mine(&touch, motion), normal).dot(normal);
+        let push = (-(z * own + c) / (1.0 + z * yields * span.dt_s)).max(0.0);
+        let damped = (push - damping * velocity.dot(normal)).max(0.0);
+        let slip = velocity - normal * velocity.dot(normal);
+        let rub = slip * (company.guests()[i].friction * damped / slip.length().max(1e-3));
+        let force = normal * damped - rub;
+        let mut given = [DVec3::ZERO; 2];
+        only_mine(&touch, motion).scatter(force * span.dt_s, &mut given);
+        motion.velocity += given[0] / spread.mass_kg;
+        motion.angular += given[1];
+        self.answer((company, i), Some((normal * c, normal * -push)), span);
+        tell(company, i, PairKind::Tlm, (force, -touch.gap_m, 1, span.dt_s));
+    }
+
+    /// A link to guest `i` by wave variables, at the point `local` of the body: it pulls nothing where it was made.
+    fn draw(
+        &mut self,
+        (motion, spread): (&mut Motion, &Spread),
+        (company, i): (&mut Company, usize),
+        (stiffness, local): (f64, DVec3),
+        span: Span,
+    ) {
+        let arriving = self.listen((company, i), stiffness, span);
+        let arm = motion.rotation * local;
+        let mut slots = Slots::default();
+        slots.add_linear(0, 1.0);
+        slots.add_angular(1, arm);
+        let own = slots.velocity(&[motion.velocity + span.gravity * span.dt_s, motion.spin(spread)]);
+        let columns = DVec3::AXES.map(|axis| answer_of(motion, spread, &slots, axis));
+        let yields = DMat3::from_cols(columns[0], columns[1], columns[2]);
+        let z = self.line(company.guests()[i].id(), stiffness).impedance();
+        let into_line = (DMat3::IDENTITY + yields * (z * span.dt_s)).inverse() * (own * z + arriving);
+        let mut given = [DVec3::ZERO; 2];
+        slots.scatter(into_line * -span.dt_s, &mut given);
+        motion.velocity += given[0] / spread.mass_kg;
+        motion.angular += given[1];
+        self.answer((company, i), Some((arriving, into_line)), span);
+        tell(company, i, PairKind::Tlm, (-into_line, 0.0, 1, span.dt_s));
+    }
+
+    /// Where guest `i` overlaps the body, and the velocities of both.
+    fn find(&mut self, (motion, spread): (&Motion, &Spread), (company, i): (&mut Company, usize)) {
+        let (guests, _, _, room, form) = company.split();
+        self.touches.clear();
+        self.velocities.clear();
+        self.velocities.extend([motion.velocity, motion.spin(spread)]);
+        self.velocities.extend_from_slice(guests[i].other.velocities());
+        if let Some(it) = guests[i].other.placed() {
+            touches(&placed(form, motion), &it, 0.0, room, &mut self.touches);
+        }
+    }
+
+    /// What arrives from guest `i` during the step.
+    fn listen(&mut self, (company, i): (&Company, usize), stiffness: f64, span: Span) -> DVec3 {
+        let Some(neighbour) = company.guests()[i].other.neighbour() else { return DVec3::ZERO };
+        let pair = neighbour.snapshot.pairs.iter().find(|pair| pair.with == company.me);
+        let (at, wave) = (neighbour.snapshot.time, pair.and_then(|pair| pair.wave));
+        let decides = neighbour.owned;
+        let line = self.line(Some(neighbour.id), stiffness);
+        line.hear(at, wave, (decides, span.dt_s));
+        line.arriving(span.at, span.dt_s)
+    }
+
+    /// Sends what this end answers: (what arrived, the force into the line), or nothing where the line is slack.
+    fn answer(&mut self, (company, i): (&mut Company, usize), answer: Option<(DVec3, DVec3)>, span: Span) {
+        let Some(id) = company.guests()[i].id() else { return };
+        let Some((_, line)) = self.lines.iter_mut().find(|(with, _)| *with == id) else { return };
+        if let Some((arriving, force)) = answer {
+            line.send(arriving, force, span.dt_s);
+        }
+        let state = company.exchange.pair_mut(id);
+        (state.kind, state.parasitic_kg) = (PairKind::Tlm, line.parasitic_kg());
+        (state.wave, state.force_n) = (Some(line.wave()), 0.0);
+    }
+
+    /// The line to `with`; a new one where there is none.
+    fn line(&mut self, with: Option<AgentId>, stiffness: f64) -> &mut Line {
+        let with = with.unwrap_or(AgentId(u32::MAX));
+        let at = self.lines.iter().position(|(id, _)| *id == with).unwrap_or_else(|| {
+            self.lines.push((with, Line::new(stiffness)));
+            self.lines.len() - 1
+        });
+        &mut self.lines[at].1
+    }
+}
+
+/// The velocities that a place joins: the body's slots, then the guest's.
+fn slots_of(touch: &Touch, motion: &Motion, guest: &Guest) -> Slots {
+    let mut slots = only_mine(touch, motion);
+    guest.other.join(&mut slots, 2, &halfway(touch).1, touch.normal, -1.0);
+    slots
+}
+
+fn only_mine(touch: &Touch, motion: &Motion) -> Slots {
+    let mut slots = Slots::default();
+    halfway(touch).0.join(&mut slots, 0, motion.position, -touch.normal, 1.0);
+    slots
+}
+
+/// How a point of the body answers a unit impulse along `axis`, 1/kg.
+fn answer_of(motion: &Motion, spread: &Spread, slots: &Slots, axis: DVec3) -> DVec3 {
+    let (inverse_mass, inverse_inertia) = motion.inverse_inertia(spread);
+    let mut answer = [DVec3::ZERO; 2];
+    slots.scatter(axis, &mut answer);
+    answer = [answer[0] * inverse_mass, inverse_inertia * answer[1]];
+    slots.velocity(&answer)
+}
+
+/// Writes what a law did to guest `i` into the state of the pair, if this body owns it.
+fn tell(company: &mut Company, i: usize, kind: PairKind, (force, depth_m, places, dt_s): (DVec3, f64, u32, f64)) {
+    let owner = company.guests()[i].other.neighbour().filter(|n| n.owned || kind == PairKind::Tlm).map(|n| n.id);
+    let Some(id) = owner else { return };
+    let state = company.exchange.pair_mut(id);
+    (state.kind, state.contacts, state.force_n) = (kind, places, force.length());
+    state.penetration_m = state.penetration_m.max(depth_m);
+    state.impulse_n_s += force.length() * dt_s;
+}

@@ -1,0 +1,118 @@
+//! Who pulls a body, and whom it pulls in return.
+//!
+//! In: hands, tools that hold the body, links whose pair it owns. Out: springs aimed at where the other ends are now, and the
+//! impulses of those ends, booked. Never here: how springs are solved ([`super::springs`]).
+
+use super::company::Company;
+use super::springs::Tie;
+use crate::coupling::{Law, Link, PairKind, Slots};
+use crate::{Anchor, Pull, Surroundings};
+use glam::{DMat3, DVec3};
+
+/// All springs on a body.
+#[derive(Default)]
+pub(super) struct Ties {
+    /// The springs.
+    pub all: Vec<Tie>,
+    /// Whom each pulls in return: which guest, and where.
+    ends: Vec<Option<(usize, Anchor)>>,
+    /// Room for one answer.
+    room: Vec<DVec3>,
+}
+
+impl Ties {
+    /// Whether nothing pulls.
+    pub(super) fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// What springs to others have given to this body in the last part, N·s; a hand or a tool is led and no coupling.
+    pub(super) fn linked(&self) -> DVec3 {
+        let linked = self.all.iter().zip(&self.ends).filter(|(tie, end)| end.is_some() && tie.yields != DMat3::ZERO);
+        linked.map(|(tie, _)| tie.impulse).sum()
+    }
+
+    /// Every spring of this step.
+    pub(super) fn gather(&mut self, around: &Surroundings<'_>, company: &Company) {
+        self.all.clear();
+        self.ends.clear();
+        for pull in around.pulls() {
+            let by = pull.by.and_then(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
+            self.all.push(Tie::led(pull));
+            self.ends.push(by.map(|guest| (guest, Anchor::Local(DVec3::ZERO))));
+        }
+        for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
+            let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+            let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
+            if let Some(guest) = guest.filter(|_| owned) {
+                self.all.push(Tie { rest_m: link.rest_m, ..Tie::led(spring_of(link)) });
+                self.ends.push(Some((guest, link.there)));
+            }
+        }
+    }
+
+    /// Aims the springs at where their other ends are, and asks how those yield.
+    ///
+    /// Where several springs pull at one agent, each meets its inverse mass times their number: together they never pull
+    /// harder than it can follow.
+    pub(super) fn aim(&mut self, company: &Company) {
+        let Self { all, ends, room } = self;
+        for (tie, end) in all.iter_mut().zip(ends.iter()) {
+            let Some((i, anchor)) = *end else { continue };
+            let other = &company.guests()[i].other;
+            let Some((target, velocity)) = other.point(anchor) else { continue };
+            (tie.pull.target, tie.pull.target_velocity) = (target, velocity);
+            let shared = ends.iter().flatten().filter(|(with, _)| *with == i).count();
+            let mut slots = Slots::default();
+            other.hold(&mut slots, anchor);
+            let column = |axis: DVec3| {
+                room.clear();
+                room.resize(other.velocities().len(), DVec3::ZERO);
+                slots.scatter(axis, room);
+                other.respond(room);
+                slots.velocity(room) * shared as f64
+            };
+            let [x, y, z] = DVec3::AXES.map(column);
+            tie.yields = DMat3::from_cols(x, y, z);
+        }
+    }
+
+    /// Gives the other ends what the springs gave to this one in the `h` seconds since; hands go on their way.
+    pub(super) fn give(&mut self, company: &mut Company, h: f64) {
+        let Self { all, ends, room } = self;
+        let after_s = company.after_s;
+        for (tie, end) in all.iter_mut().zip(ends.iter()) {
+            let Some((i, anchor)) = *end else {
+                tie.pull.target += tie.pull.target_velocity * h;
+                continue;
+            };
+            let (guests, exchange, ..) = company.split();
+            let other = &mut guests[i].other;
+            let mut slots = Slots::default();
+            other.hold(&mut slots, anchor);
+            room.clear();
+            room.resize(other.velocities().len(), DVec3::ZERO);
+            slots.scatter(-tie.impulse, room);
+            other.book(exchange, after_s, room);
+            other.push(room);
+            if let Some(id) = other.id() {
+                let state = exchange.pair_mut(id);
+                state.kind =
+                    if tie.pull.by.is_some() && other.is_held() { PairKind::Grasp } else { PairKind::Attachment };
+                state.contacts = state.contacts.max(1);
+            }
+        }
+    }
+}
+
+/// A link as a spring; its target is aimed later.
+const fn spring_of(link: &Link) -> Pull {
+    Pull {
+        by: Some(link.other),
+        anchor: link.here,
+        target: DVec3::ZERO,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: link.stiffness_n_m,
+        damping_n_s_m: link.damping_n_s_m,
+    }
+}
