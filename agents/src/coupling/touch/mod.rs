@@ -4,11 +4,14 @@
 //! Never here: velocities, forces, whose contact it is. Theory: `docs/theory/contact.md`, eq. 12–18.
 //!
 //! Everything is taken apart into strands (balls joined by spans: a ball, a capsule, a tube) and blocks (all the rest).
-//! Strands meet strands and blocks in double precision; blocks meet blocks through parry, relative to each other.
+//! All gaps are found in double precision; where blocks rest on blocks the corners and edges are clipped by parry.
+//! A half space belongs to the fixed solids: a block does not feel it, a strand does.
 
 mod blocks;
 mod chain_solid;
 mod chains;
+mod convex;
+mod overlap;
 mod pieces;
 #[cfg(test)]
 mod tests;
@@ -37,7 +40,7 @@ pub struct TouchRoom {
 
 /// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; what `into` held before is gone.
 ///
-/// Nothing is allocated once the numbers of nodes and contacts settle, except by parry where hulls and cylinders overlap.
+/// Nothing is allocated once the numbers of nodes and contacts settle.
 /// Forms without a shape and places that are not finite touch nothing.
 pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
     into.clear();
@@ -54,7 +57,7 @@ pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoo
                     chain_solid::touches(b, a, reach_m, into);
                     into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
                 }
-                // parry's answer depends on who is first: the larger, whoever asks
+                // what is clipped depends on who is first: the larger, whoever asks
                 (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
                     blocks.touches(b, a, reach_m, into);
                     into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));

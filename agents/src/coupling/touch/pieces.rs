@@ -56,7 +56,8 @@ impl<'a> Pieces<'a> {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
             (FormKind::Chain, View::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
-            (FormKind::Solid(SolidForm { solid, shape, com_local, radius_m }), View::Solid { position, rotation }) => {
+            (FormKind::Solid(form), View::Solid { position, rotation }) => {
+                let SolidForm { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;
                 let along = |half: f64| rotation * (DVec3::Z * half);
                 pieces.0[0] = Some(match solid {
@@ -67,7 +68,8 @@ impl<'a> Pieces<'a> {
                     _ => {
                         let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
                         let around = Ball { centre: position, radius_m };
-                        Piece::Block(Block { field: known.field(solid), shape, origin, rotation, around })
+                        let (field, shape) = (known.field(solid), known.shape(form));
+                        Piece::Block(Block { field, shape, origin, rotation, around })
                     }
                 });
             }

@@ -18,6 +18,7 @@ const JAW_LEVEL: u8 = 2;
 #[derive(Default)]
 pub(super) struct Known {
     fields: Vec<(Solid, Option<Field>)>,
+    hulls: Vec<(Solid, Option<SharedShape>)>,
     tools: Vec<(ToolShape, Option<[ToolSolid; PARTS]>)>,
 }
 
@@ -35,6 +36,9 @@ impl Known {
         for (form, other) in [(a, b), (b, a)] {
             match &form.kind {
                 FormKind::Solid(SolidForm { solid, .. }) if is_strand(&other.kind) => self.learn_solid(solid),
+                FormKind::Solid(SolidForm { solid, shape, .. }) if shape.as_trimesh().is_some() => {
+                    self.learn_hull(solid)
+                }
                 FormKind::Tool(shape) => self.learn_tool(shape),
                 _ => {}
             }
@@ -48,6 +52,15 @@ impl Known {
         }
     }
 
+    fn learn_hull(&mut self, solid: &Solid) {
+        if let Solid::Mesh { points_m, .. } = solid
+            && !self.hulls.iter().any(|(known, _)| is_same(known, solid))
+        {
+            let hull = Solid::Hull { points_m: points_m.clone() }.to_shared_shape().ok();
+            self.hulls.push((solid.clone(), hull));
+        }
+    }
+
     fn learn_tool(&mut self, shape: &ToolShape) {
         if !self.tools.iter().any(|(known, _)| known == shape) {
             let solids: Result<Vec<_>, _> = shape.parts(0.0).iter().map(ToolSolid::new).collect();
@@ -58,6 +71,12 @@ impl Known {
     /// The field of a solid that was learnt.
     pub fn field(&self, solid: &Solid) -> Option<&Field> {
         self.fields.iter().find(|(known, _)| is_same(known, solid))?.1.as_ref()
+    }
+
+    /// What a solid collides with: its shape, or the hull of a mesh that was not divided into convex parts.
+    pub fn shape<'a>(&'a self, SolidForm { solid, shape, .. }: &'a SolidForm) -> &'a SharedShape {
+        let hull = self.hulls.iter().find(|(known, _)| shape.as_trimesh().is_some() && is_same(known, solid));
+        hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
     }
 
     /// The solids of a tool that was learnt.

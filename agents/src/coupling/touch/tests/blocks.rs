@@ -28,9 +28,9 @@ proptest! {
         let expected = apart((DVec3::ZERO, r), (q, s));
         prop_assume!(expected > 1e-3);
         let (normal, gap_m) = nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), 1.0).unwrap();
-        prop_assert!(gap_m <= expected && gap_m > expected - 1e-5, "{gap_m} and {expected}");
+        prop_assert!(gap_m <= expected && gap_m > expected - 1e-7, "{gap_m} and {expected}");
         prop_assert!((normal.length() - 1.0).abs() < 1e-12);
-        prop_assert!(nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), expected * 0.99 - 1e-5).is_none());
+        prop_assert!(nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), expected - 1e-6).is_none());
     }
 
     #[test]
@@ -46,8 +46,26 @@ proptest! {
             let p = deepest.normal * (-deepest.gap_m * share);
             all(&at(&first, p, r), &at(&second, q, s), 1e-3)
         };
-        prop_assert!(moved(1.0).iter().all(|touch| touch.gap_m > -1e-6));
+        prop_assert!(moved(1.0).iter().all(|touch| touch.gap_m > -1e-9));
         prop_assert!(deepest.gap_m > -1e-3 || lowest(&moved(0.5)).gap_m < 0.0);
+    }
+
+    #[test]
+    fn boxes_overlap_as_deep_as_fifteen_axes_say(q in vector(0.2), r in turn(), s in turn()) {
+        let (first, second) = (cuboid(HALF[0]), cuboid(HALF[1]));
+        let axes = |turned: DQuat| [DVec3::X, DVec3::Y, DVec3::Z].map(|axis| turned * axis);
+        let crossed = axes(r).into_iter().flat_map(|u| axes(s).map(|v| u.cross(v)));
+        let slab = |axis: DVec3| {
+            let radius = |turned: DQuat, half: DVec3| (turned.conjugate() * axis).abs().dot(half);
+            q.dot(axis).abs() - radius(r, HALF[0]) - radius(s, HALF[1])
+        };
+        let all_axes = axes(r).into_iter().chain(axes(s)).chain(crossed);
+        let expected = all_axes.filter_map(|axis| axis.try_normalize().map(slab)).fold(f64::NEG_INFINITY, f64::max);
+        prop_assume!(expected < 0.0);
+        let (normal, gap_m) = nearest(&at(&first, DVec3::ZERO, r), &at(&second, q, s), 0.0).unwrap();
+        // corners went through single precision: 2^-24 of 0.2 m
+        prop_assert!((gap_m - expected).abs() < 3e-8, "{gap_m} and {expected}");
+        prop_assert!(normal.is_normalized());
     }
 
     #[test]
@@ -57,8 +75,8 @@ proptest! {
         let (a, b) = (at(&smooth, DVec3::ZERO, r), at(&faces, DVec3::ZERO, r));
         let other = at(&other, q, s);
         match (nearest(&a, &other, 0.05), nearest(&b, &other, 0.05)) {
-            (Some((_, p)), Some((_, q))) if p > 0.0 => prop_assert!((p - q).abs() < 1e-5, "{p} and {q}"),
-            (Some((_, p)), None) | (None, Some((_, p))) => prop_assert!(p > 0.05 - 1e-5),
+            (Some((_, p)), Some((_, q))) if p > 0.0 => prop_assert!((p - q).abs() < 1e-7, "{p} and {q}"),
+            (Some((_, p)), None) | (None, Some((_, p))) => prop_assert!(p > 0.05 - 1e-7),
             _ => {}
         }
     }
@@ -119,6 +137,32 @@ fn a_lying_cylinder_touches_a_box_along_its_side_and_a_standing_one_at_its_rim()
     let standing = all(&at(&round, DVec3::Z * 0.2, DQuat::IDENTITY), &floor, 1e-3);
     assert!(standing.len() >= 4 && standing.iter().all(|touch| touch.gap_m.abs() < 1e-6), "{standing:?}");
     assert!((span(&standing).1 - span(&standing).0).length() > 0.09);
+}
+
+#[test]
+fn crossed_cylinders_are_as_far_as_their_axes_say() {
+    let (first, second) = (cylinder(0.05, 0.2), cylinder(0.03, 0.15));
+    for angle in [0.0, 0.3, 1.0, 1.5] {
+        for gap_m in [0.1, 1e-3, 1e-6, -1e-4, -0.01] {
+            let p = DVec3::X * (0.08 + gap_m);
+            let turned = DQuat::from_rotation_x(angle);
+            let found = nearest(&at(&first, p, DQuat::IDENTITY), &at(&second, DVec3::ZERO, turned), 1.0).unwrap();
+            // radii are single precision; a round hull is made of faces
+            assert!(found.1 < gap_m + 1e-8 && found.1 > gap_m - 2e-5, "{angle} rad: {} of {gap_m}", found.1);
+            assert!(found.0.x > 1.0 - 1e-3, "{angle} rad, {gap_m} m: {}", found.0);
+        }
+    }
+}
+
+#[test]
+fn a_mesh_that_is_not_divided_touches_as_its_hull() {
+    let FormKind::Solid(SolidForm { solid: faces, .. }) = hull(DVec3::splat(0.05)).kind else { unreachable!() };
+    let Solid::Hull { points_m } = faces else { unreachable!() };
+    let triangles = crate::shape::hull_triangles(&points_m).unwrap();
+    let mesh = Solid::Mesh { points_m: triangles.points.into(), triangles: triangles.triangles.into() };
+    let (form, floor) = (solid(mesh, 0.1), cuboid(DVec3::new(0.5, 0.5, 0.05)));
+    let found = all(&at(&form, DVec3::Z * 0.1, DQuat::IDENTITY), &at(&floor, DVec3::ZERO, DQuat::IDENTITY), 1e-3);
+    assert!(found.len() >= 3 && found.iter().all(|touch| touch.gap_m.abs() < 1e-7 && touch.normal.z > 0.999_999));
 }
 
 #[test]

@@ -17,15 +17,6 @@ fn place<'a>(form: &'a Form, (position, rotation): (DVec3, DQuat), nodes: &'a [D
     Placed { form, view }
 }
 
-/// Whether parry answers for a pair, whose gaps are right to a thousandth of the sizes only.
-fn both_blocks(first: &Form, second: &Form) -> bool {
-    [first, second].iter().all(|form| match &form.kind {
-        FormKind::Solid(SolidForm { solid, .. }) => !matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. }),
-        FormKind::Chain => false,
-        FormKind::Tool(_) => true,
-    })
-}
-
 const RADII: [f64; 8] = [8e-3; 8];
 
 /// A gently curved tube through a place.
@@ -59,7 +50,8 @@ proptest! {
                 prop_assert!(here.iter().chain(&there).all(|m| m.normal.is_normalized() && m.gap_m <= 5e-3));
                 prop_assert_eq!(here.is_empty(), there.is_empty());
                 if let Some(m) = here.iter().min_by(|m, n| m.gap_m.total_cmp(&n.gap_m)) {
-                    prop_assert!(both_blocks(first, second) || (m.gap_m - lowest(&there).gap_m).abs() < 1e-5, "{} {}", m.gap_m, lowest(&there).gap_m);
+                    // the hull of round parts that overlap stops growing a ten-thousandth of a millimetre short
+                    prop_assert!((m.gap_m - lowest(&there).gap_m).abs() < 1e-6, "{} {}", m.gap_m, lowest(&there).gap_m);
                 }
             }
         }
@@ -97,13 +89,8 @@ fn gaps_and_normals_change_smoothly_along_a_motion() {
                 let (a, b) = (place(first, (p, turned), &u), place(second, (DVec3::ZERO, DQuat::IDENTITY), &v));
                 let now = nearest(&a, &b, 0.2);
                 if let (Some((n, g)), Some((m, f))) = (now, last) {
-                    // a gap changes by no more than the way, and single precision shakes it
-                    assert!(
-                        both_blocks(first, second) || (g - f).abs() < 5e-4 + 2e-6,
-                        "step {i}: {f} and {g} {:?} {:?}",
-                        a.view,
-                        b.view
-                    );
+                    // a gap changes by no more than the way, and spans are found to a millionth
+                    assert!((g - f).abs() < 5e-4 + 2e-6, "step {i}: {f} and {g} {:?} {:?}", a.view, b.view);
                     // the lowest places of round things apart: the normal turns by the way over the distance at most
                     assert!(f < 5e-3 || m.dot(n) > 0.0, "step {i}: {m} and {n}");
                 }
@@ -127,7 +114,7 @@ fn coincident_forms_still_have_normals() {
                 let found = all(&a, &b, 1e-3);
                 assert!(found.iter().all(|m| (m.normal.length() - 1.0).abs() < 1e-9 && m.gap_m.is_finite()));
                 assert!(found.iter().any(|m| m.gap_m < 0.0), "{:?} {:?}: {found:?}", a.view, b.view);
-                let Some((normal, gap_m)) = nearest(&a, &b, 1e-3) else { continue };
+                let (normal, gap_m) = nearest(&a, &b, 1e-3).unwrap();
                 assert!((normal.length() - 1.0).abs() < 1e-9 && gap_m < 0.0);
             }
         }
@@ -158,7 +145,7 @@ fn nothing_is_allocated_once_everything_is_known() {
     let cast = cast();
     let v = curved((DVec3::ZERO, DQuat::IDENTITY));
     let (mut room, mut found) = (TouchRoom::default(), Vec::new());
-    let mut run = |lift: f64| {
+    let mut run = |lift: f64, known: bool| {
         for first in &cast {
             for second in &cast {
                 let p = DVec3::Y * lift;
@@ -169,12 +156,12 @@ fn nothing_is_allocated_once_everything_is_known() {
                     touches(&a, &b, 0.01, &mut room, &mut found);
                     gap(&a, &b, 0.01, &mut room);
                 });
-                assert!(lift == 0.0 || info.count_total == 0, "{} allocations", info.count_total);
+                assert!(!known || info.count_total == 0, "{} allocations", info.count_total);
             }
         }
     };
-    run(0.0);
-    for i in 0..20 {
-        run(0.085 + 1e-3 * f64::from(i));
+    // storage grows to the most that the motion needs, once
+    for known in [false, true] {
+        (0..20).for_each(|i| run(5e-3 * f64::from(i), known));
     }
 }
