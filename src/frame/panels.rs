@@ -3,7 +3,7 @@
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
 use super::session::Session;
-use crate::compositor::viewer::{AgentRow, AgentState, Law, Status};
+use crate::compositor::viewer::{AgentRow, AgentState, CouplingRow, Law, Status};
 use crate::control;
 use crate::runtime::{self, AgentStats};
 use crate::scene::Spec;
@@ -81,6 +81,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     status.policy = session.policy_name().to_owned();
     status.clamp = session.clamp();
     status.triangles = session.picture().triangles();
+    fill_couplings(status, session);
     status.energy_j = 0.0;
     for (at, agent) in session.agents().iter().enumerate() {
         let (stats, newest) = (agent.stats(), agent.latest());
@@ -98,6 +99,23 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
         status.energy_j += stats.energy_j;
     }
     news
+}
+
+/// The couplings of all agents, each told by the agent that owns it.
+fn fill_couplings(status: &mut Status, session: &Session) {
+    let Status { couplings, agents, .. } = status;
+    couplings.clear();
+    for (owner, agent) in session.agents().iter().enumerate() {
+        couplings.extend(agent.latest().pairs.iter().filter(|pair| pair.contacts > 0).map(|pair| CouplingRow {
+            a: agents[owner].name.clone(),
+            b: agents[pair.with.0 as usize].name.clone(),
+            kind: pair.kind.name(),
+            contacts: pair.contacts,
+            force_n: pair.force_n,
+            penetration_m: pair.penetration_m,
+            tank_j: pair.tank_j,
+        }));
+    }
 }
 
 fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {

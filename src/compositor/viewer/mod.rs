@@ -6,6 +6,7 @@
 mod bar;
 mod blit;
 mod commands;
+mod couplings;
 mod history;
 mod icons;
 mod mouse;
@@ -23,7 +24,8 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use shell::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use show::{
-    Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, Message, Show, Skip, Status, ViewRequest, Weight,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Show, Skip, Status, ViewRequest,
+    Weight,
 };
 
 use super::{Colouring, Size, Style};

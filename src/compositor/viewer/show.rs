@@ -197,8 +197,29 @@ pub struct Status {
     pub held: Option<Held>,
     /// One row for each agent, in the scene's order.
     pub agents: Vec<AgentRow>,
+    /// What agents do to each other now.
+    pub couplings: Vec<CouplingRow>,
     /// What the user should know, oldest first.
     pub messages: Vec<Message>,
+}
+
+/// A coupling of two agents in numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CouplingRow {
+    /// The name of the agent that owns it.
+    pub a: String,
+    /// The name of the other.
+    pub b: String,
+    /// Its law.
+    pub kind: &'static str,
+    /// Places that touch or are held.
+    pub contacts: u32,
+    /// Mean force of the owner's last step, newtons, ≥ 0.
+    pub force_n: f64,
+    /// The deepest overlap, metres, ≥ 0.
+    pub penetration_m: f64,
+    /// What is left in its energy tank, joules, where it has one.
+    pub tank_j: Option<f64>,
 }
 
 /// What an agent does now.
@@ -244,6 +265,8 @@ pub struct AgentRow {
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
+    /// Whose clock it keeps while it shares a world with others.
+    pub led_by: Option<String>,
     /// What it does now.
     pub state: AgentState,
 }
@@ -267,6 +290,7 @@ impl AgentRow {
             dropped_s: 0.0,
             residual_m: 0.0,
             force_n: None,
+            led_by: None,
             state: AgentState::Running,
         }
     }

@@ -23,6 +23,9 @@ pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut Looks) 
         section(ui, "Control", |ui| control(ui, status, &mut actions));
         section(ui, "Picture", |ui| picture(ui, looks, status));
         let row = status.selected.and_then(|id| status.agents.iter().find(|row| row.id == id));
+        if !status.couplings.is_empty() {
+            section(ui, "Couplings", |ui| super::couplings::show(ui, &status.couplings));
+        }
         section(ui, "Selected", |ui| selected(ui, row, &mut actions));
     });
     actions

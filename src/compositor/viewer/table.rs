@@ -143,7 +143,7 @@ fn cells(row: &AgentRow) -> [String; COLUMNS.len()] {
         text::seconds(row.age_s),
         text::seconds(row.step_s),
         format!("{:.1} %", 100.0 * row.cpu_share),
-        state_text(&row.state),
+        state_text(row),
     ]
 }
 
@@ -151,9 +151,9 @@ fn dash() -> String {
     "–".to_owned()
 }
 
-fn state_text(state: &AgentState) -> String {
-    match state {
-        AgentState::Running => "running".to_owned(),
+fn state_text(row: &AgentRow) -> String {
+    match &row.state {
+        AgentState::Running => row.led_by.as_ref().map_or_else(|| "running".to_owned(), |by| format!("led by {by}")),
         AgentState::Resting => "resting".to_owned(),
         AgentState::Parked(reason) => format!("parked: {reason}"),
     }

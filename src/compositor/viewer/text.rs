@@ -30,6 +30,20 @@ pub fn metres(value: f64) -> String {
     }
 }
 
+/// An energy such as `3.20 mJ` or `1.50 J`.
+#[must_use]
+pub fn joules(value: f64) -> String {
+    if !value.is_finite() {
+        return "–".to_owned();
+    }
+    match value.abs() {
+        0.0 => "0 mJ".to_owned(),
+        size if size < 1e-3 => format!("{} µJ", figures(value * 1e6)),
+        size if size < 1.0 => format!("{} mJ", figures(value * 1e3)),
+        _ => format!("{} J", figures(value)),
+    }
+}
+
 /// Three figures: `0`, `0.123`, `1.23`, `12.3`, `123`, `1234`.
 #[must_use]
 pub fn figures(value: f64) -> String {

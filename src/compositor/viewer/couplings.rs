@@ -1,0 +1,41 @@
+//! The list of couplings: who acts on whom, by which law, how hard, and what is left in its energy tank.
+//!
+//! In: the rows of a [`super::Status`]. Out: a part of the panel at the side. Never here: which couplings there are.
+
+use super::show::CouplingRow;
+use super::text;
+use super::theme::palette;
+use egui::{Grid, RichText, Ui};
+
+/// More rows than this are counted, not listed.
+const ROWS_MAX: usize = 8;
+
+/// Draws the list, the strongest first.
+pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
+    let palette = palette(ui);
+    let mut order: Vec<&CouplingRow> = couplings.iter().collect();
+    order.sort_by(|a, b| b.force_n.total_cmp(&a.force_n));
+    Grid::new("couplings").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+        for row in order.iter().take(ROWS_MAX) {
+            ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
+            ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
+            ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
+            let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
+            let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
+            let color = if low { palette.warn } else { palette.weak };
+            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(spoken(row));
+            ui.end_row();
+        }
+    });
+    if couplings.len() > ROWS_MAX {
+        ui.label(RichText::new(format!("and {} more", couplings.len() - ROWS_MAX)).size(11.5).color(palette.weak));
+    }
+}
+
+fn spoken(row: &CouplingRow) -> String {
+    format!(
+        "{} contacts, {} deep; what the energy tank may still give before the coupling fades",
+        row.contacts,
+        text::metres(row.penetration_m)
+    )
+}
