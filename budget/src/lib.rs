@@ -1,7 +1,7 @@
 //! Control laws and the sharing of a budget, as numbers: a time goes in, a coarseness comes out.
 //!
-//! In: measured times or rates, ranges, weights. Out: ε, n, shares of a budget.
-//! Never here: clocks, objects, engine types, allocation. Theory: `docs/theory/control.md`, after (GDC04).
+//! In: measured times or rates, ranges, costs, benefits. Out: ε, n, shares of a budget, a level for every object.
+//! Never here: clocks, objects, engine types. Theory: `docs/theory/control.md`, after (GDC04), and `docs/theory/budget.md`.
 //!
 //! ```
 //! use metachron_budget::log_law::{Gains, LogLaw};
@@ -16,9 +16,12 @@
 //! ```
 #![no_std]
 
+extern crate alloc;
+
 pub mod grisoni;
 pub mod hysteresis;
 pub mod log_law;
+pub mod select;
 pub mod share;
 
 /// An end of a range of resolutions.

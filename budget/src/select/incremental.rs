@@ -1,0 +1,158 @@
+//! The incremental choice of Funkhouser and Séquin (FS93, §6): from the last frame's levels, one up, as many down as it takes.
+//!
+//! In: a [`Problem`] and the levels of the frame before. Out: a [`Selection`], and how many passes it took.
+//! Never here: a promise; it equals the greedy choice only where benefit per cost falls with every level.
+//! Theory: `docs/theory/budget.md`, eq. 12.
+
+use alloc::collections::BinaryHeap;
+use alloc::vec::Vec;
+use core::cmp::Reverse;
+
+use super::linear::linear;
+use super::problem::{Level, Mode, Problem, Selection};
+use super::ratio::{Rank, Ratio};
+
+/// Which of the states on the way is the answer.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Keep {
+    /// The last, as the paper says: it can be worth less than one that was passed.
+    Last,
+    /// The best that fitted.
+    Best,
+}
+
+/// What the passes came to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Passes {
+    /// The answer.
+    pub selection: Selection,
+    /// Passes of one rise and as many falls as it takes.
+    pub passes: u32,
+    /// Whether it ended by itself; otherwise the number of passes was cut off.
+    pub settled: bool,
+}
+
+/// Starts from `last`, the levels of the frame before (`None` for what is new; empty for a cold start), and passes until an object
+/// rises and falls in the same pass.
+#[must_use]
+pub fn incremental(problem: &Problem, last: &[Level], keep: Keep) -> Passes {
+    if let Some(selection) = problem.infeasible() {
+        return Passes { selection, passes: 0, settled: true };
+    }
+    let mut search = Search::from(problem, last);
+    // from anywhere, every level of every object can rise and fall once each way before the same state must come again
+    let most = 2 * (0..problem.len()).map(|i| problem.levels(i).len() as u32 + 1).sum::<u32>() + 8;
+    let (mut passes, mut settled) = (0, false);
+    while !settled && passes < most {
+        passes += 1;
+        settled = search.pass();
+    }
+    let levels = match keep {
+        Keep::Last if search.spent <= problem.budget() => search.levels,
+        _ => search.best.1,
+    };
+    let upper = linear(problem).map_or(0.0, |l| l.value);
+    Passes { selection: problem.certified(levels, upper), passes, settled }
+}
+
+struct Search<'a> {
+    problem: &'a Problem,
+    levels: Vec<Level>,
+    spent: u64,
+    value: u64,
+    /// The best state that fitted: value and levels. The cheapest set, at first.
+    best: (u64, Vec<Level>),
+    /// Levels that objects could rise to, and levels that they could leave; what has moved on is passed over.
+    rises: BinaryHeap<Reverse<Rank>>,
+    falls: BinaryHeap<Rank>,
+}
+
+impl<'a> Search<'a> {
+    fn from(problem: &'a Problem, last: &[Level]) -> Self {
+        let cheapest = problem.cheapest();
+        let start = |i: usize| {
+            let held = last.get(i).copied().flatten().filter(|&l| (l as usize) < problem.levels(i).len());
+            held.map_or(cheapest[i], |l| Some(l.max(cheapest[i].unwrap_or(0))))
+        };
+        let levels: Vec<_> = (0..problem.len()).map(start).collect();
+        let (spent, value) = (problem.cost(&levels), problem.value(&levels));
+        let best = (problem.value(&cheapest), cheapest);
+        let mut search =
+            Self { problem, levels, spent, value, best, rises: BinaryHeap::new(), falls: BinaryHeap::new() };
+        (0..problem.len()).for_each(|i| search.offer(i));
+        search.remember();
+        search
+    }
+
+    /// One pass; whether it was the last.
+    fn pass(&mut self) -> bool {
+        let risen = self.rise();
+        let mut last = risen.is_none() && self.spent <= self.problem.budget();
+        while self.spent > self.problem.budget() {
+            let fallen = self.fall();
+            last |= fallen.is_none() || fallen == risen;
+            if fallen.is_none() {
+                break;
+            }
+        }
+        self.remember();
+        last
+    }
+
+    fn rise(&mut self) -> Option<u32> {
+        while let Some(Reverse(rank)) = self.rises.pop() {
+            if above(self.levels[rank.object as usize]) == rank.level {
+                self.change(rank.object as usize, Some(rank.level));
+                return Some(rank.object);
+            }
+        }
+        None
+    }
+
+    fn fall(&mut self) -> Option<u32> {
+        while let Some(rank) = self.falls.pop() {
+            if self.levels[rank.object as usize] == Some(rank.level) {
+                self.change(rank.object as usize, rank.level.checked_sub(1));
+                return Some(rank.object);
+            }
+        }
+        None
+    }
+
+    fn change(&mut self, object: usize, level: Level) {
+        let (from, to) = (self.problem.entry(object, self.levels[object]), self.problem.entry(object, level));
+        self.spent = self.spent - from.cost + to.cost;
+        self.value = self.value - from.benefit + to.benefit;
+        self.levels[object] = level;
+        self.offer(object);
+    }
+
+    /// Puts the object's next rise and next fall where they are found.
+    fn offer(&mut self, object: usize) {
+        let levels = self.problem.levels(object);
+        let rank = |level: u32| {
+            let e = levels[level as usize];
+            Rank::new(Ratio { benefit: e.benefit, cost: e.cost }, self.problem.id(object), object, level)
+        };
+        let next = above(self.levels[object]);
+        if (next as usize) < levels.len() {
+            self.rises.push(Reverse(rank(next)));
+        }
+        let lowest = if self.problem.mode() == Mode::AtMostOne { None } else { self.problem.least(object) };
+        if let Some(held) = self.levels[object].filter(|_| self.levels[object] > lowest) {
+            self.falls.push(rank(held));
+        }
+    }
+
+    fn remember(&mut self) {
+        if self.spent <= self.problem.budget() && self.value > self.best.0 {
+            self.best.0 = self.value;
+            self.best.1.clone_from(&self.levels);
+        }
+    }
+}
+
+/// The level above one, whether it exists or not.
+fn above(level: Level) -> u32 {
+    level.map_or(0, |l| l + 1)
+}
