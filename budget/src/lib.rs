@@ -18,6 +18,7 @@
 
 extern crate alloc;
 
+pub mod adaptive;
 pub mod grisoni;
 pub mod hysteresis;
 pub mod log_law;

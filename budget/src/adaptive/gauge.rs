@@ -1,0 +1,103 @@
+//! One number that says how much slower the machine is than its table: a Kalman filter with a sense for outliers.
+//!
+//! In: the time predicted by the table, and the time measured. Out: κ = measured / predicted, and how far it can be trusted.
+//! Never here: clocks, or which frame a measurement belongs to ([`super::Adaptive`] knows). Theory: `docs/theory/budget.md`, eq. 34 … 36.
+
+use crate::within;
+
+/// Growth of the variance of κ from one lesson to the next: it may wander by 1.4 % a frame.
+const WANDER: f64 = 2e-4;
+/// Variance of κ at first: the table may be 14 % wrong before a surprise is an outlier.
+const P_START: f64 = 0.02;
+/// Variance of κ after a change of regime: the next lesson is believed whole.
+const P_REGIME: f64 = 0.2;
+/// Least standard deviation of a measurement, as a part of the frame's time.
+const SIGMA_LEAST: f64 = 0.01;
+/// Memory of σ²: each lesson counts 3 %.
+const FORGET: f64 = 0.97;
+/// An error past this many σ is an outlier …
+const OUTLIER: f64 = 4.0;
+/// … unless so many in a row err on the same side: then it is the machine that changed.
+const IN_A_ROW: i8 = 3;
+/// Where κ is kept whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
+const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
+
+/// What came of a measurement.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Lesson {
+    /// κ has moved towards it.
+    Learned,
+    /// It was too far away to be believed, for now.
+    Outlier,
+    /// It was the third too far away on the same side: κ has jumped.
+    NewRegime,
+    /// It was no measurement: a number that is none, or nothing was predicted.
+    Refused,
+}
+
+/// κ of one stage: drawing, culling, or one class of simulation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gauge {
+    kappa: f64,
+    variance: f64,
+    sigma2: f64,
+    /// Outliers in a row, counted up where too slow and down where too fast.
+    strange: i8,
+}
+
+impl Default for Gauge {
+    fn default() -> Self {
+        Self { kappa: 1.0, variance: P_START, sigma2: SIGMA_LEAST * SIGMA_LEAST, strange: 0 }
+    }
+}
+
+impl Gauge {
+    /// How many ticks one tick of the table takes, 0.001 … 1000.
+    #[must_use]
+    pub fn kappa(&self) -> f64 {
+        self.kappa
+    }
+
+    /// σ̂: standard deviation of the error of a prediction, as a part of the frame's time.
+    #[must_use]
+    pub fn sigma(&self) -> f64 {
+        libm::sqrt(self.sigma2)
+    }
+
+    /// Learns that `took` was measured where the table, without κ, had predicted `table`; both as parts of the frame's time T.
+    pub fn observe(&mut self, table: f64, took: f64) -> Lesson {
+        if !(table.is_finite() && table > 0.0 && took.is_finite() && took >= 0.0) {
+            return Lesson::Refused;
+        }
+        let error = took - self.kappa * table;
+        let surprise = error.abs() > OUTLIER * libm::sqrt(self.sigma2 + self.variance * table * table);
+        let lesson = if surprise { self.doubt(error) } else { Lesson::Learned };
+        if !surprise {
+            self.strange = 0;
+        }
+        if lesson == Lesson::Outlier {
+            return lesson;
+        }
+        // a measurement of κ with standard deviation σ/ŷ₀
+        let noise = self.sigma2 / (table * table);
+        self.variance += WANDER;
+        let gain = self.variance / (self.variance + noise);
+        self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE);
+        self.variance *= 1.0 - gain;
+        if lesson == Lesson::Learned {
+            self.sigma2 = (FORGET * self.sigma2 + (1.0 - FORGET) * error * error).max(SIGMA_LEAST * SIGMA_LEAST);
+        }
+        lesson
+    }
+
+    fn doubt(&mut self, error: f64) -> Lesson {
+        let side = if error > 0.0 { 1 } else { -1 };
+        self.strange = if self.strange * side >= 0 { self.strange + side } else { side };
+        if self.strange.abs() < IN_A_ROW {
+            return Lesson::Outlier;
+        }
+        self.strange = 0;
+        self.variance = P_REGIME;
+        Lesson::NewRegime
+    }
+}

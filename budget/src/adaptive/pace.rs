@@ -1,0 +1,95 @@
+//! When a frame may teach and when a choice may change: the miss ladder, the deadline, the hold of a still picture.
+//!
+//! In: times of frames. Out: a margin, a verdict. Never here: a clock; whoever measures has that.
+//! Theory: `docs/theory/budget.md`, eq. 37 … 40.
+
+/// A frame later than this part of T past it is a miss that the ladder counts.
+const MISS: f64 = 0.10;
+/// So many in a row raise the margin …
+const MISSES: u8 = 2;
+/// … for so many frames.
+const WARY: u8 = 30;
+/// A still picture is chosen anew where it is predicted late so often in a row …
+const LATE_IN_A_ROW: u8 = 3;
+/// … or once by more than this part of T.
+const LATE_AT_ONCE: f64 = 0.05;
+/// A still picture rises where this part of T was to spare …
+const SPARE: f64 = 0.05;
+/// … so often in a row: about as long as it takes to see that a machine has calmed down.
+const SPARE_IN_A_ROW: u8 = 8;
+
+/// Two misses in a row make the budget wary for half a second or so.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Ladder {
+    misses: u8,
+    wary: u8,
+}
+
+impl Ladder {
+    /// Learns that a frame took `part` of its time.
+    pub fn observe(&mut self, part: f64) {
+        self.wary = self.wary.saturating_sub(1);
+        self.misses = if part > 1.0 + MISS { self.misses.saturating_add(1) } else { 0 };
+        if self.misses >= MISSES {
+            self.wary = WARY;
+        }
+    }
+
+    /// What is added to the number of σ in the margin: 1 while wary.
+    #[must_use]
+    pub fn extra_sigmas(&self) -> f64 {
+        if self.wary > 0 { 1.0 } else { 0.0 }
+    }
+}
+
+/// Whether what is left of a frame must be drawn in its lowest forms: `elapsed` of `target` is past 85 %.
+///
+/// A time that is none is late: that errs on the side of the frame.
+#[must_use]
+pub fn is_late(elapsed: f64, target: f64) -> bool {
+    let in_time = elapsed <= 0.85 * target;
+    !in_time
+}
+
+/// Whether the choice for a picture in which nothing moves still holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub(crate) struct Hold {
+    late: u8,
+    spare: u8,
+}
+
+impl Hold {
+    /// Whether the last choice may stay: `predicted` is what it would take now, `goal` the budget, both as parts of T; `can_rise`
+    /// where not everything is at its most.
+    pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
+        self.late = if predicted > 1.0 { self.late.saturating_add(1) } else { 0 };
+        self.spare = if can_rise && goal - predicted > SPARE { self.spare.saturating_add(1) } else { 0 };
+        let keeps = predicted <= 1.0 + LATE_AT_ONCE && self.late < LATE_IN_A_ROW && self.spare < SPARE_IN_A_ROW;
+        if !keeps {
+            *self = Self::default();
+        }
+        keeps
+    }
+}
+
+/// A slow correction of the budget by what frames lacked or left over; off by default, since κ does the same sooner.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Trim {
+    part: f64,
+}
+
+impl Trim {
+    /// Learns what was left over of a frame, as a part of T; nothing where all was at its most and time was left, for there was
+    /// nothing to spend it on (eq. 40).
+    pub fn observe(&mut self, left_over: f64, all_at_most: bool) {
+        if left_over.is_finite() && !(all_at_most && left_over > 0.0) {
+            self.part = crate::within(self.part + 0.03 * left_over, (-0.10, 0.05));
+        }
+    }
+
+    /// What is added to the budget, as a part of T: −0.10 … 0.05.
+    #[must_use]
+    pub fn part(&self) -> f64 {
+        self.part
+    }
+}
