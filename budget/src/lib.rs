@@ -19,6 +19,7 @@
 extern crate alloc;
 
 pub mod adaptive;
+pub mod cost;
 pub mod grisoni;
 pub mod hysteresis;
 pub mod log_law;

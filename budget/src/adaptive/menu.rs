@@ -6,6 +6,8 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
+use super::STAGES;
+
 /// One level of an object as it is offered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offer {
@@ -15,34 +17,43 @@ pub struct Offer {
     pub gain: f64,
 }
 
-/// One step along an object's hull.
+/// One step along an object's hull: all that the choice looks at for each of them, so that it stays near.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Step {
     /// Gain per tick at weight 1; infinite where it is free.
     pub slope: f64,
     /// Ticks that it adds.
     pub cost: u64,
-    /// Gain that it adds at weight 1.
+}
+
+/// What an object costs and gives after a step.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct Vertex {
+    /// Ticks by the table.
+    pub cost: u64,
+    /// Gain at weight 1.
     pub gain: f64,
-    /// The level after it.
-    pub level: u32,
+    /// The level it then has; none where it is left out.
+    pub level: Option<u32>,
 }
 
 /// An object on the menu.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Object {
     pub id: u64,
-    /// Which gauge its costs belong to.
-    pub stage: usize,
+    /// Which gauge its costs belong to, below [`super::STAGES`].
+    pub stage: u8,
     /// What all its gains are multiplied by; finite, ≥ 0.
     pub weight: f64,
-    /// Cost, gain and level before the first step; no level where it may be left out.
-    pub base: (u64, f64, Option<u32>),
+    /// What it is before the first step.
+    pub base: Vertex,
+    /// What all its steps cost together, ticks by the table.
+    pub span: u64,
     first: u32,
     pub steps: u16,
     /// Steps taken in the last choice.
     pub taken: u16,
-    /// Frames for which it may not rise.
+    /// It may not rise while this is above 1; one less every frame.
     pub dwell: u8,
 }
 
@@ -51,11 +62,17 @@ pub(crate) struct Object {
 pub(crate) struct Menu {
     objects: Vec<Object>,
     steps: Vec<Step>,
+    /// Where each step leads.
+    vertices: Vec<Vertex>,
     /// Steps of objects that went or changed, still in `steps`.
     unused: usize,
+    /// What the least of everything takes by the table, ticks of each stage.
+    pub least: [u64; STAGES],
+    /// How many objects may be left out.
+    pub droppable: usize,
     /// Counts what could change the choice: objects, hulls, weights.
     pub changes: u64,
-    points: Vec<(u64, f64, u32)>,
+    points: Vec<Vertex>,
 }
 
 impl Menu {
@@ -71,6 +88,14 @@ impl Menu {
         &self.steps[range(object)]
     }
 
+    /// What an object is after `taken` steps.
+    pub(crate) fn vertex(&self, object: &Object, taken: u16) -> Vertex {
+        match taken.checked_sub(1) {
+            Some(at) => self.vertices[object.first as usize + usize::from(at)],
+            None => object.base,
+        }
+    }
+
     pub(crate) fn find(&self, id: u64) -> Option<&Object> {
         self.objects.binary_search_by_key(&id, |o| o.id).ok().map(|at| &self.objects[at])
     }
@@ -78,32 +103,52 @@ impl Menu {
     /// Puts an object on the menu, or gives it other levels. What it had taken stays as near as the new hull allows.
     pub(crate) fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
         let (base, kept) = self.hull(droppable, levels);
-        let first = self.steps.len() as u32;
-        let mut from = (base.0, base.1);
-        for at in 0..kept {
-            let (cost, gain, level) = self.points[at];
-            let (dc, dg) = (cost - from.0, gain - from.1);
-            let slope = if dc == 0 { f64::INFINITY } else { dg / dc as f64 };
-            self.steps.push(Step { slope, cost: dc, gain: dg, level });
-            from = (cost, gain);
+        let (first, steps) = (self.steps.len() as u32, kept.min(usize::from(u16::MAX)) as u16);
+        let mut from = base;
+        for &to in &self.points[..usize::from(steps)] {
+            self.steps.push(Step { slope: slope(from, to), cost: to.cost - from.cost });
+            self.vertices.push(to);
+            from = to;
         }
-        let steps = kept.min(usize::from(u16::MAX)) as u16;
-        let new = Object { id, stage, weight: 1.0, base, first, steps, taken: 0, dwell: 0 };
+        let new = Object {
+            id,
+            weight: 1.0,
+            base,
+            span: from.cost - base.cost,
+            first,
+            steps,
+            taken: 0,
+            stage: stage as u8,
+            dwell: 0,
+        };
         match self.objects.binary_search_by_key(&id, |o| o.id) {
             Ok(at) => {
                 let old = self.objects[at];
-                if self.steps[range(&old)] == self.steps[range(&new)] && old.base == base && old.stage == stage {
+                if self.vertices[range(&old)] == self.vertices[range(&new)]
+                    && old.base == base
+                    && old.stage == new.stage
+                {
                     self.steps.truncate(first as usize);
+                    self.vertices.truncate(first as usize);
                     return;
                 }
-                self.unused += usize::from(old.steps);
+                self.forget(&old);
                 let taken = old.taken.min(steps);
                 self.objects[at] = Object { weight: old.weight, taken, dwell: old.dwell, ..new };
             }
             Err(at) => self.objects.insert(at, new),
         }
+        self.least[stage] += base.cost;
+        self.droppable += usize::from(base.level.is_none());
         self.changes += 1;
         self.compact();
+    }
+
+    /// Takes an object out of the sums.
+    fn forget(&mut self, old: &Object) {
+        self.unused += usize::from(old.steps);
+        self.least[usize::from(old.stage)] -= old.base.cost;
+        self.droppable -= usize::from(old.base.level.is_none());
     }
 
     /// Changes what an object's gains are multiplied by; `false` where there is no such object.
@@ -118,36 +163,35 @@ impl Menu {
     /// Takes an object off the menu; `false` where there is no such object.
     pub(crate) fn remove(&mut self, id: u64) -> bool {
         let Ok(at) = self.objects.binary_search_by_key(&id, |o| o.id) else { return false };
-        self.unused += usize::from(self.objects.remove(at).steps);
+        let old = self.objects.remove(at);
+        self.forget(&old);
         self.changes += 1;
         self.compact();
         true
     }
 
     /// The base of an object's hull, and how many vertices above it now lie in `points`.
-    fn hull(&mut self, droppable: bool, levels: &[Offer]) -> ((u64, f64, Option<u32>), usize) {
+    fn hull(&mut self, droppable: bool, levels: &[Offer]) -> (Vertex, usize) {
         let is_sound = |c: f64| c.is_finite() && c >= 0.0;
         let dearest = levels.iter().map(|l| l.cost).filter(|c| is_sound(*c)).fold(0.0, f64::max);
         self.points.clear();
         self.points.extend((0..).zip(levels).map(|(level, offer)| {
             let cost = if is_sound(offer.cost) { offer.cost } else { 2.0 * dearest };
             let gain = if offer.gain > 0.0 { offer.gain.min(1e30) } else { 0.0 };
-            ((libm::ceil(cost) as u64).min(1 << 44), gain, level)
+            Vertex { cost: (libm::ceil(cost) as u64).min(1 << 44), gain, level: Some(level) }
         }));
-        self.points.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)).then(a.2.cmp(&b.2)));
-        let base = match self.points.first() {
-            Some(&(cost, gain, level)) if !droppable => (cost, gain, Some(level)),
-            _ => (0, 0.0, None),
-        };
-        let mut kept = 0;
+        self.points
+            .sort_unstable_by(|a, b| a.cost.cmp(&b.cost).then(b.gain.total_cmp(&a.gain)).then(a.level.cmp(&b.level)));
+        let nothing = Vertex { cost: 0, gain: 0.0, level: None };
+        let base = self.points.first().copied().filter(|_| !droppable).unwrap_or(nothing);
+        let mut kept: usize = 0;
         for at in 0..self.points.len() {
             let to = self.points[at];
-            let last = if kept > 0 { self.points[kept - 1] } else { (base.0, base.1, 0) };
-            if to.1 <= last.1 {
+            if to.gain <= kept.checked_sub(1).map_or(base, |last| self.points[last]).gain {
                 continue;
             }
             while kept > 0 {
-                let before = if kept > 1 { self.points[kept - 2] } else { (base.0, base.1, 0) };
+                let before = if kept > 1 { self.points[kept - 2] } else { base };
                 if slope(before, self.points[kept - 1]) > slope(self.points[kept - 1], to) {
                     break;
                 }
@@ -164,13 +208,15 @@ impl Menu {
         if self.unused <= self.steps.len() / 2 {
             return;
         }
-        let mut steps = Vec::with_capacity(self.steps.len() - self.unused);
+        let used = self.steps.len() - self.unused;
+        let (mut steps, mut vertices) = (Vec::with_capacity(used), Vec::with_capacity(used));
         for object in &mut self.objects {
             let range = range(object);
             object.first = steps.len() as u32;
-            steps.extend_from_slice(&self.steps[range]);
+            steps.extend_from_slice(&self.steps[range.clone()]);
+            vertices.extend_from_slice(&self.vertices[range]);
         }
-        (self.steps, self.unused) = (steps, 0);
+        (self.steps, self.vertices, self.unused) = (steps, vertices, 0);
     }
 }
 
@@ -178,7 +224,7 @@ fn range(object: &Object) -> Range<usize> {
     object.first as usize..object.first as usize + usize::from(object.steps)
 }
 
-fn slope(from: (u64, f64, u32), to: (u64, f64, u32)) -> f64 {
-    let ticks = to.0 - from.0;
-    if ticks == 0 { f64::INFINITY } else { (to.1 - from.1) / ticks as f64 }
+fn slope(from: Vertex, to: Vertex) -> f64 {
+    let ticks = to.cost - from.cost;
+    if ticks == 0 { f64::INFINITY } else { (to.gain - from.gain) / ticks as f64 }
 }

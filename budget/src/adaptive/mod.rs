@@ -19,6 +19,7 @@
 //! ```
 
 mod gauge;
+pub mod joint;
 mod menu;
 mod pace;
 mod pick;
@@ -192,9 +193,10 @@ impl Adaptive {
         }
         let trim = if self.settings.trim { self.trim.part() } else { 0.0 };
         let budget = target * (1.0 - self.margin() + trim) - fixed;
-        let terms = Terms { budget, kappa: self.kappa, loyalty: 1.0 + self.settings.hysteresis, reach: [0; STAGES] };
-        self.menu.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
-        if !self.may_keep(time, &terms, target, fixed) {
+        let terms = Terms::new(budget, self.kappa, 1.0 + self.settings.hysteresis);
+        if self.may_keep(time, &terms, target, fixed) {
+            self.menu.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
+        } else {
             self.pick(terms);
             self.chosen_for = Some((self.menu.changes, time));
         }
@@ -238,16 +240,13 @@ impl Adaptive {
     #[must_use]
     pub fn level(&self, id: u64) -> Level {
         let object = self.menu.find(id)?;
-        match object.taken.checked_sub(1) {
-            Some(at) => Some(self.menu.steps_of(object)[usize::from(at)].level),
-            None => object.base.2,
-        }
+        self.menu.vertex(object, object.taken).level
     }
 
     /// The lowest form of an object, for what is left when [`is_late`] says so.
     #[must_use]
     pub fn lowest(&self, id: u64) -> Level {
-        self.menu.find(id)?.base.2
+        self.menu.find(id)?.base.level
     }
 
     /// What is known of a stage; the last where there is no such stage.
@@ -286,9 +285,8 @@ impl Adaptive {
     fn pick(&mut self, terms: Terms) {
         let picked = self.picker.pick(&self.menu, terms);
         for (object, &taken) in self.menu.objects_mut().iter_mut().zip(self.picker.taken()) {
-            if taken < object.taken {
-                object.dwell = self.settings.dwell;
-            }
+            let fell = taken < object.taken;
+            object.dwell = if fell { self.settings.dwell } else { object.dwell.saturating_sub(1) };
             object.taken = taken;
         }
         self.table = picked.table;

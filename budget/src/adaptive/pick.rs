@@ -44,30 +44,68 @@ pub(crate) struct Terms {
     pub kappa: [f64; STAGES],
     /// What a step that was taken last time counts: 1 + h.
     pub loyalty: f64,
+    /// 1/κ of each stage: a division an object would take longer than all else.
+    pub per_kappa: [f64; STAGES],
     /// What one object can take at most above its least, by the table of each stage: what is dearer can never fit.
     pub reach: [u64; STAGES],
 }
 
 impl Terms {
+    /// Terms without a menu: what one object can take is known once there is one.
+    pub(crate) fn new(budget: f64, kappa: [f64; STAGES], loyalty: f64) -> Self {
+        Self { budget, kappa, loyalty, per_kappa: kappa.map(|k| 1.0 / k), reach: [0; STAGES] }
+    }
+
     fn cost(&self, table: &[u64; STAGES]) -> f64 {
         table.iter().zip(&self.kappa).map(|(&t, k)| t as f64 * k).sum()
     }
 
-    /// Gain per measured tick of a step.
-    fn merit(&self, object: &Object, at: usize, step: &Step) -> f64 {
-        let loyal = if at < usize::from(object.taken) { self.loyalty } else { 1.0 };
-        step.slope * (object.weight / self.kappa[object.stage] * loyal)
+    /// What a gain per tick of the table is worth per measured tick, for an object's steps: those it had, and others.
+    fn worth(&self, object: &Object) -> (f64, f64) {
+        let worth = object.weight * self.per_kappa[usize::from(object.stage)];
+        (worth * self.loyalty, worth)
     }
+
+    /// How many steps of an object are on offer: all that are worth something and can ever fit; while it dwells, those it had.
+    fn on_offer(&self, object: &Object, steps: &[Step]) -> usize {
+        let most = match (object.weight > 0.0, object.dwell) {
+            (false, _) => 0,
+            (true, 0 | 1) => object.steps,
+            (true, _) => object.taken,
+        };
+        let mut left = self.reach[usize::from(object.stage)];
+        if object.span <= left {
+            return usize::from(most);
+        }
+        let fits = |step: &&Step| match left.checked_sub(step.cost) {
+            Some(rest) => {
+                left = rest;
+                true
+            }
+            None => false,
+        };
+        steps[..usize::from(most)].iter().take_while(fits).count()
+    }
+}
+
+/// A step on the edge of the budget.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Edge {
+    merit: f64,
+    object: u32,
+    step: u16,
 }
 
 /// Buffers of the choice, kept from frame to frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Picker {
-    /// For every bucket and stage the ticks of its steps.
-    bins: Vec<[u64; STAGES]>,
-    /// Steps of the bucket in which the budget ends: merit, object, step.
-    edge: Vec<(f64, u32, u16)>,
-    /// Steps taken of every object.
+    /// For every stage and bucket the ticks of its steps.
+    bins: Vec<[u64; BUCKETS]>,
+    /// The bucket of every step on offer, object after object.
+    buckets: Vec<u16>,
+    /// Steps of the bucket in which the budget ends.
+    edge: Vec<Edge>,
+    /// Steps on offer, and then steps taken, of every object.
     taken: Vec<u16>,
 }
 
@@ -79,103 +117,126 @@ impl Picker {
 
     /// Chooses.
     pub(crate) fn pick(&mut self, menu: &Menu, mut terms: Terms) -> Picked {
-        self.taken.clear();
-        self.taken.resize(menu.objects().len(), 0);
-        let mut table = [0; STAGES];
-        menu.objects().iter().for_each(|o| table[o.stage] += o.base.0);
+        let mut table = menu.least;
         let spare = terms.budget - terms.cost(&table);
-        let feasible = spare >= 0.0;
         terms.reach = terms.kappa.map(|k| (spare / k) as u64);
-        let terms = &terms;
-        let mut lambda = 0.0;
+        let (feasible, mut lambda) = (spare >= 0.0, 0.0);
         if feasible {
-            self.fill_bins(menu, terms);
-            let edge = self.find_edge(terms, &mut table);
-            self.take_above(menu, terms, edge);
-            lambda = self.take_edge(menu, terms, &mut table);
-            let droppable = menu.objects().iter().any(|o| o.base.2.is_none());
-            if lambda > 0.0 && (droppable || menu.objects().len() < FEW) {
-                self.go_on(menu, terms, &mut table);
+            self.sort_into_buckets(menu, &terms);
+            let edge = self.find_edge(&terms, &mut table);
+            self.take_above(menu, &terms, edge);
+            lambda = self.take_edge(menu, &terms, &mut table);
+            if lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
+                self.go_on(menu, &terms, &mut table);
             }
+        } else {
+            self.taken.clear();
+            self.taken.resize(menu.objects().len(), 0);
         }
-        let (value, upper) = self.certify(menu, terms, lambda);
+        let (value, upper) = self.certify(menu, &terms, lambda);
         Picked { feasible, table, value, upper: if feasible { upper } else { 0.0 }, lambda }
     }
 
-    fn fill_bins(&mut self, menu: &Menu, terms: &Terms) {
+    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) {
         self.bins.clear();
-        self.bins.resize(BUCKETS, [0; STAGES]);
+        self.bins.resize(STAGES, [0; BUCKETS]);
+        self.buckets.clear();
+        self.taken.clear();
         for object in menu.objects() {
-            for (at, step) in open_steps(menu, object, terms) {
-                self.bins[bucket(terms.merit(object, at, step))][object.stage] += step.cost;
+            let steps = menu.steps_of(object);
+            let offered = terms.on_offer(object, steps);
+            let (had, other) = terms.worth(object);
+            let bins = &mut self.bins[usize::from(object.stage)];
+            for (at, step) in steps[..offered].iter().enumerate() {
+                let bucket = bucket(step.slope * if at < usize::from(object.taken) { had } else { other });
+                bins[bucket] += step.cost;
+                self.buckets.push(bucket as u16);
             }
+            self.taken.push(offered as u16);
         }
     }
 
-    /// The bucket in which the budget ends, and in `table` what all above it take; `None` where everything fits.
-    fn find_edge(&self, terms: &Terms, table: &mut [u64; STAGES]) -> Option<usize> {
-        for (at, bin) in self.bins.iter().enumerate().rev() {
+    /// The bucket in which the budget ends, and in `table` what all above it take; 0 where everything fits.
+    fn find_edge(&self, terms: &Terms, table: &mut [u64; STAGES]) -> usize {
+        for at in (0..BUCKETS).rev() {
             let mut with = *table;
-            with.iter_mut().zip(bin).for_each(|(sum, ticks)| *sum += ticks);
+            with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at]);
             if terms.cost(&with) > terms.budget {
-                return Some(at);
+                return at;
             }
-            *table = with;
+            if at > 0 {
+                *table = with;
+            }
         }
-        None
+        0
     }
 
-    /// Takes all steps above the edge, and lays those on it aside.
-    fn take_above(&mut self, menu: &Menu, terms: &Terms, edge: Option<usize>) {
+    /// Takes all steps above the edge, and lays those on it aside, best first.
+    fn take_above(&mut self, menu: &Menu, terms: &Terms, edge: usize) {
         self.edge.clear();
-        for (i, object) in menu.objects().iter().enumerate() {
-            for (at, step) in open_steps(menu, object, terms) {
-                let merit = terms.merit(object, at, step);
-                match edge {
-                    Some(edge) if bucket(merit) < edge => break,
-                    Some(edge) if bucket(merit) == edge => self.edge.push((merit, i as u32, at as u16)),
-                    _ => self.taken[i] = at as u16 + 1,
-                }
+        let mut rest = self.buckets.as_slice();
+        for (i, (object, taken)) in menu.objects().iter().zip(&mut self.taken).enumerate() {
+            let (own, others) = rest.split_at(usize::from(*taken));
+            rest = others;
+            // along a hull, buckets never rise
+            let above = own.iter().take_while(|&&b| usize::from(b) > edge).count();
+            let on = own[above..].iter().take_while(|&&b| usize::from(b) == edge).count();
+            *taken = above as u16;
+            let (had, other) = terms.worth(object);
+            for at in above..above + on {
+                let worth = if at < usize::from(object.taken) { had } else { other };
+                let merit = menu.steps_of(object)[at].slope * worth;
+                self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
             }
         }
-        // objects stand in the order of their ids
-        self.edge.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
+        self.sort_edge();
+    }
+
+    /// Best first; objects stand in the order of their ids, and that decides between equals.
+    fn sort_edge(&mut self) {
+        let place = |e: &Edge| (e.object, e.step);
+        self.edge.sort_unstable_by(|a, b| b.merit.total_cmp(&a.merit).then(place(a).cmp(&place(b))));
     }
 
     /// Takes the steps on the edge until one does not fit; its gain per tick.
     fn take_edge(&mut self, menu: &Menu, terms: &Terms, table: &mut [u64; STAGES]) -> f64 {
-        for &(_, i, at) in &self.edge {
-            let object = &menu.objects()[i as usize];
-            let step = &menu.steps_of(object)[usize::from(at)];
+        for edge in &self.edge {
+            let object = &menu.objects()[edge.object as usize];
+            let step = &menu.steps_of(object)[usize::from(edge.step)];
             let mut with = *table;
-            with[object.stage] += step.cost;
+            with[usize::from(object.stage)] += step.cost;
             if terms.cost(&with) > terms.budget {
-                return step.slope * (object.weight / terms.kappa[object.stage]);
+                return step.slope * terms.worth(object).1;
             }
             *table = with;
-            self.taken[i as usize] = at + 1;
+            self.taken[edge.object as usize] = edge.step + 1;
         }
         0.0
     }
 
-    /// After the first step that does not fit: every object's next step that does, best first.
+    /// After the first step that does not fit: of every object, best first, the next steps that do.
     fn go_on(&mut self, menu: &Menu, terms: &Terms, table: &mut [u64; STAGES]) {
         self.edge.clear();
         for (i, object) in menu.objects().iter().enumerate() {
-            let next = open_steps(menu, object, terms).nth(usize::from(self.taken[i]));
-            self.edge.extend(next.map(|(at, step)| (terms.merit(object, at, step), i as u32, at as u16)));
+            let (at, steps) = (usize::from(self.taken[i]), menu.steps_of(object));
+            if at < terms.on_offer(object, steps) {
+                let (had, other) = terms.worth(object);
+                let merit = steps[at].slope * if at < usize::from(object.taken) { had } else { other };
+                self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
+            }
         }
-        self.edge.sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then((a.1, a.2).cmp(&(b.1, b.2))));
-        for &(_, i, at) in &self.edge {
-            let object = &menu.objects()[i as usize];
-            for (at, step) in open_steps(menu, object, terms).skip(usize::from(at)) {
+        self.sort_edge();
+        for edge in &self.edge {
+            let object = &menu.objects()[edge.object as usize];
+            let steps = menu.steps_of(object);
+            for step in &steps[usize::from(edge.step)..terms.on_offer(object, steps)] {
                 let mut with = *table;
-                with[object.stage] += step.cost;
+                with[usize::from(object.stage)] += step.cost;
                 if terms.cost(&with) > terms.budget {
                     break;
                 }
                 *table = with;
-                self.taken[i as usize] = at as u16 + 1;
+                self.taken[edge.object as usize] += 1;
             }
         }
     }
@@ -184,41 +245,21 @@ impl Picker {
     fn certify(&self, menu: &Menu, terms: &Terms, lambda: f64) -> (f64, f64) {
         let (mut value, mut upper) = (0.0, lambda * terms.budget);
         for (object, &taken) in menu.objects().iter().zip(&self.taken) {
-            let kappa = terms.kappa[object.stage];
-            let (mut gain, mut bound) =
-                (object.base.1, object.base.1 * object.weight - lambda * kappa * object.base.0 as f64);
-            for (at, step) in menu.steps_of(object).iter().enumerate() {
-                let net = step.gain * object.weight - lambda * kappa * step.cost as f64;
-                let (takes, pays) = (at < usize::from(taken), net > 0.0);
-                if !takes && !pays {
-                    break;
-                }
-                gain += if takes { step.gain } else { 0.0 };
-                bound += if pays { net } else { 0.0 };
+            value += menu.vertex(object, taken).gain * object.weight;
+            // the best vertex is where the gain per tick falls to λ: near the one that was taken
+            let (steps, worth) = (menu.steps_of(object), terms.worth(object).1);
+            let mut best = usize::from(taken);
+            while best > 0 && steps[best - 1].slope * worth < lambda {
+                best -= 1;
             }
-            value += gain * object.weight;
-            upper += bound;
+            while best < steps.len() && steps[best].slope * worth > lambda {
+                best += 1;
+            }
+            let at = menu.vertex(object, best as u16);
+            upper += at.gain * object.weight - lambda * terms.kappa[usize::from(object.stage)] * at.cost as f64;
         }
         (value, upper)
     }
-}
-
-/// The steps that an object may take, best first: all that are worth something and can ever fit, while it dwells only those it had.
-fn open_steps<'a>(menu: &'a Menu, object: &Object, terms: &Terms) -> impl Iterator<Item = (usize, &'a Step)> {
-    let most = match (object.weight > 0.0, object.dwell) {
-        (false, _) => 0,
-        (true, 0) => object.steps,
-        (true, _) => object.taken,
-    };
-    let mut left = terms.reach[object.stage];
-    let fits = move |(_, step): &(usize, &Step)| match left.checked_sub(step.cost) {
-        Some(rest) => {
-            left = rest;
-            true
-        }
-        None => false,
-    };
-    menu.steps_of(object)[..usize::from(most)].iter().enumerate().take_while(fits)
 }
 
 /// Where a merit falls: by its exponent and the top bits of its mantissa. It is not NaN, and not below 0.

@@ -1,7 +1,7 @@
 //! The distribution of time of Robin Hood (RH05): every instance gets its part by value, and gives back what it does not need.
 //!
 //! In: a time, and instances with a value and the times of their forms. Out: a form for each. One pass, no bound.
-//! Never here: what an instance is worth ([`super::super::cost::value`]) or how much of a frame is left for drawing
+//! Never here: what an instance is worth ([`crate::cost::value`]) or how much of a frame is left for drawing
 //! ([`crate::cost::overlap`]). Theory: `docs/theory/budget.md`, eq. 26 … 28.
 
 use alloc::vec::Vec;

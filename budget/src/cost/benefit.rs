@@ -1,0 +1,107 @@
+//! What a level is worth to who looks (FS93, §5): size, accuracy, importance, focus, motion, hysteresis.
+//!
+//! In: what is seen of an object. Out: a benefit. Never here: perception; it is a heuristic with sliders, as its authors say.
+//! Theory: `docs/theory/budget.md`, eq. 46 … 48.
+
+/// How a surface is shaded, which decides what counts as a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Shading {
+    /// One colour a polygon: samples are polygons, m = 1.
+    Flat,
+    /// Colours of vertices, interpolated: samples are vertices, m = 2.
+    Gouraud,
+    /// Light worked out at every pixel: samples are pixels, m = 1.
+    PerPixel,
+}
+
+/// What is seen of an object, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct View {
+    /// Pixels it covers; ≥ 0.
+    pub pixels: f64,
+    /// Inherent importance, 0 … 1.
+    pub importance: f64,
+    /// Distance of its centre from the middle of the screen, as a part of half the diagonal; ≥ 0.
+    pub off_centre: f64,
+    /// How far it moves on the screen in a frame, pixels; ≥ 0.
+    pub motion_px: f64,
+    /// The level of the frame before, if it had one.
+    pub last: Option<u32>,
+    /// How many levels the object has.
+    pub levels: u32,
+}
+
+/// One level as it would be drawn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Picture {
+    /// Which level.
+    pub level: u32,
+    /// Its polygons.
+    pub polygons: f64,
+    /// Its vertices.
+    pub vertices: f64,
+    /// How it is shaded.
+    pub shading: Shading,
+}
+
+/// How much each factor may take from a benefit, 0 (nothing) … 1 (all of it): the sliders.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sliders {
+    /// Accuracy; at 0 all levels of an object are worth the same.
+    pub accuracy: f64,
+    /// Importance.
+    pub importance: f64,
+    /// Focus: away from the middle of the screen.
+    pub focus: f64,
+    /// Motion blur.
+    pub motion: f64,
+    /// Hysteresis: unlike the frame before.
+    pub hysteresis: f64,
+}
+
+impl Default for Sliders {
+    /// Size and accuracy alone: what the timed test of (FS93, §7) must have meant.
+    fn default() -> Self {
+        Self { accuracy: 1.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 }
+    }
+}
+
+/// The error of a surface drawn with one sample.
+pub const BASE_ERROR: f64 = 0.5;
+
+/// Accuracy = 1 − 0.5 / samples^m, samples at least 1 and never more than pixels (eq. 47); 0.5 … 1.
+#[must_use]
+pub fn accuracy(pixels: f64, picture: &Picture) -> f64 {
+    let (samples, m) = match picture.shading {
+        Shading::Flat => (picture.polygons, 1.0),
+        Shading::Gouraud => (picture.vertices, 2.0),
+        Shading::PerPixel => (pixels, 1.0),
+    };
+    // max and min pass over a NaN
+    let samples = samples.min(pixels).max(1.0);
+    (1.0 - BASE_ERROR / libm::pow(samples, m)).clamp(0.0, 1.0)
+}
+
+/// The benefit of a level (eq. 46), in pixels; ≥ 0. A number that is none takes its whole factor: 0 pixels, no importance.
+#[must_use]
+pub fn benefit(view: &View, picture: &Picture, sliders: &Sliders) -> f64 {
+    let size = if view.pixels > 0.0 { view.pixels.min(f64::MAX) } else { 0.0 };
+    let polygon_px = libm::sqrt(size / picture.polygons.max(1.0));
+    let blur = if view.motion_px > 0.0 { view.motion_px / polygon_px } else { 0.0 };
+    let change =
+        view.last.map_or(0.0, |last| f64::from(picture.level.abs_diff(last)) / f64::from(view.levels.max(2) - 1));
+    let factors = [
+        (accuracy(size, picture), sliders.accuracy),
+        (view.importance, sliders.importance),
+        (1.0 - view.off_centre, sliders.focus),
+        (1.0 - blur, sliders.motion),
+        (1.0 - change, sliders.hysteresis),
+    ];
+    factors.into_iter().map(|(factor, slider)| weighed(factor, slider)).product::<f64>() * size
+}
+
+/// A factor of which a slider lets only a part through: 1 − slider (1 − factor) (eq. 48).
+fn weighed(factor: f64, slider: f64) -> f64 {
+    let part = |x: f64| if x > 0.0 { x.min(1.0) } else { 0.0 };
+    1.0 - part(slider) * (1.0 - part(factor))
+}

@@ -1,0 +1,139 @@
+//! Coefficients of a machine from a benchmark, by fits that a few wild measurements do not move (FS93, §4).
+//!
+//! In: samples of work and time. Out: [`Stages`], and how well they predict. Never here: a measurement.
+//! Theory: `docs/theory/budget.md`, eq. 42 and 43.
+
+use alloc::vec::Vec;
+
+use super::stages::{Stages, Work};
+
+/// One measured draw.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// What was drawn.
+    pub work: Work,
+    /// The time it took, > 0.
+    pub time: f64,
+}
+
+/// Coefficients, and what they are worth.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Fit {
+    /// The coefficients.
+    pub stages: Stages,
+    /// 19 of 20 samples are predicted to within this part of their time.
+    pub error95: f64,
+    /// Samples that were used: those that are numbers.
+    pub samples: usize,
+}
+
+/// Rounds in which samples find their stage and their weight; both come to rest well before.
+const ROUNDS: usize = 30;
+/// An error past this many median errors counts less, in proportion (Huber's weight: 95 % as good as least squares where nothing is wild).
+const WILD: f64 = 1.345 * 1.4826;
+/// Fewer samples than this fix nothing.
+const LEAST: usize = 8;
+
+/// Fits setup + max(c₁ polygons + c₂ vertices, c₃ pixels) to samples of both stages; `None` with fewer than eight sound ones.
+///
+/// The samples should span polygons where pixels are few, and pixels where polygons are few. Where vertices go with polygons in one
+/// ratio throughout, they cannot be told apart: then c₂ is 0 and c₁ stands for both.
+#[must_use]
+pub fn fit(samples: &[Sample]) -> Option<Fit> {
+    let number = |x: f64| x.is_finite() && x >= 0.0;
+    let sound = |s: &Sample| {
+        number(s.work.polygons) && number(s.work.vertices) && number(s.work.pixels) && number(s.time) && s.time > 0.0
+    };
+    let samples: Vec<_> = samples.iter().copied().filter(sound).collect();
+    if samples.len() < LEAST {
+        return None;
+    }
+    let mut stages = start(&samples);
+    let mut best = (f64::INFINITY, stages);
+    for _ in 0..ROUNDS {
+        let errors: Vec<_> = samples.iter().map(|s| stages.time(s.work) / s.time - 1.0).collect();
+        let typical = quantile(errors.iter().map(|e| e.abs()), 0.5);
+        if typical < best.0 {
+            best = (typical, stages);
+        }
+        stages = round(&samples, &errors, typical, stages);
+    }
+    let error95 = quantile(samples.iter().map(|s| (best.1.time(s.work) / s.time - 1.0).abs()), 0.95);
+    Some(Fit { stages: best.1, error95, samples: samples.len() })
+}
+
+/// Both stages as if each were alone: the median time of a polygon and of a pixel, no setup.
+fn start(samples: &[Sample]) -> Stages {
+    let least = quantile(samples.iter().map(|s| s.time), 0.0);
+    let per = |count: fn(&Work) -> f64| {
+        let many = samples.iter().filter(|s| count(&s.work) > 0.0 && s.time > 2.0 * least);
+        quantile(many.map(|s| s.time / count(&s.work)), 0.1)
+    };
+    Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels) }
+}
+
+/// One least-squares fit of the relative error, each sample in the stage that is the slower by the fit before (eq. 42).
+fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> Stages {
+    let row = |s: &Sample| {
+        let w = s.work;
+        if before.is_filling(w) { [1.0, 0.0, 0.0, w.pixels] } else { [1.0, w.polygons, w.vertices, 0.0] }
+    };
+    let mut sums = [[0.0; 5]; 4];
+    for (s, error) in samples.iter().zip(errors) {
+        let weight = (WILD * typical / error.abs().max(f64::MIN_POSITIVE)).min(1.0) / (s.time * s.time);
+        let x = row(s);
+        for (i, line) in sums.iter_mut().enumerate() {
+            x.iter().enumerate().for_each(|(j, xj)| line[j] += weight * x[i] * xj);
+            line[4] += weight * x[i] * s.time;
+        }
+    }
+    let [setup, polygon, vertex, pixel] = solve_from_zero(sums);
+    // a stage in which no sample was keeps what it had
+    let (geometry, fill) = (sums[1][1] > 0.0, sums[3][3] > 0.0);
+    Stages {
+        setup,
+        polygon: if geometry { polygon } else { before.polygon },
+        vertex: if geometry { vertex } else { before.vertex },
+        pixel: if fill { pixel } else { before.pixel },
+    }
+}
+
+/// Four unknowns that are not negative: what comes out below 0 is set to 0 and the rest solved again, vertices first.
+fn solve_from_zero(sums: [[f64; 5]; 4]) -> [f64; 4] {
+    let mut free = [true; 4];
+    loop {
+        let x = solve(sums, free);
+        let worst = [2, 0, 1, 3].into_iter().find(|&i| free[i] && x[i] < 0.0);
+        match worst {
+            Some(i) => free[i] = false,
+            None => return x,
+        }
+    }
+}
+
+/// Gaussian elimination with pivots from the diagonal; an unknown that the others determine already is 0.
+fn solve(mut a: [[f64; 5]; 4], free: [bool; 4]) -> [f64; 4] {
+    const DETERMINED: f64 = 1e-9;
+    let diagonal = [a[0][0], a[1][1], a[2][2], a[3][3]];
+    let mut used = [false; 4];
+    for i in 0..4 {
+        used[i] = free[i] && a[i][i] > DETERMINED * diagonal[i];
+        if !used[i] {
+            continue;
+        }
+        let pivot = a[i];
+        for (_, line) in a.iter_mut().enumerate().filter(|(k, _)| *k != i) {
+            let factor = line[i] / pivot[i];
+            line.iter_mut().zip(pivot).for_each(|(x, p)| *x -= factor * p);
+        }
+    }
+    core::array::from_fn(|i| if used[i] { a[i][4] / a[i][i] } else { 0.0 })
+}
+
+/// The value below which this part lies; 0 of nothing.
+pub(crate) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
+    let mut values: Vec<_> = values.collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let at = libm::round(part * values.len().saturating_sub(1) as f64) as usize;
+    values.get(at).copied().unwrap_or(0.0)
+}

@@ -1,0 +1,59 @@
+//! How much of a frame is left for drawing when logic runs beside it (RH05, §5.3).
+//!
+//! In: the time of the frame and of its logic. Out: the time that may be drawn for. Never here: who measures the logic.
+//! Theory: `docs/theory/budget.md`, eq. 50 … 52.
+
+/// How times of logic and drawing add up to the time of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Overlap {
+    /// ℓ = (t_l/t_f)², ρ = 1 − ℓ, t_r = ρ² t_f/C (RH05, eq. 5 … 7), with this C, > 0. With C = 1 a balanced frame takes 0.953 of
+    /// the sum of both, not the ⅔ that the text says.
+    Printed(f64),
+    /// t_f = max(t_l, t_r) + κ min(t_l, t_r), with this κ, 0 (side by side) … 1 (one after the other): ours.
+    Fitted(f64),
+}
+
+impl Overlap {
+    /// The time for drawing in a frame of `frame` whose logic takes `logic`; 0 where the logic takes it all or a number is none.
+    #[must_use]
+    pub fn drawing(self, frame: f64, logic: f64) -> f64 {
+        let sound = frame.is_finite() && frame > 0.0 && logic < frame;
+        let logic = logic.max(0.0);
+        if !sound || logic.is_nan() {
+            return 0.0;
+        }
+        match self {
+            Self::Printed(c) => {
+                let part = logic / frame;
+                let rho = 1.0 - part * part;
+                rho * rho * frame / c.max(f64::MIN_POSITIVE)
+            }
+            Self::Fitted(kappa) => {
+                let kappa = crate::within(kappa, (0.0, 1.0));
+                let longer = frame - kappa * logic;
+                // where drawing would be the shorter of the two, it is what stretches the logic
+                if longer >= logic { longer } else { ((frame - logic) / kappa).min(logic) }
+            }
+        }
+    }
+
+    /// The time of a frame with these times of logic and drawing, by the fitted form.
+    #[must_use]
+    pub fn frame(kappa: f64, logic: f64, drawing: f64) -> f64 {
+        logic.max(drawing) + kappa * logic.min(drawing)
+    }
+
+    /// κ from measured frames (logic, drawing, frame), by least squares over those where both matter; 1 where none does.
+    #[must_use]
+    pub fn fit(frames: &[(f64, f64, f64)]) -> Self {
+        let (mut above, mut below) = (0.0, 0.0);
+        for &(logic, drawing, frame) in frames {
+            let (less, more) = (logic.min(drawing), logic.max(drawing));
+            if less > 0.0 && more.is_finite() && frame.is_finite() {
+                above += less * (frame - more);
+                below += less * less;
+            }
+        }
+        Self::Fitted(if below > 0.0 { crate::within(above / below, (0.0, 1.0)) } else { 1.0 })
+    }
+}
