@@ -44,6 +44,7 @@ fn brick(obstacles: Vec<Obstacle>) -> RigidSpec {
         friction: 0.4,
         gravity: GRAVITY,
         obstacles: obstacles.into(),
+        joints: Arc::new([]),
         sleep: true,
     }
 }

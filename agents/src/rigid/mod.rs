@@ -17,6 +17,7 @@ mod clearance;
 mod company;
 mod couple;
 mod flight;
+mod joint;
 mod mass;
 mod meeting;
 mod motion;
@@ -30,6 +31,7 @@ mod ties;
 mod world;
 
 pub use body::RigidBody;
+pub use joint::{JOINT_GAP_MAX_M, Joint, JointError, JointKind};
 pub use spec::{RigidError, RigidSpec};
 
 #[cfg(test)]

@@ -1,5 +1,6 @@
 //! What a rigid body is made of and how it starts: the numbers a scene gives, and what is wrong with them.
 
+use super::{Joint, JointError};
 use crate::shape::{Obstacle, ShapeError, Solid};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -27,6 +28,8 @@ pub struct RigidSpec {
     pub gravity: DVec3,
     /// Solids that never move.
     pub obstacles: Arc<[Obstacle]>,
+    /// All joints of the scene, in the order the scene gives them; those that hold this body are its own.
+    pub joints: Arc<[Joint]>,
     /// Whether the body may report that it is at rest.
     pub sleep: bool,
 }
@@ -46,6 +49,9 @@ pub enum RigidError {
         /// What is wrong with its shape.
         source: ShapeError,
     },
+    /// A joint cannot be.
+    #[error(transparent)]
+    Joint(#[from] JointError),
     /// A plane has no end, so it has no mass.
     #[error("a plane cannot move: it must be a fixed obstacle")]
     MovingPlane,
@@ -90,6 +96,7 @@ impl RigidSpec {
             vector("an obstacle's position", obstacle.position)?;
             rotation("an obstacle's rotation", obstacle.rotation)?;
         }
+        self.joints.iter().try_for_each(Joint::check)?;
         Ok(())
     }
 }

@@ -38,6 +38,7 @@ fn spec(solid: Solid, position: DVec3) -> RigidSpec {
         friction: 0.5,
         gravity: UP * -G,
         obstacles: Arc::new([]),
+        joints: Arc::new([]),
         sleep: true,
     }
 }

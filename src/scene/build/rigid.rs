@@ -72,6 +72,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>
         friction,
         gravity: given.gravity,
         obstacles: Arc::clone(given.obstacles),
+        joints: Arc::new([]),
         sleep: given.sleep,
     })
 }
