@@ -3,6 +3,7 @@
 //! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::company::Company;
+use super::island::{self, Island};
 use super::mass::Spread;
 use super::meeting::Meeting;
 use super::motion::Motion;
@@ -10,11 +11,12 @@ use super::obstacles::Obstacles;
 use super::sided::Sided;
 use super::ties::Ties;
 use super::world::World;
-use super::{RigidError, RigidSpec, springs};
+use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::{Form, FormKind, SolidForm};
-use crate::shape::Solid;
+use crate::shape::{Obstacle, Solid};
 use crate::{
-    Agent, Body, Grip, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport, Surroundings, check_span,
+    Agent, AgentId, Body, Companion, Grip, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport,
+    Surroundings, check_span,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -49,6 +51,14 @@ pub struct RigidBody {
     pub(super) steps: u64,
     pub(super) grips: Vec<Grip>,
     pub(super) ties: Ties,
+    /// The fixed solids and the joints of the scene, for the world that it may share.
+    pub(super) scenery: (Arc<[Obstacle]>, Arc<[Joint]>),
+    /// That world, where this body leads it or a joint holds it.
+    pub(super) island: Option<Box<Island>>,
+    /// Whether a joint of the scene holds the body; known from its first step on.
+    jointed: Option<bool>,
+    /// How deep it sank into anything in the last step of its island, metres; zero alone.
+    sunk_m: f64,
 }
 
 /// A stretch of contact or of a spring's pull is solved in parts no longer than this, seconds.
@@ -100,6 +110,10 @@ impl RigidBody {
             steps: 0,
             grips: Vec::with_capacity(4),
             ties: Ties::default(),
+            scenery: (spec.obstacles, spec.joints),
+            island: None,
+            jointed: None,
+            sunk_m: 0.0,
         })
     }
 
@@ -113,6 +127,21 @@ impl RigidBody {
 
     /// Advances by `h` seconds, springs first: pull, then fly and touch.
     fn part(&mut self, h: f64) -> Result<(), &'static str> {
+        let pulled = self.pull(h)?;
+        // the spring's solution has the gravity of this part in its velocity already
+        self.advance(h, if pulled { DVec3::ZERO } else { self.gravity })
+    }
+
+    /// Begins a step of `dt` seconds: takes what others gave, and what pulls; `fellows`, by rising ids, share its world.
+    pub(super) fn begin(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+        self.receive(around, fellows);
+        self.push_alone(around, dt);
+        self.ties.gather(around, &self.company);
+        self.grips.clear();
+    }
+
+    /// The springs' part of `h` seconds, gravity with it; whether there was one.
+    pub(super) fn pull(&mut self, h: f64) -> Result<bool, &'static str> {
         self.ties.aim(&self.company);
         let ties = (&mut self.ties.all[..], self.gravity);
         let pulled = springs::pull(&mut self.motion, &self.spread, ties, h, &mut self.grips);
@@ -121,11 +150,15 @@ impl RigidBody {
             self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
         }
-        if !self.motion.is_sane(&self.spread) {
-            return Err("a spring threw it out of reach");
-        }
-        // the spring's solution has the gravity of this part in its velocity already
-        self.advance(h, if pulled { DVec3::ZERO } else { self.gravity })
+        if self.motion.is_sane(&self.spread) { Ok(pulled) } else { Err("a spring threw it out of reach") }
+    }
+
+    /// Ends a step in which a shared world has moved it.
+    pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
+        (self.touching, self.sunk_m, self.calm_s) = (touching, sunk_m, 0.0);
+        self.steps += 1;
+        self.world.flew();
+        self.settle(around, dt);
     }
 
     /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.
@@ -160,11 +193,13 @@ impl Agent for RigidBody {
     /// Advances the body by `dt`: parts of at most 1/240 s where something touches or pulls, one part in free flight.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
+        let joints = &self.scenery.1;
+        if *self.jointed.get_or_insert_with(|| joints.iter().any(|joint| joint.holds(around.me))) {
+            return island::lead(self, dt, around, &mut [], &mut Vec::new());
+        }
+        (self.island, self.sunk_m) = (None, 0.0);
         let (before, touching) = (self.motion, self.touching);
-        self.receive(around, &[]);
-        self.push_alone(around, dt_s);
-        self.ties.gather(around, &self.company);
-        self.grips.clear();
+        self.begin(around, &[], dt_s);
         let parts = self.parts(dt_s);
         for _ in 0..parts {
             if let Err(what) = self.part(dt_s / f64::from(parts)) {
@@ -193,6 +228,16 @@ impl Agent for RigidBody {
 
     fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
         Some(self)
+    }
+
+    fn lead(
+        &mut self,
+        dt: SimSpan,
+        around: &Surroundings<'_>,
+        others: &mut [Companion<'_>],
+        apart: &mut Vec<u32>,
+    ) -> Result<StepReport, StepError> {
+        island::lead(self, dt, around, others, apart)
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -226,7 +271,7 @@ impl RigidBody {
     fn residual_m(&self) -> f64 {
         let size = self.motion.position.abs().max_element() + self.world.mover.radius_m;
         if self.touching {
-            self.world.depth_m(&self.motion) + size * f64::from(f32::EPSILON)
+            self.world.depth_m(&self.motion).max(self.sunk_m) + size * f64::from(f32::EPSILON)
         } else {
             size * f64::EPSILON
         }

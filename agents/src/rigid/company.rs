@@ -72,11 +72,11 @@ impl Company {
         }
     }
 
-    /// Brings everybody that this body meets to the start of the step, but for `fellows`, who share its world.
+    /// Brings everybody that this body meets to the start of the step, but for `fellows`, by rising ids, who share its world.
     pub(super) fn gather(&mut self, around: &Surroundings<'_>, mover: &Mover, fellows: &[AgentId]) {
         (self.me, self.count, self.after_s) = (around.me, 0, 0.0);
         for neighbour in around.neighbours {
-            if fellows.contains(&neighbour.id) || !is_met(neighbour, around) {
+            if fellows.binary_search(&neighbour.id).is_ok() || !is_met(neighbour, around) {
                 continue;
             }
             if self.guests.len() == self.count {

@@ -19,7 +19,7 @@ const EXPECTED_G: f64 = 3.0;
 impl RigidBody {
     /// Begins a step: takes what the owners of its contacts gave, and brings everybody that it meets to its own time.
     ///
-    /// `fellows` share a world with this body: what is between them is not coupled.
+    /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
     pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId]) {
         let Self { motion, spread, company, .. } = self;
         let before = motion.velocity;

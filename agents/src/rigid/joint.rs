@@ -187,7 +187,7 @@ fn number(what: &'static str, value: f64, least: f64) -> Result<(), JointError> 
 
 fn range(what: &'static str, [low, high]: [f64; 2], most: f64, wanted: &'static str) -> Result<(), JointError> {
     for value in [low, high] {
-        if !(value.abs() <= most) {
+        if value.is_nan() || value.abs() > most {
             return Err(JointError::BadNumber { what, value, wanted });
         }
     }

@@ -1,7 +1,8 @@
 //! A rigid body as an agent: exact flight in double precision, contacts in a rapier3d world of its own.
 //!
 //! In: a [`RigidSpec`], steps, what is around. Out: the body's motion about its centre of mass, and what it gives to others.
-//! Never here: the state of another agent; a body meets others as they were last seen (docs/theory/coupling.md).
+//! Never here: the state of another agent; a body meets others as they were last seen (docs/theory/coupling.md), but for
+//! those that share its world (`island/`).
 //!
 //! Between touches a body follows its parabola in closed form and turns by a splitting that keeps the angular momentum
 //! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds how long that may
@@ -17,6 +18,7 @@ mod clearance;
 mod company;
 mod couple;
 mod flight;
+mod island;
 mod joint;
 mod mass;
 mod meeting;

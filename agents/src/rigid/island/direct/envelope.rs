@@ -1,0 +1,141 @@
+//! Cholesky's factor of a symmetric positive matrix in double precision, each row stored from its first entry on.
+//!
+//! In: the first body that each body is joined to, and blocks. Out: the solution. Never here: where the matrix comes from.
+//! A chain's factor has a constant width, so it costs as much as the chain is long.
+
+/// A matrix of 6 rows a body, its lower half.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Envelope {
+    /// First column of each row.
+    first: Vec<usize>,
+    /// Where each row starts in `values`.
+    start: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl Envelope {
+    /// Makes room, all zero: body i is joined to none lower than `first_body[i]` ≤ i.
+    pub(super) fn shape(&mut self, first_body: &[u32]) {
+        self.first.clear();
+        self.start.clear();
+        let mut size = 0;
+        for (body, &first) in first_body.iter().enumerate() {
+            for row in 6 * body..6 * body + 6 {
+                self.first.push(6 * first as usize);
+                self.start.push(size);
+                size += row + 1 - 6 * first as usize;
+            }
+        }
+        self.values.clear();
+        self.values.resize(size, 0.0);
+    }
+
+    /// What a factorisation costs: the sum of squares of the widths.
+    pub(super) fn work(first_body: &[u32]) -> usize {
+        first_body.iter().enumerate().map(|(body, &first)| 6 * (6 * (body + 1 - first as usize)).pow(2)).sum()
+    }
+
+    /// Adds `weight` · left rightᵀ to the block of the bodies `row` ≥ `column`; on the diagonal only the lower half counts.
+    pub(super) fn add(&mut self, (row, column): (usize, usize), weight: f64, left: [f64; 6], right: [f64; 6]) {
+        for (i, &l) in left.iter().enumerate() {
+            let at = 6 * row + i;
+            let columns = if row == column { i + 1 } else { 6 };
+            let from = self.start[at] + 6 * column - self.first[at];
+            let scaled = weight * l;
+            self.values[from..from + columns].iter_mut().zip(right).for_each(|(value, r)| *value += scaled * r);
+        }
+    }
+
+    /// Replaces the matrix by its factor; `false` where it is not positive.
+    pub(super) fn factor(&mut self) -> bool {
+        for i in 0..self.first.len() {
+            let (done, rest) = self.values.split_at_mut(self.start[i]);
+            let first_i = self.first[i];
+            for j in first_i..i {
+                let first_j = self.first[j];
+                let from = first_i.max(first_j);
+                let row_j = &done[self.start[j]..self.start[j] + j + 1 - first_j];
+                let sum = dot(&rest[from - first_i..j - first_i], &row_j[from - first_j..j - first_j]);
+                rest[j - first_i] = (rest[j - first_i] - sum) / row_j[j - first_j];
+            }
+            let own = &rest[..i - first_i];
+            let left = rest[i - first_i] - dot(own, own);
+            if left.is_nan() || left <= 0.0 {
+                return false;
+            }
+            rest[i - first_i] = left.sqrt();
+        }
+        true
+    }
+
+    /// Solves for `x` with the factor.
+    pub(super) fn solve(&self, x: &mut [f64]) {
+        let count = self.first.len();
+        for i in 0..count {
+            let row = &self.values[self.start[i]..=self.start[i] + i - self.first[i]];
+            let (diagonal, row) = (row[row.len() - 1], &row[..row.len() - 1]);
+            x[i] = (x[i] - dot(row, &x[self.first[i]..i])) / diagonal;
+        }
+        for i in (0..count).rev() {
+            let row = &self.values[self.start[i]..=self.start[i] + i - self.first[i]];
+            let value = x[i] / row[row.len() - 1];
+            x[i] = value;
+            let columns = &mut x[self.first[i]..i];
+            columns.iter_mut().zip(row).for_each(|(below, l)| *below -= l * value);
+        }
+    }
+}
+
+/// A sum of products in four lanes: a fixed order, so the same bits everywhere.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    let mut lanes = [0.0; 4];
+    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
+    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
+    for (x, y) in a4.zip(b4) {
+        (0..4).for_each(|k| lanes[k] += x[k] * y[k]);
+    }
+    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_factor_solves_its_system() {
+        let first_body = [0, 0, 1, 0, 3];
+        let mut matrix = Envelope::default();
+        matrix.shape(&first_body);
+        let mut full = vec![vec![0.0; 30]; 30];
+        let unit = |i: usize| std::array::from_fn(|k| f64::from(u8::from(k == i)));
+        for body in 0..5 {
+            for i in 0..6 {
+                matrix.add((body, body), 3.0, unit(i), unit(i));
+                full[6 * body + i][6 * body + i] += 3.0;
+            }
+        }
+        for (seed, (a, b)) in [(1, 0), (2, 1), (3, 0), (4, 3), (3, 2)].into_iter().enumerate() {
+            let row = |k: usize| std::array::from_fn::<f64, 6, _>(|i| libm::sin((seed * 13 + k * 7 + i) as f64));
+            let (left, right) = (row(0), row(1));
+            matrix.add((a, a), 10.0, left, left);
+            matrix.add((b, b), 10.0, right, right);
+            matrix.add((a, b), 10.0, left, right);
+            for i in 0..6 {
+                for j in 0..6 {
+                    full[6 * a + i][6 * a + j] += 10.0 * left[i] * left[j];
+                    full[6 * b + i][6 * b + j] += 10.0 * right[i] * right[j];
+                    full[6 * a + i][6 * b + j] += 10.0 * left[i] * right[j];
+                    full[6 * b + j][6 * a + i] += 10.0 * left[i] * right[j];
+                }
+            }
+        }
+        let right: Vec<f64> = (0..30).map(|i| libm::cos(f64::from(i))).collect();
+        let mut x = right.clone();
+        assert!(matrix.factor());
+        matrix.solve(&mut x);
+        for (row, wanted) in full.iter().zip(&right) {
+            let got: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+            assert!((got - wanted).abs() < 1e-12, "{got} is not {wanted}"); // rounding of a sum of 30 numbers near 10
+        }
+    }
+}

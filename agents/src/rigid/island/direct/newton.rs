@@ -1,0 +1,422 @@
+//! The impulses that a few bodies give each other, exactly: Newton's method on an augmented Lagrangian.
+//!
+//! In: rows of constraints, masses, free velocities. Out: velocities and impulses. Never here: where rows come from.
+//!
+//! With the free velocities v*, wanted are min ½ (v − v*)ᵀ M (v − v*) subject to the rows' laws. Each law is a projection
+//! λ = P(λ₀ − (J v + b) / R): the gradient of a convex function of v, so that Newton's method with a line search along the
+//! convex function's own slope always converges, and its matrix M + Jᵀ R⁻¹ J over the active rows is positive. R is a
+//! millionth of the row's own inverse mass; what yields under R is taken back by λ₀ ← λ, a few times. Friction's
+//! disc takes its radius μ λₙ from the pass before: where the passes meet, the law is Coulomb's own, without dilation.
+
+use super::envelope::Envelope;
+use glam::{DMat3, DVec3};
+
+/// Where a row has no second body.
+pub(super) const NOBODY: u32 = u32::MAX;
+
+/// One scalar constraint: u = lin·(v_a − v_b) + turn_a·ω_a − turn_b·ω_b.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Row {
+    /// The first body.
+    pub a: u32,
+    /// The second body, or [`NOBODY`].
+    pub b: u32,
+    /// Direction of the impulse on `a`.
+    pub lin: DVec3,
+    /// Lever on `a`.
+    pub turn_a: DVec3,
+    /// Lever on `b`.
+    pub turn_b: DVec3,
+    /// What the row asks for.
+    pub law: Law,
+    /// Velocity added to u before the law is asked, m/s or rad/s.
+    pub bias: f64,
+    /// Impulse, N·s or N·m·s: the start, and the answer.
+    pub lambda: f64,
+}
+
+/// What a row asks of its velocity and impulse.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Law {
+    /// u + b = 0.
+    Equal,
+    /// u + b ≥ 0, λ ≥ 0, one of them zero.
+    AtLeast,
+    /// u + b = −λ · compliance: a spring and its damper over the step.
+    Spring(f64),
+    /// As `AtLeast`; the two rows after it are friction with this coefficient.
+    Normal(f64),
+    /// Friction: u = 0 within the disc, at its edge against u.
+    Tangent,
+}
+
+/// A body's mass.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Mass {
+    /// Kilograms.
+    pub mass_kg: f64,
+    /// World axes, kg·m².
+    pub inertia: DMat3,
+    /// Its inverse.
+    pub inverse: DMat3,
+}
+
+/// Linear and angular velocity of a body.
+pub(super) type Twist = [DVec3; 2];
+
+/// How a solve went.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Outcome {
+    /// Matrices factored.
+    pub factors: u32,
+    /// The velocity by which the worst row still misses its law, m/s.
+    pub miss_m_s: f64,
+}
+
+/// Room to work in; nothing is allocated once the sizes settle.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Newton {
+    matrix: Envelope,
+    first_body: Vec<u32>,
+    /// R of each row.
+    give: Vec<f64>,
+    /// λ₀ of each row; for a normal's friction the radius is in `radius`.
+    start: Vec<f64>,
+    radius: Vec<f64>,
+    velocity: Vec<f64>,
+    along: Vec<f64>,
+    free: Vec<Twist>,
+    gradient: Vec<f64>,
+}
+
+/// R as a share of a row's own inverse mass: small enough that three passes take the yielding back under a thousandfold
+/// load, large enough that the matrix keeps six digits in double precision.
+const GIVE: f64 = 1e-6;
+/// A row that misses its law by no more than this is solved, m/s: a thousandth of what an hour's creep would show.
+const MISS_M_S: f64 = 1e-9;
+/// A gradient that would change no velocity by more than this share of the fastest is none.
+const STEEP: f64 = 1e-9;
+/// Friction's disc may be wrong by this much more than a row, as a velocity.
+const DISC: f64 = 1e-3;
+/// The most passes of λ₀ ← λ.
+const PASSES_MAX: u32 = 40;
+/// The most factorisations in all.
+const FACTORS_MAX: u32 = 80;
+/// The least inverse mass of a row: a row between nothing.
+const MOBILITY_MIN: f64 = 1e-12;
+
+impl Newton {
+    /// Solves for the velocities; `rows` get their impulses.
+    pub(super) fn solve(&mut self, rows: &mut [Row], masses: &[Mass], velocities: &mut [Twist]) -> Outcome {
+        let mut outcome = Outcome::default();
+        if rows.is_empty() {
+            return outcome;
+        }
+        self.prepare(rows, masses, velocities);
+        for _ in 0..PASSES_MAX {
+            self.begin_pass(rows);
+            self.minimise(rows, (masses, velocities), &mut outcome);
+            outcome.miss_m_s = self.missed(rows);
+            if outcome.miss_m_s <= MISS_M_S || outcome.factors >= FACTORS_MAX {
+                break;
+            }
+        }
+        outcome
+    }
+
+    /// What a factorisation of these rows' matrix costs.
+    pub(super) fn work(&mut self, rows: &[Row], bodies: usize) -> usize {
+        self.link(rows, bodies);
+        Envelope::work(&self.first_body)
+    }
+
+    fn link(&mut self, rows: &[Row], bodies: usize) {
+        self.first_body.clear();
+        self.first_body.extend(0..bodies as u32);
+        for row in rows.iter().filter(|row| row.b != NOBODY) {
+            let first = &mut self.first_body[row.a.max(row.b) as usize];
+            *first = (*first).min(row.a).min(row.b);
+        }
+    }
+
+    fn prepare(&mut self, rows: &[Row], masses: &[Mass], velocities: &[Twist]) {
+        self.link(rows, masses.len());
+        self.free.clear();
+        self.free.extend_from_slice(velocities);
+        self.give.clear();
+        self.give.extend(rows.iter().map(|row| match row.law {
+            Law::Spring(compliance) => compliance,
+            _ => GIVE * row.mobility(masses).max(MOBILITY_MIN),
+        }));
+        self.radius.clear();
+        self.radius.resize(rows.len(), 0.0);
+        for room in [&mut self.velocity, &mut self.along, &mut self.start] {
+            room.clear();
+            room.resize(rows.len(), 0.0);
+        }
+    }
+
+    /// λ₀ ← λ, and friction's discs from the normals.
+    fn begin_pass(&mut self, rows: &[Row]) {
+        for (i, row) in rows.iter().enumerate() {
+            self.start[i] = if matches!(row.law, Law::Spring(_)) { 0.0 } else { row.lambda };
+            if let Law::Normal(friction) = row.law {
+                self.radius[i] = friction * row.lambda;
+            }
+        }
+    }
+
+    /// One pass: Newton's method on the convex function.
+    fn minimise(&mut self, rows: &mut [Row], state: (&[Mass], &mut [Twist]), outcome: &mut Outcome) {
+        let (masses, velocities) = state;
+        self.velocity.iter_mut().zip(rows.iter()).for_each(|(u, row)| *u = row.velocity(velocities));
+        self.project(rows, 0.0);
+        while outcome.factors < FACTORS_MAX && self.steep(rows, masses, velocities) {
+            outcome.factors += 1;
+            let slope = self.descend(rows, masses);
+            if slope.is_nan() || slope >= 0.0 {
+                return;
+            }
+            let share = self.search(rows, (masses, velocities), slope);
+            for (twist, step) in velocities.iter_mut().zip(self.gradient.chunks_exact(6)) {
+                twist[0] += DVec3::from_slice(&step[..3]) * share;
+                twist[1] += DVec3::from_slice(&step[3..]) * share;
+            }
+            // anew from the bodies, so that roundings do not add up
+            self.velocity.iter_mut().zip(rows.iter()).for_each(|(u, row)| *u = row.velocity(velocities));
+            self.project(rows, 0.0);
+        }
+    }
+
+    /// Writes the gradient; whether any body would still move under it.
+    fn steep(&mut self, rows: &[Row], masses: &[Mass], velocities: &[Twist]) -> bool {
+        self.gradient.clear();
+        let mut fastest = 1.0_f64;
+        for ((mass, now), free) in masses.iter().zip(velocities).zip(&self.free) {
+            let linear = (now[0] - free[0]) * mass.mass_kg;
+            let angular = mass.inertia * (now[1] - free[1]);
+            self.gradient.extend(linear.to_array().into_iter().chain(angular.to_array()));
+            fastest = fastest.max(now[0].abs().max_element()).max(now[1].abs().max_element());
+        }
+        for row in rows {
+            row.scatter(-row.lambda, &mut self.gradient);
+        }
+        masses.iter().zip(self.gradient.chunks_exact(6)).any(|(mass, g)| {
+            let linear = DVec3::from_slice(&g[..3]) / mass.mass_kg;
+            let angular = mass.inverse * DVec3::from_slice(&g[3..]);
+            linear.abs().max_element().max(angular.abs().max_element()) > STEEP * fastest
+        })
+    }
+
+    /// λ = P(λ₀ − (u + share·du + b) / R) for all rows.
+    fn project(&self, rows: &mut [Row], share: f64) {
+        let mut i = 0;
+        while i < rows.len() {
+            let wanted = |row: &Row, i: usize| {
+                self.start[i] - (self.velocity[i] + share * self.along[i] + row.bias) / self.give[i]
+            };
+            let raw = wanted(&rows[i], i);
+            rows[i].lambda = match rows[i].law {
+                Law::Equal | Law::Spring(_) | Law::Tangent => raw,
+                Law::AtLeast | Law::Normal(_) => raw.max(0.0),
+            };
+            if let Law::Normal(_) = rows[i].law {
+                let (s, t) = (wanted(&rows[i + 1], i + 1), wanted(&rows[i + 2], i + 2));
+                let size = libm::hypot(s, t);
+                let cut = if size > self.radius[i] { self.radius[i] / size } else { 1.0 };
+                (rows[i + 1].lambda, rows[i + 2].lambda) = (s * cut, t * cut);
+                i += 2;
+            }
+            i += 1;
+        }
+    }
+
+    /// Turns the gradient into Newton's direction and writes the rows' velocities along it; the slope along it.
+    fn descend(&mut self, rows: &[Row], masses: &[Mass]) -> f64 {
+        self.assemble(rows, masses);
+        if !self.matrix.factor() {
+            return 0.0;
+        }
+        let mut slope = 0.0;
+        self.along.clear();
+        self.along.extend_from_slice(&self.gradient);
+        self.gradient.iter_mut().for_each(|g| *g = -*g);
+        self.matrix.solve(&mut self.gradient);
+        self.along.iter().zip(&self.gradient).for_each(|(g, d)| slope += g * d);
+        self.along.clear();
+        let step = &self.gradient;
+        self.along.extend(rows.iter().map(|row| {
+            row.velocity_of(|body| {
+                let at = 6 * body as usize;
+                [DVec3::from_slice(&step[at..]), DVec3::from_slice(&step[at + 3..])]
+            })
+        }));
+        slope
+    }
+
+    /// M + Jᵀ R⁻¹ J over the active rows.
+    fn assemble(&mut self, rows: &[Row], masses: &[Mass]) {
+        self.matrix.shape(&self.first_body);
+        for (body, mass) in masses.iter().enumerate() {
+            for k in 0..3 {
+                let unit = |at: usize| std::array::from_fn(|i| f64::from(u8::from(i == at)));
+                self.matrix.add((body, body), mass.mass_kg, unit(k), unit(k));
+                let column = mass.inertia.col(k);
+                self.matrix.add((body, body), 1.0, [0.0, 0.0, 0.0, column.x, column.y, column.z], unit(3 + k));
+            }
+        }
+        let mut i = 0;
+        while i < rows.len() {
+            let stiff = 1.0 / self.give[i];
+            match rows[i].law {
+                Law::Equal | Law::Spring(_) => rows[i].stiffen(stiff, &mut self.matrix),
+                Law::AtLeast if rows[i].lambda > 0.0 => rows[i].stiffen(stiff, &mut self.matrix),
+                Law::Normal(_) => {
+                    if rows[i].lambda > 0.0 {
+                        rows[i].stiffen(stiff, &mut self.matrix);
+                    }
+                    self.stiffen_friction(&rows[i + 1], &rows[i + 2], i);
+                    i += 2;
+                }
+                Law::AtLeast | Law::Tangent => {}
+            }
+            i += 1;
+        }
+    }
+
+    /// Sticking resists both ways; slipping resists only a change of its direction.
+    fn stiffen_friction(&mut self, first: &Row, second: &Row, normal: usize) {
+        let wanted = |row: &Row, i: usize| self.start[i] - (self.velocity[i] + row.bias) / self.give[i];
+        let (s, t) = (wanted(first, normal + 1), wanted(second, normal + 2));
+        let (size, radius) = (libm::hypot(s, t), self.radius[normal]);
+        if size <= radius {
+            first.stiffen(1.0 / self.give[normal + 1], &mut self.matrix);
+            second.stiffen(1.0 / self.give[normal + 2], &mut self.matrix);
+        } else if radius > 0.0 {
+            let (cos, sin) = (s / size, t / size);
+            let across = Row {
+                lin: second.lin * cos - first.lin * sin,
+                turn_a: second.turn_a * cos - first.turn_a * sin,
+                turn_b: second.turn_b * cos - first.turn_b * sin,
+                ..*first
+            };
+            across.stiffen(radius / (size * self.give[normal + 1]), &mut self.matrix);
+        }
+    }
+
+    /// How far to go along the direction: to where the convex function's slope has all but gone.
+    fn search(&self, rows: &mut [Row], state: (&[Mass], &[Twist]), slope: f64) -> f64 {
+        /// The slope that is left, of the first one.
+        const LEFT: f64 = 0.1;
+        const HALVINGS: u32 = 30;
+        let (masses, velocities) = state;
+        let (mut linear, mut square) = (0.0, 0.0);
+        for (((mass, now), free), step) in
+            masses.iter().zip(velocities).zip(&self.free).zip(self.gradient.chunks_exact(6))
+        {
+            let (v, w) = (DVec3::from_slice(&step[..3]), DVec3::from_slice(&step[3..]));
+            linear += mass.mass_kg * v.dot(now[0] - free[0]) + w.dot(mass.inertia * (now[1] - free[1]));
+            square += mass.mass_kg * v.length_squared() + w.dot(mass.inertia * w);
+        }
+        let mut slope_at = |share: f64| {
+            self.project(rows, share);
+            let caught: f64 = rows.iter().zip(&self.along).map(|(row, du)| row.lambda * du).sum();
+            linear + share * square - caught
+        };
+        if slope_at(1.0) <= LEFT * slope.abs() {
+            return 1.0;
+        }
+        let (mut low, mut high) = (0.0, 1.0);
+        for _ in 0..HALVINGS {
+            let middle = 0.5 * (low + high);
+            let there = slope_at(middle);
+            if there.abs() <= LEFT * slope.abs() {
+                return middle;
+            }
+            if there > 0.0 { high = middle } else { low = middle }
+        }
+        low
+    }
+
+    /// The velocity by which the worst row misses its law: what λ₀ ← λ moves, and what friction's disc does.
+    fn missed(&self, rows: &[Row]) -> f64 {
+        let mut worst = 0.0_f64;
+        for (i, row) in rows.iter().enumerate() {
+            if matches!(row.law, Law::Spring(_)) {
+                continue;
+            }
+            worst = worst.max((row.lambda - self.start[i]).abs() * self.give[i]);
+            if let Law::Normal(friction) = row.law {
+                let radius = (friction * row.lambda - self.radius[i]).abs();
+                let edge = libm::hypot(rows[i + 1].lambda, rows[i + 2].lambda) >= 0.999 * self.radius[i];
+                // a disc that is not reached may have any size
+                worst = worst.max(if edge { DISC * radius * self.give[i] / GIVE } else { 0.0 });
+            }
+        }
+        worst
+    }
+}
+
+impl Row {
+    /// u, from the twist of each body.
+    fn velocity_of(&self, twist: impl Fn(u32) -> Twist) -> f64 {
+        let [v, w] = twist(self.a);
+        let of_a = self.lin.dot(v) + self.turn_a.dot(w);
+        if self.b == NOBODY {
+            return of_a;
+        }
+        let [v, w] = twist(self.b);
+        of_a - self.lin.dot(v) - self.turn_b.dot(w)
+    }
+
+    /// u.
+    pub(super) fn velocity(&self, velocities: &[Twist]) -> f64 {
+        self.velocity_of(|body| velocities[body as usize])
+    }
+
+    /// Whether it acts on this body.
+    pub(super) fn joins(&self, body: u32) -> bool {
+        self.a == body || self.b == body
+    }
+
+    /// The row's own inverse mass.
+    pub(super) fn mobility(&self, masses: &[Mass]) -> f64 {
+        let of = |body: u32, turn: DVec3| {
+            let mass = &masses[body as usize];
+            self.lin.length_squared() / mass.mass_kg + turn.dot(mass.inverse * turn)
+        };
+        of(self.a, self.turn_a) + if self.b == NOBODY { 0.0 } else { of(self.b, self.turn_b) }
+    }
+
+    /// Adds Jᵀ impulse.
+    fn scatter(&self, impulse: f64, into: &mut [f64]) {
+        let mut add = |body: u32, sign: f64, turn: DVec3| {
+            let at = 6 * body as usize;
+            let (linear, angular) = (self.lin * (sign * impulse), turn * (sign * impulse));
+            into[at..at + 6]
+                .iter_mut()
+                .zip(linear.to_array().into_iter().chain(angular.to_array()))
+                .for_each(|(g, part)| *g += part);
+        };
+        add(self.a, 1.0, self.turn_a);
+        if self.b != NOBODY {
+            add(self.b, -1.0, self.turn_b);
+        }
+    }
+
+    /// Adds weight · Jᵀ J.
+    fn stiffen(&self, weight: f64, matrix: &mut Envelope) {
+        let six = |sign: f64, turn: DVec3| {
+            let (l, t) = (self.lin * sign, turn * sign);
+            [l.x, l.y, l.z, t.x, t.y, t.z]
+        };
+        let a = (self.a as usize, six(1.0, self.turn_a));
+        matrix.add((a.0, a.0), weight, a.1, a.1);
+        if self.b != NOBODY {
+            let b = (self.b as usize, six(-1.0, self.turn_b));
+            matrix.add((b.0, b.0), weight, b.1, b.1);
+            let (row, column) = if a.0 > b.0 { (a, b) } else { (b, a) };
+            matrix.add((row.0, column.0), weight, row.1, column.1);
+        }
+    }
+}
