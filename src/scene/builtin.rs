@@ -12,11 +12,16 @@ pub struct BuiltIn {
 }
 
 /// Every built-in scene; the first is the default.
-pub const ALL: [BuiltIn; 4] = [
+pub const ALL: [BuiltIn; 9] = [
     BuiltIn { name: "tube", text: include_str!("../../scenes/tube.toml") },
     BuiltIn { name: "pendulum", text: include_str!("../../scenes/pendulum.toml") },
     BuiltIn { name: "yard", text: include_str!("../../scenes/yard.toml") },
     BuiltIn { name: "overload", text: include_str!("../../scenes/overload.toml") },
+    BuiltIn { name: "stack", text: include_str!("../../scenes/stack.toml") },
+    BuiltIn { name: "chain", text: include_str!("../../scenes/chain.toml") },
+    BuiltIn { name: "pile", text: include_str!("../../scenes/pile.toml") },
+    BuiltIn { name: "crossing", text: include_str!("../../scenes/crossing.toml") },
+    BuiltIn { name: "gripper", text: include_str!("../../scenes/gripper.toml") },
 ];
 
 /// Files that built-in scenes name.

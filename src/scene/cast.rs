@@ -4,6 +4,7 @@
 //! Never here: the file's text, running agents.
 
 use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind};
+use super::ties::{Coupling, Faults, Joint};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
 use metachron_agents::rigid::RigidSpec;
@@ -38,6 +39,12 @@ pub struct Scene {
     pub obstacles: Arc<[Obstacle]>,
     /// How each obstacle looks, in their order.
     pub obstacle_looks: Vec<Look>,
+    /// Whether agents touch each other where no coupling says otherwise.
+    pub contacts: bool,
+    /// What holds rigid agents together.
+    pub joints: Vec<Joint>,
+    /// Pairs that act on each other in another way.
+    pub couplings: Vec<Coupling>,
     /// The points whose state is reported.
     pub probes: Vec<Probe>,
 }
@@ -144,6 +151,8 @@ pub struct Member {
     pub links: Vec<AgentId>,
     /// How it looks.
     pub look: Look,
+    /// What goes wrong with its clock and messages on purpose.
+    pub faults: Faults,
 }
 
 /// How an agent wants to keep time.

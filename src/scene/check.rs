@@ -10,6 +10,9 @@ use glam::DVec3;
 use std::fmt::Display;
 use std::ops::RangeInclusive;
 
+/// More names than this are counted, not listed.
+const LISTED_MAX: usize = 20;
+
 /// Collects problems of one scene.
 pub(super) struct Checker<'d, 't> {
     document: &'d Document<'t>,
@@ -155,9 +158,13 @@ impl<'d, 't> Checker<'d, 't> {
             return true;
         }
         let span = self.document.locate(&place.key(key));
-        let list = known.clone().map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
-        let expected =
-            if list.is_empty() { "there is none in this scene".to_owned() } else { format!("expected one of {list}") };
+        let list = known.clone().take(LISTED_MAX).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");
+        let more = known.clone().count().saturating_sub(LISTED_MAX);
+        let expected = match (list.is_empty(), more) {
+            (true, _) => "there is none in this scene".to_owned(),
+            (_, 0) => format!("expected one of {list}"),
+            _ => format!("expected one of {list} and {more} more"),
+        };
         let problem = Problem::new(span, format!("{} names `{name}`, which does not exist", place.named(key)));
         self.problems.push(problem.expecting(expected).helped(did_you_mean(name, known)));
         false

@@ -12,13 +12,14 @@ pub mod format;
 mod problem;
 mod schema;
 mod source;
+pub mod ties;
 
 pub use cast::{Camera, Gains, Look, Machine, Member, PaceWish, Probe, Scene, Spec, Target, View};
 pub use problem::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{SCENE_BYTES_MAX, Source};
 
-use build::Objects;
+use build::{Around, Objects};
 use check::{Checker, Place};
 use document::Document;
 use format::{SceneFile, WorldFile};
@@ -49,8 +50,14 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let document = Document::parse(text).map_err(|problem| vec![problem])?;
     let mut c = Checker::new(&document);
     let file = read_stage(&mut c);
-    let gravity = gravity(&mut c, file.as_ref().and_then(|f| f.world.as_ref()));
-    let objects = build::read_objects(&mut c, document.root().get("object"), source, gravity);
+    let world = file.as_ref().and_then(|f| f.world.as_ref());
+    let gravity = gravity(&mut c, world);
+    let faults = world.and_then(|w| w.faults.as_ref());
+    if let Some(faults) = faults {
+        build::world_faults(&mut c, faults);
+    }
+    let around = Around { source, gravity, faults };
+    let objects = build::read_objects(&mut c, document.root().get("object"), &around);
     let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
     match (scene, c.finish()) {
         (Some(scene), problems) if problems.is_empty() => Ok(scene),
@@ -85,6 +92,10 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, (gravity,
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
     }
     let probes = build::probes(c, &file.probe, &objects.names);
+    // ties between objects that are wrong themselves would be told of for nothing
+    let sound = c.count() == 0;
+    let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
+    let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
@@ -97,6 +108,9 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, (gravity,
         agents: objects.agents,
         obstacles: objects.obstacles,
         obstacle_looks: objects.obstacle_looks,
+        contacts: file.world.as_ref().and_then(|w| w.contacts).unwrap_or(true),
+        joints,
+        couplings,
         probes,
     }
 }

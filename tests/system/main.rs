@@ -4,5 +4,6 @@ mod picture;
 mod play;
 mod run;
 mod scene;
+mod scene_ties;
 mod scenes;
 mod viewer;

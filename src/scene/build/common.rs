@@ -2,7 +2,8 @@
 
 use crate::scene::cast::{Look, PaceWish};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{CommonFile, Material, OneOrRange};
+use crate::scene::format::{CommonFile, FaultsFile, Material, OneOrRange};
+use crate::scene::ties::Faults;
 use metachron_agents::{N_MAX, SimSpan};
 
 /// Wanted rate where a scene says neither rate nor step, hertz.
@@ -15,6 +16,8 @@ const RATE_AGREES: f64 = 1e-4;
 const RATE: Allowed = allowed(1.0..=100_000.0, "Hz");
 const DT: Allowed = allowed(0.01..=1000.0, "ms");
 const IMPORTANCE: Allowed = allowed(0.001..=1000.0, "");
+const JITTER: Allowed = allowed(0.0..=0.5, "");
+const LOSS: Allowed = allowed(0.0..=0.9, "");
 
 /// Rate and step: either gives the other; both together must agree.
 pub(super) fn pace(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) -> PaceWish {
@@ -57,6 +60,29 @@ fn shown(dt: OneOrRange<f64>) -> String {
 /// A number with at most four decimals, for messages.
 pub(super) fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
+}
+
+/// What goes wrong on purpose: the object's own faults, and for what they leave out the world's.
+pub(super) fn faults(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    (own, world): (Option<&FaultsFile>, Option<&FaultsFile>),
+) -> Faults {
+    let (none, own_place) = (FaultsFile::default(), place.table("faults"));
+    let (own, world) = (own.unwrap_or(&none), world.unwrap_or(&none));
+    let world_jitter = world.jitter.unwrap_or(0.0);
+    Faults {
+        jitter: c.number_or(&own_place, "jitter", (own.jitter, world_jitter), &JITTER),
+        loss: c.number_or(&own_place, "loss", (own.loss, world.loss.unwrap_or(0.0)), &LOSS),
+        seed: u64::from(own.seed.or(world.seed).unwrap_or(0)),
+    }
+}
+
+/// Tells what is wrong with the world's own faults.
+pub(in crate::scene) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
+    let place = Place::new("world.faults", "of `[world.faults]`");
+    c.number_or(&place, "jitter", (file.jitter, 0.0), &JITTER);
+    c.number_or(&place, "loss", (file.loss, 0.0), &LOSS);
 }
 
 /// The levels of the drawn primitive.

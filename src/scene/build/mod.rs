@@ -4,7 +4,12 @@
 //! Never here: text and its syntax.
 
 mod common;
+mod coupling;
+mod grid;
 mod instrument;
+mod joint;
+mod joint_keys;
+mod joint_rules;
 mod mesh;
 mod object;
 mod rigid;
@@ -12,7 +17,10 @@ mod stage;
 mod synthetic;
 mod tube;
 
-pub(super) use object::{Named, Names, Objects, read_objects};
+pub(super) use common::world_faults;
+pub(super) use coupling::couplings;
+pub(super) use joint::joints;
+pub(super) use object::{Around, Names, Objects, read_objects};
 pub(super) use stage::{camera, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.

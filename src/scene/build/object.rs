@@ -1,11 +1,12 @@
 //! The objects of a scene: read one by one by their model, named, linked.
 
-use super::common::{levels, look, pace};
+use super::common::{faults, levels, look, pace};
+use super::grid::{Copies, copies};
 use super::{instrument, rigid, synthetic, tube};
 use crate::scene::cast::{Look, Member, Spec};
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{
-    COMMON_KEYS, CommonFile, InstrumentFile, MODELS, Material, RigidFile, SyntheticFile, TubeFile,
+    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, RigidFile, SyntheticFile, TubeFile,
 };
 use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
@@ -58,10 +59,24 @@ pub(in crate::scene) struct Names(BTreeMap<String, Named>);
 pub(in crate::scene) enum Named {
     /// A fixed object.
     Fixed,
-    /// An agent that is no tube.
-    Agent(AgentId),
+    /// A rigid object that moves.
+    Rigid(AgentId),
+    /// An instrument.
+    Tool(AgentId),
+    /// An agent without matter.
+    Synthetic(AgentId),
     /// A tube.
     Tube(AgentId),
+}
+
+impl Named {
+    /// The number of what moves.
+    pub(in crate::scene) const fn agent(self) -> Option<AgentId> {
+        match self {
+            Self::Fixed => None,
+            Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) => Some(id),
+        }
+    }
 }
 
 impl Names {
@@ -71,6 +86,11 @@ impl Names {
 
     pub(in crate::scene) fn agents(&self) -> impl Iterator<Item = &str> + Clone {
         self.0.iter().filter(|(_, n)| **n != Named::Fixed).map(|(name, _)| name.as_str())
+    }
+
+    /// The names of those that `wanted` takes.
+    pub(super) fn only(&self, wanted: impl Fn(Named) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
+        self.0.iter().filter(move |(_, n)| wanted(**n)).map(|(name, _)| name.as_str())
     }
 
     pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
@@ -96,6 +116,7 @@ struct Entry {
     common: CommonFile,
     model: ModelFile,
     fixed: bool,
+    copies: Copies,
 }
 
 enum ModelFile {
@@ -105,12 +126,18 @@ enum ModelFile {
     Synthetic(SyntheticFile),
 }
 
+/// What all objects of a scene stand in.
+pub(in crate::scene) struct Around<'a> {
+    pub(in crate::scene) source: &'a Source,
+    pub(in crate::scene) gravity: DVec3,
+    pub(in crate::scene) faults: Option<&'a FaultsFile>,
+}
+
 /// Reads every `[[object]]`.
 pub(in crate::scene) fn read_objects(
     c: &mut Checker<'_, '_>,
     list: Option<&Spanned<DeValue<'_>>>,
-    source: &Source,
-    gravity: DVec3,
+    around: &Around<'_>,
 ) -> Objects {
     let Some(list) = list else { return Objects::default() };
     let DeValue::Array(items) = list.get_ref() else {
@@ -123,11 +150,14 @@ pub(in crate::scene) fn read_objects(
         if let ModelFile::Rigid(file) = &entry.model {
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
+        let can_move = matches!(entry.model, ModelFile::Rigid(_) | ModelFile::Tube(_));
+        let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
+        entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
     }
     let names = name_all(c, &entries);
-    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, source);
+    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, around.source);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
-    let agents = agents(c, &entries, &names, &Stage { source, gravity, obstacles: &obstacles });
+    let agents = agents(c, &entries, &names, &Stage { around, obstacles: &obstacles });
     Objects { agents, obstacles, obstacle_looks, names }
 }
 
@@ -155,7 +185,7 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
     };
     let common = common?;
     let place = Place::new(path, format!("of `{}`", common.name.chars().take(NAME_MAX).collect::<String>()));
-    Some(Entry { place, common, model: own?, fixed: false })
+    Some(Entry { place, common, model: own?, fixed: false, copies: Copies::single() })
 }
 
 fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) -> Option<&'static str> {
@@ -191,24 +221,28 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     let mut next = 0;
     for entry in entries {
         let name = &entry.common.name;
-        let id = AgentId(next);
-        let named = match (&entry.model, entry.fixed) {
+        let named = |id: AgentId| match (&entry.model, entry.fixed) {
             (_, true) => Named::Fixed,
             (ModelFile::Tube(_), _) => Named::Tube(id),
-            _ => Named::Agent(id),
+            (ModelFile::Rigid(_), _) => Named::Rigid(id),
+            (ModelFile::Instrument(_), _) => Named::Tool(id),
+            (ModelFile::Synthetic(_), _) => Named::Synthetic(id),
         };
-        next += u32::from(!entry.fixed);
+        let first = next;
+        next += if entry.fixed { 0 } else { entry.copies.len() as u32 };
         let length = name.chars().count();
         if name.trim().is_empty() || length > NAME_MAX || name.chars().any(char::is_control) {
             let expected = format!("expected 1 … {NAME_MAX} characters that can be seen");
             c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a name", expected);
-        } else if names.0.insert(name.clone(), named).is_some() {
-            c.wrong(
-                &Place::new(entry.place.path.clone(), ""),
-                "name",
-                format_args!("`{name}` is taken"),
-                "expected a name of its own",
-            );
+            continue;
+        }
+        let taken = (first..).zip(entry.copies.names(name)).filter_map(|(id, name)| {
+            let before = names.0.insert(name.clone(), named(AgentId(id)));
+            before.map(|_| name)
+        });
+        if let Some(name) = taken.collect::<Vec<_>>().first() {
+            let what = format!("`{name}` is taken");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected a name of its own");
         }
     }
     names
@@ -223,8 +257,10 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
         levels(c, &entry.place, &entry.common);
         let look = look(c, &entry.place, &entry.common, Material::Plastic);
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
-            found.0.push(Obstacle { name: entry.common.name.clone(), ..obstacle });
-            found.1.push(look);
+            for (offset, name) in entry.copies.places(&entry.common.name) {
+                found.0.push(Obstacle { name, position: obstacle.position + offset, ..obstacle.clone() });
+                found.1.push(look);
+            }
         }
     }
     if found.0.len() > OBSTACLES_MAX {
@@ -240,22 +276,30 @@ fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
 }
 
 struct Stage<'a> {
-    source: &'a Source,
-    gravity: DVec3,
+    around: &'a Around<'a>,
     obstacles: &'a Arc<[Obstacle]>,
 }
 
 fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Stage<'_>) -> Vec<Member> {
     let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
-    if moving.len() > AGENTS_MAX {
-        too_many(c, "agents", moving.len(), AGENTS_MAX);
+    let count = moving.iter().map(|entry| entry.copies.len()).sum();
+    if count > AGENTS_MAX {
+        too_many(c, "agents", count, AGENTS_MAX);
         return Vec::new();
     }
-    let mut members: Vec<Member> =
-        moving.iter().zip(0..).filter_map(|(entry, id)| member(c, entry, AgentId(id), (names, stage))).collect();
+    let mut members = Vec::with_capacity(count);
+    let mut firsts = Vec::with_capacity(moving.len());
+    let mut next = 0;
+    for entry in moving {
+        if let Some(member) = member(c, entry, AgentId(next), (names, stage)) {
+            firsts.push((entry, members.len()));
+            members.extend(entry.copies.members(&member));
+        }
+        next += entry.copies.len() as u32;
+    }
     link(&mut members);
     if c.count() == 0 {
-        members.iter().for_each(|member| try_out(c, &moving[member.id.0 as usize].place, member));
+        firsts.iter().for_each(|(entry, at)| try_out(c, &entry.place, &members[*at]));
     }
     members
 }
@@ -287,13 +331,14 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     let Entry { place, common, model, .. } = entry;
     let given = Given {
         place,
-        source: stage.source,
-        gravity: stage.gravity,
+        source: stage.around.source,
+        gravity: stage.around.gravity,
         obstacles: stage.obstacles,
         levels: levels(c, place, common),
         sleep: common.sleep.unwrap_or(true),
     };
     let pace = pace(c, place, common);
+    let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
     let material = match model {
         ModelFile::Tube(_) => Material::Tissue,
         ModelFile::Instrument(_) => Material::Metal,
@@ -317,7 +362,8 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }
     };
-    Some(Member { id, name: common.name.clone(), spec, pace, simulation, start, picture, links: Vec::new(), look })
+    let (name, links) = (common.name.clone(), Vec::new());
+    Some(Member { id, name, spec, pace, simulation, start, picture, links, look, faults })
 }
 
 /// Tools and the tubes that they can hold see each other.

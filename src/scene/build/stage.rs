@@ -1,6 +1,6 @@
 //! Target, camera, machine and probes of the file.
 
-use super::{Named, Names, POSITION_MAX_M};
+use super::{Names, POSITION_MAX_M};
 use crate::scene::cast::{Camera, Gains, Machine, Probe, Target, View};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CameraFile, CameraKeyFile, MODELS, MachineFile, ProbeFile, TargetFile};
@@ -173,8 +173,8 @@ fn probe(c: &mut Checker<'_, '_>, place: &Place, file: &ProbeFile, names: &Names
     let at = c.number_or(place, "at", (file.at, 1.0), &allowed(0.0..=1.0, ""));
     let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, &allowed(0.01..=1e6, "ms")));
     let agent = match names.get(&file.object) {
-        Some(Named::Tube(id) | Named::Agent(id)) => id,
-        Some(Named::Fixed) => {
+        Some(named) if named.agent().is_some() => named.agent()?,
+        Some(_) => {
             c.wrong(
                 place,
                 "object",

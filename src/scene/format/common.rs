@@ -1,11 +1,25 @@
 //! The keys that objects of every model share.
 
-use super::OneOrRange;
+use super::{FaultsFile, OneOrRange, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 8] = ["name", "rate_hz", "dt_ms", "n", "importance", "colour", "material", "sleep"];
+pub const COMMON_KEYS: [&str; 13] = [
+    "name",
+    "rate_hz",
+    "dt_ms",
+    "n",
+    "importance",
+    "colour",
+    "material",
+    "sleep",
+    "faults",
+    "grid",
+    "spacing_m",
+    "scatter_m",
+    "scatter_seed",
+];
 
 /// What every object may say, whatever its model.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
@@ -33,6 +47,19 @@ pub struct CommonFile {
     pub material: Option<Material>,
     /// Whether it stops stepping when it is at rest and nothing touches it. Default true.
     pub sleep: Option<bool>,
+    /// What goes wrong with its clock and its messages on purpose; what is left out is the world's.
+    pub faults: Option<FaultsFile>,
+    /// Repeats a rigid object or a tube: how many along x, y and z, each 1 … 1000. The first stands where the object says, the
+    /// others `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….
+    #[schemars(length(min = 3, max = 3))]
+    pub grid: Option<[u32; 3]>,
+    /// Distance of neighbours in the grid along x, y and z, metres, up to 1e4 in magnitude.
+    pub spacing_m: Option<Point>,
+    /// Moves every object of the grid by a random distance along each axis, evenly up to this far either way, metres,
+    /// 0 … 1e4. Default 0.
+    pub scatter_m: Option<f64>,
+    /// Seed of the random distances. Default 0.
+    pub scatter_seed: Option<u32>,
 }
 
 /// How a surface looks.

@@ -4,7 +4,9 @@
 //! Never here: defaults that depend on other keys, and rules between keys (`build` has them).
 
 mod common;
+mod coupling;
 mod instrument;
+mod joint;
 mod rigid;
 mod scene;
 mod synthetic;
@@ -12,7 +14,9 @@ mod tube;
 mod value;
 
 pub use common::{COMMON_KEYS, CommonFile, Material};
+pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use instrument::{InstrumentFile, KeyframeFile};
+pub use joint::{JointFile, JointKind};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ExecutorKind, LawKind, MachineFile, ModelCostFile, PolicyKind, ProbeFile, SceneFile,

@@ -1,6 +1,6 @@
 //! The tables of a scene besides its objects.
 
-use super::Point;
+use super::{CouplingFile, FaultsFile, JointFile, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -31,6 +31,14 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub probe: Vec<ProbeFile>,
+    /// What holds rigid objects together; at most 10000. Objects in a joint keep one common clock.
+    #[serde(default)]
+    #[schemars(length(max = 10_000))]
+    pub joint: Vec<JointFile>,
+    /// Pairs of objects that act on each other in another way than by touching, by the ledger; at most 10000.
+    #[serde(default)]
+    #[schemars(length(max = 10_000))]
+    pub coupling: Vec<CouplingFile>,
     /// Known here as a key only: each object is read by its model.
     #[serde(default)]
     #[schemars(skip)]
@@ -43,6 +51,10 @@ pub struct SceneFile {
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
+    /// Whether objects that move touch each other. Default true; with false only pairs that a `[[coupling]]` names do.
+    pub contacts: Option<bool>,
+    /// What goes wrong with every object's clock and messages on purpose.
+    pub faults: Option<FaultsFile>,
 }
 
 /// `[target]`: the frame rate wanted and how it is held.
