@@ -18,8 +18,9 @@ pub struct Other {
     velocities: Vec<DVec3>,
     /// A tube's nodes.
     positions: Vec<DVec3>,
-    /// Room for one answer.
+    /// Room for two answers.
     answer: Vec<DVec3>,
+    carried: Vec<DVec3>,
     age_s: f64,
     held: bool,
 }
@@ -273,8 +274,9 @@ impl Other {
     /// Adds what is on its way: W (J − J_ack) to the velocities, W ((J − J_ack) t − (S − S_ack)) to the positions.
     fn deliver(&mut self, neighbour: &Neighbour, me: AgentId, exchange: &Exchange, at: SimTime) {
         let slots = self.velocities.len();
-        let (mut sums, mut carried) = (std::mem::take(&mut self.answer), Vec::new());
+        let (mut sums, mut carried) = (std::mem::take(&mut self.answer), std::mem::take(&mut self.carried));
         sums.clear();
+        carried.clear();
         exchange.in_flight(me, neighbour, at, |site, sum, moved| {
             if sums.is_empty() {
                 sums.resize(slots, DVec3::ZERO);
@@ -292,7 +294,7 @@ impl Other {
             self.velocities.iter_mut().zip(&sums).for_each(|(v, dv)| *v += *dv);
             self.shift(&carried);
         }
-        self.answer = sums;
+        (self.answer, self.carried) = (sums, carried);
     }
 
     /// Moves by what each slot is carried.

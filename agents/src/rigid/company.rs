@@ -5,6 +5,7 @@
 //! ([`super::meeting`]), fixed solids ([`super::clearance`]).
 
 use super::clearance::{Fall, Mover, first_root};
+use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
 use crate::coupling::touch::{TouchRoom, gap};
@@ -28,6 +29,8 @@ pub(super) struct Company {
     pub me: AgentId,
     /// Seconds since the step began.
     pub after_s: f64,
+    /// Bodies at rest that own the contact with this one, and that it is about to touch.
+    pub knocks: Vec<AgentId>,
     guests: Vec<Guest>,
     /// How many of `guests` are in use; the rest is storage.
     count: usize,
@@ -67,6 +70,7 @@ impl Company {
             form,
             me: AgentId(0),
             after_s: 0.0,
+            knocks: Vec::new(),
             guests: Vec::new(),
             count: 0,
         }
@@ -96,6 +100,21 @@ impl Company {
                 if let Some(pair) = self.pairs.get(neighbour.id) {
                     pair.correct(guest.other.velocities());
                 }
+            }
+        }
+    }
+
+    /// Finds who sleeps where the body may get within two steps of `dt` seconds: nobody but them would see it come.
+    pub(super) fn knock(&mut self, around: &Surroundings<'_>, mover: &Mover, motion: &Motion, dt: f64) {
+        self.knocks.clear();
+        let reach = mover.radius_m + 2.0 * dt * motion.velocity.length();
+        for neighbour in around.neighbours.iter().filter(|n| !n.owned && n.form.is_some() && n.law != Law::Off) {
+            let Some(bounds) = neighbour.snapshot.bounds.filter(|_| neighbour.snapshot.at_rest) else { continue };
+            let nearest = motion.position.clamp(bounds.low, bounds.high);
+            let towards = nearest - motion.position;
+            let closing = motion.velocity.dot(towards.normalize_or_zero());
+            if towards.length() < reach && (closing > WAKE_M_S || towards == DVec3::ZERO) {
+                self.knocks.push(neighbour.id);
             }
         }
     }

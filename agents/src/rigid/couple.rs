@@ -73,6 +73,7 @@ impl RigidBody {
     pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
+        self.company.knock(around, &self.world.mover, &self.motion, dt);
         self.company.settle(around, dt);
     }
 
@@ -118,6 +119,7 @@ impl RigidBody {
         into.bonds.clear();
         if !self.at_rest {
             into.touches.extend(self.company.pairs.touched());
+            into.touches.extend(&self.company.knocks);
             into.bonds.extend(self.company.pairs.bonds());
         }
     }

@@ -9,6 +9,7 @@ use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 mod coupling;
+mod lasting;
 mod laws;
 mod surfaces;
 
