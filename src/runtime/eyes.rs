@@ -206,3 +206,6 @@ fn newest<R>(writer: &SlotWriter<Snapshot>, read: impl FnOnce(&Snapshot) -> R) -
         None => read(&writer.slot().latest()),
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -3,7 +3,8 @@
 //! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and how they fare.
 //! Every executor makes the same turns of an agent and shows the same surface, [`Run`], so that there is one frame loop:
 //! [`Threads`] gives each agent a thread of its own and real time; [`Lockstep`] runs all in virtual time on a declared
-//! [`Machine`], bit-identical from run to run. Never here: a model of physics, a picture, a law of control, a file.
+//! [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
+//! those that hang together share the turns of one of them (`island`). Never here: a model of physics, a picture, a law of control, a file.
 
 mod account;
 mod clock;
@@ -18,6 +19,7 @@ mod lockstep;
 mod machine;
 mod mailbox;
 mod pace;
+mod show;
 mod slot;
 mod spawn;
 mod switchboard;

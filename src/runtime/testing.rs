@@ -38,7 +38,7 @@ pub(super) struct Made {
 /// All steps that were made, by anybody.
 pub(super) type Log = Arc<Mutex<Vec<Made>>>;
 
-/// The test agent.
+/// The test agent. Its snapshot says as energy what it has taken, and as residual what it has given.
 #[derive(Debug, Clone)]
 pub(super) struct Dummy {
     /// The work each step reports; with the model "synthetic", microseconds.
@@ -56,10 +56,12 @@ pub(super) struct Dummy {
     pub ball: Option<(f64, f64)>,
     /// With whom it hangs together.
     pub bond: Option<Bond>,
-    /// It gives one newton second to everybody it owns a pair with, at each of the first so many steps.
+    /// It gives one newton second to everybody it owns a pair with, at each of its first so many steps.
     pub gifts: u64,
     /// Impulses along x it has taken, newton seconds.
     pub taken: f64,
+    /// Impulses along x it has given.
+    pub given: f64,
     pub exchange: Exchange,
     pub log: Option<Log>,
     pub me: AgentId,
@@ -83,6 +85,7 @@ impl Dummy {
             bond: None,
             gifts: 0,
             taken: 0.0,
+            given: 0.0,
             exchange: Exchange::default(),
             log: None,
             me: AgentId(0),
@@ -131,26 +134,26 @@ impl Dummy {
             for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };
                 self.exchange.give(other.id, Site::Whole, 0.0, push);
+                self.given += 1.0;
             }
         }
         self.exchange.close(around, dt_s);
     }
 }
 
-/// For each of `others`, its group: zero hangs together with the first of `all`.
-fn groups(bond: Bond, all: &[AgentId], time: SimTime) -> Vec<u32> {
-    let mut group: Vec<u32> = (0..all.len() as u32).collect();
-    for _ in all {
-        for (i, a) in all.iter().enumerate() {
-            for (j, b) in all.iter().enumerate() {
-                if a < b && bond(a.0, b.0, time) {
-                    let least = group[i].min(group[j]);
-                    (group[i], group[j]) = (least, least);
-                }
+/// Writes the group of every agent but the first of `ids` into `apart`: zero hangs together with the first.
+fn groups(bond: Bond, ids: impl Fn(usize) -> AgentId, count: usize, time: SimTime, apart: &mut Vec<u32>) {
+    apart.extend(0..count as u32);
+    for _ in 0..count {
+        for (i, j) in (0..count).flat_map(|i| (0..i).map(move |j| (i, j))) {
+            let (a, b) = (ids(i).0.min(ids(j).0), ids(i).0.max(ids(j).0));
+            if bond(a, b, time) {
+                let least = apart[i].min(apart[j]);
+                (apart[i], apart[j]) = (least, least);
             }
         }
     }
-    group.split_off(1)
+    apart.remove(0);
 }
 
 impl Agent for Dummy {
@@ -193,6 +196,7 @@ impl Agent for Dummy {
         into.body = Body::Rigid(RigidState { position, rotation: DQuat::IDENTITY, ..RigidState::default() });
         into.steps = self.steps;
         into.resolution = Some(self.resolution);
+        (into.energy_j, into.residual_m) = (self.taken, self.given);
         into.touches.extend(self.touches.filter(|(from, _)| self.steps >= *from).map(|(_, id)| id));
         // where its matter is does not follow x, so that these tests place it
         into.bounds = self.ball.map(|(radius_m, speed_m_s)| {
@@ -226,21 +230,14 @@ impl Agent for Dummy {
         apart: &mut Vec<u32>,
     ) -> Result<StepReport, StepError> {
         let Some(bond) = self.bond else { return Err(StepError::Alone { model: "synthetic" }) };
-        let before = self.clone();
-        let mut report = match self.step(dt, around) {
-            Ok(report) => report,
-            Err(error) => {
-                *self = before;
-                return Err(error);
-            }
-        };
+        let mut report = self.step(dt, around)?;
         for other in others.iter_mut() {
             let one = other.agent.step(dt, &other.around)?;
             report.work += one.work;
             report.at_rest &= one.at_rest;
         }
-        let all: Vec<_> = std::iter::once(around.me).chain(others.iter().map(|o| o.id)).collect();
-        apart.extend(groups(bond, &all, around.time + dt));
+        let ids = |k: usize| if k == 0 { around.me } else { others[k - 1].id };
+        groups(bond, ids, others.len() + 1, around.time + dt, apart);
         Ok(report)
     }
 }

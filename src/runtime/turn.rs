@@ -8,7 +8,7 @@
 //! published and the others go on. Never here: threads, sleeping, events, any law of control, the turns of those an agent
 //! leads ([`super::island`]).
 
-use super::account::{Diary, Entry, SMOOTHING};
+use super::account::{Diary, SMOOTHING};
 use super::eyes::{Eyes, Peers};
 use super::faults::Faults;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -21,8 +21,8 @@ use metachron_agents::{
     Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, PoisonError};
 use std::time::Duration;
 
 /// An agent and all it needs to live.
@@ -162,20 +162,6 @@ impl Actor {
         if open.rests && published && self.lie_down(now) { Next::Rest } else { Next::Due }
     }
 
-    /// Accounts for a step that has been made and shows it; whether its state can be seen.
-    pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
-        let missed = now > self.pace.time();
-        let entry = Entry { now, late: open.start.late, missed, work_s };
-        // first the account: who sees a state finds it accounted for
-        self.diary.write(&self.shared.gauges, &self.pace, entry);
-        self.withheld = self.faults.loses(self.id(), self.diary.steps());
-        let published = !self.withheld && self.writer.publish();
-        if published {
-            self.announce(now);
-        }
-        published
-    }
-
     /// Whether somebody has woken the agent from its rest; it is on its feet then, at the timeline's present, and all it leads.
     pub fn wakes(&mut self, timeline: &Timeline, wall: Duration) -> bool {
         if !self.shared.board.take_wake(self.id()) {
@@ -263,65 +249,6 @@ impl Actor {
     /// Whether nothing from outside keeps the agent from resting at simulated time `now`.
     pub fn is_let_alone(&self, now: SimTime) -> bool {
         self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
-    }
-
-    /// Writes the state at `time`, to be published later; `at_rest` where the agent means to rest in it.
-    pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
-        let agent = &self.agent;
-        self.withheld = false;
-        let finite = self.writer.fill(|into| {
-            into.clear();
-            agent.write_snapshot(into);
-            (into.time, into.at_rest) = (time, at_rest);
-            into.is_finite()
-        });
-        let model = self.shared.model;
-        if let (true, Some(state)) = (finite, self.writer.filled()) {
-            self.eyes.stand(&self.peers, state);
-            let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-            traces.iter_mut().for_each(|trace| trace.look(state));
-            Ok(())
-        } else {
-            Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
-        }
-    }
-
-    /// Shows a state that was kept from being seen: the last of a life never is.
-    fn show_withheld(&mut self) {
-        if std::mem::take(&mut self.withheld) {
-            self.writer.publish();
-        }
-    }
-
-    /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.
-    fn hold_watched(&self, now: SimTime) {
-        let state = self.shared.slot.latest();
-        let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-        traces.iter_mut().for_each(|trace| trace.hold(&state, now));
-    }
-
-    /// Tells those this agent acts on, once they can see how.
-    fn announce(&mut self, now: SimTime) {
-        let newest = self.shared.slot.latest();
-        let board = &self.shared.board;
-        let leader = board.leader(self.shared.id);
-        let others = newest.touches.iter().filter(|id| board.leader(**id) != leader);
-        others.for_each(|id| board.touch(*id, now));
-        let Some(crowd) = &self.peers.crowd else { return };
-        for ledger in &newest.given {
-            let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);
-            if known.as_ref().is_some_and(|(_, revision)| *revision == ledger.revision) {
-                continue;
-            }
-            match known {
-                Some((_, revision)) => *revision = ledger.revision,
-                None => self.announced.push((ledger.with, ledger.revision)),
-            }
-            crowd.call(ledger.with, self.shared.id);
-            if board.rests(ledger.with) {
-                board.wake(ledger.with);
-            }
-        }
     }
 
     fn consult(&mut self, timeline: &Timeline, open: &Open, work_s: f64) -> Result<(), String> {
