@@ -6,6 +6,7 @@
 use metachron::control::{FrameWork, Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Status};
 use metachron_agents::{AgentId, ResolutionRange};
 use plotters::prelude::*;
+use plotters::style::register_font;
 use std::error::Error;
 use std::fs;
 use std::time::Duration;
@@ -198,8 +199,16 @@ const BLUE_LINE: RGBColor = RGBColor(0x1f, 0x5f, 0xa8);
 const RED_LINE: RGBColor = RGBColor(0xc0, 0x4a, 0x3a);
 const GREY: RGBColor = RGBColor(0x88, 0x88, 0x88);
 
+/// The widths of words are those of the font that the window's panels are written in.
+fn bring_font() -> Result<(), Box<dyn Error>> {
+    let font = egui::FontDefinitions::default().font_data.remove("Ubuntu-Light").ok_or("no font")?;
+    let bytes = Box::leak(font.bytes().to_vec().into_boxed_slice());
+    register_font("sans-serif", FontStyle::Normal, bytes).map_err(|_| "a font that is none".into())
+}
+
 /// A panel a target: t/T_set over time, both laws from both sides.
 fn write_svg(path: &str, runs: &[Run]) -> Result<(), Box<dyn Error>> {
+    bring_font()?;
     let root = SVGBackend::new(path, (1080, 380)).into_drawing_area();
     root.fill(&WHITE)?;
     for (area, target_hz) in root.split_evenly((1, 3)).iter().zip([20.0, 30.0, 60.0]) {

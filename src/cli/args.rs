@@ -33,6 +33,14 @@ Examples:
   metachron check my.toml other.toml
   metachron check --json my.toml | jq '.[].problems'";
 
+const CHART_EXAMPLES: &str = "\
+Examples:
+  metachron chart stability                            every experiment, into the folder charts/
+  metachron chart stability --quick --only tube-map --out /tmp/charts
+  metachron chart stability --json -q | jq '.experiments[].findings'
+
+Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
+
 /// A real-time physics engine in which every object keeps its own time and the frame never waits.
 ///
 /// A scene is a TOML file of objects: soft tubes, rigid bodies, instruments. Each runs as an agent on its own clock, with its
@@ -54,6 +62,9 @@ pub enum Command {
     /// Validate scenes; every problem is shown where it stands
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
+    /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
+    #[command(after_help = CHART_EXAMPLES)]
+    Chart(ChartArgs),
     /// Print the JSON Schema of scene files
     Schema,
     /// List the built-in scenes
@@ -155,6 +166,35 @@ pub struct CheckArgs {
     /// Say nothing of scenes that are sound
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `chart`.
+#[derive(Debug, Args)]
+pub struct ChartArgs {
+    /// What to chart
+    pub subject: Subject,
+    /// Write the files here; the folder is made where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// A small part of the cases, or shorter runs: minutes become seconds
+    #[arg(long)]
+    pub quick: bool,
+    /// Only this experiment; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+    /// Print the tables as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no tables
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A subject of `chart`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Subject {
+    /// Where integrators and couplings blow up, and where they are bounded but wrong
+    Stability,
 }
 
 /// `list`.

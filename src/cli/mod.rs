@@ -4,6 +4,7 @@
 //! Never here: physics, drawing, the format of scenes.
 
 mod args;
+mod chart;
 mod check;
 mod describe;
 mod output;
@@ -63,6 +64,7 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
         Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
         Command::Check(args) => check::command(&args),
+        Command::Chart(args) => chart::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),
         Command::Completions { shell } => describe::completions(shell),

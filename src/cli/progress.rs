@@ -20,8 +20,13 @@ impl Bar {
 
     /// Shows how far the run is: the share that is done, and the last frame.
     pub(super) fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
+        self.tell(done, format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
+    }
+
+    /// Shows the share that is done, and words beside it.
+    pub(super) fn tell(&self, done: f64, words: String) {
         self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
-        self.0.set_message(format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
+        self.0.set_message(words);
     }
 }
 

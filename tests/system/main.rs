@@ -1,4 +1,5 @@
 //! The whole program as its users meet it; one binary, so that it links once.
+mod chart;
 mod cli;
 mod picture;
 mod play;

@@ -1,0 +1,77 @@
+//! What an experiment is: cases that are data, and a function from a case to a row.
+//!
+//! In: whether to be quick. Out: cases, rows, a figure, a table, findings. Never here: files, threads, drawing.
+
+use super::figure::Figure;
+use super::table::Table;
+use serde::Serialize;
+use serde::de::DeserializeOwned;
+
+/// One question, asked of many cases.
+pub(super) trait Experiment: Sync {
+    /// What tells one row from another: rows of the same case are the same measurement.
+    type Case: PartialEq + Sync;
+    /// A case with what was measured of it; its fields are the columns of the CSV file.
+    type Row: Serialize + DeserializeOwned + Clone + Send + Sync;
+
+    /// The name that `--only` takes; the files are called after it.
+    const NAME: &'static str;
+    /// What it shows, in one sentence.
+    const TITLE: &'static str;
+
+    /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
+    fn cases(quick: bool) -> Vec<Self::Case>;
+
+    /// Measures one case. The same case gives the same row, whoever measures it and when.
+    fn measure(case: &Self::Case) -> Self::Row;
+
+    /// The case that a row is of.
+    fn case_of(row: &Self::Row) -> Self::Case;
+
+    /// The picture of the rows there are.
+    fn figure(rows: &[Self::Row]) -> Figure;
+
+    /// The table that is printed.
+    fn table(rows: &[Self::Row]) -> Table;
+
+    /// What was claimed, and what came out.
+    fn findings(rows: &[Self::Row]) -> Vec<Finding>;
+}
+
+/// A claim held against the rows.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub(super) struct Finding {
+    /// The claim, as a sentence with its limit.
+    pub(super) claim: String,
+    /// What was measured.
+    pub(super) measured: f64,
+    /// The limit.
+    pub(super) limit: f64,
+    /// Whether the claim holds.
+    pub(super) holds: bool,
+}
+
+impl Finding {
+    /// Holds where `measured` is at most `limit`; a number that is none holds nothing.
+    pub(super) fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
+        Self { claim: claim.into(), measured, limit, holds: measured <= limit }
+    }
+}
+
+/// The greatest of some numbers; NaN where one of them is, or where there are none.
+pub(super) fn worst(numbers: impl IntoIterator<Item = f64>) -> f64 {
+    let greater = |a: f64, b: f64| if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) };
+    numbers.into_iter().reduce(greater).unwrap_or(f64::NAN)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_number_that_is_none_keeps_no_claim() {
+        assert!(worst([1.0, f64::NAN, 2.0]).is_nan() && worst([]).is_nan());
+        assert!(!Finding::at_most("bounded", worst([1.0, f64::NAN]), 2.0).holds);
+        assert!(Finding::at_most("bounded", worst([1.0, 2.0]), 2.0).holds);
+    }
+}

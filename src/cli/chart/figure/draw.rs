@@ -1,0 +1,213 @@
+//! Draws a figure, as SVG text or as pixels.
+//!
+//! In: a [`Figure`]. Out: text, or the bytes of a PNG file. Never here: what the numbers mean, files.
+
+use super::font::bring_font;
+use super::scale::Scale;
+use super::{Colour, Figure, Layer, Mark, Panel};
+use anyhow::{Context, anyhow};
+use image::imageops::{FilterType, resize};
+use image::{ImageFormat, RgbImage};
+use plotters::coord::Shift;
+use plotters::prelude::*;
+
+type Chart<'a, D> = ChartContext<'a, D, Cartesian2d<Scale, Scale>>;
+
+/// Width and height of a panel, and height of the title above all of them.
+const PANEL: [u32; 2] = [430, 330];
+const TITLE: u32 = 34;
+/// Heights of letters.
+const LARGE: u32 = 17;
+const MIDDLE: u32 = 15;
+const SMALL: u32 = 12;
+const FONT: &str = "sans-serif";
+/// Pixels are drawn so many times finer than units of the SVG text, and then brought to [`SHARP`]: smooth lines.
+const FINE: u32 = 4;
+/// Pixels a unit: sharp on fine screens too.
+const SHARP: u32 = 2;
+
+/// The figure as SVG text; the same figure is always the same text.
+///
+/// # Errors
+/// What cannot be drawn: an axis that ends where it begins.
+pub(in crate::cli::chart) fn svg(figure: &Figure) -> anyhow::Result<String> {
+    let mut text = String::new();
+    let [width, height] = size(figure);
+    draw(SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(), figure, Pen(1))?;
+    Ok(text)
+}
+
+/// The figure as the bytes of a PNG file; the same figure is always the same bytes.
+///
+/// # Errors
+/// What cannot be drawn.
+pub(in crate::cli::chart) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
+    let [width, height] = size(figure);
+    let fine = (width * FINE, height * FINE);
+    let mut pixels = vec![0; fine.0 as usize * fine.1 as usize * 3];
+    draw(BitMapBackend::with_buffer(&mut pixels, fine).into_drawing_area(), figure, Pen(FINE))?;
+    let picture = RgbImage::from_raw(fine.0, fine.1, pixels).context("the figure has no size")?;
+    let picture = resize(&picture, width * SHARP, height * SHARP, FilterType::Triangle);
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.write_to(&mut bytes, ImageFormat::Png).context("the figure cannot be written as PNG")?;
+    Ok(bytes.into_inner())
+}
+
+fn columns(figure: &Figure) -> usize {
+    figure.columns.clamp(1, figure.panels.len().max(1))
+}
+
+fn lines(figure: &Figure) -> usize {
+    figure.panels.len().div_ceil(columns(figure)).max(1)
+}
+
+fn size(figure: &Figure) -> [u32; 2] {
+    [PANEL[0] * columns(figure) as u32, PANEL[1] * lines(figure) as u32 + TITLE]
+}
+
+/// How many pixels a unit has.
+#[derive(Clone, Copy)]
+struct Pen(u32);
+
+impl Pen {
+    fn px(self, units: u32) -> u32 {
+        self.0 * units
+    }
+
+    fn at(self, units: i32) -> i32 {
+        self.0 as i32 * units
+    }
+
+    fn font(self, units: u32) -> TextStyle<'static> {
+        (FONT, self.px(units)).into_font().color(&BLACK)
+    }
+}
+
+/// plotters' errors borrow what was drawn on.
+fn undrawn(error: impl std::fmt::Display) -> anyhow::Error {
+    anyhow!("the figure cannot be drawn: {error}")
+}
+
+fn draw<D: DrawingBackend>(root: DrawingArea<D, Shift>, figure: &Figure, pen: Pen) -> anyhow::Result<()> {
+    bring_font(FONT)?;
+    root.fill(&WHITE).map_err(undrawn)?;
+    let (top, rest) = root.split_vertically(pen.px(TITLE));
+    top.draw_text(&figure.title, &pen.font(LARGE), (pen.at(12), pen.at(10))).map_err(undrawn)?;
+    let areas = rest.split_evenly((lines(figure), columns(figure)));
+    areas.iter().zip(&figure.panels).try_for_each(|(area, panel)| draw_panel(area, panel, pen))?;
+    root.present().map_err(undrawn)
+}
+
+fn draw_panel<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pen: Pen) -> anyhow::Result<()> {
+    let mut chart = ChartBuilder::on(area)
+        .caption(&panel.title, pen.font(MIDDLE))
+        .margin(pen.px(10))
+        .margin_right(pen.px(18))
+        .x_label_area_size(pen.px(40))
+        .y_label_area_size(pen.px(56))
+        .build_cartesian_2d(Scale(panel.x.clone()), Scale(panel.y.clone()))
+        .map_err(undrawn)?;
+    let mesh = &mut chart.configure_mesh();
+    mesh.x_desc(panel.x.label).y_desc(panel.y.label).x_labels(9).y_labels(8).max_light_lines(1);
+    mesh.light_line_style(WHITE).bold_line_style(rgb(Colour::Grey).mix(0.25).stroke_width(pen.px(1)));
+    mesh.axis_style(BLACK.stroke_width(pen.px(1))).set_all_tick_mark_size(pen.px(4));
+    mesh.label_style(pen.font(SMALL)).axis_desc_style(pen.font(SMALL + 1)).draw().map_err(undrawn)?;
+    panel.layers.iter().try_for_each(|layer| draw_layer(&mut chart, layer, pen))?;
+    if panel.layers.iter().any(|l| !l.label.is_empty()) {
+        let legend = &mut chart.configure_series_labels();
+        legend.position(SeriesLabelPosition::UpperRight).label_font(pen.font(SMALL)).legend_area_size(pen.px(22));
+        legend.background_style(WHITE.mix(0.85)).margin(pen.px(6)).draw().map_err(undrawn)?;
+    }
+    Ok(())
+}
+
+fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: Pen) -> anyhow::Result<()> {
+    let colour = rgb(layer.colour);
+    let line = colour.stroke_width(pen.px(2));
+    let dot = pen.px(3);
+    let series = match &layer.mark {
+        Mark::Dashed(points) => {
+            let dashes = DashedLineSeries::new(finite(points), pen.px(5), pen.px(4), line);
+            chart.draw_series(dashes).map_err(undrawn)?
+        }
+        Mark::Dots(points) => {
+            let dots = finite(points).into_iter().map(|at| Circle::new(at, dot, colour.filled()));
+            chart.draw_series(dots).map_err(undrawn)?
+        }
+        Mark::Cells(cells) => {
+            let boxes = cells.iter().map(|&[a, b, c, d]| Rectangle::new([(a, c), (b, d)], colour.filled()));
+            chart.draw_series(boxes).map_err(undrawn)?
+        }
+    };
+    if layer.label.is_empty() {
+        return Ok(());
+    }
+    let (series, at) = (series.label(&layer.label), move |units| pen.at(units));
+    match layer.mark {
+        Mark::Dashed(_) => series.legend(move |(x, y)| PathElement::new([(x + at(4), y), (x + at(10), y)], line)),
+        Mark::Dots(_) => series.legend(move |(x, y)| Circle::new((x + at(8), y), dot, colour.filled())),
+        Mark::Cells(_) => series
+            .legend(move |(x, y)| Rectangle::new([(x + at(2), y - at(5)), (x + at(14), y + at(5))], colour.filled())),
+    };
+    Ok(())
+}
+
+/// The points that are numbers.
+fn finite(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
+}
+
+fn rgb(colour: Colour) -> RGBColor {
+    match colour {
+        Colour::Blue => RGBColor(0x1f, 0x5f, 0xa8),
+        Colour::Red => RGBColor(0xc0, 0x4a, 0x3a),
+        Colour::Green => RGBColor(0x00, 0x9e, 0x73),
+        Colour::Orange => RGBColor(0xe6, 0x9f, 0x00),
+        Colour::Sky => RGBColor(0x56, 0xb4, 0xe9),
+        Colour::Purple => RGBColor(0xcc, 0x79, 0xa7),
+        Colour::Grey => RGBColor(0x70, 0x70, 0x70),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Axis;
+    use super::*;
+
+    fn dark_pixels(title: &str) -> usize {
+        let axis = || Axis::linear("", 0.0, 1.0);
+        let panel = Panel { title: String::new(), x: axis(), y: axis(), layers: vec![] };
+        let figure = Figure { title: title.to_owned(), panels: vec![panel], columns: 1 };
+        let picture = image::load_from_memory(&png(&figure).unwrap()).unwrap().to_luma8();
+        assert_eq!(picture.dimensions(), (2 * 430, 2 * (330 + 34)));
+        picture.rows().take(2 * TITLE as usize).flatten().filter(|p| p.0[0] < 128).count()
+    }
+
+    #[test]
+    fn letters_are_drawn_with_the_font_that_the_program_brings() {
+        assert_eq!(dark_pixels(""), 0);
+        // Greek and signs that the charts' labels need: each draws something of its own, none a missing glyph's nothing
+        let counts = ["μ", "φ", "π", "²", "×", "≤", "Δ", "τ", "₁"].map(dark_pixels);
+        assert!(counts.iter().all(|c| *c > 4), "{counts:?}");
+    }
+
+    #[test]
+    fn what_is_drawn_is_in_both_kinds_of_file() {
+        let dots = Layer {
+            label: "dots".to_owned(),
+            colour: Colour::Blue,
+            mark: Mark::Dots(vec![(0.5, 0.5), (f64::NAN, 0.1)]),
+        };
+        let axis = |label| Axis::linear(label, 0.0, 1.0);
+        let panel =
+            Panel { title: "panel".to_owned(), x: axis("to the right, m"), y: axis("up, s"), layers: vec![dots] };
+        let figure = Figure { title: "figure".to_owned(), panels: vec![panel], columns: 1 };
+        let text = svg(&figure).unwrap();
+        for word in ["figure", "panel", "to the right, m", "up, s", "dots", "<circle"] {
+            assert!(text.contains(word), "{word} is not in\n{text}");
+        }
+        assert_eq!(text.matches("<circle").count(), 2, "one dot that is a number, one in the legend");
+        let picture = image::load_from_memory(&png(&figure).unwrap()).unwrap().to_rgb8();
+        assert!(picture.pixels().any(|p| p.0 == [0x1f, 0x5f, 0xa8]));
+    }
+}

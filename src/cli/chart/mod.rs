@@ -1,0 +1,188 @@
+//! `chart`: experiments that show where methods fail, as CSV, SVG and PNG in a folder and a table on standard output.
+//!
+//! In: which subject, which folder. Out: files, a table, findings. Never here: what is measured (each experiment is a file).
+
+mod experiment;
+mod figure;
+mod rows;
+mod stability;
+mod sweep;
+mod table;
+
+use super::Exit;
+use super::args::{ChartArgs, Subject};
+use super::output::{BadInput, data, message};
+use super::progress::Bar;
+use anyhow::Context;
+use experiment::{Experiment, Finding};
+use rows::RowFile;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use table::{Cell, Table};
+
+/// What a command's experiments share.
+struct Setting<'a> {
+    subject: &'static str,
+    folder: &'a Path,
+    quick: bool,
+    quiet: bool,
+    stopped: &'a AtomicBool,
+}
+
+/// What an experiment came to.
+#[derive(Serialize)]
+struct Done {
+    name: &'static str,
+    title: &'static str,
+    complete: bool,
+    rows: usize,
+    files: Vec<PathBuf>,
+    table: Table,
+    findings: Vec<Finding>,
+}
+
+/// An experiment that can be run by its name.
+struct Entry {
+    name: &'static str,
+    run: fn(&Setting<'_>) -> anyhow::Result<Done>,
+}
+
+const fn entry<E: Experiment>() -> Entry {
+    Entry { name: E::NAME, run: run::<E> }
+}
+
+const STABILITY: &[Entry] = &[entry::<stability::tube_map::TubeMap>(), entry::<stability::incline::Incline>()];
+
+/// Runs the experiments of a subject.
+pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
+    let subject = match args.subject {
+        Subject::Stability => "stability",
+    };
+    let all = match args.subject {
+        Subject::Stability => STABILITY,
+    };
+    let chosen = chosen(all, &args.only)?;
+    let folder = prepared(&args.out)?;
+    let stopped = stopper()?;
+    let quiet = args.quiet || args.json;
+    let setting = Setting { subject, folder, quick: args.quick, quiet: args.quiet, stopped: &stopped };
+    let mut done = Vec::new();
+    for entry in chosen {
+        let one = (entry.run)(&setting)?;
+        if !quiet {
+            data(&told(&one))?;
+        }
+        done.push(one);
+        if stopped.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let interrupted = stopped.load(Ordering::Relaxed);
+    if args.json {
+        let whole = serde_json::json!({ "chart": subject, "quick": args.quick, "interrupted": interrupted, "experiments": done });
+        data(&format!("{}\n", serde_json::to_string_pretty(&whole)?))?;
+    }
+    if interrupted {
+        message("interrupted: the finished rows are kept, and the same command takes them up");
+    }
+    Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
+}
+
+/// The experiments that were named, or all of them.
+fn chosen<'a>(all: &'a [Entry], only: &[String]) -> anyhow::Result<Vec<&'a Entry>> {
+    let find = |name: &String| all.iter().find(|e| e.name == name).ok_or_else(|| unknown(all, name));
+    if only.is_empty() { Ok(all.iter().collect()) } else { only.iter().map(find).collect() }
+}
+
+fn unknown(all: &[Entry], name: &str) -> anyhow::Error {
+    const NEAR_ENOUGH: f64 = 0.75;
+    let near = all.iter().map(|e| (strsim::jaro_winkler(name, e.name), e.name)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = near.filter(|n| n.0 > NEAR_ENOUGH).map_or_else(String::new, |n| format!("; did you mean `{}`?", n.1));
+    let names: Vec<_> = all.iter().map(|e| e.name).collect();
+    BadInput(format!("there is no experiment `{name}`{hint} (there are: {})", names.join(", "))).into()
+}
+
+/// The folder, made and tried: better known before an hour's work than after.
+fn prepared(folder: &Path) -> anyhow::Result<&Path> {
+    let refused = |why: std::io::Error| BadInput(format!("the folder {} cannot be written: {why}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(refused)?;
+    let trial = folder.join(".metachron-chart");
+    std::fs::write(&trial, b"").and_then(|()| std::fs::remove_file(&trial)).map_err(refused)?;
+    Ok(folder)
+}
+
+/// A flag that Ctrl-C raises; pressed again, the program ends at once.
+fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
+    let (stopped, presses) = (Arc::new(AtomicBool::new(false)), AtomicU32::new(0));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || {
+        flag.store(true, Ordering::Relaxed);
+        if presses.fetch_add(1, Ordering::Relaxed) > 0 {
+            std::process::exit(130);
+        }
+    })
+    .context("Ctrl-C cannot be caught")?;
+    Ok(stopped)
+}
+
+/// Measures, draws and writes one experiment.
+fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
+    let stem = format!("{}-{}", setting.subject, E::NAME);
+    let cases = E::cases(setting.quick);
+    let file = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
+    let bar = Bar::new(E::NAME, setting.quiet);
+    let swept = sweep::sweep::<E>(&cases, file, setting.stopped, &mut |done, all| {
+        bar.tell(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
+    })?;
+    drop(bar);
+    let mut files = vec![setting.folder.join(format!("{stem}.csv"))];
+    if swept.complete {
+        files.extend(drawn::<E>(setting.folder, &stem, &swept.rows)?);
+    }
+    Ok(Done {
+        name: E::NAME,
+        title: E::TITLE,
+        complete: swept.complete,
+        rows: swept.rows.len(),
+        files,
+        table: E::table(&swept.rows),
+        findings: E::findings(&swept.rows),
+    })
+}
+
+/// What must be the same for rows to be taken up: the experiment, its extent, and the program that measured them.
+fn settings<E: Experiment>(quick: bool) -> String {
+    let built = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
+    format!("{} quick={quick} version={} built={:?}\n", E::NAME, env!("CARGO_PKG_VERSION"), built.ok())
+}
+
+/// Writes the figure as SVG and as PNG.
+fn drawn<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<[PathBuf; 2]> {
+    let figure = E::figure(rows);
+    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
+    let paths = ["svg", "png"].map(|kind| folder.join(format!("{stem}.{kind}")));
+    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(paths)
+}
+
+/// An experiment's table, findings and files as text.
+fn told(done: &Done) -> String {
+    let mut findings = Table::new(&["", "claim", "measured", "limit"]);
+    for Finding { claim, measured, limit, holds } in &done.findings {
+        let word = if *holds { "holds" } else { "FAILS" };
+        findings.rows.push(vec![
+            word.into(),
+            claim.clone().into(),
+            Cell::Number(*measured, 4),
+            Cell::Number(*limit, 4),
+        ]);
+    }
+    let files: Vec<_> = done.files.iter().map(|f| f.display().to_string()).collect();
+    let state = if done.complete { "" } else { " (unfinished)" };
+    let Done { name, title, table, .. } = done;
+    format!("{name}: {title}{state}\n\n{}\n{}\nfiles: {}\n\n", table.text(), findings.text(), files.join(", "))
+}

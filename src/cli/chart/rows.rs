@@ -1,0 +1,86 @@
+//! The CSV file of an experiment, which grows row by row and can be taken up again.
+//!
+//! In: rows as they come. Out: a file that holds every finished row at any moment, in the order of the cases once all are
+//! there. While rows are missing a mark stands beside it: the settings it is made with. Never here: what a row means.
+
+use super::experiment::Experiment;
+use anyhow::Context;
+use std::fs::{self, File, OpenOptions};
+use std::path::{Path, PathBuf};
+
+/// The file while its experiment runs.
+pub(super) struct RowFile {
+    path: PathBuf,
+    mark: PathBuf,
+    out: csv::Writer<File>,
+}
+
+impl RowFile {
+    /// Opens the file of `E` in `folder` and returns the rows that an interrupted run of the same settings left there.
+    ///
+    /// # Errors
+    /// What the file system refuses.
+    pub(super) fn open<E: Experiment>(
+        folder: &Path,
+        stem: &str,
+        settings: &str,
+        cases: &[E::Case],
+    ) -> anyhow::Result<(Self, Vec<E::Row>)> {
+        let (path, mark) = (folder.join(format!("{stem}.csv")), folder.join(format!("{stem}.unfinished")));
+        let same = fs::read_to_string(&mark).is_ok_and(|text| text == settings);
+        let kept = if same { read::<E>(&path, cases) } else { Vec::new() };
+        replace::<E>(&path, &kept)?;
+        let file = OpenOptions::new().append(true).open(&path);
+        let file = file.with_context(|| format!("{} cannot be written", path.display()))?;
+        // the names of the columns come with the first row
+        let out = csv::WriterBuilder::new().has_headers(kept.is_empty()).from_writer(file);
+        fs::write(&mark, settings).with_context(|| format!("{} cannot be written", mark.display()))?;
+        Ok((Self { path, mark, out }, kept))
+    }
+
+    /// Adds a row; it is in the file when this returns.
+    ///
+    /// # Errors
+    /// What the file system refuses.
+    pub(super) fn add<E: Experiment>(&mut self, row: &E::Row) -> anyhow::Result<()> {
+        let written = self.out.serialize(row).map_err(anyhow::Error::from).and_then(|()| Ok(self.out.flush()?));
+        written.with_context(|| format!("{} cannot be written", self.path.display()))
+    }
+
+    /// All rows are there: writes them once more, in order, and takes the mark away.
+    ///
+    /// # Errors
+    /// What the file system refuses.
+    pub(super) fn finish<E: Experiment>(self, rows: &[E::Row]) -> anyhow::Result<()> {
+        drop(self.out);
+        replace::<E>(&self.path, rows)?;
+        fs::remove_file(&self.mark).with_context(|| format!("{} cannot be removed", self.mark.display()))
+    }
+}
+
+/// Writes rows beside the file and moves them over it: there is no moment without the finished rows.
+fn replace<E: Experiment>(path: &Path, rows: &[E::Row]) -> anyhow::Result<()> {
+    let beside = path.with_extension("csv.new");
+    let write = || -> anyhow::Result<()> {
+        let mut out = csv::Writer::from_path(&beside)?;
+        rows.iter().try_for_each(|row| out.serialize(row))?;
+        out.flush()?;
+        Ok(fs::rename(&beside, path)?)
+    };
+    write().with_context(|| format!("{} cannot be written", path.display()))
+}
+
+/// The rows of a file that are of these cases, one a case; a last line that was cut off is none.
+fn read<E: Experiment>(path: &Path, cases: &[E::Case]) -> Vec<E::Row> {
+    let Ok(mut file) = csv::Reader::from_path(path) else { return Vec::new() };
+    let mut seen: Vec<E::Case> = Vec::new();
+    let mut rows = Vec::new();
+    for row in file.deserialize::<E::Row>().flatten() {
+        let case = E::case_of(&row);
+        if cases.contains(&case) && !seen.contains(&case) {
+            seen.push(case);
+            rows.push(row);
+        }
+    }
+    rows
+}

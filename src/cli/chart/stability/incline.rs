@@ -1,0 +1,159 @@
+//! Incline: a box and a tube on a slope stick below tan(angle) = μ and slide above, as far as Coulomb says.
+
+use super::super::experiment::{Experiment, Finding, worst};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::table::Table;
+use super::common::{GRAVITY, plain_body, plain_tube};
+use glam::{DQuat, DVec3};
+use metachron_agents::rigid::{RigidBody, RigidSpec};
+use metachron_agents::rod::{Tube, TubeSpec};
+use metachron_agents::shape::{Obstacle, Solid};
+use metachron_agents::{Agent, AgentId, Body, SimSpan, SimTime, Snapshot, Surroundings};
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(in super::super) struct Incline;
+
+const BODIES: [&str; 2] = ["box", "tube"];
+const FRICTION: f64 = 0.3;
+/// tan(angle)/μ.
+const SLOPES: [f64; 13] = [0.9, 0.94, 0.96, 0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1.03, 1.04, 1.06, 1.1];
+const QUICK_SLOPES: [f64; 2] = [0.98, 1.02];
+/// The claim's tolerance on tan(angle).
+const TOLERANCE: f64 = 0.02;
+/// What moves less than this in a second sticks, metres: a thirtieth of the way it slides 2 % above the angle.
+const STICKS_M: f64 = 1e-3;
+const SECONDS: f64 = 1.0;
+const DT_S: f64 = 0.004;
+
+/// A body on a slope.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    body: String,
+    slope: f64,
+}
+
+/// What it did.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    body: String,
+    /// tan(angle)/μ.
+    slope: f64,
+    /// How far it slid in a second, metres.
+    slid_m: Option<f64>,
+    /// How far Coulomb says it slides.
+    theory_m: f64,
+}
+
+impl Experiment for Incline {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "incline";
+    const TITLE: &'static str = "a box and a tube on a slope: where they begin to slide, μ = 0.3";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let slopes = if quick { &QUICK_SLOPES[..] } else { &SLOPES[..] };
+        let of = |body: &'static str| slopes.iter().map(move |&slope| Case { body: body.to_owned(), slope });
+        BODIES.into_iter().flat_map(of).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let angle = libm::atan(case.slope * FRICTION);
+        let pull = GRAVITY * (libm::sin(angle) - FRICTION * libm::cos(angle));
+        let Case { body, slope } = case.clone();
+        Row { body, slope, slid_m: slid(case, angle), theory_m: 0.5 * pull.max(0.0) * SECONDS * SECONDS }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { body: row.body.clone(), slope: row.slope }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let mut theory: Vec<_> = rows.iter().map(|r| (r.slope, 1e3 * r.theory_m)).collect();
+        theory.sort_by(|a, b| a.0.total_cmp(&b.0));
+        let mut layers =
+            vec![Layer { label: "Coulomb".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(theory.clone()) }];
+        for (body, colour) in BODIES.into_iter().zip(Colour::LINES) {
+            let points = rows.iter().filter(|r| r.body == body).filter_map(|r| Some((r.slope, 1e3 * r.slid_m?)));
+            layers.push(Layer { label: body.to_owned(), colour, mark: Mark::Dots(points.collect()) });
+        }
+        let (low, high) = span(theory.iter().map(|p| p.1), false);
+        let (x, y) = (Axis::linear("tan(angle)/μ", 0.89, 1.11), Axis::linear("way in the first second, mm", low, high));
+        let panel = Panel { title: String::new(), x, y, layers };
+        Figure { title: "On a slope, μ = 0.3".to_owned(), panels: vec![panel], columns: 1 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["body", "tan/μ", "slid_mm", "Coulomb_mm"]);
+        table.rows.extend(rows.iter().map(|r| {
+            let slid = 1e3 * r.slid_m.unwrap_or(f64::NAN);
+            vec![r.body.clone().into(), (r.slope, 2).into(), (slid, 3).into(), (1e3 * r.theory_m, 3).into()]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let of = |body: &str| {
+            let here = || rows.iter().filter(|r| r.body == body);
+            let slides = |r: &&Row| r.slid_m.is_none_or(|slid| slid.abs() > STICKS_M);
+            let slid_below = here().filter(slides).map(|r| 1.0 - r.slope);
+            let stuck_above = here().filter(|r| !slides(r)).map(|r| r.slope - 1.0);
+            let off = worst(slid_below.chain(stuck_above).chain([0.0]));
+            Finding::at_most(
+                format!("{body}: stick and slip change at tan(angle) = μ, relative error below"),
+                off,
+                TOLERANCE * 0.999,
+            )
+        };
+        BODIES.into_iter().map(of).collect()
+    }
+}
+
+/// The way that the body makes down the slope.
+fn slid(case: &Case, angle: f64) -> Option<f64> {
+    let rotation = DQuat::from_rotation_y(angle);
+    let ground = Obstacle {
+        name: "slope".to_owned(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation,
+        friction: FRICTION,
+        restitution: 0.0,
+    };
+    let (down, up) = (rotation * DVec3::X, rotation * DVec3::Z);
+    let gravity = DVec3::NEG_Z * GRAVITY;
+    let mut agent: Box<dyn Agent> = if case.body == "box" {
+        let half_extents_m = DVec3::new(0.1, 0.1, 0.02);
+        let plain = plain_body(Solid::Box { half_extents_m }, up * half_extents_m.z, 1.0);
+        let spec = RigidSpec { rotation, friction: FRICTION, gravity, obstacles: [ground].into(), ..plain };
+        Box::new(RigidBody::new(spec).ok()?)
+    } else {
+        let radius_m = 0.015;
+        let plain = plain_tube(vec![up * radius_m, up * radius_m + down * 0.4], radius_m, 20);
+        Box::new(Tube::new(TubeSpec { friction: FRICTION, gravity, obstacles: [ground].into(), ..plain }).ok()?)
+    };
+    let before = middle(&*agent)?;
+    let dt = SimSpan::from_secs_f64(DT_S)?;
+    let mut time = SimTime::ZERO;
+    while time.as_secs_f64() < SECONDS - 0.5 * DT_S {
+        agent.step(dt, &Surroundings::alone(AgentId(0), time)).ok()?;
+        time += dt;
+    }
+    Some((middle(&*agent)? - before).dot(down))
+}
+
+/// The centre of mass; of a tube, of its nodes by length.
+fn middle(agent: &dyn Agent) -> Option<DVec3> {
+    let mut snapshot = Snapshot::default();
+    agent.write_snapshot(&mut snapshot);
+    match &snapshot.body {
+        Body::Curve(curve) => {
+            let halves = curve.positions.windows(2).zip(curve.arc_m.windows(2));
+            let (sum, length) = halves.fold((DVec3::ZERO, 0.0), |(sum, length), (x, s)| {
+                (sum + (x[0] + x[1]) * (0.5 * (s[1] - s[0])), length + s[1] - s[0])
+            });
+            Some(sum / length)
+        }
+        other => other.probe(0.0).map(|(x, _)| x),
+    }
+}

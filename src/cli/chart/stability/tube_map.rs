@@ -1,0 +1,254 @@
+//! dt × stiffness: where each integrator of the tube is stable, bounded but wrong, or blown up.
+//!
+//! A tube of 1 m, 15 mm radius, 2 mm wall is clamped at one end, let go from the horizontal and left to come to rest. A step
+//! that is too long may end in numbers that are none; it may also end at a wrong place, so the tip is held against the rest
+//! shape that an independent computation gives ([`super::hanging`]).
+
+use super::super::experiment::{Experiment, Finding};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::table::Table;
+use super::common::{GRAVITY, plain_tube};
+use super::hanging::Hanging;
+use glam::DVec3;
+use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
+use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Snapshot, Surroundings};
+use serde::{Deserialize, Serialize};
+
+/// The map.
+pub(in super::super) struct TubeMap;
+
+/// Integrators that tubes have.
+const INTEGRATORS: [&str; 1] = ["implicit-euler"];
+const YOUNG_PA: [f64; 14] = [5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8, 1e9];
+const DT_MS: [f64; 9] = [0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0];
+const QUICK_YOUNG_PA: [f64; 3] = [5e4, 1e7, 1e9];
+const QUICK_DT_MS: [f64; 3] = [1.0, 10.0, 50.0];
+const LENGTH_M: f64 = 1.0;
+/// Segments: their own error at rest is below 1 % of the length for every stiffness here.
+const SEGMENTS: usize = 32;
+/// Mass-proportional damping, 1/s, and how long the tube has to come to rest.
+const DAMPING_PER_S: f64 = 6.0;
+const SECONDS: f64 = 6.0;
+/// A tip farther off than this share of the length is wrong.
+const WRONG: f64 = 0.05;
+/// Energy, or speed, past which a motion has blown up: this many times what the fall can give.
+const BLOWN_UP: f64 = 10.0;
+/// Past this stretch the sections of a soft tube tilt (docs/theory/rod.md).
+const TILT: f64 = 1.5;
+
+/// A square of the map.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    integrator: String,
+    young_pa: f64,
+    dt_ms: f64,
+}
+
+/// What became of it.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    integrator: String,
+    young_pa: f64,
+    dt_ms: f64,
+    verdict: Verdict,
+    /// How far the tip is from where it should rest, as a share of the length; empty where it blew up.
+    tip_error: Option<f64>,
+    /// The greatest rise of the mechanical energy above that of the start, as a share of what the fall can give.
+    energy_rise: f64,
+    /// The greatest stretch on the way.
+    stretch: f64,
+    substeps_per_step: f64,
+}
+
+/// The three ways it can end.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+enum Verdict {
+    Stable,
+    Wrong,
+    BlownUp,
+}
+
+impl Experiment for TubeMap {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "tube-map";
+    const TITLE: &'static str = "dt × stiffness of the tube: stable, bounded but wrong, or blown up";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let (young, dt) = if quick { (&QUICK_YOUNG_PA[..], &QUICK_DT_MS[..]) } else { (&YOUNG_PA[..], &DT_MS[..]) };
+        let of = |integrator: &'static str| {
+            young.iter().flat_map(move |&young_pa| {
+                dt.iter().map(move |&dt_ms| Case { integrator: integrator.to_owned(), young_pa, dt_ms })
+            })
+        };
+        INTEGRATORS.into_iter().flat_map(of).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let fall = fall(case);
+        let tip_error = fall.tip.map(|tip| tip.distance(rest_of(case.young_pa)) / LENGTH_M);
+        let verdict = match tip_error {
+            None => Verdict::BlownUp,
+            Some(error) if error <= WRONG => Verdict::Stable,
+            Some(_) => Verdict::Wrong,
+        };
+        let Case { integrator, young_pa, dt_ms } = case.clone();
+        let Fall { energy_rise, stretch, substeps_per_step, .. } = fall;
+        Row { integrator, young_pa, dt_ms, verdict, tip_error, energy_rise, stretch, substeps_per_step }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { integrator: row.integrator.clone(), young_pa: row.young_pa, dt_ms: row.dt_ms }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let panels = INTEGRATORS.into_iter().map(|name| panel(name, rows)).collect();
+        Figure { title: "A clamped tube let go from the horizontal, 6 s".to_owned(), panels, columns: 3 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&[
+            "integrator",
+            "young_pa",
+            "stable to dt_ms",
+            "wrong",
+            "blown up",
+            "worst tip error",
+            "most substeps",
+            "stretch",
+        ]);
+        for integrator in INTEGRATORS {
+            for young_pa in moduli(rows) {
+                let here = || rows.iter().filter(move |r| r.integrator == integrator && r.young_pa == young_pa);
+                let count = |verdict| here().filter(|r| r.verdict == verdict).count() as f64;
+                let bad =
+                    here().filter(|r| r.verdict != Verdict::Stable).map(|r| r.dt_ms).fold(f64::INFINITY, f64::min);
+                let stable_ms = here().map(|r| r.dt_ms).filter(|dt| *dt < bad).fold(0.0, f64::max);
+                let greatest = |of: fn(&Row) -> f64| here().map(of).fold(0.0, f64::max);
+                table.rows.push(vec![
+                    integrator.into(),
+                    (young_pa, 0).into(),
+                    (stable_ms, 1).into(),
+                    (count(Verdict::Wrong), 0).into(),
+                    (count(Verdict::BlownUp), 0).into(),
+                    (greatest(|r| r.tip_error.unwrap_or(f64::INFINITY)), 4).into(),
+                    (greatest(|r| r.substeps_per_step), 1).into(),
+                    (greatest(|r| r.stretch), 2).into(),
+                ]);
+            }
+        }
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let bad = rows.iter().filter(|r| r.verdict != Verdict::Stable).count();
+        vec![Finding::at_most("implicit methods: squares of the map that are not stable", bad as f64, 0.0)]
+    }
+}
+
+/// The moduli in the rows, rising.
+fn moduli(rows: &[Row]) -> Vec<f64> {
+    YOUNG_PA.into_iter().filter(|young| rows.iter().any(|r| r.young_pa == *young)).collect()
+}
+
+/// The reference tube along +x.
+fn spec(young_pa: f64) -> TubeSpec {
+    let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    TubeSpec {
+        section,
+        mass_per_length_kg_m,
+        damping_per_s: DAMPING_PER_S,
+        clamp: [true, false],
+        gravity: DVec3::NEG_Z * GRAVITY,
+        ..plain_tube(vec![DVec3::ZERO, DVec3::X * LENGTH_M], 0.015, SEGMENTS)
+    }
+}
+
+/// Where the tip should come to rest.
+fn rest_of(young_pa: f64) -> DVec3 {
+    let spec = spec(young_pa);
+    let Section { ea_n, ga_n, ei_n_m2, .. } = spec.section;
+    let weight_n_m = spec.mass_per_length_kg_m * GRAVITY;
+    let (side, down) = Hanging { length_m: LENGTH_M, weight_n_m, ea_n, ga_n, ei_n_m2 }.tip_m();
+    DVec3::new(side, 0.0, -down)
+}
+
+/// What a fall was like.
+struct Fall {
+    tip: Option<DVec3>,
+    energy_rise: f64,
+    stretch: f64,
+    substeps_per_step: f64,
+}
+
+/// Lets the tube go; the tip is `None` where the motion blew up.
+fn fall(case: &Case) -> Fall {
+    let spec = spec(case.young_pa);
+    let given_j = spec.mass_per_length_kg_m * GRAVITY * LENGTH_M * LENGTH_M;
+    let mut out = Fall { tip: None, energy_rise: 0.0, stretch: 1.0, substeps_per_step: 0.0 };
+    let (Ok(mut tube), Some(dt)) = (Tube::new(spec), SimSpan::from_secs_f64(case.dt_ms * 1e-3)) else { return out };
+    let start_j = tube.energy_j();
+    let (mut time, mut steps, mut substeps) = (SimTime::ZERO, 0_u32, 0_u32);
+    while time.as_secs_f64() < SECONDS {
+        match tube.step(dt, &Surroundings::alone(AgentId(0), time)) {
+            Ok(report) => substeps += report.substeps,
+            Err(_) => return out,
+        }
+        (time, steps) = (time + dt, steps + 1);
+        out.substeps_per_step = f64::from(substeps) / f64::from(steps);
+        out.stretch = out.stretch.max(tube.stretch());
+        out.energy_rise = out.energy_rise.max((tube.energy_j() - start_j) / given_j);
+        if out.energy_rise.is_nan() || out.energy_rise > BLOWN_UP {
+            return out;
+        }
+    }
+    let mut snapshot = Snapshot::default();
+    tube.write_snapshot(&mut snapshot);
+    out.tip = snapshot.body.probe(1.0).map(|(tip, _)| tip).filter(|tip| tip.is_finite());
+    out
+}
+
+/// The map of one integrator.
+fn panel(integrator: &str, rows: &[Row]) -> Panel {
+    let here: Vec<&Row> = rows.iter().filter(|r| r.integrator == integrator).collect();
+    let edges = |of: fn(&Row) -> f64| {
+        let mut values: Vec<f64> = here.iter().map(|r| of(r)).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        values
+    };
+    let (young, dt) = (edges(|r| r.young_pa), edges(|r| r.dt_ms));
+    let cell = |r: &Row| {
+        let ([a, b], [c, d]) = (around(&young, r.young_pa), around(&dt, r.dt_ms));
+        [a, b, c, d]
+    };
+    let squares = |label: &str, colour, verdict| Layer {
+        label: label.to_owned(),
+        colour,
+        mark: Mark::Cells(here.iter().filter(|r| r.verdict == verdict).map(|r| cell(r)).collect()),
+    };
+    let tilted = here.iter().filter(|r| r.stretch > TILT).map(|r| (r.young_pa, r.dt_ms)).collect();
+    let layers = vec![
+        squares("stable", Colour::Sky, Verdict::Stable),
+        squares("bounded but wrong", Colour::Orange, Verdict::Wrong),
+        squares("blown up", Colour::Red, Verdict::BlownUp),
+        Layer { label: format!("stretched past {TILT}"), colour: Colour::Grey, mark: Mark::Dots(tilted) },
+    ];
+    let axis = |label, values: &[f64]| {
+        let ends = |v: Option<&f64>| v.copied().unwrap_or(1.0);
+        let ([low, _], [_, high]) = (around(values, ends(values.first())), around(values, ends(values.last())));
+        Axis::log(label, low, high)
+    };
+    Panel { title: integrator.to_owned(), x: axis("Young's modulus, Pa", &young), y: axis("dt, ms", &dt), layers }
+}
+
+/// From where to where the square of a value goes: half way to its neighbours, in ratios.
+fn around(values: &[f64], value: f64) -> [f64; 2] {
+    let k = values.iter().position(|v| *v == value).unwrap_or(0);
+    let up = values.get(k + 1).map(|next| (next / value).sqrt());
+    let down = k.checked_sub(1).and_then(|k| values.get(k)).map(|last| (value / last).sqrt());
+    let (up, down) = (up.or(down).unwrap_or(2.0), down.or(up).unwrap_or(2.0));
+    [value / down, value * up]
+}

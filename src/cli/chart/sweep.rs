@@ -1,0 +1,80 @@
+//! Measures the cases of an experiment on all cores.
+//!
+//! In: cases, rows that are there already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
+//! as it is measured. Which core measures which case is chance; what comes out is not. Never here: what is measured.
+
+use super::experiment::Experiment;
+use super::rows::RowFile;
+use anyhow::Context;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc;
+use std::thread;
+
+/// What a sweep left.
+pub(super) struct Swept<R> {
+    /// The rows there are, in the order of the cases.
+    pub(super) rows: Vec<R>,
+    /// Whether all cases were measured.
+    pub(super) complete: bool,
+}
+
+/// Measures every case of `E` that `kept` has no row of; `stopped` ends it after the rows in hand; `told` hears of every
+/// row: how many are done, out of how many.
+///
+/// # Errors
+/// What the file system refuses; a case that panicked.
+pub(super) fn sweep<E: Experiment>(
+    cases: &[E::Case],
+    (mut file, kept): (RowFile, Vec<E::Row>),
+    stopped: &AtomicBool,
+    told: &mut dyn FnMut(usize, usize),
+) -> anyhow::Result<Swept<E::Row>> {
+    let mut rows: Vec<Option<E::Row>> = cases.iter().map(|_| None).collect();
+    for row in kept {
+        let case = E::case_of(&row);
+        if let Some(k) = cases.iter().position(|c| *c == case) {
+            rows[k] = Some(row);
+        }
+    }
+    let open: Vec<usize> = (0..cases.len()).filter(|&k| rows[k].is_none()).collect();
+    let mut done = cases.len() - open.len();
+    told(done, cases.len());
+    let next = AtomicUsize::new(0);
+    let work = |out: mpsc::Sender<(usize, Option<E::Row>)>| {
+        while !stopped.load(Ordering::Relaxed) {
+            let Some(&k) = open.get(next.fetch_add(1, Ordering::Relaxed)) else { break };
+            let row = catch_unwind(AssertUnwindSafe(|| E::measure(&cases[k]))).ok();
+            if out.send((k, row)).is_err() {
+                break;
+            }
+        }
+    };
+    thread::scope(|scope| -> anyhow::Result<()> {
+        let (out, rows_in) = mpsc::channel();
+        for number in 0..cores().min(open.len()) {
+            let (out, work) = (out.clone(), &work);
+            let name = format!("sweep-{number}");
+            thread::Builder::new().name(name).spawn_scoped(scope, move || work(out)).context("no thread to be had")?;
+        }
+        drop(out);
+        for (k, row) in rows_in {
+            let row = row.with_context(|| format!("case {k} of {} could not be measured", E::NAME))?;
+            file.add::<E>(&row)?;
+            rows[k] = Some(row);
+            done += 1;
+            told(done, cases.len());
+        }
+        Ok(())
+    })?;
+    let complete = done == cases.len();
+    let rows: Vec<E::Row> = rows.into_iter().flatten().collect();
+    if complete {
+        file.finish::<E>(&rows)?;
+    }
+    Ok(Swept { rows, complete })
+}
+
+fn cores() -> usize {
+    thread::available_parallelism().map_or(1, std::num::NonZero::get)
+}

@@ -1,0 +1,142 @@
+//! A table for people and for programs: columns, and cells that are words or numbers.
+//!
+//! In: cells. Out: aligned text, or JSON. Never here: where it is printed.
+
+use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
+
+/// What stands in a cell.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Cell {
+    /// Words.
+    Text(String),
+    /// A number, and how many digits after the point people see.
+    Number(f64, usize),
+}
+
+/// Rows of cells under names.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Table {
+    /// The names of the columns; keys in JSON.
+    pub(super) columns: Vec<String>,
+    /// As many cells a row as there are columns.
+    pub(super) rows: Vec<Vec<Cell>>,
+}
+
+impl Table {
+    /// An empty table.
+    pub(super) fn new(columns: &[&str]) -> Self {
+        Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
+    }
+
+    /// The table as lines, columns two spaces apart.
+    pub(super) fn text(&self) -> String {
+        let cells = |row: &Vec<Cell>| row.iter().map(Cell::text).collect::<Vec<_>>();
+        let lines: Vec<Vec<String>> =
+            std::iter::once(self.columns.clone()).chain(self.rows.iter().map(cells)).collect();
+        let width = |k: usize| lines.iter().filter_map(|l| Some(l.get(k)?.chars().count())).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
+        let number = |k: usize| self.rows.iter().any(|r| matches!(r.get(k), Some(Cell::Number(..))));
+        let mut out = String::new();
+        for line in &lines {
+            let padded = line.iter().zip(&widths).enumerate().map(|(k, (cell, &width))| {
+                if number(k) { format!("{cell:>width$}") } else { format!("{cell:<width$}") }
+            });
+            out += padded.collect::<Vec<_>>().join("  ").trim_end();
+            out.push('\n');
+        }
+        out
+    }
+}
+
+impl Cell {
+    fn text(&self) -> String {
+        match self {
+            Self::Text(text) => text.clone(),
+            Self::Number(value, digits) => readable(*value, *digits),
+        }
+    }
+}
+
+/// A number as people read it: what is too large or too small for `digits` after the point is written as a power of ten.
+fn readable(value: f64, digits: usize) -> String {
+    let least = libm::exp10(-(digits as f64));
+    if value == 0.0 || (least..1e6).contains(&value.abs()) || !value.is_finite() {
+        format!("{value:.digits$}")
+    } else {
+        format!("{value:.1e}")
+    }
+}
+
+impl From<&str> for Cell {
+    fn from(text: &str) -> Self {
+        Self::Text(text.to_owned())
+    }
+}
+
+impl From<String> for Cell {
+    fn from(text: String) -> Self {
+        Self::Text(text)
+    }
+}
+
+impl From<(f64, usize)> for Cell {
+    fn from((value, digits): (f64, usize)) -> Self {
+        Self::Number(value, digits)
+    }
+}
+
+impl Serialize for Cell {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        match self {
+            Self::Text(text) => out.serialize_str(text),
+            Self::Number(value, _) => out.serialize_f64(*value),
+        }
+    }
+}
+
+/// One row: the columns' names with its cells.
+struct Entries<'a>(&'a [String], &'a [Cell]);
+
+impl Serialize for Entries<'_> {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        let mut map = out.serialize_map(Some(self.0.len()))?;
+        for (name, cell) in self.0.iter().zip(self.1) {
+            map.serialize_entry(name, cell)?;
+        }
+        map.end()
+    }
+}
+
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, out: S) -> Result<S::Ok, S::Error> {
+        let mut list = out.serialize_seq(Some(self.rows.len()))?;
+        for row in &self.rows {
+            list.serialize_element(&Entries(&self.columns, row))?;
+        }
+        list.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        let mut table = Table::new(&["law", "peak"]);
+        table.rows.push(vec!["ledger".into(), (1.5, 2).into()]);
+        table.rows.push(vec!["penalty".into(), (2e9, 2).into()]);
+        table
+    }
+
+    #[test]
+    fn words_stand_left_and_numbers_right() {
+        assert_eq!(table().text(), "law       peak\nledger    1.50\npenalty  2.0e9\n");
+    }
+
+    #[test]
+    fn programs_get_numbers_under_the_columns_names() {
+        let json = serde_json::to_value(table()).unwrap();
+        assert_eq!(json[0]["law"], "ledger");
+        assert_eq!(json[1]["peak"], 2e9);
+    }
+}

@@ -1,0 +1,159 @@
+//! `metachron chart`: what it writes, how it is stopped and taken up again, and what it refuses.
+
+use crate::play::{metachron, program};
+use serde_json::Value;
+use std::io::Read;
+use std::path::Path;
+use std::process::{Output, Stdio};
+use tempfile::TempDir;
+
+fn folder() -> TempDir {
+    tempfile::tempdir().unwrap()
+}
+
+fn chart(folder: &Path, arguments: &[&str]) -> Output {
+    let fixed = ["chart", "stability", "--quick", "--out", folder.to_str().unwrap()];
+    metachron(&[&fixed[..], arguments].concat())
+}
+
+fn said(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+/// The rows of a CSV file, under the columns' names.
+fn rows(path: &Path) -> Vec<std::collections::BTreeMap<String, String>> {
+    csv::Reader::from_path(path).unwrap().deserialize().map(Result::unwrap).collect()
+}
+
+#[test]
+fn a_quick_map_is_written_as_rows_and_pictures_and_as_json() {
+    let out = folder();
+    let done = chart(out.path(), &["--only", "tube-map", "--json", "-q"]);
+    assert_eq!((done.status.code(), said(&done).as_str()), (Some(0), ""));
+    let json: Value = serde_json::from_slice(&done.stdout).expect("nothing but JSON on standard output");
+    let map = &json["experiments"][0];
+    assert_eq!(
+        (json["chart"].as_str(), map["name"].as_str(), map["complete"].as_bool()),
+        (Some("stability"), Some("tube-map"), Some(true))
+    );
+    let text = std::fs::read_to_string(out.path().join("stability-tube-map.csv")).unwrap();
+    let columns = "integrator,young_pa,dt_ms,verdict,tip_error,energy_rise,stretch,substeps_per_step";
+    assert_eq!(text.lines().next(), Some(columns));
+    assert_eq!(map["rows"].as_u64(), Some(text.lines().count() as u64 - 1));
+    let svg = std::fs::read_to_string(out.path().join("stability-tube-map.svg")).unwrap();
+    for word in ["<svg", "dt, ms", "Young", "blown up"] {
+        assert!(svg.contains(word), "{word} is not in the figure");
+    }
+    let picture = image::open(out.path().join("stability-tube-map.png")).unwrap().to_rgb8();
+    let colours: std::collections::BTreeSet<_> = picture.pixels().map(|p| p.0).collect();
+    assert!(picture.width() > 400 && colours.len() > 10, "{} colours", colours.len());
+    assert_eq!(std::fs::read_dir(out.path()).unwrap().count(), 3, "nothing else is left behind");
+}
+
+#[test]
+fn implicit_tubes_are_stable_everywhere_in_the_quick_map() {
+    let out = folder();
+    chart(out.path(), &["--only", "tube-map", "-q"]);
+    let rows = rows(&out.path().join("stability-tube-map.csv"));
+    assert_eq!(rows.len(), 9);
+    for row in rows {
+        let error: f64 = row["tip_error"].parse().unwrap();
+        assert!(row["verdict"] == "stable" && error < 0.05, "{row:?}"); // the 5 % of the length
+    }
+}
+
+#[test]
+fn the_rows_of_two_runs_are_the_same_bytes() {
+    let [first, second] = [0, 1].map(|_| {
+        let out = folder();
+        chart(out.path(), &["--only", "incline", "-q"]);
+        ["csv", "svg", "png"].map(|kind| std::fs::read(out.path().join(format!("stability-incline.{kind}"))).unwrap())
+    });
+    assert!(first == second);
+}
+
+#[test]
+fn people_get_a_table_and_what_holds() {
+    let out = folder();
+    let done = chart(out.path(), &["--only", "incline"]);
+    let table = String::from_utf8_lossy(&done.stdout);
+    for word in ["incline:", "tan/μ", "holds", "claim", "stability-incline.png"] {
+        assert!(table.contains(word), "{word} is not in\n{table}");
+    }
+    assert!(chart(out.path(), &["--only", "incline", "-q"]).stdout.is_empty());
+}
+
+#[test]
+fn an_unknown_experiment_is_refused_with_a_suggestion() {
+    let out = folder();
+    let done = chart(out.path(), &["--only", "tube-mop"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(said(&done).contains("did you mean `tube-map`?"), "{}", said(&done));
+    let done = metachron(&["chart", "stabilty"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(said(&done).contains("stability"), "{}", said(&done));
+}
+
+#[test]
+fn a_folder_that_cannot_be_made_is_bad_input() {
+    let out = folder();
+    let file = out.path().join("file");
+    std::fs::write(&file, b"").unwrap();
+    let done = chart(&file.join("below"), &["--only", "incline"]);
+    assert_eq!(done.status.code(), Some(2));
+    assert!(said(&done).contains("cannot be written") && said(&done).contains("below"), "{}", said(&done));
+}
+
+/// A child that is interrupted once its file has rows; its exit code and what it said.
+#[cfg(unix)]
+fn interrupted(out: &Path, experiment: &str) -> (Option<i32>, String) {
+    let mut child = program()
+        .args(["chart", "stability", "--out", out.to_str().unwrap(), "--only", experiment])
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let file = out.join(format!("stability-{experiment}.csv"));
+    while std::fs::read_to_string(&file).map_or(0, |text| text.lines().count()) < 3 {
+        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    let interrupt = format!("kill -INT {}", child.id());
+    assert!(std::process::Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
+    let code = child.wait().unwrap().code();
+    let mut words = String::new();
+    child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
+    (code, words)
+}
+
+#[cfg(unix)]
+#[test]
+fn an_interrupted_sweep_keeps_its_rows_and_the_next_run_takes_them_up() {
+    let out = folder();
+    let (code, words) = interrupted(out.path(), "tube-map");
+    assert_eq!(code, Some(130), "{words}");
+    assert!(words.contains("takes them up"), "{words}");
+    let (path, mark) = (out.path().join("stability-tube-map.csv"), out.path().join("stability-tube-map.unfinished"));
+    let kept = rows(&path);
+    assert!(kept.len() >= 2 && mark.exists());
+    // a mark in a finished row tells whether it is taken up or measured again
+    let text = std::fs::read_to_string(&path).unwrap();
+    let first = text.lines().nth(1).unwrap();
+    let (head, _) = first.rsplit_once(',').unwrap();
+    std::fs::write(&path, text.replace(first, &format!("{head},777.0"))).unwrap();
+    interrupted_again(out.path(), kept.len());
+    assert!(rows(&path).iter().any(|row| row["substeps_per_step"] == "777.0"), "the row was measured again");
+    // other settings are another sweep
+    let done = chart(out.path(), &["--only", "tube-map", "-q"]);
+    assert_eq!(done.status.code(), Some(0), "{}", said(&done));
+    let rows = rows(&path);
+    assert!(rows.len() == 9 && rows.iter().all(|row| row["substeps_per_step"] != "777.0") && !mark.exists());
+}
+
+/// Interrupts a second run, which must begin with the rows of the first.
+#[cfg(unix)]
+fn interrupted_again(out: &Path, kept: usize) {
+    let (code, words) = interrupted(out, "tube-map");
+    assert_eq!(code, Some(130), "{words}");
+    assert!(rows(&out.join("stability-tube-map.csv")).len() >= kept);
+}
