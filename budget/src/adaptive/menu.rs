@@ -11,7 +11,7 @@ use super::STAGES;
 /// One level of an object as it is offered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offer {
-    /// What the table says it takes, ticks; NaN, infinite or negative: twice the dearest sound cost of the same object.
+    /// What the table says it takes, ticks, 2³² at most; NaN, infinite or negative: twice the dearest sound cost of the same object.
     pub cost: f64,
     /// What it gives at weight 1, 0 or more; what is NaN or negative counts as 0.
     pub gain: f64,
@@ -20,10 +20,10 @@ pub struct Offer {
 /// One step along an object's hull: all that the choice looks at for each of them, so that it stays near.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Step {
-    /// Gain per tick at weight 1; infinite where it is free.
+    /// Gain per tick at weight 1; > 0, finite.
     pub slope: f64,
-    /// Ticks that it adds.
-    pub cost: u64,
+    /// Ticks that it adds; 32 bits because they become doubles in one instruction.
+    pub cost: u32,
 }
 
 /// What an object costs and gives after a step.
@@ -84,6 +84,16 @@ impl Menu {
         &mut self.objects
     }
 
+    /// Where the steps of an object lie among all, below [`Self::room`].
+    pub(crate) fn range_of(&self, object: &Object) -> Range<usize> {
+        range(object)
+    }
+
+    /// How many places all steps take, those no longer used with them.
+    pub(crate) fn room(&self) -> usize {
+        self.steps.len()
+    }
+
     pub(crate) fn steps_of(&self, object: &Object) -> &[Step] {
         &self.steps[range(object)]
     }
@@ -106,7 +116,7 @@ impl Menu {
         let (first, steps) = (self.steps.len() as u32, kept.min(usize::from(u16::MAX)) as u16);
         let mut from = base;
         for &to in &self.points[..usize::from(steps)] {
-            self.steps.push(Step { slope: slope(from, to), cost: to.cost - from.cost });
+            self.steps.push(Step { slope: slope(from, to), cost: (to.cost - from.cost) as u32 });
             self.vertices.push(to);
             from = to;
         }
@@ -178,12 +188,14 @@ impl Menu {
         self.points.extend((0..).zip(levels).map(|(level, offer)| {
             let cost = if is_sound(offer.cost) { offer.cost } else { 2.0 * dearest };
             let gain = if offer.gain > 0.0 { offer.gain.min(1e30) } else { 0.0 };
-            Vertex { cost: (libm::ceil(cost) as u64).min(1 << 44), gain, level: Some(level) }
+            Vertex { cost: (libm::ceil(cost) as u64).min(u64::from(u32::MAX)), gain, level: Some(level) }
         }));
         self.points
             .sort_unstable_by(|a, b| a.cost.cmp(&b.cost).then(b.gain.total_cmp(&a.gain)).then(a.level.cmp(&b.level)));
         let nothing = Vertex { cost: 0, gain: 0.0, level: None };
-        let base = self.points.first().copied().filter(|_| !droppable).unwrap_or(nothing);
+        // what is free is taken in any case, so no step is
+        let drawn = |v: &Vertex| !droppable || (v.cost == 0 && v.gain > 0.0);
+        let base = self.points.first().copied().filter(drawn).unwrap_or(nothing);
         let mut kept: usize = 0;
         for at in 0..self.points.len() {
             let to = self.points[at];
@@ -225,6 +237,5 @@ fn range(object: &Object) -> Range<usize> {
 }
 
 fn slope(from: Vertex, to: Vertex) -> f64 {
-    let ticks = to.cost - from.cost;
-    if ticks == 0 { f64::INFINITY } else { (to.gain - from.gain) / ticks as f64 }
+    (to.gain - from.gain) / (to.cost - from.cost) as f64
 }

@@ -35,6 +35,20 @@ pub(crate) struct Picked {
     pub lambda: f64,
 }
 
+impl Picked {
+    /// Takes one more step where it fits.
+    fn take(&mut self, terms: &Terms, object: &Object, step: &Step) -> bool {
+        let mut with = self.table;
+        with[usize::from(object.stage)] += u64::from(step.cost);
+        let fits = terms.cost(&with) <= terms.budget;
+        if fits {
+            self.table = with;
+            self.value += step.slope * object.weight * f64::from(step.cost);
+        }
+        fits
+    }
+}
+
 /// What a choice depends on besides the menu.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Terms {
@@ -60,10 +74,10 @@ impl Terms {
         table.iter().zip(&self.kappa).map(|(&t, k)| t as f64 * k).sum()
     }
 
-    /// What a gain per tick of the table is worth per measured tick, for an object's steps: those it had, and others.
-    fn worth(&self, object: &Object) -> (f64, f64) {
+    /// What a gain per tick of the table is worth per measured tick, for an object's steps: others, and those it had.
+    fn worth(&self, object: &Object) -> [f64; 2] {
         let worth = object.weight * self.per_kappa[usize::from(object.stage)];
-        (worth * self.loyalty, worth)
+        [worth, worth * self.loyalty]
     }
 
     /// How many steps of an object are on offer: all that are worth something and can ever fit; while it dwells, those it had.
@@ -77,7 +91,7 @@ impl Terms {
         if object.span <= left {
             return usize::from(most);
         }
-        let fits = |step: &&Step| match left.checked_sub(step.cost) {
+        let fits = |step: &&Step| match left.checked_sub(u64::from(step.cost)) {
             Some(rest) => {
                 left = rest;
                 true
@@ -86,6 +100,15 @@ impl Terms {
         };
         steps[..usize::from(most)].iter().take_while(fits).count()
     }
+}
+
+/// What the steps of a bucket come to.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Bin {
+    /// By the table.
+    ticks: u64,
+    /// Gain over κ: gain per measured tick, times ticks of the table.
+    gain: f64,
 }
 
 /// A step on the edge of the budget.
@@ -99,9 +122,9 @@ struct Edge {
 /// Buffers of the choice, kept from frame to frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Picker {
-    /// For every stage and bucket the ticks of its steps.
-    bins: Vec<[u64; BUCKETS]>,
-    /// The bucket of every step on offer, object after object.
+    /// For every stage and bucket.
+    bins: Vec<[Bin; BUCKETS]>,
+    /// The bucket of every step on offer, where the menu has the step.
     buckets: Vec<u16>,
     /// Steps of the bucket in which the budget ends.
     edge: Vec<Edge>,
@@ -117,74 +140,81 @@ impl Picker {
 
     /// Chooses.
     pub(crate) fn pick(&mut self, menu: &Menu, mut terms: Terms) -> Picked {
-        let mut table = menu.least;
-        let spare = terms.budget - terms.cost(&table);
+        let mut picked = Picked { table: menu.least, ..Picked::default() };
+        let spare = terms.budget - terms.cost(&menu.least);
         terms.reach = terms.kappa.map(|k| (spare / k) as u64);
-        let (feasible, mut lambda) = (spare >= 0.0, 0.0);
-        if feasible {
-            self.sort_into_buckets(menu, &terms);
-            let edge = self.find_edge(&terms, &mut table);
-            self.take_above(menu, &terms, edge);
-            lambda = self.take_edge(menu, &terms, &mut table);
-            if lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
-                self.go_on(menu, &terms, &mut table);
-            }
-        } else {
+        if spare < 0.0 || spare.is_nan() {
             self.taken.clear();
             self.taken.resize(menu.objects().len(), 0);
+            picked.value = menu.objects().iter().map(|o| o.base.gain * o.weight).sum();
+            return picked;
         }
-        let (value, upper) = self.certify(menu, &terms, lambda);
-        Picked { feasible, table, value, upper: if feasible { upper } else { 0.0 }, lambda }
+        picked.feasible = true;
+        picked.value = self.sort_into_buckets(menu, &terms);
+        let edge = self.find_edge(&terms, &mut picked);
+        self.take_above(menu, &terms, edge);
+        picked.lambda = self.take_edge(menu, &terms, &mut picked);
+        if picked.lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
+            self.go_on(menu, &terms, &mut picked);
+        }
+        picked.upper = self.bound(menu, &terms, &picked);
+        picked
     }
 
-    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) {
+    /// Fills the bins; what the least of everything is worth.
+    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) -> f64 {
+        let mut least = 0.0;
         self.bins.clear();
-        self.bins.resize(STAGES, [0; BUCKETS]);
-        self.buckets.clear();
+        self.bins.resize(STAGES, [Bin::default(); BUCKETS]);
+        self.buckets.resize(menu.room(), 0);
         self.taken.clear();
         for object in menu.objects() {
             let steps = menu.steps_of(object);
             let offered = terms.on_offer(object, steps);
-            let (had, other) = terms.worth(object);
+            let worth = terms.worth(object);
+            least += object.base.gain * object.weight;
             let bins = &mut self.bins[usize::from(object.stage)];
-            for (at, step) in steps[..offered].iter().enumerate() {
-                let bucket = bucket(step.slope * if at < usize::from(object.taken) { had } else { other });
-                bins[bucket] += step.cost;
-                self.buckets.push(bucket as u16);
+            let buckets = &mut self.buckets[menu.range_of(object)][..offered];
+            for (at, (step, place)) in steps[..offered].iter().zip(buckets).enumerate() {
+                // an index, not a branch: what an object had cannot be foreseen
+                let bucket = bucket(step.slope * worth[usize::from(at < usize::from(object.taken))]);
+                bins[bucket].ticks += u64::from(step.cost);
+                bins[bucket].gain += step.slope * worth[0] * f64::from(step.cost);
+                *place = bucket as u16;
             }
             self.taken.push(offered as u16);
         }
+        least
     }
 
-    /// The bucket in which the budget ends, and in `table` what all above it take; 0 where everything fits.
-    fn find_edge(&self, terms: &Terms, table: &mut [u64; STAGES]) -> usize {
-        for at in (0..BUCKETS).rev() {
-            let mut with = *table;
-            with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at]);
+    /// The bucket in which the budget ends, and in `picked` what all above it come to; 0 where everything fits.
+    fn find_edge(&self, terms: &Terms, picked: &mut Picked) -> u16 {
+        for at in (1..BUCKETS).rev() {
+            let mut with = picked.table;
+            with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at].ticks);
             if terms.cost(&with) > terms.budget {
-                return at;
+                return at as u16;
             }
-            if at > 0 {
-                *table = with;
-            }
+            picked.table = with;
+            picked.value += self.bins.iter().zip(&terms.kappa).map(|(bins, k)| bins[at].gain * k).sum::<f64>();
         }
         0
     }
 
     /// Takes all steps above the edge, and lays those on it aside, best first.
-    fn take_above(&mut self, menu: &Menu, terms: &Terms, edge: usize) {
+    fn take_above(&mut self, menu: &Menu, terms: &Terms, edge: u16) {
         self.edge.clear();
-        let mut rest = self.buckets.as_slice();
         for (i, (object, taken)) in menu.objects().iter().zip(&mut self.taken).enumerate() {
-            let (own, others) = rest.split_at(usize::from(*taken));
-            rest = others;
-            // along a hull, buckets never rise
-            let above = own.iter().take_while(|&&b| usize::from(b) > edge).count();
-            let on = own[above..].iter().take_while(|&&b| usize::from(b) == edge).count();
+            let own = &self.buckets[menu.range_of(object)][..usize::from(*taken)];
+            // along a hull buckets never rise, so these are the first; counting them all has no branch to be foreseen
+            let (mut above, mut on) = (0, 0);
+            for &bucket in own {
+                above += usize::from(bucket > edge);
+                on += usize::from(bucket == edge);
+            }
             *taken = above as u16;
-            let (had, other) = terms.worth(object);
             for at in above..above + on {
-                let worth = if at < usize::from(object.taken) { had } else { other };
+                let worth = terms.worth(object)[usize::from(at < usize::from(object.taken))];
                 let merit = menu.steps_of(object)[at].slope * worth;
                 self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
             }
@@ -199,29 +229,25 @@ impl Picker {
     }
 
     /// Takes the steps on the edge until one does not fit; its gain per tick.
-    fn take_edge(&mut self, menu: &Menu, terms: &Terms, table: &mut [u64; STAGES]) -> f64 {
+    fn take_edge(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) -> f64 {
         for edge in &self.edge {
             let object = &menu.objects()[edge.object as usize];
             let step = &menu.steps_of(object)[usize::from(edge.step)];
-            let mut with = *table;
-            with[usize::from(object.stage)] += step.cost;
-            if terms.cost(&with) > terms.budget {
-                return step.slope * terms.worth(object).1;
+            if !picked.take(terms, object, step) {
+                return step.slope * terms.worth(object)[0];
             }
-            *table = with;
             self.taken[edge.object as usize] = edge.step + 1;
         }
         0.0
     }
 
     /// After the first step that does not fit: of every object, best first, the next steps that do.
-    fn go_on(&mut self, menu: &Menu, terms: &Terms, table: &mut [u64; STAGES]) {
+    fn go_on(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) {
         self.edge.clear();
         for (i, object) in menu.objects().iter().enumerate() {
             let (at, steps) = (usize::from(self.taken[i]), menu.steps_of(object));
             if at < terms.on_offer(object, steps) {
-                let (had, other) = terms.worth(object);
-                let merit = steps[at].slope * if at < usize::from(object.taken) { had } else { other };
+                let merit = steps[at].slope * terms.worth(object)[usize::from(at < usize::from(object.taken))];
                 self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
             }
         }
@@ -229,36 +255,25 @@ impl Picker {
         for edge in &self.edge {
             let object = &menu.objects()[edge.object as usize];
             let steps = menu.steps_of(object);
-            for step in &steps[usize::from(edge.step)..terms.on_offer(object, steps)] {
-                let mut with = *table;
-                with[usize::from(object.stage)] += step.cost;
-                if terms.cost(&with) > terms.budget {
-                    break;
-                }
-                *table = with;
-                self.taken[edge.object as usize] += 1;
-            }
+            let next = &steps[usize::from(edge.step)..terms.on_offer(object, steps)];
+            let taken = next.iter().take_while(|step| picked.take(terms, object, step)).count();
+            self.taken[edge.object as usize] += taken as u16;
         }
     }
 
-    /// The value taken, and the bound that the price λ gives for any choice: each object is best for itself (eq. 33).
-    fn certify(&self, menu: &Menu, terms: &Terms, lambda: f64) -> (f64, f64) {
-        let (mut value, mut upper) = (0.0, lambda * terms.budget);
+    /// The bound that the price λ gives for any choice, each object being best for itself (eq. 33): what was taken, the price of what
+    /// is left over, and what hysteresis kept from being best.
+    fn bound(&self, menu: &Menu, terms: &Terms, picked: &Picked) -> f64 {
+        let mut upper = picked.value + picked.lambda * (terms.budget - terms.cost(&picked.table));
         for (object, &taken) in menu.objects().iter().zip(&self.taken) {
-            value += menu.vertex(object, taken).gain * object.weight;
-            // the best vertex is where the gain per tick falls to λ: near the one that was taken
-            let (steps, worth) = (menu.steps_of(object), terms.worth(object).1);
-            let mut best = usize::from(taken);
-            while best > 0 && steps[best - 1].slope * worth < lambda {
-                best -= 1;
-            }
-            while best < steps.len() && steps[best].slope * worth > lambda {
-                best += 1;
-            }
-            let at = menu.vertex(object, best as u16);
-            upper += at.gain * object.weight - lambda * terms.kappa[usize::from(object.stage)] * at.cost as f64;
+            let (steps, worth) = (menu.steps_of(object), terms.worth(object)[0]);
+            let kappa = terms.kappa[usize::from(object.stage)];
+            let net = |step: &Step| (step.slope * worth - picked.lambda) * (kappa * f64::from(step.cost));
+            let (had, rest) = steps.split_at(usize::from(taken));
+            upper -= had.iter().rev().map(net).take_while(|n| *n < 0.0).sum::<f64>();
+            upper += rest.iter().map(net).take_while(|n| *n > 0.0).sum::<f64>();
         }
-        (value, upper)
+        upper
     }
 }
 
