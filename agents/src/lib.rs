@@ -20,6 +20,6 @@ pub use agent::{
 };
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
-    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, ToolState,
+    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, Stand, ToolState,
 };
 pub use time::{SimSpan, SimTime};

@@ -33,6 +33,8 @@ pub struct Snapshot {
     pub acceleration: DVec3,
     /// How it answers impulses.
     pub inertia: Inertia,
+    /// How it stands on something fixed; `None` where it does not, or not on one level.
+    pub stand: Option<Stand>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -60,6 +62,17 @@ pub enum Inertia {
     },
     /// A tube.
     Curve(CurveInertia),
+}
+
+/// How a body stands on something fixed: pushed towards it, near the middle of its feet, the body does not yield.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Stand {
+    /// Unit normal, from what it stands on towards the body.
+    pub normal: DVec3,
+    /// The middle of the places where it stands, metres.
+    pub centre: DVec3,
+    /// A push whose line passes the middle no farther than this does not tip it, metres.
+    pub reach_m: f64,
 }
 
 /// Where matter is and how fast it may leave.
@@ -271,7 +284,7 @@ impl Snapshot {
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
-        (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
+        (self.at_rest, self.acceleration, self.bounds, self.stand) = (false, DVec3::ZERO, None, None);
         self.pairs.clear();
         self.bonds.clear();
     }

@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 5–7: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
-use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
+use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Stand, Surroundings, ToolState};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -198,12 +198,31 @@ impl Other {
         let inertia = self.neighbour.as_ref().filter(|_| !self.held).map(|n| &n.snapshot.inertia);
         match inertia {
             Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
+                let stand = self.stands(impulses[0], impulses[1]);
                 impulses[0] *= *inverse_mass;
                 impulses[1] = *inverse_inertia * impulses[1];
+                if let Some(normal) = stand {
+                    impulses[0] -= normal * normal.dot(impulses[0]);
+                    impulses[1] = DVec3::ZERO;
+                }
             }
             Some(Inertia::Curve(curve)) if curve.slots() == impulses.len() => curve.respond(impulses),
             _ => impulses.fill(DVec3::ZERO),
         }
+    }
+
+    /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a): its line meets the ground
+    /// between the feet.
+    fn stands(&self, linear: DVec3, angular: DVec3) -> Option<DVec3> {
+        let Stand { normal, centre, reach_m } = self.neighbour.as_ref()?.snapshot.stand?;
+        let along = linear.dot(normal);
+        if along >= 0.0 {
+            return None;
+        }
+        let feet = centre - self.pose.centre;
+        let depth = feet.dot(normal);
+        let met = (normal.cross(angular) + (linear - normal * along) * depth) / along;
+        (met.distance(feet - normal * depth) <= reach_m).then_some(normal)
     }
 
     /// Lets impulses, one a slot, act on it.

@@ -15,7 +15,7 @@ use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::{Form, FormKind, SolidForm};
 use crate::shape::{Obstacle, Solid};
 use crate::{
-    Agent, AgentId, Body, Companion, Grip, Resolution, RigidState, SimSpan, Snapshot, StepError, StepReport,
+    Agent, AgentId, Body, Companion, Grip, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport,
     Surroundings, check_span,
 };
 use glam::DVec3;
@@ -46,6 +46,7 @@ pub struct RigidBody {
     pub(super) received: DVec3,
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
+    pub(super) stand: Option<Stand>,
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
@@ -89,13 +90,14 @@ impl RigidBody {
         motion.set_spin(&spread, spec.spin);
         let world = World::new(&spec, &spread)?;
         let form = form_of(&spec, &spread, &world);
+        let obstacles = Obstacles::new(&spec.obstacles, world.mover.radius_m)?;
         Ok(Self {
             spread,
             gravity: spec.gravity,
             may_sleep: spec.sleep,
             motion,
             world,
-            obstacles: Obstacles::new(&spec.obstacles)?,
+            obstacles,
             company: Company::new(Arc::new(form)),
             meeting: Meeting::default(),
             sided: Sided::default(),
@@ -105,6 +107,7 @@ impl RigidBody {
             coupled: DVec3::ZERO,
             received: DVec3::ZERO,
             acceleration: spec.gravity,
+            stand: None,
             at_rest: false,
             calm_s: 0.0,
             steps: 0,

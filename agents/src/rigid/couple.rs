@@ -6,15 +6,24 @@
 
 use super::RigidBody;
 use super::clearance::Fall;
+use super::company::placed;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
-use crate::coupling::Impulse;
-use crate::{AgentId, Bounds, Inertia, Snapshot, Surroundings};
+use crate::coupling::touch::touches;
+use crate::coupling::{Impulse, Place};
+use crate::{AgentId, Bounds, Inertia, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
 /// a single hard step must not send it flying in others' eyes.
 const EXPECTED_G: f64 = 3.0;
+
+/// Places nearer than this to a fixed solid carry, beside the skin, metres.
+const FEET_M: f64 = 2e-5;
+/// A body whose feet leave the ground or come down on it faster than this does not stand, m/s.
+const STANDING_M_S: f64 = 0.05;
+/// Feet whose normals differ by less than 8° stand on one level: the cosine.
+const LEVEL: f64 = 0.99;
 
 impl RigidBody {
     /// Begins a step: takes what the owners of its contacts gave, and brings everybody that it meets to its own time.
@@ -73,6 +82,8 @@ impl RigidBody {
     pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
+        let seen = around.neighbours.iter().any(|n| n.form.is_some() && !n.owned);
+        self.stand = if seen { self.feet() } else { None };
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         self.company.settle(around, dt);
     }
@@ -90,6 +101,32 @@ impl RigidBody {
         let received = self.received / dt;
         let taken_back = -(measured + self.gravity).dot(received) / received.length_squared();
         if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
+    }
+
+    /// The places where it stands on fixed solids, where all of them are on one level.
+    fn feet(&mut self) -> Option<Stand> {
+        let Self { motion, world, company, meeting, obstacles, .. } = self;
+        let (_, _, _, room, form) = company.split();
+        let mine = placed(form, motion);
+        let (mut normal, mut count) = (None, 0_u32);
+        let (mut low, mut high, mut sum) = (DVec3::INFINITY, DVec3::NEG_INFINITY, DVec3::ZERO);
+        for (solid, _) in obstacles.iter(motion.position) {
+            touches(&mine, &solid, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
+            for touch in &meeting.touches {
+                let first = *normal.get_or_insert(touch.normal);
+                let Place::Point(point) = touch.on_a else { return None };
+                if first.dot(touch.normal) < LEVEL {
+                    return None;
+                }
+                (low, high, sum, count) = (low.min(point), high.max(point), sum + point, count + 1);
+            }
+        }
+        let centre = sum / f64::from(count.max(1));
+        let normal = normal.filter(|normal| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
+        let spread = (high - low) - normal * normal.dot(high - low);
+        // a square of feet bears pushes as far as half its side, a triangle less; on one or two feet a body only balances
+        let reach_m = if count > 2 { 0.25 * spread.length() } else { 0.05 * world.mover.radius_m };
+        Some(Stand { normal, centre, reach_m })
     }
 
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
@@ -113,7 +150,7 @@ impl RigidBody {
             high: self.motion.position + radius_m,
             speed_m_s: self.motion.velocity.length() + swing,
         });
-        (into.at_rest, into.acceleration) = (self.at_rest, self.acceleration);
+        (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
         self.company.exchange.write(into);
         into.touches.clear();
         into.bonds.clear();

@@ -30,7 +30,7 @@ impl Meeting {
             let bounce = guest.restitution * fade;
             self.take_up(me, Some((i, guest)), (guest.friction, bounce));
         }
-        for (solid, skin) in fixed.iter() {
+        for (solid, skin) in fixed.iter(me.motion.position) {
             touches(&mine, &solid, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
             let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution));
             self.take_up(me, None, law);
@@ -82,7 +82,7 @@ impl Meeting {
         let mine = placed(form, me.motion);
         let swing = self.before[1].length() * me.mover.swing_m;
         let reach = (me.motion.velocity.length() + swing + gravity.length() * h) * h + SLACK_M;
-        for (solid, skin) in fixed.iter() {
+        for (solid, skin) in fixed.iter(me.motion.position) {
             touches(&mine, &solid, reach, room, &mut self.touches);
             let from = self.found.len();
             self.take_up(me, None, ((form.friction * skin.friction).sqrt(), 0.0));

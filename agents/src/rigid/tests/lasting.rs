@@ -250,3 +250,24 @@ fn a_body_that_comes_near_wakes_the_sleeping_owner_of_their_contact() {
     let at: f64 = knocked_at.expect("it knocks");
     assert!(slept && at > -0.2 && at < -0.08, "it knocks at {at} m, the other slept: {slept}");
 }
+
+/// The other way round the ledger alone does not hold for long: the light box answers each load a step late and rocks.
+/// It only has to last until the two share one world.
+#[test]
+fn a_heavy_fast_box_sinks_little_into_a_slow_light_one_before_they_are_bonded() {
+    for (light_hz, heavy_hz) in [(60.0, 240.0), (60.0, 1000.0)] {
+        let mut stage = Stage::new(Faults::default());
+        let below = RigidSpec { mass_kg: 0.5, obstacles: [floor(0.5)].into(), ..cube(0.05, UP * 0.05) };
+        let above = RigidSpec { mass_kg: 5.0, ..cube(0.05, UP * 0.151) };
+        let below = stage.add(RigidBody::new(below).unwrap(), light_hz);
+        let above = stage.add(RigidBody::new(above).unwrap(), heavy_hz);
+        let (mut deepest, mut bonded) = (0.0_f64, false);
+        stage.run(0.3, |stage| {
+            let [low, high] = [below, above].map(|id| stage.newest(id).body.probe(0.0).unwrap().0);
+            bonded |= !stage.newest(above).bonds.is_empty();
+            deepest = if bonded { deepest } else { deepest.max(0.1 - (high.z - low.z)) };
+        });
+        println!("light {light_hz} Hz under heavy {heavy_hz} Hz: {deepest:.2e} m before they are bonded");
+        assert!(bonded && deepest < 1e-2, "light {light_hz} Hz, heavy {heavy_hz} Hz: {deepest} m, bonded {bonded}");
+    }
+}
