@@ -58,7 +58,7 @@ pub trait Agent: Send {
     /// Advances this agent and `others`, which have handed themselves over to it, as one world on its own clock.
     ///
     /// `apart` comes back with a number for each of `others`: zero where it stays in this world; else it has left, and equal
-    /// numbers still belong together.
+    /// numbers still belong together. The report counts the work of all.
     ///
     /// # Errors
     /// [`StepError::Alone`] for a model that leads nobody; else as [`Agent::step`].

@@ -13,6 +13,8 @@ use metachron_agents::{AgentId, Bounds, SimSpan, SimTime};
 pub(in super::super) struct Sight {
     me: AgentId,
     mine: Option<Reach>,
+    /// The speed at the end of the step before, m/s: the way to the newest state may have begun with it.
+    speed_before_m_s: f64,
     others: Vec<Other>,
     /// No appointment is earlier.
     soonest: SimTime,
@@ -49,7 +51,7 @@ impl Sight {
     pub fn new(me: AgentId, others: impl Iterator<Item = AgentId>) -> Self {
         let others: Vec<_> = others.map(|id| Other { id, at: SimTime::ZERO, near: false }).collect();
         let near = Vec::with_capacity(others.len().min(16));
-        Self { me, mine: None, others, soonest: SimTime::ZERO, unread: 0, near }
+        Self { me, mine: None, speed_before_m_s: 0.0, others, soonest: SimTime::ZERO, unread: 0, near }
     }
 
     /// Those who were near when it last looked, by rising numbers.
@@ -61,9 +63,11 @@ impl Sight {
     pub fn stand(&mut self, crowd: &Crowd, bounds: Option<&Bounds>, time: SimTime) {
         let said = self.mine.map_or(0.0, |mine| mine.speed_m_s);
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
-            let speed_m_s = crowd.stand(self.me, bounds, time).max(SPEED_LEAST_M_S);
-            Reach::new(bounds, speed_m_s, time)
+            let speed_m_s = bounds.speed_m_s.max(self.speed_before_m_s);
+            let said_m_s = crowd.stand(self.me, &Bounds { speed_m_s, ..*bounds }, time).max(SPEED_LEAST_M_S);
+            Reach::new(bounds, said_m_s, time)
         });
+        self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
         if self.mine.is_some_and(|mine| mine.speed_m_s > said) {
             self.look_at_all();
         }

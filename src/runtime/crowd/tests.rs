@@ -12,6 +12,8 @@ struct Flyer {
     dt: SimSpan,
     at: DVec3,
     velocity: DVec3,
+    /// How it flew through the step that led here.
+    came_with: DVec3,
     radius_m: f64,
     /// What it does at its next turns: keeps on (`None`), or flies with this velocity from there on.
     plan: Vec<Option<[f64; 3]>>,
@@ -23,11 +25,13 @@ impl Flyer {
         Bounds { low: self.at - half, high: self.at + half, speed_m_s: self.velocity.length() }
     }
 
+    /// Where it was in its last step, and where it will be if it keeps on.
     fn position_at(&self, time: SimTime) -> DVec3 {
-        self.at + self.velocity * time.secs_after(self.time)
+        let velocity = if time < self.time { self.came_with } else { self.velocity };
+        self.at + velocity * time.secs_after(self.time)
     }
 
-    /// The distance between the boxes at `time`, each as its last state lets expect.
+    /// The distance between the boxes at `time`.
     fn gap_m(&self, other: &Self, time: SimTime) -> f64 {
         let apart = (self.position_at(time) - other.position_at(time)).abs() - self.radius_m - other.radius_m;
         apart.max(DVec3::ZERO).length()
@@ -49,6 +53,7 @@ fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flye
         let flyer = &mut flyers[who];
         flyer.at = flyer.position_at(flyer.time + flyer.dt);
         flyer.time += flyer.dt;
+        flyer.came_with = flyer.velocity;
         let news = flyer.plan[turn % flyer.plan.len()];
         flyer.velocity = news.map_or(flyer.velocity, DVec3::from_array);
         sights[who].stand(&crowd, Some(&flyer.bounds()), flyer.time);
@@ -68,6 +73,7 @@ fn flyer() -> impl Strategy<Value = Flyer> {
         dt: SimSpan::from_nanos(dt),
         at: DVec3::from_array(at),
         velocity: DVec3::ZERO,
+        came_with: DVec3::ZERO,
         radius_m,
         plan,
     })
