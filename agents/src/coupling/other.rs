@@ -6,7 +6,7 @@
 
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
 use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Stand, Surroundings, ToolState};
-use glam::{DQuat, DVec3};
+use glam::{DMat3, DQuat, DVec3};
 use std::sync::Arc;
 
 /// A neighbour at one's own time.
@@ -24,6 +24,9 @@ pub struct Other {
     age_s: f64,
     held: bool,
 }
+
+/// A body at rest is immovable until something comes at it faster than this, m/s: what is laid down gently is not noticed.
+pub const WAKE_M_S: f64 = 5e-3;
 
 /// Where a body of one piece is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -115,6 +118,15 @@ impl Other {
         self.held = self.neighbour.as_ref().is_none_or(|n| matches!(n.snapshot.inertia, Inertia::Immovable));
     }
 
+    /// Wakes a body that rests if a blow is on its way to it: it only rests until it reads of that.
+    pub fn stir(&mut self, around: &Surroundings<'_>, exchange: &Exchange) {
+        let Some(neighbour) = self.neighbour.clone().filter(|n| self.held && n.snapshot.at_rest) else { return };
+        self.wake();
+        self.deliver(&neighbour, around.me, exchange, around.time);
+        let moves = self.velocities.iter().step_by(2).any(|v| v.length_squared() > WAKE_M_S * WAKE_M_S);
+        self.held = self.held || !moves;
+    }
+
     /// Its velocities in slots, m/s and rad/s.
     #[must_use]
     pub fn velocities(&self) -> &[DVec3] {
@@ -188,6 +200,22 @@ impl Other {
             }
             _ => None,
         }
+    }
+
+    /// The inverse mass of what gathers from `slots`, 1/kg: J A⁻¹ Jᵀ.
+    #[must_use]
+    pub fn inverse_mass(&mut self, slots: &Slots) -> DMat3 {
+        let mut answer = std::mem::take(&mut self.answer);
+        answer.resize(self.velocities.len(), DVec3::ZERO);
+        let mut column = |axis: DVec3| {
+            answer.fill(DVec3::ZERO);
+            slots.scatter(axis, &mut answer);
+            self.respond(&mut answer);
+            slots.velocity(&answer)
+        };
+        let whole = DMat3::from_cols(column(DVec3::X), column(DVec3::Y), column(DVec3::Z));
+        self.answer = answer;
+        whole
     }
 
     /// Turns impulses, one a slot, into the velocities they cause: W of the coupling (eq. 7).

@@ -7,7 +7,7 @@ use crate::{AgentId, Anchor, Body, CurveState, Grasp, Surroundings};
 use glam::DVec3;
 
 /// Jaws that pass below this opening grasp.
-pub(super) const GRASP_BELOW: f64 = 0.2;
+pub(crate) const GRASP_BELOW: f64 = 0.2;
 /// Jaws that pass above this opening let go.
 pub(super) const RELEASE_ABOVE: f64 = 0.3;
 /// The hold reaches its full stiffness in this time, seconds: the tube is not torn to the tip at once.

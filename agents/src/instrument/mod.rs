@@ -1,16 +1,18 @@
 //! A driven tool: follows keyframes or a hand, opens, closes, grasps a tube and drags it.
 //!
 //! In: a [`ToolSpec`], steps, the user's hand, the snapshots of the tubes it can grasp. Out: a tip, jaws, a hold.
-//! Never here: the force of the hold. The tube solves it in its own solver and says it in its snapshot (`grips`).
+//! Never here: the force of the hold. What is held solves it in its own step and books it in a ledger (`felt.rs` reads it).
 //!
 //! A tool weighs nothing and nothing stops it: it is led. `script.rs` says where the keyframes lead, `jaws.rs` what the
 //! jaws catch, `tool.rs` is the agent.
 
+mod felt;
 mod jaws;
 mod script;
 mod spec;
 mod tool;
 
+pub(crate) use jaws::GRASP_BELOW;
 pub use spec::{Keyframe, ToolError, ToolSpec};
 pub use tool::Instrument;
 

@@ -1,8 +1,9 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
 use super::{Instrument, Keyframe, ToolError, ToolSpec};
+use crate::coupling::{Impulse, Ledger, Site};
 use crate::{
-    Agent, AgentId, Anchor, Body, CurveState, Grip, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, StepReport,
+    Agent, AgentId, Anchor, Body, CurveState, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, StepReport,
     Surroundings, ToolState,
 };
 use glam::{DQuat, DVec3};
@@ -28,7 +29,7 @@ fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
 }
 
 /// A straight tube of 1 cm radius along x, 1 m long, at rest.
-fn tube(grips: Vec<Grip>) -> Neighbour {
+fn tube() -> Neighbour {
     let curve = CurveState {
         arc_m: vec![0.0, 0.5, 1.0],
         positions: vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::X],
@@ -36,7 +37,7 @@ fn tube(grips: Vec<Grip>) -> Neighbour {
         frames: vec![DQuat::IDENTITY; 2],
         radii_m: vec![0.01; 3],
     };
-    Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), grips, ..Snapshot::default() }))
+    Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
 }
 
 fn state(tool: &Instrument) -> ToolState {
@@ -59,7 +60,7 @@ struct Stage {
 
 impl Stage {
     fn new(spec: ToolSpec) -> Self {
-        Self { tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube(vec![])] }
+        Self { tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
     }
 
     fn step_with(&mut self, hands: &[Pull]) -> Result<StepReport, StepError> {
@@ -188,14 +189,28 @@ fn a_tube_out_of_reach_is_not_grasped() {
 }
 
 #[test]
-fn a_tool_feels_the_force_that_the_tube_says_it_exerts() {
+fn a_tool_feels_what_it_was_given_as_the_mean_force_since_it_last_read() {
     let over = DVec3::new(0.3, 0.0, 0.02);
     let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
-    let theirs = Grip { by: Some(AgentId(8)), force_n: DVec3::X * 9.0 };
-    let mine = Grip { by: Some(ME), force_n: DVec3::new(0.0, 3.0, 4.0) };
-    stage.around = vec![tube(vec![theirs, mine])];
+    let account = |with, linear: DVec3| {
+        let mut ledger = Ledger::new(with);
+        ledger.give(Site::Whole, SimTime::ZERO, 0.0, Impulse { linear, angular: DVec3::ZERO });
+        ledger
+    };
+    let at = |given, millis: u64| {
+        let near = tube();
+        let time = SimTime::from_nanos(millis * 1_000_000);
+        let snapshot = Snapshot { time, given, ..near.snapshot.as_ref().clone() };
+        vec![Neighbour { snapshot: Arc::new(snapshot), ..near }]
+    };
+    stage.around = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
     stage.step();
-    assert_eq!(state(&stage.tool).force_n, 5.0);
+    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12); // 0.5 N·s in 100 ms
+    stage.step();
+    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12, "nothing new is known");
+    stage.around = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
+    stage.step();
+    assert_eq!(state(&stage.tool).force_n, 0.0, "nothing more was given");
 }
 
 #[test]

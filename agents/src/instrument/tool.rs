@@ -1,29 +1,48 @@
 //! The agent: one step of a tool, told as a contents page.
 //!
-//! In: a span, the hand, the tubes around. Out: a [`ToolState`]. Never here: forces; the held tube solves them.
+//! In: a span, the hand, the tubes around. Out: a [`ToolState`]. Never here: forces; who is held or touched solves them.
 //!
 //! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
 //! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
 
+use super::felt::Felt;
 use super::jaws::{Jaws, nearest};
 use super::script::{Pose, Script};
 use super::spec::REACH_MAX_M;
 use super::{ToolError, ToolSpec};
+use crate::coupling::{Form, FormKind};
+use crate::shape::ToolShape;
 use crate::{
-    Agent, Anchor, Body, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings, ToolState,
-    check_span,
+    Agent, Anchor, Body, Bounds, Inertia, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings,
+    ToolState, check_span,
 };
 use glam::{DQuat, DVec3};
+use std::fmt;
+use std::sync::Arc;
 
 /// A driven tool that lives by its own steps.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Instrument {
     spec: ToolSpec,
     script: Script,
     tool: ToolState,
     jaws: Jaws,
+    felt: Felt,
+    form: Arc<Form>,
+    /// How fast any of its points went in the last step, m/s.
+    speed_m_s: f64,
+    at_rest: bool,
     steps: u64,
 }
+
+impl fmt::Debug for Instrument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Instrument").field("tool", &self.tool).field("jaws", &self.jaws).finish_non_exhaustive()
+    }
+}
+
+/// Coulomb friction coefficient of wet steel.
+const FRICTION: f64 = 0.2;
 
 /// How fast the tip closes up to a hand, 1/s: nine tenths of the way in 65 ms, the tremor of a mouse is gone.
 const HAND_RATE_PER_S: f64 = 60.0;
@@ -48,7 +67,9 @@ impl Instrument {
         let script = Script::new(&spec.keyframes, spec.repeat);
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
         let tool = ToolState { tip, rotation, velocity, jaw, grasp: None, force_n: 0.0 };
-        Ok(Self { spec, script, tool, jaws: Jaws::new(), steps: 0 })
+        let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
+        let (jaws, felt) = (Jaws::new(), Felt::default());
+        Ok(Self { spec, script, tool, jaws, felt, form, speed_m_s: 0.0, at_rest: false, steps: 0 })
     }
 
     /// Where the hand wants the tip, and how fast it moves there.
@@ -91,14 +112,6 @@ impl Instrument {
         }
     }
 
-    /// The force that what is held says this tool exerts on it, newtons.
-    fn felt_n(&self, around: &Surroundings<'_>) -> f64 {
-        let Some(grasp) = self.tool.grasp else { return 0.0 };
-        let held = around.neighbours.iter().find(|other| other.id == grasp.target);
-        let grip = held.and_then(|other| other.snapshot.grips.iter().find(|grip| grip.by == Some(around.me)));
-        grip.map_or(0.0, |grip| grip.force_n.length())
-    }
-
     /// Whether the tool has come to the end of its script and waits there, empty.
     fn rests(&mut self, end: &Pose, time_s: f64) -> bool {
         let there = (self.tool.tip - end.tip).length() < ARRIVED && self.tool.velocity.length() < ARRIVED;
@@ -108,6 +121,32 @@ impl Instrument {
         }
         rests
     }
+}
+
+/// The shape of every tool.
+fn shape() -> ToolShape {
+    ToolShape::default()
+}
+
+/// The ends of a tool in its own axes, and how far it reaches sideways of the line between them, metres.
+fn reach() -> (DVec3, DVec3, f64) {
+    let ToolShape { shaft_radius_m: r, shaft_length_m } = shape();
+    // jaws: 2 radii before the tip and 6 behind it, 4 to the side when they are wide open; clevis and ring, then the shaft
+    (DVec3::Z * (2.0 * r), DVec3::NEG_Z * (10.0 * r + shaft_length_m), 5.0 * r)
+}
+
+/// The box around a tool whose points move no faster than `speed_m_s`.
+fn bounds(tool: &ToolState, speed_m_s: f64) -> Bounds {
+    let (front, back, side_m) = reach();
+    let (front, back) = (tool.tip + tool.rotation * front, tool.tip + tool.rotation * back);
+    Bounds { low: front.min(back) - side_m, high: front.max(back) + side_m, speed_m_s }
+}
+
+/// How fast the fastest point of a tool went between two states `dt` seconds apart, m/s.
+fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
+    let (front, back, side_m) = reach();
+    let way = |end: DVec3| (after.tip + after.rotation * end).distance(before.tip + before.rotation * end);
+    (way(front).max(way(back)) + (after.jaw - before.jaw).abs() * side_m) / dt
 }
 
 /// A deviation and its rate after `t` seconds of critical damping: exact, whatever the step.
@@ -140,13 +179,15 @@ impl Agent for Instrument {
             return Err(StepError::Diverged { model: "instrument", dt_s, what });
         }
         let was = self.tool.jaw;
+        self.speed_m_s = speed(&self.tool, &led, dt_s);
         self.tool = led;
         self.jaws.move_to(&self.spec, (was, led.jaw), led.tip, (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
-        self.tool.force_n = self.felt_n(around);
+        self.felt.read(around);
+        self.tool.force_n = self.felt.force_n();
         self.steps += 1;
-        let at_rest = hand.is_none() && self.rests(&end, end_s);
-        Ok(StepReport { work: 1.0, substeps: 1, at_rest })
+        self.at_rest = hand.is_none() && self.rests(&end, end_s);
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -157,14 +198,21 @@ impl Agent for Instrument {
     fn retune(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
+        into.clear();
         into.steps = self.steps;
         into.resolution = None;
         into.body = Body::Tool(self.tool);
         into.energy_j = 0.0;
         into.residual_m = 0.0;
-        into.touches.clear();
         into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
-        into.grips.clear();
+        into.at_rest = self.at_rest;
+        into.inertia = Inertia::Immovable;
+        into.bounds = Some(bounds(&self.tool, self.speed_m_s));
+        self.felt.write(into);
+    }
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.form.clone())
     }
 
     /// A tool is led from outside and weighs nothing here.

@@ -67,6 +67,16 @@ impl Factor {
         self.rows.clone_from(&other.rows);
     }
 
+    /// The size of the inverse of each slot's pivot: a scale, not the inverse mass itself.
+    pub fn scales(&self) -> impl Iterator<Item = f64> {
+        self.rows.iter().map(|row| row.inverse.d.element_sum() / 3.0)
+    }
+
+    /// Forgets the matrix.
+    pub fn forget(&mut self) {
+        self.rows.clear();
+    }
+
     /// Factors the matrix; returns the first slot whose pivot is not positive definite, where there is one (eq. 16).
     pub fn factor(&mut self, rows: &[Row]) -> Result<(), usize> {
         self.rows.resize(rows.len(), Factored::ZERO);

@@ -6,8 +6,9 @@
 use super::division::Division;
 use super::spec::Attachment;
 use super::sym3::Sym3;
+use crate::coupling::Link;
 use crate::{AgentId, Anchor, Pull};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// The spring that an attachment makes at one node.
 #[derive(Debug, Clone, Copy)]
@@ -91,27 +92,98 @@ pub struct Tie {
     pub segment: usize,
     /// How far along the segment the point lies, 0 … 1.
     pub share: f64,
+    /// What holds the other end.
+    pub end: End,
+    /// Where the other end would be at the start of the step, had it always moved as it does now.
     target: DVec3,
     target_velocity: DVec3,
-    stiffness: f64,
-    damping: f64,
+    stiffness: Sym3,
+    damping: Sym3,
+    /// What is left of a force because the other end gives way (eq. 35).
+    ease: DMat3,
     /// The impulse that it gave in this step, N·s.
     pub impulse: DVec3,
+    /// The part of it that the last substep gave.
+    pub given: DVec3,
+}
+
+/// What holds the other end of a pull.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum End {
+    /// A hand or a tool: it is led and never gives way.
+    Led,
+    /// A point of another agent, which gives way.
+    Linked(Link),
+}
+
+/// The other end of a link at the start of a substep.
+#[derive(Debug, Clone, Copy)]
+pub struct Far {
+    /// Where it is, metres.
+    pub point: DVec3,
+    /// Its velocity without this link, m/s.
+    pub velocity: DVec3,
+    /// Its inverse mass there, 1/kg.
+    pub inverse_mass: DMat3,
 }
 
 impl Tie {
     /// The tie of a pull; `None` where it has no point on this tube or is not finite.
     pub fn new(pull: &Pull, division: &Division) -> Option<Self> {
-        let Anchor::Arc(arc_m) = pull.anchor else { return None };
-        let finite = pull.target.is_finite() && pull.target_velocity.is_finite() && arc_m.is_finite();
-        let (stiffness, damping) = (pull.stiffness_n_m, pull.damping_n_s_m);
+        let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
+        let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), division)?;
+        let (target, target_velocity) = (pull.target, pull.target_velocity);
+        finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
+    }
+
+    /// The tie of a link, whose far end is told later ([`Tie::aim`]); `None` where it has no point on this tube.
+    pub fn of_link(link: &Link, division: &Division) -> Option<Self> {
+        let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), division)?;
+        Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
+    }
+
+    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), division: &Division) -> Option<Self> {
+        let Anchor::Arc(arc_m) = anchor else { return None };
         let fair = |c: f64| c.is_finite() && c >= 0.0;
-        if !(finite && fair(stiffness) && fair(damping)) {
+        if !(arc_m.is_finite() && fair(stiffness) && fair(damping)) {
             return None;
         }
         let (segment, share) = division.locate(arc_m);
-        let (target, target_velocity) = (pull.target, pull.target_velocity);
-        Some(Self { by: pull.by, segment, share, target, target_velocity, stiffness, damping, impulse: DVec3::ZERO })
+        Some(Self {
+            by: None,
+            segment,
+            share,
+            end: End::Led,
+            target: DVec3::ZERO,
+            target_velocity: DVec3::ZERO,
+            stiffness: Sym3::identity(stiffness),
+            damping: Sym3::identity(damping),
+            ease: DMat3::IDENTITY,
+            impulse: DVec3::ZERO,
+            given: DVec3::ZERO,
+        })
+    }
+
+    /// Takes in where the far end of a link is for the substep from `start` to `start + h` seconds of the step; `point` is
+    /// the near end at its start (eq. 35, 36).
+    pub fn aim(&mut self, far: &Far, point: DVec3, (start, h): (f64, f64)) {
+        let End::Linked(link) = self.end else { return };
+        let way = point - far.point;
+        let distance = way.length();
+        let (k, d) = (link.stiffness_n_m, link.damping_n_s_m);
+        let mut aim = far.point;
+        (self.stiffness, self.damping) = (Sym3::identity(k), Sym3::identity(d));
+        if link.rest_m > 0.0 && distance > 0.0 {
+            let along = way / distance;
+            // a spring in compression has no stiffness across: it would have less than none
+            let across = k * (1.0 - link.rest_m / distance).max(0.0);
+            self.stiffness = Sym3::identity(across) + Sym3::outer(along, k - across);
+            self.damping = Sym3::outer(along, d);
+            aim += along * link.rest_m;
+        }
+        (self.target, self.target_velocity) = (aim - far.velocity * start, far.velocity);
+        let resistance = (self.stiffness * (h * h) + self.damping * h).full();
+        self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass).inverse();
     }
 
     /// The value at the tied point of a quantity given at the ends of its segment.
@@ -120,16 +192,26 @@ impl Tie {
         a * (1.0 - self.share) + b * self.share
     }
 
-    /// Force on the point at `x` moving by `v`, `after` seconds into the step, N (eq. 24).
+    /// Books what it gave in a substep of `h` seconds that ended `after` seconds into the step at `x`, moving by `v`.
+    pub fn book(&mut self, (x, v): (DVec3, DVec3), (h, after): (f64, f64)) {
+        self.given = self.force(x, v, after) * h;
+        self.impulse += self.given;
+    }
+
+    /// Force on the point at `x` moving by `v`, `after` seconds into the step, N (eq. 24, 35).
     pub fn force(&self, x: DVec3, v: DVec3, after: f64) -> DVec3 {
         let target = self.target + self.target_velocity * after;
-        (target - x) * self.stiffness + (self.target_velocity - v) * self.damping
+        self.ease * (self.stiffness * (target - x) + self.damping * (self.target_velocity - v))
     }
 
     /// What a change of the point's velocity changes of the impulse of a substep `h`: h² k + h d, kg.
     #[inline]
-    pub fn implicit(&self, h: f64) -> f64 {
-        h * (h * self.stiffness + self.damping)
+    pub fn implicit(&self, h: f64) -> Sym3 {
+        let resistance = self.stiffness * (h * h) + self.damping * h;
+        match self.end {
+            End::Led => resistance,
+            End::Linked(_) => Sym3::of(&(self.ease * resistance.full())),
+        }
     }
 }
 

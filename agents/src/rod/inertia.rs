@@ -29,6 +29,17 @@ impl CurveInertia {
         self.factor.slots()
     }
 
+    /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
+    pub(super) fn scale(&self, into: &mut Vec<f64>) {
+        let first = into.len();
+        into.extend(self.factor.scales());
+        for (end, slot) in [(0, first), (1, into.len() - 1)] {
+            if self.held[end] {
+                into[slot] = 0.0;
+            }
+        }
+    }
+
     /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s).
     ///
     /// # Panics

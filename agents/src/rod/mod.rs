@@ -13,11 +13,15 @@
 mod band;
 mod calm;
 mod check;
+mod company;
 mod config;
 mod contact;
 mod division;
 mod holds;
 mod inertia;
+mod mate;
+mod publish;
+mod receive;
 mod remesh;
 mod residual;
 mod rest;

@@ -5,6 +5,7 @@
 
 use super::band::{Factor, InverseBlocks, Row};
 use super::calm;
+use super::company::Company;
 use super::config::{Config, Matter};
 use super::contact::{Solved, TubeContacts};
 use super::division::Division;
@@ -56,6 +57,8 @@ pub struct Stepper {
     next: Config,
     /// What the skin touches.
     pub contacts: TubeContacts,
+    /// Who else is near.
+    pub company: Company,
     /// Work that contact does in the substep tried, J.
     pushed_j: f64,
 }
@@ -79,19 +82,21 @@ impl Stepper {
         let tick = setting.dt / ticks as f64;
         let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
         while gone < ticks {
+            let span = (tick * gone as f64, tick * size as f64);
+            self.company.aim(ties, &now.x, span);
             let scene = Scene {
                 matter: setting.matter,
                 division: setting.division,
                 springs: setting.springs,
                 ties,
-                h: tick * size as f64,
+                h: span.1,
                 until: tick * (gone + size) as f64,
             };
             if self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
                 size /= 2;
                 continue;
             }
-            self.accept(now, ties, (tick * size as f64, tick * (gone + size) as f64));
+            self.accept(now, ties, span);
             (gone, taken) = (gone + size, taken + 1);
             // twice as long again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
@@ -99,6 +104,49 @@ impl Stepper {
             }
         }
         Ok(taken)
+    }
+
+    /// Takes what others gave into `now`: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is moved farther than `way_m`.
+    ///
+    /// # Errors
+    /// [`Lost`] where the system cannot be factored; `now` is then untouched.
+    pub fn receive(&mut self, now: &mut Config, setting: &Setting<'_>, way_m: f64) -> Result<(), Lost> {
+        if self.company.received().is_empty() {
+            return Ok(());
+        }
+        self.prepare(now, setting)?;
+        let Self { company, factor, .. } = self;
+        company.received().apply(now, factor, (setting.matter, setting.division), way_m);
+        Ok(())
+    }
+
+    /// Factors the system of a substep about `now` where there is no factor of this division yet.
+    ///
+    /// # Errors
+    /// [`Lost`] where it cannot be.
+    pub fn prepare(&mut self, now: &Config, setting: &Setting<'_>) -> Result<(), Lost> {
+        if self.factor.slots() == now.u.len() {
+            return Ok(());
+        }
+        let Setting { matter, division, springs, dt, substeps } = *setting;
+        let h = dt / f64::from(substeps);
+        let scene = Scene { matter, division, springs, ties: &[], h, until: h };
+        assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs);
+        self.factor.factor(&self.rows).map_err(|slot| {
+            self.factor.forget();
+            Lost { slot: Some(slot) }
+        })
+    }
+
+    /// Forgets what it knows of nodes and segments: the tube was divided anew.
+    pub fn forget(&mut self) {
+        self.factor.forget();
+        self.contacts.forget();
+    }
+
+    /// The factor of the substep that ended last; without slots where the division has changed since.
+    pub fn factor(&self) -> &Factor {
+        &self.factor
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
@@ -158,12 +206,12 @@ impl Stepper {
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
     fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
-        let Self { rhs, next, rows, factor, contacts, pushed_j, .. } = self;
+        let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
         let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
         // contact is a law of whole velocities, not of what an iteration changes of them
         let known = if first { &[][..] } else { &next.u[..] };
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
-        *pushed_j = contacts.act(&now.x, rhs, &solved, first);
+        *pushed_j = contacts.act(&now.x, rhs, &solved, (company, first));
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
     }
 
@@ -212,14 +260,15 @@ impl Stepper {
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
-    /// Makes `next` the state and books what the pulls gave.
-    fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (h, until): (f64, f64)) {
+    /// Makes `next` the state and books what pulls and contacts gave.
+    fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
-        for tie in ties {
+        for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
-            let (x, v) = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));
-            tie.impulse += tie.force(x, v, until) * h;
+            let point = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));
+            tie.book(point, (h, start + h));
         }
+        self.company.accept(self.contacts.impulses(), ties, (now.u.len(), start, h));
     }
 }
 

@@ -163,9 +163,9 @@ fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mu
         let moved = tie.mix(iterate.moved(left), iterate.moved(right));
         let impulse = tie.force(point, moved, scene.until) * scene.h;
         let (implicit, w) = (tie.implicit(scene.h), tie.share);
-        rows[left].diag += Sym3::identity(implicit * (1.0 - w) * (1.0 - w));
-        rows[right].diag += Sym3::identity(implicit * w * w);
-        rows[right].far += Sym3::identity(implicit * w * (1.0 - w));
+        rows[left].diag += implicit * ((1.0 - w) * (1.0 - w));
+        rows[right].diag += implicit * (w * w);
+        rows[right].far += implicit * (w * (1.0 - w));
         rhs[left] += impulse * (1.0 - w);
         rhs[right] += impulse * w;
     }

@@ -1,20 +1,25 @@
 //! The tube as an agent: one divided rod, its holds, its radius, its rest.
 //!
-//! In: a [`TubeSpec`], steps, pulls, wishes for a resolution. Out: snapshots. Never here: how a step is solved
-//! ([`super::step`]), how a state is carried to another division ([`super::remesh`]). Theory: docs/theory/rod.md.
+//! In: a [`TubeSpec`], steps, pulls, neighbours, wishes for a resolution. Out: snapshots ([`super::publish`]). Never here: how a
+//! step is solved ([`super::step`]), how others are met ([`super::company`]), how a state is carried to another division
+//! ([`super::remesh`]). Theory: docs/theory/rod.md.
 
 use super::check::{TubeError, check};
+use super::company::Company;
 use super::config::{Config, Matter};
 use super::contact::TubeContacts;
 use super::division::{self, Division};
 use super::holds::{NodeSpring, Tie, springs};
+use super::publish::{bounds, smooth};
 use super::remesh::Remesher;
 use super::rest::RestWatch;
 use super::skeleton::Skeleton;
 use super::step::{Lost, Setting, Stepper, energy};
-use super::{Section, TubeSpec, residual};
+use super::{Section, TubeSpec};
+use crate::coupling::{Form, FormKind, Law, Link};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
 use glam::{DMat3, DVec3};
+use std::sync::Arc;
 
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
 pub const STRETCH_WARN: f64 = 1.4;
@@ -22,20 +27,24 @@ pub const STRETCH_WARN: f64 = 1.4;
 /// A tube, cable or rod that lives by its own steps.
 #[derive(Debug, Clone)]
 pub struct Tube {
-    spec: TubeSpec,
+    pub(super) spec: TubeSpec,
     skeleton: Skeleton,
-    matter: Matter,
-    division: Division,
-    now: Config,
-    stepper: Stepper,
+    pub(super) matter: Matter,
+    pub(super) division: Division,
+    pub(super) now: Config,
+    pub(super) stepper: Stepper,
     remesher: Remesher,
     springs: Vec<NodeSpring>,
     ties: Vec<Tie>,
-    grips: Vec<Grip>,
+    pub(super) grips: Vec<Grip>,
     rest: RestWatch,
-    resolution: Resolution,
+    pub(super) at_rest: bool,
+    /// Of the centre of mass in the last step, without what others gave at its start, m/s².
+    pub(super) acceleration: DVec3,
+    pub(super) resolution: Resolution,
     time: SimTime,
-    steps: u64,
+    dt_s: f64,
+    pub(super) steps: u64,
 }
 
 /// The outer radius under `pressure_pa` inside: r + p r² (1 − ν/2)/(E t) (docs/theory/rod.md, eq. 33).
@@ -75,12 +84,30 @@ impl Tube {
             ties: vec![],
             grips: vec![],
             rest: RestWatch::default(),
+            at_rest: false,
+            acceleration: DVec3::ZERO,
             time: SimTime::ZERO,
+            dt_s: 0.0,
             steps: 0,
         };
+        let form = Form { kind: FormKind::Chain, friction: tube.spec.friction, restitution: 0.0 };
+        tube.stepper.company = Company::new(Arc::new(form));
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
         tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
+        tube.prepare();
         Ok(tube)
+    }
+
+    /// Sees to it that others can be told how this tube answers impulses, before its first step too.
+    /// A matrix that has no factor is the next step's to report.
+    fn prepare(&mut self) {
+        let _ = self.step_by(self.dt_s, |stepper, now, setting, _| stepper.prepare(now, setting));
+    }
+
+    /// Lends the stepper all it works on, for a step of `dt` seconds.
+    fn step_by<T>(&mut self, dt: f64, act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T) -> T {
+        let Self { stepper, now, ties, matter, division, springs, .. } = self;
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps: self.spec.substeps }, ties)
     }
 
     /// The numbers it was built from.
@@ -131,10 +158,11 @@ impl Tube {
     /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
     /// impulse (N·s) on it causes, within the substep that ended last (docs/theory/rod.md, eq. 18).
     ///
-    /// One O(N) sweep. `None` before the first step and after a change of resolution until the next.
+    /// One O(N) sweep. `None` before the first step, and after a change of resolution until the next where nobody else is near.
     #[must_use]
     pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
-        self.stepper.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
+        let stepped = (self.steps > 0).then_some(&self.stepper)?;
+        stepped.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
     }
 
     /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
@@ -156,12 +184,40 @@ impl Tube {
     fn take_pulls(&mut self, around: &Surroundings<'_>) {
         self.ties.clear();
         self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
+        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        self.ties.extend(links.filter_map(|link| Tie::of_link(link, &self.division)));
+    }
+
+    /// Takes in what others gave since the last step, and looks who is near.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where what was given cannot be taken.
+    fn meet(&mut self, around: &Surroundings<'_>, dt_s: f64) -> Result<(), StepError> {
+        self.dt_s = dt_s;
+        self.stepper.company.open(around, &self.division);
+        let way_m = self.spec.section.radius_m;
+        let taken = self.step_by(dt_s, |stepper, now, setting, _| stepper.receive(now, setting, way_m));
+        taken.map_err(|lost| self.diverged(lost, dt_s))?;
+        if around.neighbours.iter().any(|n| n.owned) {
+            let bounds = bounds(&self.now, self.widest_m());
+            self.stepper.company.gather(around, &bounds, dt_s);
+        } else {
+            self.stepper.company.dismiss();
+        }
+        Ok(())
+    }
+
+    /// The widest its skin can be, metres.
+    pub(super) fn widest_m(&self) -> f64 {
+        pressed_radius_m(&self.spec.section, self.spec.pressure_pa)
     }
 
     /// Tells the contacts how wide the tube will be at the end of the step.
     fn widen(&mut self, then: SimTime) {
         let mut contacts = std::mem::take(&mut self.stepper.contacts);
-        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, then)));
+        let met = !self.stepper.company.is_empty();
+        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, then)), met);
         self.stepper.contacts = contacts;
     }
 
@@ -182,7 +238,7 @@ impl Tube {
     /// Whether the tube is at rest after a step of `dt` seconds; it then stands still exactly.
     fn watch_rest(&mut self, dt: f64) -> bool {
         let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
-        if !self.spec.sleep || wave || !self.ties.is_empty() {
+        if !self.spec.sleep || wave || !self.ties.is_empty() || !self.stepper.company.is_calm() {
             self.rest.wake();
             return false;
         }
@@ -224,28 +280,30 @@ impl Agent for Tube {
 
     /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
     ///
-    /// pulls    the springs of hands and tools on this tube
+    /// meet     what others gave, and who is near
+    /// pulls    the springs of hands and tools on this tube, and its links
     /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
     /// grips    the mean force of each pull
     /// rest     whether it could sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
+        self.meet(around, dt_s)?;
         self.take_pulls(around);
         self.widen(around.time + dt);
-        let setting = Setting {
-            matter: &self.matter,
-            division: &self.division,
-            springs: &self.springs,
-            dt: dt_s,
-            substeps: self.spec.substeps,
-        };
-        let taken = self.stepper.step(&mut self.now, &setting, &mut self.ties);
+        let watched = self.stepper.company.is_watched();
+        let before = if watched { self.momentum().0 } else { DVec3::ZERO };
+        let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
         self.write_grips(dt_s);
+        self.stepper.company.close(around, dt_s);
+        if watched {
+            let gained = self.momentum().0 - before;
+            self.acceleration = smooth(gained / (self.mass_kg() * dt_s), self.spec.gravity);
+        }
         self.time = around.time + dt;
         self.steps += 1;
-        let at_rest = self.watch_rest(dt_s);
-        Ok(StepReport { work: self.segments() as f64 * f64::from(substeps), substeps, at_rest })
+        self.at_rest = self.watch_rest(dt_s);
+        Ok(StepReport { work: self.segments() as f64 * f64::from(substeps), substeps, at_rest: self.at_rest })
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -272,25 +330,20 @@ impl Agent for Tube {
         next.strain(&self.matter, &self.division);
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
-        self.stepper.contacts.forget();
+        self.stepper.forget();
         self.rest.wake();
+        self.at_rest = false;
+        if self.stepper.company.is_watched() {
+            self.prepare();
+        }
     }
 
     fn write_snapshot(&self, into: &mut Snapshot) {
-        into.steps = self.steps;
-        into.resolution = Some(self.resolution);
-        into.energy_j = self.energy_j();
-        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division);
-        into.touches.clear();
-        into.grips.clone_from(&self.grips);
-        let curve = into.body.curve_mut();
-        curve.arc_m.clone_from(&self.division.arc_m);
-        curve.positions.clone_from(&self.now.x);
-        curve.velocities.clear();
-        curve.velocities.extend(self.now.u.iter().step_by(2));
-        curve.frames.clone_from(&self.now.q);
-        curve.radii_m.clear();
-        curve.radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_at_m(s)));
+        self.publish(into);
+    }
+
+    fn form(&self) -> Option<Arc<Form>> {
+        self.stepper.company.form().cloned()
     }
 
     fn momentum(&self) -> (DVec3, DVec3) {

@@ -6,6 +6,7 @@
 use super::{Skin, TubeContacts, node_slot, segment_slot};
 use crate::coupling::Settings;
 use crate::rod::band::{Factor, Row};
+use crate::rod::company::Company;
 use crate::rod::config::Matter;
 use crate::rod::division::Division;
 use glam::DVec3;
@@ -33,11 +34,19 @@ impl TubeContacts {
     /// Corrects the free `velocities` of a substep that starts at `positions`; returns the work that contact then does, J.
     ///
     /// `first` finds the contacts; a further Newton iteration of the same substep keeps them.
-    pub fn act(&mut self, positions: &[DVec3], velocities: &mut [DVec3], solved: &Solved<'_>, first: bool) -> f64 {
+    pub fn act(
+        &mut self,
+        positions: &[DVec3],
+        velocities: &mut Vec<DVec3>,
+        solved: &Solved<'_>,
+        (company, first): (&mut Company, bool),
+    ) -> f64 {
         // a system that was lost has no motion to correct: the step will see it and give up or divide
-        if self.is_idle() || !velocities.iter().sum::<DVec3>().is_finite() {
+        if (self.is_idle() && company.is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
             return 0.0;
         }
+        let own = velocities.len();
+        company.extend(velocities, solved.h);
         if first {
             let arc_m = &solved.division.arc_m;
             let radii_m = std::mem::take(&mut self.radii_m);
@@ -50,26 +59,33 @@ impl TubeContacts {
                 h_s: solved.h,
             };
             self.find(&skin);
+            self.find_others(&skin, company);
             self.radii_m = radii_m;
         }
         if self.contacts.is_empty() {
             self.solver.forget();
+            velocities.truncate(own);
             return 0.0;
         }
         self.scale(solved);
+        company.scale(&mut self.mobilities);
         let held = solved.matter.held;
-        let last = velocities.len() - 1;
+        let last = own - 1;
+        let met = !company.is_empty();
         let mut answer = |impulses: &mut [DVec3]| {
             for (end, slot) in [(0, 0), (1, last)] {
                 if held[end] {
                     impulses[slot] = DVec3::ZERO;
                 }
             }
-            solved.factor.solve(impulses);
+            solved.factor.solve(&mut impulses[..own]);
+            company.respond(impulses);
         };
-        self.solve((solved.h, SETTINGS), velocities, &mut answer);
-        let pairs = self.contacts.iter().zip(self.solver.impulses());
-        pairs.map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum()
+        self.solve((solved.h, SETTINGS), velocities, met, &mut answer);
+        velocities[own..].fill(DVec3::ZERO); // what the others do is not this tube's work
+        let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
+        velocities.truncate(own);
+        work
     }
 
     /// The size of each slot's inverse mass (eq. 22): a node's from its own mass, a segment's from the matrix, because what

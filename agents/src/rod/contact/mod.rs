@@ -7,6 +7,8 @@ mod act;
 mod pairs;
 mod walls;
 
+use super::company::Company;
+use crate::coupling::touch;
 use crate::coupling::{Contact, Problem, Response, Settings, Slots, Solver, SolverReport};
 use crate::shape::field::Ball;
 use crate::shape::{Obstacle, ShapeError};
@@ -20,8 +22,15 @@ const SLACK_RADII: f64 = 0.05;
 
 /// What a step of the second and of the first segment is in the key of a pair's place.
 const KEY_STEPS: [u64; 2] = [PLACES as u64, 1 << 20];
-/// The names that a foot had before it passed to the next segment.
-const KIN: [i64; 4] = [KEY_STEPS[0] as i64, -(KEY_STEPS[0] as i64), KEY_STEPS[1] as i64, -(KEY_STEPS[1] as i64)];
+/// The names that a foot had before it passed to the next segment, within one tube and between a tube and another.
+const KIN: [i64; 8] = {
+    let ([a, b], [c, d]) = (KEY_STEPS, touch::KEY_STEPS);
+    let (a, b, c, d) = (a as i64, b as i64, c as i64, d as i64);
+    [a, -a, b, -b, c, -c, d, -d]
+};
+
+/// How many of [`KIN`] matter where there is nobody else.
+const KIN_OWN: usize = 4;
 
 /// A tube's skin at the start of a substep: balls on nodes, joined by spans.
 #[derive(Debug, Clone, Copy)]
@@ -99,15 +108,27 @@ impl TubeContacts {
         contacts.len()
     }
 
-    /// Takes the outer radius at each node, metres.
-    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>) {
+    /// Adds the contacts with others, whose velocities stand behind the tube's own.
+    pub fn find_others(&mut self, skin: &Skin<'_>, company: &mut Company) {
+        if !company.is_empty() {
+            company.find(skin, SLACK_RADII * skin.widest_m(), &mut self.contacts);
+        }
+    }
+
+    /// Takes the outer radius at each node, metres; `met` if there is somebody to touch.
+    pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, met: bool) {
         self.radii_m.clear();
-        if !self.is_idle() {
+        if met || !self.is_idle() {
             self.radii_m.extend(radii_m);
         }
     }
 
-    /// Whether there is nothing to touch.
+    /// The contacts found last, and the impulses they then gave.
+    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
+        self.contacts.iter().zip(self.solver.impulses())
+    }
+
+    /// Whether the tube has nothing of its own to touch.
     fn is_idle(&self) -> bool {
         self.pairs.is_none() && self.walls.is_empty()
     }
@@ -117,9 +138,16 @@ impl TubeContacts {
         &mut self,
         (h_s, settings): (f64, Settings),
         velocities: &mut [DVec3],
+        met: bool,
         body: &mut impl Response,
     ) -> SolverReport {
-        let problem = Problem { contacts: &self.contacts, kin: &KIN, h_s, mobilities: &self.mobilities, settings };
+        let problem = Problem {
+            contacts: &self.contacts,
+            kin: &KIN[..if met { KIN.len() } else { KIN_OWN }],
+            h_s,
+            mobilities: &self.mobilities,
+            settings,
+        };
         self.solver.solve(&problem, velocities, body)
     }
 }
@@ -158,12 +186,12 @@ impl Skin<'_> {
         (self.radii_m[segment] - self.radii_m[segment + 1]).abs()
     }
 
-    fn widest_m(&self) -> f64 {
+    pub fn widest_m(&self) -> f64 {
         self.radii_m.iter().copied().fold(0.0, f64::max)
     }
 
     /// The speed of the fastest node, m/s.
-    fn speed(&self) -> f64 {
+    pub fn speed(&self) -> f64 {
         (0..self.positions.len()).map(|i| self.velocity(i).length_squared()).fold(0.0, f64::max).sqrt()
     }
 

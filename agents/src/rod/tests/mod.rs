@@ -1,5 +1,6 @@
 //! What the tube promises, against independent answers (`tests/reference/`).
 
+mod coupling;
 mod motion;
 mod remesh;
 mod statics;

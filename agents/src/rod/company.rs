@@ -1,0 +1,222 @@
+//! The other agents near a tube during one step: what they gave it, where they are, and what it gives them.
+//!
+//! In: neighbours as they were published; the impulses of the contacts and links that this tube owns. Out: contacts for the
+//! tube's own solve, far ends of links, ledgers. Never here: the tube's own state and its solve.
+//! Theory: docs/theory/coupling.md.
+
+use super::contact::Skin;
+use super::division::Division;
+use super::holds::{End, Tie};
+use super::mate::Mate;
+use super::receive::Received;
+use crate::coupling::touch::{TouchRoom, touches};
+use crate::coupling::{Contact, Exchange, Form, Impulse, PairKind, Placed, Site, Touch, View};
+use crate::instrument::GRASP_BELOW;
+use crate::{AgentId, Body, Bounds, Neighbour, Snapshot, Surroundings};
+use glam::DVec3;
+use std::fmt;
+use std::sync::Arc;
+
+/// The agents near one tube.
+#[derive(Clone, Default)]
+pub struct Company {
+    form: Option<Arc<Form>>,
+    exchange: Exchange,
+    received: Received,
+    mates: Vec<Mate>,
+    /// How many of `mates` are here in this step; the rest is room.
+    count: usize,
+    room: Room,
+    touches: Vec<Touch>,
+    impulses: Vec<DVec3>,
+    watched: bool,
+}
+
+/// Room for searches; a copy of a tube starts with none.
+#[derive(Default)]
+struct Room(TouchRoom);
+
+impl Clone for Room {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl fmt::Debug for Company {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Company").field("count", &self.count).field("exchange", &self.exchange).finish_non_exhaustive()
+    }
+}
+
+impl Company {
+    /// The company of a tube of this form.
+    pub fn new(form: Arc<Form>) -> Self {
+        Self { form: Some(form), ..Self::default() }
+    }
+
+    /// The tube's form.
+    pub fn form(&self) -> Option<&Arc<Form>> {
+        self.form.as_ref()
+    }
+
+    /// Whether anybody is near enough to need to know how the tube answers impulses.
+    pub fn is_watched(&self) -> bool {
+        self.watched
+    }
+
+    /// Begins a step: takes in what others gave since the last one, in slots of `division`.
+    pub fn open(&mut self, around: &Surroundings<'_>, division: &Division) {
+        self.watched = !around.links.is_empty() || around.neighbours.iter().any(|n| n.form.is_some());
+        let Self { exchange, received, .. } = self;
+        received.clear(2 * division.segments() + 1);
+        if !around.neighbours.is_empty() || !exchange.is_empty() {
+            exchange.open(around);
+            exchange.take(around, |_, site, sum, carried| received.add(division, site, sum, carried));
+        }
+    }
+
+    /// What others gave since the last step.
+    pub fn received(&mut self) -> &mut Received {
+        &mut self.received
+    }
+
+    /// Gathers those whose couplings with this tube it owns, for a step of `dt` seconds from `bounds`.
+    pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) {
+        self.count = 0;
+        let Self { form, mates, count, exchange, .. } = self;
+        let Some(form) = form else { return };
+        for neighbour in around.neighbours.iter().filter(|n| n.owned) {
+            let linked = around.links.iter().any(|link| link.other == neighbour.id);
+            let touched = Mate::may_touch(neighbour, around, bounds, dt);
+            if !(linked || touched) {
+                continue;
+            }
+            if mates.len() == *count {
+                mates.push(Mate::default());
+            }
+            if mates[*count].meet(neighbour, around, exchange, (form, touched)) {
+                *count += 1;
+            }
+        }
+    }
+
+    /// There is nobody in this step.
+    pub fn dismiss(&mut self) {
+        self.count = 0;
+    }
+
+    /// Whether there is nobody.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Appends the velocities that the others would have without this tube, in slots, on the mean of a substep `h`: what is
+    /// given at its start and what falls freely through it then meet exactly at its end.
+    pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
+        self.mates[..self.count].iter_mut().for_each(|mate| mate.extend(velocities, h));
+    }
+
+    /// Finds the contacts with the others, whose velocities stand behind the tube's own.
+    pub fn find(&mut self, skin: &Skin<'_>, slack_m: f64, contacts: &mut Vec<Contact>) {
+        let Self { form, mates, count, room, touches: list, .. } = self;
+        let Some(form) = form else { return };
+        let here = Placed { form, view: View::Chain { positions: skin.positions, radii_m: skin.radii_m } };
+        let (first, speed) = (contacts.len(), skin.speed());
+        for mate in &mut mates[..*count] {
+            let reach_m = slack_m + (speed + mate.speed()) * skin.h_s;
+            let Some(there) = mate.to_touch() else { continue };
+            touches(&here, &there, reach_m, &mut room.0, list);
+            mate.add_contacts(list, (skin.h_s, slack_m), skin.slots, contacts);
+        }
+        contacts[first..].sort_unstable_by_key(|contact| contact.key);
+    }
+
+    /// Turns the impulses on the others, one a slot, into the velocities they cause; the tube's own slots are left alone.
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        self.mates[..self.count].iter().for_each(|mate| mate.other.respond(mate.slots_mut(impulses)));
+    }
+
+    /// The size of the inverse mass of each slot of the others, behind those of the tube (docs/theory/contact.md, eq. 9).
+    pub fn scale(&self, mobilities: &mut Vec<f64>) {
+        self.mates[..self.count].iter().for_each(|mate| mate.scale(mobilities));
+    }
+
+    /// Tells links where their far ends are for the substep from `start` to `start + h` seconds of the step.
+    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], (start, h): (f64, f64)) {
+        for tie in ties {
+            let End::Linked(link) = tie.end else { continue };
+            let mate = self.mates[..self.count].iter_mut().find(|mate| mate.other.id() == Some(link.other));
+            let Some(far) = mate.and_then(|mate| mate.far(link.there, h)) else { continue };
+            let point = tie.mix(positions[tie.segment], positions[tie.segment + 1]);
+            tie.aim(&far, point, (start, h));
+        }
+    }
+
+    /// Gives what the contacts of a substep that stands gave, `start` seconds into the step, and lets the others go on by `h`.
+    ///
+    /// An impulse acts at the start of its substep: all of the substep's way is made with the velocity after it.
+    pub fn accept<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>,
+        ties: &[Tie],
+        (own, start, h): (usize, f64, f64),
+    ) {
+        if self.is_empty() && ties.is_empty() {
+            return;
+        }
+        let Self { mates, count, impulses, exchange, .. } = self;
+        let mates = &mut mates[..*count];
+        impulses.clear();
+        impulses.resize(mates.last().map_or(own, Mate::end), DVec3::ZERO);
+        for (contact, impulse) in contacts {
+            contact.slots.scatter(*impulse, impulses);
+            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.note(contact, *impulse));
+        }
+        for tie in ties {
+            let (Some(by), impulse) = (tie.by, tie.given) else { continue };
+            match tie.end {
+                // a tool is led: it only learns of it
+                End::Led => {
+                    exchange.give(by, Site::Whole, start, Impulse { linear: -impulse, angular: DVec3::ZERO });
+                    let pair = exchange.pair_mut(by);
+                    (pair.kind, pair.contacts) = (PairKind::Grasp, 1);
+                }
+                End::Linked(link) => {
+                    let mate = mates.iter_mut().find(|mate| mate.other.id() == Some(by));
+                    mate.into_iter().for_each(|mate| mate.pull(link.there, -impulse, impulses));
+                }
+            }
+        }
+        for mate in mates {
+            mate.take(impulses, exchange, (start, h));
+        }
+    }
+
+    /// Ends a step of `dt` seconds.
+    pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
+        for mate in &mut self.mates[..self.count] {
+            mate.tell(&mut self.exchange);
+        }
+        if !self.exchange.is_empty() {
+            self.exchange.close(around, dt);
+        }
+    }
+
+    /// Whether everybody that the tube touches rests or never moves: only then may it rest itself.
+    pub fn is_calm(&self) -> bool {
+        self.received.is_empty() && self.mates[..self.count].iter().all(Mate::is_calm)
+    }
+
+    /// Writes ledgers and pairs, and who must stay awake.
+    pub fn write(&self, into: &mut Snapshot) {
+        self.exchange.write(into);
+        let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
+        into.touches.extend(woken);
+    }
+}
+
+/// Whether a tool's jaws leave this tube alone: they hold it, or stand open so that it may come between them.
+pub fn is_let_in(neighbour: &Neighbour, me: AgentId) -> bool {
+    let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
+    tool.grasp.map_or(tool.jaw > GRASP_BELOW, |grasp| grasp.target == me)
+}

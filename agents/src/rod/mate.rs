@@ -1,0 +1,225 @@
+//! One agent that a tube touches or is linked to during a step.
+//!
+//! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the tube's solve, entries in the ledger.
+//! Never here: the solve itself, the tube's own state. Theory: docs/theory/coupling.md.
+
+use super::company::is_let_in;
+use super::holds::Far;
+use crate::coupling::{Contact, Exchange, Form, FormKind, Law, Other, PairKind, Placed, Slots, Touch, WAKE_M_S};
+use crate::{Anchor, Bounds, Inertia, Neighbour, Surroundings};
+use glam::DVec3;
+
+/// A body may come faster by this than it was seen, m/s²: three times gravity.
+const SURPRISE_M_S2: f64 = 30.0;
+/// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
+const OTHERS_KEY: u64 = 1 << 63;
+/// Where the number of the other begins in a key.
+const ID_SHIFT: u32 = 48;
+/// Where the part of the other stands in a key, and where in the key of a place that touches.
+const PART_SHIFT: u32 = 44;
+/// See [`PART_SHIFT`].
+const TOUCH_PARTS_SHIFT: u32 = 58;
+
+/// One agent near a tube.
+#[derive(Clone, Default)]
+pub struct Mate {
+    /// Where it is.
+    pub other: Other,
+    /// Its first slot, and how many it has.
+    slots: (usize, usize),
+    touched: bool,
+    friction: f64,
+    /// Places that touched in the step, at most; the deepest overlap, metres.
+    contacts: u32,
+    depth_m: f64,
+    /// Whether impulses passed in the step, and whether this tube woke it.
+    acted: bool,
+    woken: bool,
+    linked: bool,
+}
+
+impl Mate {
+    /// Whether a neighbour may come near enough to touch within `dt` seconds.
+    pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
+        let (Some(_), Some(there)) = (&neighbour.form, &neighbour.snapshot.bounds) else { return false };
+        if neighbour.law != Law::Ledger || is_let_in(neighbour, around.me) {
+            return false;
+        }
+        let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
+        let way = bounds.speed_m_s * dt + (there.speed_m_s + SURPRISE_M_S2 * ahead) * ahead;
+        let apart = (there.low - bounds.high).max(bounds.low - there.high).max_element();
+        apart <= way
+    }
+
+    /// Takes in a neighbour; whether it is one that can be touched or held.
+    pub fn meet(
+        &mut self,
+        neighbour: &Neighbour,
+        around: &Surroundings<'_>,
+        exchange: &Exchange,
+        (form, touched): (&Form, bool),
+    ) -> bool {
+        let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
+        let friction = (form.friction * there).sqrt();
+        let other = std::mem::take(&mut self.other);
+        *self = Self { other, touched, friction, ..Self::default() };
+        let known = self.other.meet(neighbour, around, exchange, around.time);
+        self.other.stir(around, exchange);
+        known
+    }
+
+    /// Appends its velocities on the mean of a substep `h`.
+    pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
+        let fall = self.other.acceleration() * (0.5 * h);
+        let list = self.other.velocities();
+        self.slots = (velocities.len(), list.len());
+        velocities.extend_from_slice(list);
+        let fallen = if self.is_tube() { list.len() } else { 1 };
+        velocities[self.slots.0..][..fallen].iter_mut().step_by(2).for_each(|v| *v += fall);
+    }
+
+    fn is_tube(&self) -> bool {
+        self.other.form().is_some_and(|form| matches!(form.kind, FormKind::Chain))
+    }
+
+    /// One past its last slot.
+    pub fn end(&self) -> usize {
+        self.slots.0 + self.slots.1
+    }
+
+    /// Its part of an array of slots.
+    pub fn slots_mut<'a>(&self, all: &'a mut [DVec3]) -> &'a mut [DVec3] {
+        &mut all[self.slots.0..self.end()]
+    }
+
+    /// The fastest of its points, m/s.
+    pub fn speed(&self) -> f64 {
+        let list = self.other.velocities();
+        let spin = match self.other.form().map(|form| &form.kind) {
+            Some(FormKind::Solid(solid)) => list[1].length() * solid.radius_m,
+            _ => 0.0,
+        };
+        list.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt() + spin
+    }
+
+    /// Where it is, if it can be touched.
+    pub fn to_touch(&self) -> Option<Placed<'_>> {
+        self.other.placed().filter(|_| self.touched)
+    }
+
+    /// Makes contacts of the places that may close within a substep.
+    pub fn add_contacts(
+        &mut self,
+        touches: &[Touch],
+        (h, slack_m): (f64, f64),
+        velocities: &[DVec3],
+        into: &mut Vec<Contact>,
+    ) {
+        for touch in touches {
+            let contact = self.contact(touch);
+            let closing = contact.slots.velocity(velocities).dot(contact.normal);
+            if touch.gap_m + closing * h > slack_m {
+                continue;
+            }
+            if self.other.is_held() && closing < -WAKE_M_S {
+                self.other.wake();
+                self.woken = !self.other.is_held();
+            }
+            into.push(contact);
+        }
+    }
+
+    /// The contact of a place: this tube is the first of the two.
+    fn contact(&self, touch: &Touch) -> Contact {
+        let mut slots = Slots::default();
+        touch.on_a.join(&mut slots, 0, DVec3::ZERO, -touch.normal, 1.0);
+        self.other.join(&mut slots, self.slots.0 as u32, &touch.on_b, touch.normal, -1.0);
+        let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
+        Contact {
+            key: self.key() | place,
+            slots,
+            normal: touch.normal,
+            gap_m: touch.gap_m,
+            friction: self.friction,
+            rebound_m_s: 0.0,
+            age_s: self.other.age_s().max(0.0),
+        }
+    }
+
+    fn key(&self) -> u64 {
+        let id = self.other.id().map_or(0, |id| u64::from(id.0));
+        OTHERS_KEY | (id & 0x7fff) << ID_SHIFT
+    }
+
+    /// Whether a contact is one with this agent.
+    pub fn is_of(&self, contact: &Contact) -> bool {
+        contact.key >> ID_SHIFT == self.key() >> ID_SHIFT
+    }
+
+    /// Appends the size of the inverse mass of its slots.
+    pub fn scale(&self, mobilities: &mut Vec<f64>) {
+        let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);
+        match inertia {
+            Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
+                let trace = (0..3).map(|i| inverse_inertia.col(i)[i]).sum::<f64>();
+                mobilities.extend([*inverse_mass, trace / 3.0]);
+            }
+            Some(Inertia::Curve(curve)) if curve.slots() == self.slots.1 => curve.scale(mobilities),
+            _ => mobilities.extend(std::iter::repeat_n(0.0, self.slots.1)),
+        }
+    }
+
+    /// The far end of a link to this agent, for a substep of `h` seconds.
+    pub fn far(&mut self, there: Anchor, h: f64) -> Option<Far> {
+        self.linked = true;
+        let (point, velocity) = self.other.point(there)?;
+        let mut slots = Slots::default();
+        self.other.hold(&mut slots, there);
+        let inverse_mass = self.other.inverse_mass(&slots);
+        Some(Far { point, velocity: velocity + self.other.acceleration() * (0.5 * h), inverse_mass })
+    }
+
+    /// Adds what a link gives to one of its points.
+    pub fn pull(&mut self, there: Anchor, impulse: DVec3, impulses: &mut [DVec3]) {
+        let mut slots = Slots::default();
+        self.other.hold(&mut slots, there);
+        slots.scatter(impulse, self.slots_mut(impulses));
+        self.acted = true;
+    }
+
+    /// Notes what one contact did in a substep.
+    pub fn note(&mut self, contact: &Contact, impulse: DVec3) {
+        self.acted |= impulse != DVec3::ZERO;
+        self.depth_m = self.depth_m.max(-contact.gap_m);
+        self.contacts += 1;
+    }
+
+    /// Takes its part of the impulses of a substep, books it, and goes on.
+    pub fn take(&mut self, impulses: &mut [DVec3], exchange: &mut Exchange, (start, h): (f64, f64)) {
+        if self.acted {
+            let list = self.slots_mut(impulses);
+            self.other.book(exchange, start, list);
+            self.other.push(list);
+        }
+        self.other.go_on(h);
+    }
+
+    /// Writes on the state of the pair.
+    pub fn tell(&mut self, exchange: &mut Exchange) {
+        if let (true, Some(id)) = (self.acted, self.other.id()) {
+            let pair = exchange.pair_mut(id);
+            pair.kind = if self.linked { PairKind::Attachment } else { PairKind::Ledger };
+            (pair.contacts, pair.penetration_m) = (self.contacts, self.depth_m);
+        }
+    }
+
+    /// Whether nothing that moves is touched or held here.
+    pub fn is_calm(&self) -> bool {
+        !self.acted || self.other.is_held()
+    }
+
+    /// Whether it must not rest: it was woken.
+    pub fn must_wake(&self) -> bool {
+        self.woken
+    }
+}

@@ -1,0 +1,83 @@
+//! What other agents gave a tube since its last step, and how the tube takes it.
+//!
+//! In: impulses at rest arc lengths, and how far they have carried by now. Out: the state with both in it.
+//! Never here: who gave them, and why. Theory: docs/theory/coupling.md.
+
+use super::band::Factor;
+use super::config::{Config, Matter};
+use super::division::Division;
+use super::turn::{exp, unit};
+use crate::coupling::{Impulse, Site};
+use glam::DVec3;
+
+/// What impulses have carried a tube by turns no segment further, radians: a reading that comes very late must not fold it.
+const TURN_MAX_RAD: f64 = 0.25;
+
+/// Impulses received, gathered in slots.
+#[derive(Debug, Clone, Default)]
+pub struct Received {
+    /// dJ: N·s at nodes, N·m·s at segments.
+    sum: Vec<DVec3>,
+    /// t dJ − dS: seconds times that.
+    carried: Vec<DVec3>,
+    slots: usize,
+    any: bool,
+}
+
+impl Received {
+    /// Empties the slots of a tube of so many.
+    pub fn clear(&mut self, slots: usize) {
+        (self.slots, self.any) = (slots, false);
+    }
+
+    /// Whether nothing came.
+    pub fn is_empty(&self) -> bool {
+        !self.any
+    }
+
+    /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division does not lose any of it.
+    pub fn add(&mut self, division: &Division, site: Site, sum: Impulse, carried: Impulse) {
+        let Site::Arc(arc_m) = site else { return };
+        let (segment, share) = division.locate(arc_m);
+        if !self.any {
+            for list in [&mut self.sum, &mut self.carried] {
+                list.clear();
+                list.resize(self.slots, DVec3::ZERO);
+            }
+        }
+        for (list, what) in [(&mut self.sum, sum), (&mut self.carried, carried)] {
+            list[2 * segment] += what.linear * (1.0 - share);
+            list[2 * segment + 2] += what.linear * share;
+            list[2 * segment + 1] += what.angular;
+        }
+        self.any = true;
+    }
+
+    /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
+    ///
+    /// No node is carried farther than `way_m`: a tube must not be found beyond a wall.
+    pub fn apply(&mut self, state: &mut Config, factor: &Factor, (matter, division): (&Matter, &Division), way_m: f64) {
+        let Self { sum, carried, .. } = self;
+        for list in [&mut *sum, &mut *carried] {
+            let last = list.len() - 1;
+            for (end, slot) in [(0, 0), (1, last)] {
+                if matter.held[end] {
+                    list[slot] = DVec3::ZERO;
+                }
+            }
+            factor.solve(list);
+        }
+        if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
+            return; // impulses past all measure: better to lose them than the tube
+        }
+        let longest = |list: &[DVec3], from: usize| {
+            list.iter().skip(from).step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
+        };
+        let over = (longest(carried, 0) / way_m).max(longest(carried, 1) / TURN_MAX_RAD).max(1.0);
+        state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
+        state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way / over);
+        let turns = carried.iter().skip(1).step_by(2);
+        state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn / over) * *q));
+        state.strain(matter, division);
+    }
+}
