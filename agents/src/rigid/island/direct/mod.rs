@@ -35,6 +35,8 @@ pub(super) struct Direct {
     start: Vec<Motion>,
     free: Vec<Twist>,
     velocities: Vec<Twist>,
+    /// The velocities that stay where displacements take others for the way.
+    real: Vec<Twist>,
     /// What the flight's turning adds to each joint row's error, metres or radians.
     bend: Vec<f64>,
     /// What each joint row gave in the last part, and at its end, newtons or newton metres.
@@ -154,10 +156,11 @@ impl Direct {
         }
         self.remember(0, h);
         if self.displace(members, h) {
-            let drift: Vec<Twist> = self.velocities.clone();
+            std::mem::swap(&mut self.velocities, &mut self.real);
             self.solve();
             self.fly(members, h);
-            for ((member, start), (real, free)) in members.iter_mut().zip(&self.start).zip(drift.iter().zip(&self.free))
+            for ((member, start), (real, free)) in
+                members.iter_mut().zip(&self.start).zip(self.real.iter().zip(&self.free))
             {
                 member.motion.velocity = real[0];
                 member.motion.angular = start.angular + start.inertia_times(&member.spread, real[1] - free[1]);
