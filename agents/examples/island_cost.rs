@@ -1,0 +1,100 @@
+//! What does an island add to the rapier3d world it is made of? Prints the time of both for the same pile, and their ratio.
+//!
+//! `cargo run --release -p metachron-agents --example island_cost [SIDE]`, a cube of SIDE³ boxes (10: 1000).
+//!
+//! Both worlds have the same boxes and the same solver settings and are stepped in turn, so that a busy machine slows both.
+
+use glam::{DQuat, DVec3};
+use metachron_agents::rigid::{RigidBody, RigidSpec};
+use metachron_agents::shape::{Obstacle, Solid};
+use metachron_agents::{Agent, AgentId, Companion, SimSpan, SimTime, Surroundings};
+use rapier3d::prelude::*;
+use std::sync::Arc;
+use std::time::Instant;
+
+const HALF: f64 = 0.1;
+const DT: f64 = 1.0 / 240.0;
+const STEPS: u32 = 480;
+
+fn place(side: u32, i: u32) -> DVec3 {
+    let at = |n: u32| f64::from(n) * 2.02 * HALF;
+    DVec3::new(at(i % side), at(i / side % side), at(i / side / side) + 1.01 * HALF)
+}
+
+fn bodies(side: u32) -> Vec<RigidBody> {
+    let floor = Obstacle {
+        name: "floor".to_owned(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.5,
+        restitution: 0.0,
+    };
+    let obstacles: Arc<[Obstacle]> = Arc::from([floor]);
+    let spec = |i: u32| RigidSpec {
+        solid: Solid::Box { half_extents_m: DVec3::splat(HALF) },
+        position: place(side, i),
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        spin: DVec3::ZERO,
+        mass_kg: 1.0,
+        restitution: 0.0,
+        friction: 0.5,
+        gravity: DVec3::Z * -9.81,
+        obstacles: obstacles.clone(),
+        joints: Arc::from([]),
+        sleep: false,
+    };
+    (0..side.pow(3)).map(|i| RigidBody::new(spec(i)).expect("a box can be built")).collect()
+}
+
+fn plain(side: u32) -> PhysicsWorld {
+    let mut world = PhysicsWorld { gravity: Vector::new(0.0, 0.0, -9.81), ..PhysicsWorld::default() };
+    let softness = SpringCoefficients::new(300.0, 10.0);
+    world.integration_parameters = IntegrationParameters {
+        dt: DT as f32,
+        length_unit: (2.0 * HALF * 3.0_f64.sqrt()) as f32,
+        num_solver_iterations: 4,
+        num_internal_stabilization_iterations: 2,
+        contact_softness: softness,
+        static_contact_softness: softness,
+        normalized_max_linear_velocity: f32::MAX,
+        ..IntegrationParameters::default()
+    };
+    world.colliders.insert(ColliderBuilder::halfspace(Vector::Z).friction(0.5));
+    for i in 0..side.pow(3) {
+        let body = RigidBodyBuilder::dynamic()
+            .translation(place(side, i).as_vec3())
+            .can_sleep(false)
+            .gyroscopic_forces_enabled(true);
+        let half = HALF as f32;
+        world.insert(body, ColliderBuilder::cuboid(half, half, half).mass(1.0).friction(0.5));
+    }
+    world
+}
+
+fn main() {
+    let side = std::env::args().nth(1).and_then(|side| side.parse().ok()).unwrap_or(10);
+    let (mut bodies, mut world) = (bodies(side), plain(side));
+    let span = SimSpan::from_secs_f64(DT).expect("dt is a span");
+    let (leader, others) = bodies.split_first_mut().expect("there is a box");
+    let around = |i| Surroundings::alone(AgentId(i), SimTime::ZERO);
+    let mut others: Vec<Companion<'_>> =
+        (1..).zip(others.iter_mut()).map(|(i, agent)| Companion { id: AgentId(i), agent, around: around(i) }).collect();
+    let (mut ours, mut theirs, mut apart) = (0.0, 0.0, Vec::new());
+    for step in 0..STEPS {
+        let start = Instant::now();
+        leader.lead(span, &around(0), &mut others, &mut apart).expect("nobody is lost");
+        let middle = Instant::now();
+        world.step();
+        // the first steps build both worlds
+        if step >= STEPS / 8 {
+            ours += middle.duration_since(start).as_secs_f64();
+            theirs += middle.elapsed().as_secs_f64();
+        }
+    }
+    let steps = f64::from(STEPS - STEPS / 8);
+    let (ours, theirs) = (ours / steps * 1e6, theirs / steps * 1e6);
+    println!("boxes,island_us_per_step,rapier_us_per_step,ratio");
+    println!("{},{ours:.0},{theirs:.0},{:.3}", side.pow(3), ours / theirs);
+}
