@@ -88,6 +88,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
         let row = &mut status.agents[at];
         let was_parked = matches!(row.state, AgentState::Parked(_));
         fill_row(row, &stats, &newest);
+        row.led_by = stats.led_by.map(|leader| session.agents()[leader.0 as usize].name().to_owned());
         row.cpu_share = meter.shares[at];
         if let AgentState::Parked(reason) = &row.state
             && !was_parked
