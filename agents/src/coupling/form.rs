@@ -133,7 +133,7 @@ impl SolidForm {
 impl Place {
     /// Adds `sign` times the velocity of this point to what `slots` gather. The body's slots begin at `base`: its centre's
     /// velocity and its spin, or a tube's nodes and segments in turn. `towards` is the unit normal out of this body's skin.
-    pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, towards: DVec3, sign: f64) {
+    pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
         match *self {
             Self::Point(point) => {
                 slots.add_linear(base, sign);

@@ -161,9 +161,9 @@ impl Other {
         Some(Placed { form: neighbour.form.as_deref()?, view })
     }
 
-    /// Adds `sign` times the velocity of the place of a contact to what `slots` gather; this body's slots begin at `base`.
-    pub fn join(&self, slots: &mut Slots, base: u32, place: &Place, towards: DVec3, sign: f64) {
-        place.join(slots, base, self.pose.centre, towards, sign);
+    /// Adds the velocity of the place of a contact to what `slots` gather, as [`Place::join`] does; this body's slots begin at `base`.
+    pub fn join(&self, slots: &mut Slots, base: u32, place: &Place, towards: (DVec3, f64)) {
+        place.join(slots, base, self.pose.centre, towards);
     }
 
     /// Where a material point is and how it moves; `None` where there is no such point.
@@ -171,7 +171,7 @@ impl Other {
     pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
         let place = self.place(anchor)?;
         let mut slots = Slots::default();
-        self.join(&mut slots, 0, &place, DVec3::ZERO, 1.0);
+        self.join(&mut slots, 0, &place, (DVec3::ZERO, 1.0));
         let position = match place {
             Place::Point(point) => point,
             Place::Chain { segment, share, .. } => {
@@ -185,7 +185,7 @@ impl Other {
     /// Adds the velocity of a material point to what `slots` gather; this body's slots begin at zero.
     pub fn hold(&self, slots: &mut Slots, anchor: Anchor) {
         if let Some(place) = self.place(anchor) {
-            self.join(slots, 0, &place, DVec3::ZERO, 1.0);
+            self.join(slots, 0, &place, (DVec3::ZERO, 1.0));
         }
     }
 

@@ -95,9 +95,9 @@ impl Meeting {
         for touch in &self.touches {
             let mut slots = Slots::default();
             let (mine, theirs) = halfway(touch);
-            mine.join(&mut slots, 0, me.motion.position, -touch.normal, 1.0);
+            mine.join(&mut slots, 0, me.motion.position, (-touch.normal, 1.0));
             if let Some((i, guest)) = guest {
-                guest.other.join(&mut slots, self.bases[i], &theirs, touch.normal, -1.0);
+                guest.other.join(&mut slots, self.bases[i], &theirs, (touch.normal, -1.0));
             }
             let approach_m_s = -slots.velocity(&self.velocities).dot(touch.normal);
             let rebound_m_s = (bounce * approach_m_s).max(0.0);

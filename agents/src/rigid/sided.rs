@@ -197,13 +197,13 @@ impl Sided {
 /// The velocities that a place joins: the body's slots, then the guest's.
 fn slots_of(touch: &Touch, motion: &Motion, guest: &Guest) -> Slots {
     let mut slots = only_mine(touch, motion);
-    guest.other.join(&mut slots, 2, &halfway(touch).1, touch.normal, -1.0);
+    guest.other.join(&mut slots, 2, &halfway(touch).1, (touch.normal, -1.0));
     slots
 }
 
 fn only_mine(touch: &Touch, motion: &Motion) -> Slots {
     let mut slots = Slots::default();
-    halfway(touch).0.join(&mut slots, 0, motion.position, -touch.normal, 1.0);
+    halfway(touch).0.join(&mut slots, 0, motion.position, (-touch.normal, 1.0));
     slots
 }
 

@@ -132,8 +132,8 @@ impl Mate {
     /// The contact of a place: this tube is the first of the two.
     fn contact(&self, touch: &Touch) -> Contact {
         let mut slots = Slots::default();
-        touch.on_a.join(&mut slots, 0, DVec3::ZERO, -touch.normal, 1.0);
-        self.other.join(&mut slots, self.slots.0 as u32, &touch.on_b, touch.normal, -1.0);
+        touch.on_a.join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
+        self.other.join(&mut slots, self.slots.0 as u32, &touch.on_b, (touch.normal, -1.0));
         let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
         Contact {
             key: self.key() | place,
