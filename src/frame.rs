@@ -4,16 +4,23 @@
 //! A [`Session`] is a scene in play; [`play_headless`] and [`play_in_window`] drive it. Never here: a law of control, physics.
 
 mod cast;
+mod couplings;
 mod error;
 mod governor;
 mod headless;
+mod oracle;
 mod outcome;
 mod panels;
 mod session;
+mod ties;
+mod trace;
 mod window;
 
+pub use couplings::Coupling;
 pub use error::SessionError;
 pub use headless::{Drawing, End, Headless, play_headless};
-pub use outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
+pub use oracle::{Oracle, PairError, consult_oracle};
+pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 pub use session::{Finished, Session};
+pub use trace::Trace;
 pub use window::{FRAMES_KEPT, GoOn, WindowFailure, WindowPlan, play_in_window};

@@ -23,6 +23,7 @@ Examples:
   metachron run tube --headless --target-fps 30 --fail-on 'missed_share>0.01'
   metachron run pendulum --executor lockstep --frames 300 --headless --report -
   metachron run yard --set object.hose.young_pa=5e5 --set target.frame_hz=30
+  metachron run crossing --executor lockstep --headless --seconds 2 --oracle
   METACHRON_EXECUTOR=lockstep metachron run overload --headless
 
 Flags go before --set, --set before the environment (METACHRON_…), that before the scene, and the scene before defaults.
@@ -128,6 +129,9 @@ pub struct RunArgs {
     /// Change a key of the scene, such as target.frame_hz=60 or object.NAME.rate_hz=120; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
     pub set: Vec<(String, String)>,
+    /// Play the scene a second time on one tiny common clock, and report what its own clocks changed (without a window alone)
+    #[arg(long)]
+    pub oracle: bool,
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,

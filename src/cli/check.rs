@@ -2,8 +2,8 @@
 
 use super::Exit;
 use super::args::CheckArgs;
-use super::output::{data, message, pictured};
-use crate::scene::{Scene, SceneError, SceneProblem, Source, load};
+use super::output::{data, message, pictured, tell_overlaps};
+use crate::scene::{Overlap, Scene, SceneError, SceneProblem, Source, load};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -20,6 +20,16 @@ struct Content {
     agents: usize,
     fixed: usize,
     probes: usize,
+    joints: usize,
+    couplings: usize,
+    overlaps: Vec<OverlapRow>,
+}
+
+#[derive(Serialize)]
+struct OverlapRow {
+    a: String,
+    b: String,
+    depth_m: f64,
 }
 
 #[derive(Serialize)]
@@ -55,9 +65,12 @@ fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::
         Err(error) => message(&pictured(error)),
         Ok(_) if quiet => {}
         Ok(scene) => {
-            let Content { agents, fixed, probes } = content(scene);
-            let list = [(agents, "agent"), (fixed, "fixed object"), (probes, "probe")].map(counted).join(", ");
+            let Content { agents, fixed, probes, joints, couplings, .. } = content(scene);
+            let always = [(agents, "agent"), (fixed, "fixed object"), (probes, "probe")].into_iter();
+            let some = [(joints, "joint"), (couplings, "coupling")].into_iter().filter(|(count, _)| *count > 0);
+            let list = always.chain(some).map(counted).collect::<Vec<_>>().join(", ");
             data(&format!("{name}: ok ({list})\n"))?;
+            tell_overlaps(scene);
         }
     }
     Ok(())
@@ -69,7 +82,19 @@ fn counted((count, what): (usize, &str)) -> String {
 }
 
 fn content(scene: &Scene) -> Content {
-    Content { agents: scene.agents.len(), fixed: scene.obstacles.len(), probes: scene.probes.len() }
+    let row = |overlap: &Overlap| OverlapRow {
+        a: scene.name_of(overlap.a).to_owned(),
+        b: scene.name_of(overlap.b).to_owned(),
+        depth_m: overlap.depth_m,
+    };
+    Content {
+        agents: scene.agents.len(),
+        fixed: scene.obstacles.len(),
+        probes: scene.probes.len(),
+        joints: scene.joints.len(),
+        couplings: scene.couplings.len(),
+        overlaps: scene.overlaps().iter().map(row).collect(),
+    }
 }
 
 fn row<'a>(name: &'a str, result: &'a Result<Scene, SceneError>) -> Row<'a> {

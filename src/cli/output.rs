@@ -1,7 +1,7 @@
 //! Where words go: data to standard output, messages to standard error.
 
 use super::Exit;
-use crate::scene::SceneError;
+use crate::scene::{Scene, SceneError};
 use std::io::{ErrorKind, Write};
 
 /// Writes data to standard output. A reader that has gone away (`| head`) is no error.
@@ -16,6 +16,21 @@ pub(super) fn data(text: &str) -> anyhow::Result<()> {
 /// A message for people. Where nobody can read it, it is lost.
 pub(super) fn message(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
+}
+
+/// More overlaps than this are counted, not told.
+const OVERLAPS_TOLD: usize = 10;
+
+/// Tells of agents that start inside each other, which is no error: they are pushed apart without a jump.
+pub(super) fn tell_overlaps(scene: &Scene) {
+    let overlaps = scene.overlaps();
+    for overlap in overlaps.iter().take(OVERLAPS_TOLD) {
+        let (a, b) = (scene.name_of(overlap.a), scene.name_of(overlap.b));
+        message(&format!("note: `{a}` and `{b}` overlap by {:.3} mm at the start", overlap.depth_m * 1e3));
+    }
+    if overlaps.len() > OVERLAPS_TOLD {
+        message(&format!("note: {} more pairs overlap at the start", overlaps.len() - OVERLAPS_TOLD));
+    }
 }
 
 /// Tells an error, and with which code the program ends.

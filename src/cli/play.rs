@@ -2,15 +2,20 @@
 //!
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
-use super::report::{AgentReport, BudgetReport, CouplingReport, ProbeReport, Quantiles, Report, summarise};
+use super::report::{
+    AgentReport, BudgetReport, CouplingError, CouplingReport, OracleReport, OverlapReport, ProbeReport, Quantiles,
+    Report, summarise,
+};
 use super::run::{Played, Request, RunLength, Step};
 use crate::compositor::viewer::WindowError;
 use crate::compositor::{Gpu, GpuError, Offscreen, RendererOptions, Size};
 use crate::frame::{
-    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Outcome, ProbeOutcome, Session, WindowFailure,
-    WindowPlan, play_headless, play_in_window,
+    AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Oracle, Outcome, PairError, ProbeOutcome, Session,
+    WindowFailure, WindowPlan, consult_oracle, play_headless, play_in_window,
 };
 use crate::runtime::{AgentState, Spread};
+use crate::scene::{Overlap, Scene};
+use metachron_agents::AgentId;
 use std::path::PathBuf;
 
 /// Told of every frame; answers whether to go on.
@@ -24,12 +29,15 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// # Errors
 /// What the models, the executor or the adapter refuse.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
-    let session = Session::open(request.scene.clone())?;
+    let mut session = Session::open(request.scene.clone())?;
+    if request.oracle {
+        session.keep_trace();
+    }
     if !request.window {
         return headless(session, request, request.png.clone(), go_on);
     }
     match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
-        Ok(outcome) => Ok(played(outcome, None)),
+        Ok(outcome) => Ok(played(&request.scene, outcome, None)),
         Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
         Err(WindowFailure::Session(error)) => Err(error.into()),
     }
@@ -69,8 +77,18 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
         RunLength::Seconds(seconds) => End::Seconds(seconds),
     };
     let plan = Headless { end, size, style: request.style, drawing, png };
-    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(done))))?;
-    Ok(played(outcome, picture))
+    // the second run takes about as long as the first, so each is half of the whole
+    let half = if request.oracle { 0.5 } else { 1.0 };
+    let outcome = play_headless(session, plan, &mut |record, done| go_on(step(record, Some(half * done))))?;
+    if !request.oracle || outcome.interrupted {
+        return Ok(played(&request.scene, outcome, picture));
+    }
+    let last = outcome.frames.last().copied().unwrap_or_default();
+    let oracle = consult_oracle(&request.scene, &outcome, &mut |done| go_on(step(&last, Some(half + half * done))))?;
+    let mut played = played(&request.scene, outcome, picture);
+    played.interrupted = oracle.interrupted;
+    played.report.oracle = Some(oracle_report(&request.scene, &oracle));
+    Ok(played)
 }
 
 /// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter.
@@ -97,7 +115,7 @@ fn step(record: &FrameRecord, done: Option<f64>) -> Step {
     Step { done, sim_s: record.sim_s, frame_ms: record.frame_ms }
 }
 
-fn played(outcome: Outcome, picture: Option<PathBuf>) -> Played {
+fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
     let warm = outcome.warm_up.min(outcome.frames.len().saturating_sub(1));
     let summary = summarise(&outcome.frames[warm..], outcome.target_ms);
     let spent_share = (!outcome.frames.is_empty()).then(|| summary.frame_ms.mean / outcome.target_ms);
@@ -114,15 +132,17 @@ fn played(outcome: Outcome, picture: Option<PathBuf>) -> Played {
         state_hash: format!("{:016x}", outcome.state_hash),
         target_ms: outcome.target_ms,
         summary,
-        agents: outcome.agents.iter().map(agent).collect(),
-        couplings: outcome.couplings.iter().map(coupling).collect(),
+        agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
+        couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
+        overlaps: scene.overlaps().iter().map(|one| overlap(scene, one)).collect(),
+        oracle: None,
         budget: BudgetReport { spent_share, clamped: outcome.clamp },
         probes: outcome.probes.iter().map(probe).collect(),
     };
     Played { report, frames: outcome.frames, no_window: None, picture, interrupted: outcome.interrupted }
 }
 
-fn agent(agent: &AgentOutcome) -> AgentReport {
+fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
     let stats = &agent.stats;
     let parked_reason = match &stats.state {
         AgentState::Parked(reason) => Some(reason.clone()),
@@ -148,6 +168,7 @@ fn agent(agent: &AgentOutcome) -> AgentReport {
         late_ms: quantiles(stats.late),
         dropped_ms: stats.dropped.as_secs_f64() * 1e3,
         rested_ms: stats.rested.as_secs_f64() * 1e3,
+        led_by: stats.led_by.map(|id| scene.name_of(id).to_owned()),
         parked: parked_reason.is_some(),
         parked_reason,
         energy_j: stats.energy_j,
@@ -159,15 +180,43 @@ fn quantiles(spread: Spread) -> Quantiles {
     Quantiles { p50: spread.p50_s * 1e3, p99: spread.p99_s * 1e3 }
 }
 
-fn coupling(coupling: &Coupling) -> CouplingReport {
+fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
+    let name = |id: AgentId| scene.name_of(id).to_owned();
     CouplingReport {
-        a: coupling.a.clone(),
-        b: coupling.b.clone(),
+        a: name(coupling.a),
+        b: name(coupling.b),
         kind: coupling.kind.to_owned(),
         contacts: u64::from(coupling.contacts),
+        momentum_error: coupling.momentum_error,
+        impulse_n_s: coupling.impulse_n_s,
+        in_flight_n_s: coupling.in_flight_n_s,
+        tank_j: coupling.tank_j,
+        penetration_m: coupling.penetration_m,
+        penetration_max_m: coupling.penetration_max_m,
         force_n: coupling.force_n,
         force_max_n: coupling.force_max_n,
+        parasitic_kg: coupling.parasitic_kg,
     }
+}
+
+fn overlap(scene: &Scene, overlap: &Overlap) -> OverlapReport {
+    let name = |id: AgentId| scene.name_of(id).to_owned();
+    OverlapReport { a: name(overlap.a), b: name(overlap.b), depth_m: overlap.depth_m }
+}
+
+fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {
+    let name = |id: AgentId| scene.name_of(id).to_owned();
+    let error = |pair: &PairError| CouplingError {
+        a: name(pair.a),
+        b: name(pair.b),
+        position_rms_m: pair.position_rms_m,
+        position_max_m: pair.position_max_m,
+        momentum_max_n_s: pair.momentum_max_n_s,
+        impulse_n_s: pair.impulse_n_s,
+        impulse_oracle_n_s: pair.impulse_oracle_n_s,
+    };
+    let couplings = oracle.pairs.iter().map(error).collect();
+    OracleReport { dt_ms: oracle.dt_s * 1e3, states: oracle.states, couplings }
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {

@@ -5,7 +5,7 @@
 
 use super::Exit;
 use super::args::{RunArgs, StyleWord};
-use super::output::{BadInput, data, message};
+use super::output::{BadInput, data, message, tell_overlaps};
 use super::play::play;
 use super::progress::Bar;
 use super::report::{Report, Verdict};
@@ -42,6 +42,8 @@ pub struct Request {
     pub size: Option<[u32; 2]>,
     /// How pictures without a window show things.
     pub style: Style,
+    /// Whether to play the scene once more on one tiny common clock; a run without a window alone.
+    pub oracle: bool,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
     /// Where to write it when a window was wanted and none could be opened, and `png` says nothing.
@@ -95,6 +97,9 @@ impl Request {
 pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Exit> {
     check_outputs(args)?;
     let request = request(args, matches)?;
+    if !args.quiet {
+        tell_overlaps(&request.scene);
+    }
     let bar = Bar::new(&request.scene.name, args.quiet);
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
@@ -138,6 +143,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         end,
         size: args.size,
         style: style(&args.style),
+        oracle: args.oracle,
         png: args.png.clone(),
         png_without_window,
     })
@@ -165,6 +171,10 @@ fn stem(name: &str) -> String {
 fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.json && args.report.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
+    }
+    if args.oracle && !args.headless {
+        let why = "--oracle plays the scene twice without a window; add --headless";
+        return Err(BadInput(why.to_owned()).into());
     }
     for (flag, path) in [("--png", &args.png), ("--frames-csv", &args.frames_csv)] {
         if path.as_deref() == Some(Path::new("-")) {

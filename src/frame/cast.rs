@@ -5,9 +5,10 @@
 
 use super::error::SessionError;
 use super::governor::RateGovernor;
+use super::ties::{Ties, faults};
 use crate::compositor::{Actor, Camera, Form, Look, Material, Prop, Seen, Stage};
 use crate::control::{Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits};
-use crate::runtime::{AgentSpawn, Faults, Governor, Machine, StepPrice, Watch};
+use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind};
 use crate::scene::{self, Member, Scene, Spec};
 use glam::DVec3;
@@ -25,7 +26,8 @@ use std::borrow::Cow;
 /// [`SessionError::Build`] where a model refuses its object.
 pub(super) fn spawns(scene: &Scene) -> Result<Vec<AgentSpawn>, SessionError> {
     let share = fair_share(machine(scene).cores, scene.agents.len());
-    scene.agents.iter().map(|member| spawn(scene, member, share)).collect()
+    let mut ties = Ties::of(scene);
+    scene.agents.iter().map(|member| spawn(scene, member, share, &mut ties)).collect()
 }
 
 /// The share of its period that one agent's work may take, so that all find room on `cores` beside the frame loop.
@@ -38,7 +40,7 @@ const ROOM: f64 = 0.75;
 /// Share of its period that an agent may take however many cores are idle: past it every hiccup makes it late.
 const SHARE_MAX: f64 = 0.6;
 
-fn spawn(scene: &Scene, member: &Member, share: f64) -> Result<AgentSpawn, SessionError> {
+fn spawn(scene: &Scene, member: &Member, share: f64, ties: &mut Ties) -> Result<AgentSpawn, SessionError> {
     let agent = build(member, scene.executor)
         .map_err(|reason| SessionError::Build { name: member.name.clone(), reason: reason.to_string() })?;
     let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
@@ -51,10 +53,10 @@ fn spawn(scene: &Scene, member: &Member, share: f64) -> Result<AgentSpawn, Sessi
         dt_range: member.pace.dt_range,
         range: Some(member.simulation),
         links: member.links.clone(),
-        laws: Vec::new(),
-        attached: Vec::new(),
-        together: None,
-        faults: Faults::default(),
+        laws: ties.laws(member.id),
+        attached: ties.attached(member.id),
+        together: ties.together(member.id),
+        faults: faults(member.faults),
         watches: watches.collect(),
         governor: governor(member, share),
     })

@@ -2,6 +2,8 @@
 //!
 //! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
 
+use super::couplings::Coupling;
+use super::trace::Trace;
 use crate::runtime::{AgentStats, Sample};
 use glam::DVec3;
 use metachron_agents::Resolution;
@@ -47,30 +49,6 @@ pub struct ProbeOutcome {
     pub samples: Option<Vec<Sample>>,
 }
 
-/// What two agents did to each other.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Coupling {
-    /// Who holds.
-    pub a: String,
-    /// Who is held.
-    pub b: String,
-    /// Which law: `grasp`.
-    pub kind: &'static str,
-    /// Holds at the end of the run.
-    pub contacts: u32,
-    /// Force at the end of the run, newtons.
-    pub force_n: f64,
-    /// Largest force seen by a frame, newtons.
-    pub force_max_n: f64,
-}
-
-impl Coupling {
-    /// A grasp that has just begun.
-    pub(super) fn grasp(a: &str, b: &str) -> Self {
-        Self { a: a.to_owned(), b: b.to_owned(), kind: "grasp", contacts: 1, force_n: 0.0, force_max_n: 0.0 }
-    }
-}
-
 /// An agent at the end of the run, with the picture's resolution.
 #[derive(Debug, Clone)]
 pub struct AgentOutcome {
@@ -113,6 +91,8 @@ pub struct Outcome {
     pub agents: Vec<AgentOutcome>,
     /// All couplings.
     pub couplings: Vec<Coupling>,
+    /// Where agents were, where that was wanted ([`super::Session::keep_trace`]).
+    pub trace: Option<Trace>,
     /// All probes.
     pub probes: Vec<ProbeOutcome>,
     /// Says that the controller rested on a limit at the end, and on which.

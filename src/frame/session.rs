@@ -4,8 +4,10 @@
 //! Never here: windows, files, arguments.
 
 use super::cast;
+use super::couplings::{Coupling, Couplings};
 use super::error::SessionError;
-use super::outcome::{AgentOutcome, Coupling, FrameRecord, Outcome, ProbeOutcome};
+use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
+use super::trace::Trace;
 use crate::compositor::{Camera, Hand, Picture, Seen, Size, Stage, States, Style};
 use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
 use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
@@ -26,7 +28,8 @@ pub struct Session {
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
     levels: Vec<Resolution>,
-    couplings: Vec<Coupling>,
+    couplings: Couplings,
+    trace: Option<Trace>,
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
@@ -79,7 +82,8 @@ impl Session {
             seen: Vec::new(),
             views: Vec::new(),
             levels: Vec::new(),
-            couplings: Vec::new(),
+            couplings: Couplings::of(&scene),
+            trace: None,
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
@@ -298,10 +302,27 @@ impl Session {
                 .enumerate()
                 .map(|(at, stats)| AgentOutcome { picture: drawn(at), stats })
                 .collect(),
-            couplings: self.couplings,
+            couplings: self.couplings.all().to_vec(),
+            trace: self.trace,
             clamp,
             interrupted,
         }
+    }
+
+    /// Takes the newest states without a frame: for their couplings.
+    pub(super) fn look(&mut self) {
+        self.gather();
+    }
+
+    /// What agents have done to each other so far.
+    #[must_use]
+    pub fn couplings(&self) -> &[Coupling] {
+        self.couplings.all()
+    }
+
+    /// Writes down from now on where every agent is, to be compared with another run.
+    pub fn keep_trace(&mut self) {
+        self.trace.get_or_insert_default();
     }
 
     fn gather(&mut self) {
@@ -313,25 +334,11 @@ impl Session {
         }
         self.stage.pose(now, states(self.scene.states));
         self.chosen.sim = now;
-        self.note_grasps();
-    }
-
-    /// Keeps who holds whom, and how hard.
-    fn note_grasps(&mut self) {
-        self.couplings.iter_mut().for_each(|c| (c.contacts, c.force_n) = (0, 0.0));
-        for (holder, snapshot) in self.scene.agents.iter().zip(&self.newest) {
-            let Body::Tool(tool) = &snapshot.body else { continue };
-            let Some(grasp) = tool.grasp else { continue };
-            let held = &self.scene.agents[grasp.target.0 as usize].name;
-            let known = self.couplings.iter().position(|c| c.a == holder.name && c.b == *held);
-            let at = known.unwrap_or_else(|| {
-                self.couplings.push(Coupling::grasp(&holder.name, held));
-                self.couplings.len() - 1
-            });
-            let coupling = &mut self.couplings[at];
-            coupling.contacts = 1;
-            coupling.force_n = tool.force_n;
-            coupling.force_max_n = coupling.force_max_n.max(tool.force_n);
+        let agents = self.run.agents();
+        let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
+        self.couplings.note(&self.scene, &self.newest, leader);
+        if let Some(trace) = &mut self.trace {
+            trace.note(&self.scene, &self.newest);
         }
     }
 

@@ -78,6 +78,12 @@ impl AgentHandle {
         }
     }
 
+    /// In whose world it steps now; `None` where it keeps its own.
+    #[must_use]
+    pub fn led_by(&self) -> Option<AgentId> {
+        Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
+    }
+
     /// What it does now.
     #[must_use]
     pub fn state(&self) -> AgentState {
@@ -134,7 +140,7 @@ impl AgentHandle {
             state: gauges.state(),
             energy_j: newest.energy_j,
             residual_m: newest.residual_m,
-            led_by: Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id),
+            led_by: self.led_by(),
         }
     }
 }

@@ -4,10 +4,10 @@
 //! Never here: the file's text, running agents.
 
 use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind};
-use super::ties::{Coupling, Faults, Joint};
+use super::ties::{Coupling, Faults};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
-use metachron_agents::rigid::RigidSpec;
+use metachron_agents::rigid::{Joint, RigidSpec};
 use metachron_agents::rod::TubeSpec;
 use metachron_agents::shape::Obstacle;
 use metachron_agents::synthetic::SyntheticSpec;
@@ -41,8 +41,8 @@ pub struct Scene {
     pub obstacle_looks: Vec<Look>,
     /// Whether agents touch each other where no coupling says otherwise.
     pub contacts: bool,
-    /// What holds rigid agents together.
-    pub joints: Vec<Joint>,
+    /// What holds rigid agents together; each of them has all of them in its spec.
+    pub joints: Arc<[Joint]>,
     /// Pairs that act on each other in another way.
     pub couplings: Vec<Coupling>,
     /// The points whose state is reported.
@@ -214,6 +214,14 @@ pub struct Probe {
     pub at: f64,
     /// Time between samples, where samples are wanted.
     pub every: Option<SimSpan>,
+}
+
+impl Scene {
+    /// The name of an agent; empty where there is none of that number.
+    #[must_use]
+    pub fn name_of(&self, id: AgentId) -> &str {
+        self.agents.get(id.0 as usize).map_or("", |member| &member.name)
+    }
 }
 
 impl Camera {

@@ -9,12 +9,14 @@ mod cast;
 mod check;
 mod document;
 pub mod format;
+mod overlap;
 mod problem;
 mod schema;
 mod source;
 pub mod ties;
 
 pub use cast::{Camera, Gains, Look, Machine, Member, PaceWish, Probe, Scene, Spec, Target, View};
+pub use overlap::Overlap;
 pub use problem::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{SCENE_BYTES_MAX, Source};
@@ -24,8 +26,10 @@ use check::{Checker, Place};
 use document::Document;
 use format::{SceneFile, WorldFile};
 use glam::DVec3;
+use metachron_agents::rigid::Joint;
 use problem::Problem;
 use serde::Deserialize;
+use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeValue, ValueDeserializer};
 
@@ -86,7 +90,12 @@ fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
     given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
 }
 
-fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, (gravity, objects): (DVec3, Objects)) -> Scene {
+fn assemble(
+    c: &mut Checker<'_, '_>,
+    source: &Source,
+    file: SceneFile,
+    (gravity, mut objects): (DVec3, Objects),
+) -> Scene {
     if file.format != FORMAT {
         let what = format!("is {}, which this program does not know", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
@@ -95,6 +104,8 @@ fn assemble(c: &mut Checker<'_, '_>, source: &Source, file: SceneFile, (gravity,
     // ties between objects that are wrong themselves would be told of for nothing
     let sound = c.count() == 0;
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
+    let joints: Arc<[Joint]> = joints.into();
+    objects.hold(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
     Scene {
         name: source.name().to_owned(),

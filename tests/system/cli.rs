@@ -29,7 +29,7 @@ fn help_teaches_by_examples_and_exit_codes() {
         assert!(out(&help).contains(word), "{word}");
     }
     let help = out(&metachron(&["run", "--help"]));
-    let flags = "--headless --frames --seconds --target-fps --policy --law --executor --size --png --report --frames-csv --seed \
+    let flags = "--headless --frames --seconds --target-fps --policy --law --executor --size --png --report --frames-csv --seed --oracle \
                  --fail-on --set --json --quiet METACHRON_TARGET_FPS";
     for flag in flags.split_whitespace() {
         assert!(help.contains(flag), "{flag}");

@@ -7,4 +7,5 @@ mod run;
 mod scene;
 mod scene_ties;
 mod scenes;
+mod scenes_coupled;
 mod viewer;

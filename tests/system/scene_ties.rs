@@ -1,9 +1,11 @@
 //! Joints, couplings, grids and faults as users write them: what loads, and what an error shows.
 
 use glam::DVec3;
-use metachron::scene::ties::{CouplingKind, JointKind, Law};
+use metachron::scene::ties::CouplingKind;
 use metachron::scene::{Scene, SceneError, Source, Spec, load};
 use metachron_agents::Anchor;
+use metachron_agents::coupling::Law;
+use metachron_agents::rigid::JointKind;
 
 /// Two boxes side by side, a tube, two tools, an agent without matter and a post; the tests add ties.
 const YARD: &str = r#"format = 1
@@ -163,7 +165,7 @@ fn a_joint_holds_where_the_objects_start() {
     joint_refused(
         &format!(r#"kind = "prismatic", {pair}, axis = [1, 0, 0], range_m = [0.2, 0.5]"#),
         "[0.2, 0.5]",
-        &["with 0, the start, among them"],
+        &["start at 0.0000 m"],
     );
     joint_refused(
         &format!(r#"kind = "revolute", {pair}, axis = [1, 0, 0], range_deg = [-400, 0]"#),
@@ -239,6 +241,11 @@ fn a_coupling_that_cannot_be_says_why() {
     coupling_refused(&format!("{attach}, at_a = 0.5, at_b = 0.5"), "0.5", &["[x, y, z]"]);
     coupling_refused(&format!("{attach}, at_a = \"end\", at_b = [0, 0, 0]"), "\"end\"", &["a number from 0 to 1"]);
     coupling_refused(&format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"off\""), "\"off\"", &["attaches nothing"]);
+    coupling_refused(
+        &format!("{attach}, at_a = 1, at_b = [0, 0, 0], law = \"penalty\""),
+        "\"penalty\"",
+        &["a law of contacts"],
+    );
     let tlm = format!(r#"{pair}, law = "tlm""#);
     coupling_refused(&tlm, &format!("{{ {tlm} }}"), &["`stiffness_n_m`", "is missing"]);
     let twice = format!("coupling = [\n{{ {pair}, law = \"off\" }},\n{{ a = \"right\", b = \"left\" }},\n]");

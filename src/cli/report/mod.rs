@@ -43,6 +43,11 @@ pub struct Report {
     pub agents: Vec<AgentReport>,
     /// What agents did to each other.
     pub couplings: Vec<CouplingReport>,
+    /// Agents that started inside each other.
+    pub overlaps: Vec<OverlapReport>,
+    /// What different clocks changed, where that was asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub oracle: Option<OracleReport>,
     /// How the frame budget was spent.
     pub budget: BudgetReport,
     /// The scene's probes.
@@ -50,7 +55,7 @@ pub struct Report {
 }
 
 /// One agent of a run.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct AgentReport {
     /// Its name in the scene.
     pub name: String,
@@ -82,6 +87,8 @@ pub struct AgentReport {
     pub dropped_ms: f64,
     /// Simulated milliseconds at rest.
     pub rested_ms: f64,
+    /// Name of the agent whose clock it shared at the end; `None` where it kept its own.
+    pub led_by: Option<String>,
     /// Whether it was taken out of the run after a failed step.
     pub parked: bool,
     /// Why it was parked.
@@ -103,20 +110,76 @@ pub struct Quantiles {
 }
 
 /// What two agents did to each other.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct CouplingReport {
     /// The first agent's name.
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// How they were coupled: `grasp`.
+    /// How they were coupled: `ledger`, `tlm`, `penalty`, `island`, `grasp` or `attach`.
     pub kind: String,
-    /// Contacts or holds at the end of the run.
+    /// Contacts, holds or joints at the end of the run.
     pub contacts: u64,
+    /// Difference of both sides' accounts of the same impulses, as a share of the impulse exchanged; `None` where there are no
+    /// two accounts, as in an island.
+    pub momentum_error: Option<f64>,
+    /// Impulses exchanged, magnitudes summed, newton seconds.
+    pub impulse_n_s: f64,
+    /// What one had given and the other had not taken yet when it was last seen, newton seconds.
+    pub in_flight_n_s: f64,
+    /// What was left in the energy tank, joules; `None` where the law keeps none.
+    pub tank_j: Option<f64>,
+    /// Overlap at the end of the run, metres.
+    pub penetration_m: f64,
+    /// Greatest overlap that a frame saw, metres.
+    pub penetration_max_m: f64,
     /// Force at the end of the run, newtons.
     pub force_n: f64,
-    /// Greatest force of the run, newtons.
+    /// Greatest force that a frame saw, newtons.
     pub force_max_n: f64,
+    /// Mass that the law added, kilograms.
+    pub parasitic_kg: f64,
+}
+
+/// Two agents that started inside each other.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OverlapReport {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name.
+    pub b: String,
+    /// How deep, metres.
+    pub depth_m: f64,
+}
+
+/// The same scene on one tiny common clock, and what its own clocks changed.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OracleReport {
+    /// Step of the common clock, milliseconds.
+    pub dt_ms: f64,
+    /// Points compared.
+    pub states: u64,
+    /// Every pair that was coupled in either run.
+    pub couplings: Vec<CouplingError>,
+}
+
+/// What different clocks changed for two coupled agents.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct CouplingError {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name.
+    pub b: String,
+    /// Root mean square distance of both from where the common clock has them, metres.
+    pub position_rms_m: f64,
+    /// Greatest such distance, metres.
+    pub position_max_m: f64,
+    /// Greatest difference of either one's momentum, newton seconds.
+    pub momentum_max_n_s: f64,
+    /// Impulse exchanged in the run, newton seconds; `None` where an island kept it to itself.
+    pub impulse_n_s: Option<f64>,
+    /// Impulse exchanged on the common clock, newton seconds.
+    pub impulse_oracle_n_s: Option<f64>,
 }
 
 /// How the frame budget was spent.
@@ -129,7 +192,7 @@ pub struct BudgetReport {
 }
 
 /// Where a probe was.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone, Default, Serialize)]
 pub struct ProbeReport {
     /// Name of the object.
     pub object: String,
@@ -150,31 +213,7 @@ impl Report {
     fn template() -> Self {
         let summary = summarise(&[crate::frame::FrameRecord::default()], 1.0);
         let name = String::new;
-        let agent = AgentReport {
-            name: name(),
-            model: name(),
-            state: "",
-            steps: 0,
-            rate_hz: 0.0,
-            wanted_hz: 0.0,
-            dt_ms: 0.0,
-            eps_m: None,
-            n: None,
-            picture_eps_m: None,
-            cpu_s: 0.0,
-            age_ms: Quantiles::default(),
-            late_ms: Quantiles::default(),
-            dropped_ms: 0.0,
-            rested_ms: 0.0,
-            parked: false,
-            parked_reason: None,
-            energy_j: 0.0,
-            residual_m: 0.0,
-        };
-        let coupling =
-            CouplingReport { a: name(), b: name(), kind: name(), contacts: 0, force_n: 0.0, force_max_n: 0.0 };
-        let probe =
-            ProbeReport { object: name(), at: 0.0, position_m: [0.0; 3], velocity_m_s: [0.0; 3], samples: None };
+        let oracle = OracleReport { couplings: vec![CouplingError::default()], ..OracleReport::default() };
         Self {
             scene: name(),
             policy: name(),
@@ -188,10 +227,12 @@ impl Report {
             state_hash: name(),
             target_ms: 0.0,
             summary,
-            agents: vec![agent],
-            couplings: vec![coupling],
+            agents: vec![AgentReport::default()],
+            couplings: vec![CouplingReport::default()],
+            overlaps: vec![OverlapReport::default()],
+            oracle: Some(oracle),
             budget: BudgetReport::default(),
-            probes: vec![probe],
+            probes: vec![ProbeReport::default()],
         }
     }
 }
@@ -246,6 +287,13 @@ mod tests {
             "/couplings/0/kind",
             "/couplings/0/contacts",
             "/couplings/0/force_n",
+            "/couplings/0/momentum_error",
+            "/couplings/0/tank_j",
+            "/couplings/0/penetration_m",
+            "/overlaps/0/depth_m",
+            "/oracle/dt_ms",
+            "/oracle/couplings/0/position_rms_m",
+            "/agents/0/led_by",
             "/budget/spent_share",
             "/probes/0/object",
             "/probes/0/at",

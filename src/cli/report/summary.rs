@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, Report};
+use super::{AgentReport, CouplingReport, OracleReport, Report};
 use std::fmt::Write;
 
 impl Report {
@@ -31,6 +31,10 @@ impl Report {
             "agent", "model", "rate Hz", "wanted", "dt ms", "ε mm", "cpu s", "age ms", "dropped ms"
         );
         self.agents.iter().for_each(|agent| agent_row(&mut out, agent));
+        coupling_table(&mut out, &self.couplings);
+        if let Some(oracle) = &self.oracle {
+            oracle_table(&mut out, oracle);
+        }
         out
     }
 }
@@ -52,4 +56,61 @@ fn agent_row(out: &mut String, agent: &AgentReport) {
     );
     let reason = agent.parked_reason.as_deref().unwrap_or("parked");
     let _ = if agent.parked { writeln!(out, "  {reason}") } else { writeln!(out) };
+}
+
+/// More couplings than this are counted, not shown: the report has them all.
+const COUPLINGS_SHOWN: usize = 20;
+
+fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
+    if couplings.is_empty() {
+        return;
+    }
+    let _ = writeln!(
+        out,
+        "\n{:<41} {:<8} {:>8} {:>10} {:>10} {:>11} {:>11}",
+        "coupling", "kind", "contacts", "force N", "greatest", "overlap mm", "momentum %"
+    );
+    for c in couplings.iter().take(COUPLINGS_SHOWN) {
+        let pair = format!("{} · {}", c.a, c.b);
+        let error = c.momentum_error.map_or_else(|| "-".to_owned(), |error| format!("{:.4}", error * 100.0));
+        let _ = writeln!(
+            out,
+            "{pair:<41} {:<8} {:>8} {:>10.3} {:>10.3} {:>11.4} {error:>11}",
+            c.kind,
+            c.contacts,
+            c.force_n,
+            c.force_max_n,
+            c.penetration_m * 1e3
+        );
+    }
+    more(out, couplings.len());
+}
+
+fn oracle_table(out: &mut String, oracle: &OracleReport) {
+    let _ = writeln!(out, "\nagainst one common clock of {:.4} ms, {} points compared", oracle.dt_ms, oracle.states);
+    let _ = writeln!(
+        out,
+        "{:<41} {:>11} {:>11} {:>13} {:>12} {:>12}",
+        "coupling", "rms mm", "greatest mm", "momentum N·s", "impulse N·s", "common N·s"
+    );
+    let shown = |impulse: Option<f64>| impulse.map_or_else(|| "-".to_owned(), |impulse| format!("{impulse:.5}"));
+    for c in oracle.couplings.iter().take(COUPLINGS_SHOWN) {
+        let pair = format!("{} · {}", c.a, c.b);
+        let _ = writeln!(
+            out,
+            "{pair:<41} {:>11.4} {:>11.4} {:>13.6} {:>12} {:>12}",
+            c.position_rms_m * 1e3,
+            c.position_max_m * 1e3,
+            c.momentum_max_n_s,
+            shown(c.impulse_n_s),
+            shown(c.impulse_oracle_n_s)
+        );
+    }
+    more(out, oracle.couplings.len());
+}
+
+fn more(out: &mut String, count: usize) {
+    if count > COUPLINGS_SHOWN {
+        let _ = writeln!(out, "and {} more in the report", count - COUPLINGS_SHOWN);
+    }
 }

@@ -8,8 +8,9 @@ use super::object::{Named, Objects};
 use crate::scene::cast::Spec;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
-use crate::scene::ties::{Coupling, CouplingKind, Law};
+use crate::scene::ties::{Coupling, CouplingKind};
 use glam::DVec3;
+use metachron_agents::coupling::Law;
 use metachron_agents::rigid::RigidBody;
 use metachron_agents::{AgentId, Anchor};
 use std::collections::BTreeMap;
@@ -108,6 +109,9 @@ fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     }
     if attach && law == CouplingLaw::Off {
         c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
+    } else if attach && matches!(law, CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) {
+        let what = format!("is `{}`, a law of contacts", law.name());
+        c.wrong(place, "law", what, "expected `ledger` or `tlm`: nothing else attaches");
     }
 }
 

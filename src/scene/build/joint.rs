@@ -10,9 +10,9 @@ use super::object::{Named, Objects};
 use crate::scene::cast::Spec;
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{JointFile, JointKind as Kind, Point};
-use crate::scene::ties::{Joint, JointKind};
 use glam::{DQuat, DVec3};
 use metachron_agents::AgentId;
+use metachron_agents::rigid::{Joint, JointKind};
 
 /// Most joints of a scene.
 const JOINTS_MAX: usize = 10_000;
@@ -141,16 +141,15 @@ impl Held {
     fn joint(self) -> Option<Joint> {
         let Self { ends: [a, b], anchors: [from, to], .. } = self;
         match (a.agent, b.agent) {
-            (Some(id), other) => Some(self.between(id, other, (a, from), (b, to), 1.0)),
-            (None, Some(id)) => Some(self.between(id, None, (b, to), (a, from), -1.0)),
+            (Some(id), other) => Some(self.between((id, other), (a, from), (b, to), 1.0)),
+            (None, Some(id)) => Some(self.between((id, None), (b, to), (a, from), -1.0)),
             (None, None) => None,
         }
     }
 
     fn between(
         &self,
-        id: AgentId,
-        other: Option<AgentId>,
+        (id, other): (AgentId, Option<AgentId>),
         (a, from): (End, DVec3),
         (b, to): (End, DVec3),
         sign: f64,

@@ -43,6 +43,10 @@ pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -
         Kind::Spherical => Leaves::Turns,
         Kind::Revolute => {
             let range = range(c, place, ("range_deg", file.range_deg), 180.0);
+            let around_start = range.is_none_or(|[least, greatest]| least <= 0.0 && greatest >= 0.0);
+            if !around_start {
+                c.wrong(place, "range_deg", "does not contain the start", "expected a range with 0 among it");
+            }
             Leaves::Turn { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
         }
         Kind::Prismatic => {
@@ -110,7 +114,7 @@ fn axis(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<DVec
     axis.try_normalize()
 }
 
-/// A range with the start, 0, in it.
+/// A range with both ends within ± `most`, in order.
 fn range(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -118,9 +122,9 @@ fn range(
     most: f64,
 ) -> Option<[f64; 2]> {
     let [least, greatest] = given?;
-    if !(-most..=0.0).contains(&least) || !(0.0..=most).contains(&greatest) {
-        let expected =
-            format!("expected [least, greatest] with 0, the start, among them, each up to {most} in magnitude");
+    let within = |end: f64| end.abs() <= most;
+    if !(within(least) && within(greatest) && least <= greatest) {
+        let expected = format!("expected [least, greatest], each up to {most} in magnitude");
         c.wrong(place, key, format_args!("is [{least}, {greatest}]"), expected);
         return None;
     }

@@ -5,10 +5,9 @@ use super::joint_keys::Leaves;
 use crate::scene::check::{Checker, Place};
 use glam::DVec3;
 use metachron_agents::AgentId;
+use metachron_agents::rigid::JOINT_GAP_MAX_M as GAP_MAX_M;
 use std::collections::BTreeMap;
 
-/// Anchors may start this far from where the joint holds them, metres: rounding of a scene's numbers.
-const GAP_MAX_M: f64 = 1e-3;
 /// Directions that differ by less than this are one direction: sine of the angle.
 const SAME_DIRECTION: f64 = 1e-3;
 

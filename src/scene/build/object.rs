@@ -12,7 +12,7 @@ use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
 use glam::DVec3;
 use metachron_agents::instrument::Instrument;
-use metachron_agents::rigid::RigidBody;
+use metachron_agents::rigid::{Joint, RigidBody};
 use metachron_agents::rod::{Tube, TubeError};
 use metachron_agents::shape::Obstacle;
 use metachron_agents::synthetic::Synthetic;
@@ -39,6 +39,17 @@ pub(in crate::scene) struct Objects {
     pub(in crate::scene) obstacle_looks: Vec<Look>,
     /// Names of fixed objects and of agents.
     pub(in crate::scene) names: Names,
+}
+
+impl Objects {
+    /// Gives every rigid agent the joints of the scene.
+    pub(in crate::scene) fn hold(&mut self, joints: &Arc<[Joint]>) {
+        for member in &mut self.agents {
+            if let Spec::Rigid(body) = &mut member.spec {
+                body.joints = Arc::clone(joints);
+            }
+        }
+    }
 }
 
 /// What a model's reader is given beside its own table.

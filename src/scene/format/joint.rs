@@ -22,8 +22,8 @@ pub struct JointFile {
     pub at_b_m: Option<Point>,
     /// Axis of a `revolute` or `prismatic` joint in the axes of `a`; its length has no meaning.
     pub axis: Option<Point>,
-    /// How far a `prismatic` joint slides, metres from where it is at the start: `[least, greatest]`, 0 among them.
-    /// Default without end.
+    /// How far `at_b_m` may be from `at_a_m` along the axis of a `prismatic` joint, metres: `[least, greatest]`, each up to 1e4
+    /// in magnitude. Default without end.
     pub range_m: Option<[f64; 2]>,
     /// How far a `revolute` joint turns, degrees from where it is at the start: `[least, greatest]`, 0 among them, each up to
     /// 180 in magnitude. Default without end.

@@ -1,0 +1,285 @@
+//! What agents did to each other in a run, kept from what they publish.
+//!
+//! In: the newest states, gathering by gathering. Out: a [`Coupling`] for every pair and kind that was ever there.
+//! Never here: forces; only their owners know them.
+
+use crate::scene::Scene;
+use glam::DVec3;
+use metachron_agents::coupling::{PairKind, PairState};
+use metachron_agents::{AgentId, Body, Snapshot};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// What two agents did to each other.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// Who holds, or who owns the pair; of an island the lower number.
+    pub a: AgentId,
+    /// The other.
+    pub b: AgentId,
+    /// How they are coupled: `ledger`, `penalty`, `tlm`, `island`, `grasp`, `attach`.
+    pub kind: &'static str,
+    /// Contacts or holds at the end of the run.
+    pub contacts: u32,
+    /// Force at the end of the run, newtons; zero in an island, whose inner forces nobody publishes.
+    pub force_n: f64,
+    /// Largest force seen by a frame, newtons.
+    pub force_max_n: f64,
+    /// Overlap at the end of the run, metres.
+    pub penetration_m: f64,
+    /// Largest overlap seen by a frame, metres.
+    pub penetration_max_m: f64,
+    /// Impulses exchanged, magnitudes summed, N·s.
+    pub impulse_n_s: f64,
+    /// What has been given and was not yet taken when it was last seen, N·s.
+    pub in_flight_n_s: f64,
+    /// Largest difference of the two sides' accounts where both are of the same reading, as a share of the impulse exchanged;
+    /// `None` where there are no two accounts to compare.
+    pub momentum_error: Option<f64>,
+    /// What was left in the energy tank, joules; `None` where the law keeps none.
+    pub tank_j: Option<f64>,
+    /// The mass that the law added, kilograms.
+    pub parasitic_kg: f64,
+}
+
+/// Every coupling of a run so far.
+#[derive(Debug, Default)]
+pub(super) struct Couplings {
+    /// Pairs that lie against each other from the start: they have no time to bond, they are together already.
+    resting: Vec<(AgentId, AgentId)>,
+    all: Vec<Coupling>,
+    known: BTreeMap<(AgentId, AgentId, &'static str), usize>,
+}
+
+/// Rigid bodies that share a clock.
+const ISLAND: &str = "island";
+
+impl Coupling {
+    pub(super) const fn new(a: AgentId, b: AgentId, kind: &'static str) -> Self {
+        Self {
+            a,
+            b,
+            kind,
+            contacts: 0,
+            force_n: 0.0,
+            force_max_n: 0.0,
+            penetration_m: 0.0,
+            penetration_max_m: 0.0,
+            impulse_n_s: 0.0,
+            in_flight_n_s: 0.0,
+            momentum_error: None,
+            tank_j: None,
+            parasitic_kg: 0.0,
+        }
+    }
+
+    /// Whether the two share a clock.
+    #[must_use]
+    pub fn is_island(&self) -> bool {
+        self.kind == ISLAND
+    }
+
+    fn see(&mut self, state: &PairState) {
+        self.contacts = state.contacts;
+        self.force_n = state.force_n;
+        self.force_max_n = self.force_max_n.max(state.force_n);
+        self.penetration_m = state.penetration_m;
+        self.penetration_max_m = self.penetration_max_m.max(state.penetration_m);
+        self.impulse_n_s = state.impulse_n_s;
+        self.in_flight_n_s = state.in_flight_n_s;
+        self.tank_j = state.tank_j;
+        self.parasitic_kg = state.parasitic_kg;
+    }
+
+    fn differ(&mut self, error: f64) {
+        self.momentum_error = Some(self.momentum_error.unwrap_or(0.0).max(error));
+    }
+}
+
+impl Couplings {
+    /// What is there before the first step: jointed bodies share a clock from the start.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
+        couplings.note_joints(scene);
+        couplings
+    }
+
+    fn note_joints(&mut self, scene: &Scene) {
+        for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
+            self.at(a.min(b), a.max(b), ISLAND).contacts += 1;
+        }
+    }
+
+    /// All of them, in the order in which they were first seen.
+    pub(super) fn all(&self) -> &[Coupling] {
+        &self.all
+    }
+
+    /// Keeps what the `newest` states say, agent by agent; `leader` says in whose world one steps.
+    pub(super) fn note(&mut self, scene: &Scene, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
+        self.all.iter_mut().for_each(|c| (c.contacts, c.force_n, c.penetration_m) = (0, 0.0, 0.0));
+        self.note_joints(scene);
+        self.note_resting(leader);
+        for (member, snapshot) in scene.agents.iter().zip(newest) {
+            self.note_grasp(member.id, snapshot);
+            for state in &snapshot.pairs {
+                self.note_pair(member.id, state, newest);
+            }
+            // both sides say so while they share a clock: the lower number counts it
+            for other in snapshot.bonds.iter().filter(|other| **other > member.id) {
+                let coupling = self.at(member.id, *other, ISLAND);
+                coupling.contacts = coupling.contacts.max(1);
+            }
+        }
+    }
+
+    fn note_resting(&mut self, leader: impl Fn(AgentId) -> AgentId) {
+        for (a, b) in std::mem::take(&mut self.resting) {
+            if leader(a) == leader(b) {
+                let coupling = self.at(a, b, ISLAND);
+                coupling.contacts = coupling.contacts.max(1);
+                self.resting.push((a, b));
+            }
+        }
+    }
+
+    /// What a tool says of its hold.
+    fn note_grasp(&mut self, holder: AgentId, snapshot: &Snapshot) {
+        let Body::Tool(tool) = &snapshot.body else { return };
+        let Some(grasp) = tool.grasp else { return };
+        let coupling = self.at(holder, grasp.target, PairKind::Grasp.name());
+        coupling.contacts = 1;
+        coupling.force_n = tool.force_n;
+        coupling.force_max_n = coupling.force_max_n.max(tool.force_n);
+    }
+
+    fn note_pair(&mut self, owner: AgentId, state: &PairState, newest: &[Arc<Snapshot>]) {
+        let other = state.with;
+        let Some((mine, theirs)) = newest.get(owner.0 as usize).zip(newest.get(other.0 as usize)) else { return };
+        let held_by_tool = state.kind == PairKind::Grasp && matches!(theirs.body, Body::Tool(_));
+        let (a, b) = if held_by_tool { (other, owner) } else { (owner, other) };
+        if let Some(back) = both_sides(state, theirs, owner) {
+            // each side of a penalty force has its own idea of it: one coupling, and how far the two are apart
+            let greatest = state.impulse_n_s.max(back.impulse_n_s);
+            let (a, b) = (a.min(b), a.max(b));
+            let coupling = self.at(a, b, state.kind.name());
+            if owner == a {
+                coupling.see(state);
+            }
+            if greatest > 0.0 {
+                coupling.differ((state.impulse_n_s - back.impulse_n_s).abs() / greatest);
+            }
+            return;
+        }
+        let coupling = self.at(a, b, state.kind.name());
+        coupling.see(state);
+        if let Some(error) = difference_n_s((mine, owner), (theirs, other)).filter(|_| state.impulse_n_s > 0.0) {
+            coupling.differ(error / state.impulse_n_s);
+        }
+    }
+
+    fn at(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> &mut Coupling {
+        let at = *self.known.entry((a, b, kind)).or_insert_with(|| {
+            self.all.push(Coupling::new(a, b, kind));
+            self.all.len() - 1
+        });
+        &mut self.all[at]
+    }
+}
+
+/// The state of the same pair as its other side publishes it, where both sides push.
+fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Option<&'s PairState> {
+    let pushes = state.kind == PairKind::Penalty;
+    theirs.pairs.iter().find(|back| pushes && back.with == owner && back.kind == PairKind::Penalty)
+}
+
+/// By how much the accounts of what `owner` gave and what `other` took differ, N·s, where both are of the same reading.
+fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<f64> {
+    let given = mine.given.iter().find(|ledger| ledger.with == other)?;
+    let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
+    if given.revision != taken.revision {
+        return None;
+    }
+    let mut apart = DVec3::ZERO;
+    given.since(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
+    Some(apart.length())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Source, load};
+    use metachron_agents::SimTime;
+    use metachron_agents::coupling::{Impulse, Ledger, Site};
+
+    fn two_balls() -> Scene {
+        let text = "format = 1\nobject = [\n{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 },\n\
+                    { name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, position_m = [9, 0, 0] },\n]\n";
+        Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
+    }
+
+    /// Everybody steps in a world of its own.
+    fn alone(id: AgentId) -> AgentId {
+        id
+    }
+
+    fn pushed(x: f64) -> Impulse {
+        Impulse { linear: DVec3::X * x, angular: DVec3::ZERO }
+    }
+
+    /// The states of an owner that has given `given` and of another that has taken what `taken` says.
+    fn states(given: &Ledger, taken: Ledger, state: PairState) -> Vec<Arc<Snapshot>> {
+        let owner = Snapshot { given: vec![given.clone()], pairs: vec![state], ..Snapshot::default() };
+        let other = Snapshot { taken: vec![Ledger { with: AgentId(0), ..taken }], ..Snapshot::default() };
+        vec![Arc::new(owner), Arc::new(other)]
+    }
+
+    #[test]
+    fn accounts_of_the_same_reading_are_compared_and_others_are_on_their_way() {
+        let mut given = Ledger::new(AgentId(1));
+        given.give(Site::Whole, SimTime::ZERO, 0.0, pushed(2.0));
+        let early = given.clone();
+        given.give(Site::Whole, SimTime::ZERO, 0.1, pushed(2.0));
+        let state =
+            PairState { contacts: 1, impulse_n_s: 4.0, force_n: 3.0, ..PairState::new(AgentId(1), PairKind::Ledger) };
+        let scene = two_balls();
+        let mut couplings = Couplings::of(&scene);
+        couplings.note(&scene, &states(&given, early.clone(), state), alone);
+        assert_eq!(couplings.all()[0].momentum_error, None);
+        couplings.note(&scene, &states(&given, given.clone(), state), alone);
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
+        // a reader that lost half of it and does not know
+        couplings.note(&scene, &states(&given, Ledger { revision: given.revision, ..early }, state), alone);
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.5));
+        assert_eq!(
+            (couplings.all().len(), couplings.all()[0].kind, couplings.all()[0].force_max_n),
+            (1, "ledger", 3.0)
+        );
+    }
+
+    #[test]
+    fn the_two_sides_of_a_penalty_are_one_coupling_with_what_they_differ_by() {
+        let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), PairKind::Penalty) };
+        let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
+        let scene = two_balls();
+        let mut couplings = Couplings::of(&scene);
+        couplings.note(&scene, &[state(side(1, 5.0)), state(side(0, 4.0))], alone);
+        let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
+        assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, "penalty"));
+        assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
+    }
+
+    #[test]
+    fn bodies_that_share_a_clock_are_an_island_until_they_part() {
+        let bound = |with| Arc::new(Snapshot { bonds: vec![AgentId(with)], ..Snapshot::default() });
+        let scene = two_balls();
+        let mut couplings = Couplings::of(&scene);
+        couplings.note(&scene, &[bound(1), bound(0)], alone);
+        assert_eq!(
+            couplings.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>(),
+            [(0, 1, "island", 1)]
+        );
+        couplings.note(&scene, &[Arc::default(), Arc::default()], alone);
+        assert_eq!(couplings.all()[0].contacts, 0);
+    }
+}

@@ -1,0 +1,247 @@
+//! The coupling error of a run: the same scene once more on one tiny common clock, and what the clocks changed.
+//!
+//! In: a scene and the [`Trace`] of its run. Out: an [`Oracle`]. Never here: arguments, progress bars.
+//!
+//! In the second run every agent makes the same steps, a quarter of the shortest that any of them wants, in virtual time at no
+//! cost, without faults and without control of rates and resolutions. What both runs differ by is the error of different
+//! clocks, of longer steps, of coarser divisions and of late frames together.
+
+use super::couplings::Coupling;
+use super::error::SessionError;
+use super::outcome::Outcome;
+use super::session::Session;
+use super::trace::{Trace, Traced, mass_kg, momentum, points};
+use crate::scene::Scene;
+use crate::scene::format::{ExecutorKind, MODELS};
+use crate::scene::ties::Faults;
+use metachron_agents::{AgentId, SimSpan, Snapshot};
+use std::collections::BTreeMap;
+use std::time::Duration;
+
+/// The common clock ticks this many times in the shortest step that any agent wants.
+const DIVISION: f64 = 4.0;
+/// The common clock's shortest step, seconds.
+const STEP_MIN_S: f64 = 2e-6;
+/// The common clock's longest step, seconds: a scene of slow agents is still to be right.
+const STEP_MAX_S: f64 = 2e-3;
+
+/// What different clocks changed.
+#[derive(Debug, Clone)]
+pub struct Oracle {
+    /// Step of the common clock, seconds.
+    pub dt_s: f64,
+    /// States compared.
+    pub states: u64,
+    /// Every pair that was coupled in either run.
+    pub pairs: Vec<PairError>,
+    /// Whether the comparison was ended before its end.
+    pub interrupted: bool,
+}
+
+/// What different clocks changed for two coupled agents.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairError {
+    /// The first agent.
+    pub a: AgentId,
+    /// The second.
+    pub b: AgentId,
+    /// Root mean square distance of the points of both from where the common clock has them, metres.
+    pub position_rms_m: f64,
+    /// Largest such distance, metres.
+    pub position_max_m: f64,
+    /// Largest difference of either one's momentum, N·s.
+    pub momentum_max_n_s: f64,
+    /// Impulse exchanged in the run, N·s; `None` where an island kept it to itself.
+    pub impulse_n_s: Option<f64>,
+    /// Impulse exchanged on the common clock, N·s.
+    pub impulse_oracle_n_s: Option<f64>,
+}
+
+/// How far one agent's states are from the common clock's.
+#[derive(Debug, Clone, Copy, Default)]
+struct Distance {
+    points: u64,
+    square_sum: f64,
+    max_m: f64,
+    momentum_max_n_s: f64,
+}
+
+/// Plays `scene` on one tiny common clock and compares it with the run that left `outcome`. `go_on` is told of the share that
+/// is done, 0 … 1; on its `false` the comparison ends.
+///
+/// # Errors
+/// As [`Session::open`].
+pub fn consult_oracle(
+    scene: &Scene,
+    outcome: &Outcome,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Oracle, SessionError> {
+    consult(scene, outcome, &mut Vec::new(), go_on)
+}
+
+fn consult(
+    scene: &Scene,
+    outcome: &Outcome,
+    distances: &mut Vec<Distance>,
+    go_on: &mut dyn FnMut(f64) -> bool,
+) -> Result<Oracle, SessionError> {
+    let common = common_clock(scene);
+    let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
+    let mut session = Session::open(common)?;
+    let empty = Trace::default();
+    let mut states: Vec<&Traced> = outcome.trace.as_ref().unwrap_or(&empty).states.iter().collect();
+    states.sort_by_key(|state| (state.time, state.agent));
+    distances.resize(scene.agents.len(), Distance::default());
+    let mut interrupted = false;
+    let mut looked = Duration::ZERO;
+    for (at, state) in states.iter().enumerate() {
+        session.wait_until(Duration::from_nanos(state.time.as_nanos()));
+        compare(&session, state, distances);
+        // couplings are published for a second after they end: looking every frame misses none
+        if session.now() >= looked {
+            session.look();
+            looked = session.now() + session.period();
+            if !go_on(at as f64 / states.len() as f64) {
+                interrupted = true;
+                break;
+            }
+        }
+    }
+    session.look();
+    let pairs = pairs(&outcome.couplings, session.couplings(), distances);
+    let states = distances.iter().map(|d| d.points).sum();
+    Ok(Oracle { dt_s, states, pairs, interrupted })
+}
+
+/// The same scene with one clock for all, and nothing in the way of it.
+fn common_clock(scene: &Scene) -> Scene {
+    let mut scene = scene.clone();
+    let shortest = scene.agents.iter().map(|m| m.pace.dt.as_secs_f64()).fold(f64::INFINITY, f64::min);
+    let dt_s = (shortest / DIVISION).clamp(STEP_MIN_S, STEP_MAX_S);
+    let dt = SimSpan::from_secs_f64(dt_s).unwrap_or(SimSpan::from_nanos(1_000_000));
+    for member in &mut scene.agents {
+        member.pace.rate_hz = 1.0 / dt.as_secs_f64();
+        (member.pace.dt, member.pace.dt_range) = (dt, (dt, dt));
+        member.simulation.eps_m = (member.start.eps_m, member.start.eps_m);
+        member.faults = Faults::default();
+    }
+    scene.executor = ExecutorKind::Lockstep;
+    let machine = &mut scene.machine;
+    machine.steps = MODELS.map(|model| (model.to_owned(), Some(0.0), Some(0.0))).to_vec();
+    (machine.draw_setup_ms, machine.draw_object_us) = (Some(0.0), Some(0.0));
+    (machine.draw_triangle_us, machine.draw_pixel_ns) = (Some(0.0), Some(0.0));
+    machine.noise = Some(0.0);
+    scene
+}
+
+/// Adds how far the common clock has an agent from where it was in the run at the same time.
+fn compare(session: &Session, state: &Traced, distances: &mut [Distance]) {
+    let at = state.agent.0 as usize;
+    let (Some(agent), Some(distance)) = (session.agents().get(at), distances.get_mut(at)) else { return };
+    let snapshot: &Snapshot = &agent.latest();
+    // the newest state is at most one tick away from that time
+    let ahead_s = state.time.secs_after(snapshot.time);
+    for ((there, velocity), here) in points(&snapshot.body).zip(&state.points_m) {
+        let apart = here.distance(there + velocity * ahead_s);
+        distance.points += 1;
+        distance.square_sum += apart * apart;
+        distance.max_m = distance.max_m.max(apart);
+    }
+    let spec = &session.scene().agents[at].spec;
+    let there = momentum(spec, &snapshot.body) + snapshot.acceleration * (mass_kg(spec, &snapshot.body) * ahead_s);
+    distance.momentum_max_n_s = distance.momentum_max_n_s.max((there - state.momentum).length());
+}
+
+/// Every pair that was coupled in either run, with what it differs by.
+fn pairs(run: &[Coupling], common: &[Coupling], distances: &[Distance]) -> Vec<PairError> {
+    let (run, common) = (impulses(run), impulses(common));
+    let mut all: Vec<_> = run.keys().chain(common.keys()).copied().collect();
+    all.sort_unstable();
+    all.dedup();
+    let of = |id: AgentId| distances.get(id.0 as usize).copied().unwrap_or_default();
+    let pair = |(a, b): (AgentId, AgentId)| {
+        let (one, two) = (of(a), of(b));
+        let points = (one.points + two.points).max(1) as f64;
+        PairError {
+            a,
+            b,
+            position_rms_m: ((one.square_sum + two.square_sum) / points).sqrt(),
+            position_max_m: one.max_m.max(two.max_m),
+            momentum_max_n_s: one.momentum_max_n_s.max(two.momentum_max_n_s),
+            impulse_n_s: run.get(&(a, b)).copied().unwrap_or(Some(0.0)),
+            impulse_oracle_n_s: common.get(&(a, b)).copied().unwrap_or(Some(0.0)),
+        }
+    };
+    all.into_iter().map(pair).collect()
+}
+
+/// The impulse that every pair exchanged, by whatever kinds of coupling; `None` where an island kept some of it to itself.
+fn impulses(couplings: &[Coupling]) -> BTreeMap<(AgentId, AgentId), Option<f64>> {
+    let mut sums = BTreeMap::new();
+    for coupling in couplings {
+        let pair = (coupling.a.min(coupling.b), coupling.a.max(coupling.b));
+        let sum = sums.entry(pair).or_insert(Some(0.0));
+        *sum = sum.filter(|_| !coupling.is_island()).map(|sum| sum + coupling.impulse_n_s);
+    }
+    sums
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Source, load};
+
+    /// Two balls that fall side by side at different rates, far from everything.
+    const FALL: &str = "format = 1\nexecutor = \"lockstep\"\n[target]\nframe_hz = 50.0\nobject = []\n";
+
+    fn falling() -> Scene {
+        let ball = |name: &str, x: f64, hz: f64| {
+            format!(
+                "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [{x}, 0, 0]\nrate_hz = {hz}\nfaults = {{ jitter = 0.2, loss = 0.1 }}\n"
+            )
+        };
+        let text =
+            format!("{}{}{}", FALL.replace("object = []\n", ""), ball("slow", 0.0, 40.0), ball("fast", 5.0, 500.0));
+        Source::memory("fall", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
+    }
+
+    #[test]
+    fn the_common_clock_is_a_quarter_of_the_shortest_step_and_has_no_faults() {
+        let common = common_clock(&falling());
+        assert!(common.agents.iter().all(|m| m.pace.dt.as_nanos() == 500_000 && m.faults == Faults::default()));
+        assert_eq!(common.executor, ExecutorKind::Lockstep);
+    }
+
+    #[test]
+    fn impulses_of_all_kinds_are_summed_and_an_island_keeps_its_own() {
+        let coupling =
+            |a, b, kind, impulse_n_s| Coupling { impulse_n_s, ..Coupling::new(AgentId(a), AgentId(b), kind) };
+        let sums =
+            impulses(&[coupling(1, 0, "ledger", 2.0), coupling(0, 1, "attach", 3.0), coupling(1, 2, "island", 0.0)]);
+        let sum = |a, b| sums[&(AgentId(a), AgentId(b))];
+        assert_eq!((sum(0, 1), sum(1, 2)), (Some(5.0), None));
+    }
+
+    #[test]
+    fn states_of_free_fall_are_compared_at_their_own_times() {
+        let scene = falling();
+        let mut session = Session::open(scene.clone()).unwrap();
+        session.keep_trace();
+        for frame in 0..25 {
+            session.wait_until(session.period() * frame);
+            session.look();
+        }
+        let outcome = session.end(None, false);
+        let mut told = 0;
+        let mut distances = Vec::new();
+        let oracle = consult(&scene, &outcome, &mut distances, &mut |_| {
+            told += 1;
+            true
+        });
+        // the balls fly their parabola exactly at any step; between ticks of 0.5 ms it is drawn straight: g dt²/2 = 1.2 µm
+        assert!(oracle.unwrap().states > 40 && told > 5 && !distances.is_empty());
+        for distance in distances {
+            assert!(distance.max_m < 2e-6 && distance.momentum_max_n_s < 1e-6, "{distance:?}");
+        }
+    }
+}

@@ -1,0 +1,144 @@
+//! The joints, couplings and faults of a scene as agents and the runtime want them.
+//!
+//! In: a [`Scene`]. Out: for each agent its laws, links, faults, and in whose world it begins. Never here: forces.
+
+use crate::runtime::Faults;
+use crate::scene::ties::{Coupling, CouplingKind};
+use crate::scene::{Scene, Spec};
+use metachron_agents::AgentId;
+use metachron_agents::coupling::{Law, Link};
+use std::collections::BTreeMap;
+
+/// What ties every agent of a scene to others.
+pub(super) struct Ties {
+    laws: BTreeMap<AgentId, Vec<(AgentId, Law)>>,
+    attached: BTreeMap<AgentId, Vec<Link>>,
+    leaders: Vec<AgentId>,
+}
+
+impl Ties {
+    /// Reads the ties of `scene`.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let mut laws: BTreeMap<AgentId, Vec<_>> = BTreeMap::new();
+        for (a, b, law) in contact_laws(scene) {
+            laws.entry(a).or_default().push((b, law));
+        }
+        let mut attached: BTreeMap<AgentId, Vec<_>> = BTreeMap::new();
+        for (id, link) in scene.couplings.iter().filter_map(link) {
+            attached.entry(id).or_default().push(link);
+        }
+        Self { laws, attached, leaders: leaders(scene) }
+    }
+
+    /// By which laws contact of `id` and others goes, where that is not the ledger; one side of a pair has it.
+    pub(super) fn laws(&mut self, id: AgentId) -> Vec<(AgentId, Law)> {
+        self.laws.remove(&id).unwrap_or_default()
+    }
+
+    /// The lasting couplings of `id`; one side of a pair has it.
+    pub(super) fn attached(&mut self, id: AgentId) -> Vec<Link> {
+        self.attached.remove(&id).unwrap_or_default()
+    }
+
+    /// In whose world `id` begins, where joints hold it to others or it lies against them: that of the lowest number among them.
+    pub(super) fn together(&self, id: AgentId) -> Option<AgentId> {
+        self.leaders.get(id.0 as usize).copied().filter(|leader| *leader != id)
+    }
+}
+
+/// What goes wrong on purpose, in the runtime's words.
+pub(super) const fn faults(faults: crate::scene::ties::Faults) -> Faults {
+    let crate::scene::ties::Faults { jitter, loss, seed } = faults;
+    Faults { jitter, loss, seed }
+}
+
+/// Every pair with a law of its own; in a scene without contacts that is every pair of what has matter.
+fn contact_laws(scene: &Scene) -> Vec<(AgentId, AgentId, Law)> {
+    let contacts = scene.couplings.iter().filter(|c| c.kind == CouplingKind::Contact);
+    let named: BTreeMap<_, _> = contacts.map(|c| ((c.a.min(c.b), c.a.max(c.b)), c.law)).collect();
+    if scene.contacts {
+        return named.into_iter().map(|((a, b), law)| (a, b, law)).collect();
+    }
+    let matter: Vec<AgentId> =
+        scene.agents.iter().filter(|m| !matches!(m.spec, Spec::Synthetic(_))).map(|m| m.id).collect();
+    let pairs = matter.iter().enumerate().flat_map(|(at, a)| matter[at + 1..].iter().map(move |b| (*a, *b)));
+    pairs.map(|pair| (pair.0, pair.1, named.get(&pair).copied().unwrap_or(Law::Off))).collect()
+}
+
+fn link(coupling: &Coupling) -> Option<(AgentId, Link)> {
+    let CouplingKind::Attach { at_a, at_b, stiffness_n_m, damping_n_s_m, rest_m } = coupling.kind else { return None };
+    let law = coupling.law;
+    Some((coupling.a, Link { other: coupling.b, here: at_a, there: at_b, stiffness_n_m, damping_n_s_m, rest_m, law }))
+}
+
+/// For each agent the lowest number among those that joints hold together with it or that it lies against at rest: its own
+/// where there are none. A stack that starts standing must not first be dropped on itself.
+fn leaders(scene: &Scene) -> Vec<AgentId> {
+    let mut above: Vec<usize> = (0..scene.agents.len()).collect();
+    let jointed = scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?)));
+    for (a, b) in jointed.chain(scene.resting_pairs()) {
+        let (a, b) = (root(&mut above, a.0 as usize), root(&mut above, b.0 as usize));
+        above[a.max(b)] = a.min(b);
+    }
+    (0..above.len()).map(|at| AgentId(root(&mut above, at) as u32)).collect()
+}
+
+/// Follows `above` to the top, and shortens the way.
+fn root(above: &mut [usize], mut at: usize) -> usize {
+    while above[at] != at {
+        above[at] = above[above[at]];
+        at = above[at];
+    }
+    at
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{Source, load};
+
+    fn balls(ties: &str) -> Scene {
+        let text = format!(
+            "format = 1\n{ties}\n[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\ngrid = [6, 1, 1]\nspacing_m = [1, 1, 1]\n"
+        );
+        Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
+    }
+
+    #[test]
+    fn agents_that_joints_hold_together_begin_in_the_world_of_the_lowest() {
+        let joint = |a, b| format!("{{ kind = \"fixed\", a = \"b-{a}\", b = \"b-{b}\" }}");
+        let scene = balls(&format!("joint = [{}, {}, {}]", joint(5, 3), joint(2, 1), joint(3, 2)));
+        let ties = Ties::of(&scene);
+        let together: Vec<_> = (0..6).map(|id| ties.together(AgentId(id)).map(|leader| leader.0)).collect();
+        assert_eq!(together, [None, None, Some(1), Some(1), None, Some(1)]);
+    }
+
+    #[test]
+    fn bodies_that_lie_against_each_other_begin_in_one_world_unless_their_law_is_another() {
+        let row = |x: f64, more: &str| {
+            format!(
+                "{{ name = \"{x}\", model = \"rigid\", shape = \"ball\", radius_m = 0.5, position_m = [{x}, 0, 0]{more} }},\n"
+            )
+        };
+        let still = [row(0.0, ""), row(1.0, ""), row(2.01, ""), row(3.01, ""), row(4.01, ", velocity_m_s = [1, 0, 0]")]
+            .concat();
+        let leaders = |ties: &str| {
+            let text = format!("format = 1\n{ties}\nobject = [\n{still}]\n");
+            let scene = Source::memory("row", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
+            leaders(&scene).iter().map(|id| id.0).collect::<Vec<_>>()
+        };
+        assert_eq!(leaders(""), [0, 0, 2, 2, 4]);
+        assert_eq!(leaders("coupling = [{ a = \"0\", b = \"1\", law = \"off\" }]"), [0, 1, 2, 2, 4]);
+        assert_eq!(leaders("world = { contacts = false }"), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_world_without_contacts_turns_every_pair_off_but_those_it_names() {
+        let coupling = "coupling = [{ a = \"b-4\", b = \"b-1\", law = \"ledger\" }]\n[world]\ncontacts = false";
+        let laws = contact_laws(&balls(coupling));
+        assert_eq!(laws.len(), 15);
+        let on: Vec<_> = laws.iter().filter(|(.., law)| *law != Law::Off).map(|(a, b, _)| (a.0, b.0)).collect();
+        assert_eq!(on, [(1, 4)]);
+        assert!(contact_laws(&balls("")).is_empty());
+    }
+}

@@ -1,0 +1,161 @@
+//! Agents that start against or inside each other.
+//!
+//! In: a scene. Out: every pair that overlaps where the two would touch, and how deep; every pair that lies at rest.
+//! Never here: what is done about it.
+
+use super::cast::{Member, Scene, Spec};
+use super::ties::{Coupling, CouplingKind};
+use glam::{DQuat, DVec3};
+use metachron_agents::coupling::touch::{TouchRoom, touches};
+use metachron_agents::coupling::{Form, FormKind, Law, Placed, SolidForm, Touch, View};
+use metachron_agents::rod::Tube;
+use metachron_agents::shape::ToolShape;
+use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot};
+use std::collections::BTreeSet;
+
+/// Less than this is rounding, not overlap, metres: shapes are in single precision.
+const OVERLAP_MIN_M: f64 = 2e-5;
+/// Bodies no farther apart than this lie against each other, metres.
+const TOUCH_MAX_M: f64 = 1e-4;
+
+/// Two agents that start inside each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Overlap {
+    /// The lower number.
+    pub a: AgentId,
+    /// The higher.
+    pub b: AgentId,
+    /// How deep at the deepest place, metres.
+    pub depth_m: f64,
+}
+
+/// An agent's shape where it starts.
+struct Figure {
+    id: AgentId,
+    form: Form,
+    place: Pose,
+    low: DVec3,
+    high: DVec3,
+}
+
+enum Pose {
+    Solid(DVec3, DQuat),
+    Chain(CurveState),
+    Tool(DVec3, DQuat, f64),
+}
+
+impl Scene {
+    /// Every pair of agents that starts inside each other, in the order of their numbers.
+    #[must_use]
+    pub fn overlaps(&self) -> Vec<Overlap> {
+        let mut overlaps = Vec::new();
+        self.pairs_within(0.0, |one, two, gap_m| {
+            let (a, b) = (one.id.min(two.id), one.id.max(two.id));
+            if gap_m <= -OVERLAP_MIN_M {
+                overlaps.push(Overlap { a, b, depth_m: -gap_m });
+            }
+        });
+        overlaps.sort_by_key(|overlap| (overlap.a, overlap.b));
+        overlaps
+    }
+
+    /// Every pair of rigid agents that starts at rest against each other and touches by the ledger.
+    #[must_use]
+    pub fn resting_pairs(&self) -> Vec<(AgentId, AgentId)> {
+        let still = |id: AgentId| match self.agents.get(id.0 as usize).map(|member| &member.spec) {
+            Some(Spec::Rigid(body)) => body.velocity == DVec3::ZERO && body.spin == DVec3::ZERO,
+            _ => false,
+        };
+        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
+        let other: BTreeSet<_> =
+            self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect();
+        let mut pairs = Vec::new();
+        self.pairs_within(TOUCH_MAX_M, |one, two, _| {
+            let pair = (one.id.min(two.id), one.id.max(two.id));
+            if still(pair.0) && still(pair.1) && !other.contains(&pair) {
+                pairs.push(pair);
+            }
+        });
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// Calls `visit` with every pair that touches and starts no farther apart than `reach_m`, and with its least gap.
+    fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure, f64)) {
+        let mut figures: Vec<Figure> = self.agents.iter().filter_map(figure).collect();
+        figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+        let apart = self.pairs_apart();
+        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        for (at, one) in figures.iter().enumerate() {
+            for two in figures[at + 1..].iter().take_while(|two| two.low.x <= one.high.x + reach_m) {
+                if one.meets(two, reach_m) && self.touch(one, two, &apart) {
+                    touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
+                    if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
+                        visit(one, two, gap_m);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Pairs whose contact differs from the scene's: with contacts those that do not touch, without those that do.
+    fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
+        let contact =
+            |c: &&super::ties::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
+        let coupled = self.couplings.iter().filter(contact).map(|c| (c.a, c.b));
+        let jointed = self.joints.iter().filter(|j| !j.collide && self.contacts).filter_map(|j| Some((j.a, j.b?)));
+        coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()
+    }
+
+    fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
+        let led = |figure: &Figure| matches!(figure.form.kind, FormKind::Tool(_));
+        let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
+        named != self.contacts && !(led(one) && led(two))
+    }
+}
+
+impl Figure {
+    fn meets(&self, other: &Self, reach_m: f64) -> bool {
+        self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
+    }
+
+    fn placed(&self) -> Placed<'_> {
+        let view = match &self.place {
+            Pose::Solid(position, rotation) => View::Solid { position: *position, rotation: *rotation },
+            Pose::Chain(curve) => View::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
+            Pose::Tool(tip, rotation, jaw) => View::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
+        };
+        Placed { form: &self.form, view }
+    }
+}
+
+/// The shape of an agent at its start; `None` for one that nothing touches.
+fn figure(member: &Member) -> Option<Figure> {
+    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
+    let (kind, place, low, high) = match &member.spec {
+        Spec::Rigid(spec) => {
+            let solid = SolidForm::new(spec.solid.clone(), DVec3::ZERO).ok()?;
+            let (radius, at) = (DVec3::splat(solid.radius_m), spec.position);
+            (FormKind::Solid(solid), Pose::Solid(at, spec.rotation.normalize()), at - radius, at + radius)
+        }
+        Spec::Tube(spec) => {
+            let mut start = Snapshot::default();
+            Tube::new(spec.clone()).ok()?.write_snapshot(&mut start);
+            let Body::Curve(curve) = start.body else { return None };
+            let radius = DVec3::splat(curve.radii_m.iter().copied().fold(0.0, f64::max));
+            let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
+            let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
+            (FormKind::Chain, Pose::Chain(curve), low, high)
+        }
+        Spec::Instrument(spec) => {
+            let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
+            let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
+            (FormKind::Tool(shape), Pose::Tool(key.tip_m, key.rotation, key.jaw), key.tip_m - reach, key.tip_m + reach)
+        }
+        Spec::Synthetic(_) => return None,
+    };
+    Some(Figure { id: member.id, form: form(kind), place, low, high })
+}
+
+/// Nothing of a tool is farther from its tip than its shaft is long and this many shaft radii.
+const TOOL_TIP_RADII: f64 = 12.0;

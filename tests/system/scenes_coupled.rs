@@ -1,0 +1,142 @@
+//! Scenes in which agents act on each other, played from the command line: joints, islands, couplings, overlaps, the oracle.
+
+use crate::play::{Folder, agent, lockstep, metachron, number, point, program};
+use serde_json::Value;
+
+/// Two balls of 1 kg and radius 0.1 m on the x axis, without gravity; the left one moves right at 1 m/s.
+fn balls(gap_m: f64, ties: &str) -> Folder {
+    let ball = |name: &str, x: f64, v: f64, hz: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1.0\nrestitution = 1.0\nfriction = 0.0\n\
+             position_m = [{x}, 0, 0]\nvelocity_m_s = [{v}, 0, 0]\nrate_hz = {hz}\n"
+        )
+    };
+    let text = format!(
+        "{ties}\n[[probe]]\nobject = \"left\"\n[[probe]]\nobject = \"right\"\n{}{}",
+        ball("left", 0.0, 1.0, 250.0),
+        ball("right", 0.2 + gap_m, 0.0, 100.0)
+    );
+    Folder::with(&text)
+}
+
+const WEIGHTLESS: &str = "[world]\ngravity_m_s2 = [0, 0, 0]";
+
+fn coupling<'r>(report: &'r Value, a: &str, b: &str) -> &'r Value {
+    let all = report["couplings"].as_array().unwrap();
+    let of = |c: &&Value| (c["a"] == a && c["b"] == b) || (c["a"] == b && c["b"] == a);
+    all.iter().find(of).unwrap_or_else(|| panic!("no coupling of {a} and {b} in {all:?}"))
+}
+
+#[test]
+fn a_stack_with_its_heaviest_box_on_top_stands_and_shares_one_clock() {
+    let report = lockstep("stack", &["--seconds", "2"]);
+    // the top's centre: nine boxes and a half of 0.1 m; a hundred times a box's weight on the lowest contact
+    let top = point(&report, "/probes/1/position_m");
+    assert!((top[2] - 0.95).abs() < 1e-3 && top[0].hypot(top[1]) < 1e-3, "{top:?}");
+    assert_eq!(agent(&report, "anvil")["led_by"], "box-0");
+    assert_eq!(coupling(&report, "box-8", "anvil")["kind"], "island");
+}
+
+#[test]
+fn a_chain_keeps_its_length_and_gains_no_energy_while_it_swings() {
+    let energy =
+        |report: &Value| report["agents"].as_array().unwrap().iter().map(|a| number(a, "/energy_j")).sum::<f64>();
+    // at the start all hang level at 1.25 m: m g z of 20 links of 0.04 kg and a weight of 2 kg
+    let start_j = (20.0 * 0.04 + 2.0) * 9.81 * 1.25;
+    for seconds in ["0.4", "1.5"] {
+        let report = lockstep("chain", &["--seconds", seconds]);
+        let weight = point(&report, "/probes/0/position_m");
+        let from_hook = (weight[0].powi(2) + weight[1].powi(2) + (weight[2] - 1.25).powi(2)).sqrt();
+        assert!(from_hook < 1.05 * 1.001, "{from_hook} m after {seconds} s");
+        assert!(energy(&report) < start_j * 1.01, "{} J of {start_j} J after {seconds} s", energy(&report));
+        assert_eq!(agent(&report, "weight")["led_by"], "link-0");
+        assert_eq!(coupling(&report, "link-0", "link-1")["kind"], "island");
+    }
+}
+
+#[test]
+fn a_thousand_agents_play_in_virtual_time() {
+    let report = lockstep("pile", &["--seconds", "0.1"]);
+    let agents = report["agents"].as_array().unwrap();
+    assert_eq!(agents.len(), 1000);
+    assert!(agents.iter().all(|a| a["parked"] == false && number(a, "/steps") >= 5.0));
+}
+
+#[test]
+fn a_blow_between_clocks_hands_over_the_whole_momentum_and_stays_between_clocks() {
+    let report = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5"]);
+    let speeds = [0, 1].map(|k| point(&report, &format!("/probes/{k}/velocity_m_s"))[0]);
+    // equal masses, e = 1: they change places
+    assert!(speeds[0].abs() < 0.01 && (speeds[1] - 1.0).abs() < 0.01, "{speeds:?}");
+    assert!((speeds[0] + speeds[1] - 1.0).abs() < 1e-9, "{speeds:?}");
+    let coupling = coupling(&report, "left", "right");
+    assert_eq!((coupling["kind"].as_str(), coupling["momentum_error"].as_f64()), (Some("ledger"), Some(0.0)));
+    assert!((number(coupling, "/impulse_n_s") - 1.0).abs() < 0.02, "{coupling}");
+    assert_eq!(agent(&report, "right")["led_by"], Value::Null);
+}
+
+#[test]
+fn pairs_that_are_off_pass_through_each_other() {
+    let off = format!("coupling = [{{ a = \"left\", b = \"right\", law = \"off\" }}]\n{WEIGHTLESS}");
+    for ties in [off, format!("{WEIGHTLESS}\ncontacts = false")] {
+        let report = balls(0.1, &ties).lockstep(&["--seconds", "0.5"]);
+        let at = [0, 1].map(|k| point(&report, &format!("/probes/{k}/position_m"))[0]);
+        assert!((at[0] - 0.5).abs() < 5e-3 && (at[1] - 0.3).abs() < 1e-12, "{at:?}");
+        assert!(report["couplings"].as_array().unwrap().is_empty());
+    }
+}
+
+#[test]
+fn agents_that_start_inside_each_other_are_named_and_play() {
+    let folder = balls(-0.03, WEIGHTLESS);
+    let run = metachron(&["run", folder.scene(), "--headless", "--executor", "lockstep", "--seconds", "0.2", "--json"]);
+    let said = String::from_utf8_lossy(&run.stderr);
+    assert!(said.contains("note: `left` and `right` overlap by 30.0"), "{said}");
+    let report: Value = serde_json::from_slice(&run.stdout).unwrap();
+    assert_eq!(
+        (report["overlaps"][0]["a"].as_str(), report["overlaps"][0]["b"].as_str()),
+        (Some("left"), Some("right"))
+    );
+    // shapes are compared in single precision
+    assert!((number(&report, "/overlaps/0/depth_m") - 0.03).abs() < 1e-6);
+    let check = metachron(&["check", folder.scene()]);
+    assert_eq!(check.status.code(), Some(0));
+    assert!(String::from_utf8_lossy(&check.stderr).contains("`left` and `right` overlap"));
+    let check = metachron(&["check", "--json", folder.scene()]);
+    let rows: Value = serde_json::from_slice(&check.stdout).unwrap();
+    assert!((number(&rows, "/0/content/overlaps/0/depth_m") - 0.03).abs() < 1e-6);
+    assert!(lockstep("stack", &["--frames", "1"])["overlaps"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn the_oracle_tells_what_different_clocks_changed() {
+    let report = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5", "--oracle"]);
+    let oracle = &report["oracle"];
+    // a quarter of the shorter step, 4 ms
+    assert_eq!((number(oracle, "/dt_ms"), number(oracle, "/couplings/0/impulse_oracle_n_s").round()), (1.0, 1.0));
+    assert!(number(oracle, "/states") > 40.0);
+    // a blow is seen at most a step of 10 ms late, at 1 m/s
+    let (rms, most) = (number(oracle, "/couplings/0/position_rms_m"), number(oracle, "/couplings/0/position_max_m"));
+    assert!(rms > 0.0 && rms <= most && most < 0.011, "{oracle}");
+    let apart = balls(9.0, WEIGHTLESS).lockstep(&["--seconds", "0.2", "--oracle"]);
+    assert!(apart["oracle"]["couplings"].as_array().unwrap().is_empty());
+}
+
+#[test]
+fn the_oracle_is_not_asked_where_there_is_a_window() {
+    let refused = program().args(["run", "stack", "--oracle"]).output().unwrap();
+    assert_eq!(refused.status.code(), Some(2));
+    let said = String::from_utf8_lossy(&refused.stderr);
+    assert!(said.contains("--oracle") && said.contains("--headless"), "{said}");
+}
+
+#[test]
+fn faults_on_purpose_shake_the_steps_and_are_the_same_on_every_run() {
+    let faults = format!("{WEIGHTLESS}\nfaults = {{ jitter = 0.2, loss = 0.1, seed = 5 }}");
+    let [one, two] = [0, 1].map(|_| balls(0.1, &faults).lockstep(&["--seconds", "0.5"]));
+    let plain = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5"]);
+    assert_eq!(one["state_hash"], two["state_hash"]);
+    assert_ne!(one["state_hash"], plain["state_hash"]);
+    let speeds = [0, 1].map(|k| point(&one, &format!("/probes/{k}/velocity_m_s"))[0]);
+    assert!((speeds[0] + speeds[1] - 1.0).abs() < 1e-9, "{speeds:?}");
+}
