@@ -9,8 +9,12 @@ use super::division::Division;
 use super::holds::{End, Tie};
 use super::mate::Mate;
 use super::receive::Received;
+use super::sided::Sided;
+use super::tank::Tanks;
 use crate::coupling::touch::{TouchRoom, touches};
-use crate::coupling::{Contact, Exchange, Form, Impulse, PairKind, Placed, Site, Touch, View};
+use crate::coupling::{
+    Contact, Exchange, Form, Impulse, Law, PairKind, PairState, Placed, Site, Touch, View, WAKE_M_S,
+};
 use crate::instrument::GRASP_BELOW;
 use crate::{AgentId, Body, Bounds, Neighbour, Snapshot, Surroundings};
 use glam::DVec3;
@@ -29,6 +33,11 @@ pub struct Company {
     room: Room,
     touches: Vec<Touch>,
     impulses: Vec<DVec3>,
+    tanks: Tanks,
+    sided: Sided,
+    /// Who sleeps where the tube may get, and owns the pair: nobody but this tube would see it come.
+    knocks: Vec<AgentId>,
+    mass_kg: f64,
     watched: bool,
 }
 
@@ -49,9 +58,9 @@ impl fmt::Debug for Company {
 }
 
 impl Company {
-    /// The company of a tube of this form.
-    pub fn new(form: Arc<Form>) -> Self {
-        Self { form: Some(form), ..Self::default() }
+    /// The company of a tube of this form and mass.
+    pub fn new(form: Arc<Form>, mass_kg: f64) -> Self {
+        Self { form: Some(form), mass_kg, ..Self::default() }
     }
 
     /// The tube's form.
@@ -75,6 +84,37 @@ impl Company {
         }
     }
 
+    /// The books of all couplings.
+    pub fn exchange(&self) -> &Exchange {
+        &self.exchange
+    }
+
+    /// The state of the pair with `id`.
+    pub fn pair_mut(&mut self, id: AgentId) -> &mut PairState {
+        self.exchange.pair_mut(id)
+    }
+
+    /// Friction coefficient of the tube's skin.
+    pub fn friction(&self) -> f64 {
+        self.form.as_ref().map_or(0.0, |form| form.friction)
+    }
+
+    /// What it keeps of laws by which the tube acts on itself.
+    pub fn sided(&mut self) -> &mut Sided {
+        &mut self.sided
+    }
+
+    /// Lends what a search for places needs: the tube's form, room, and a list that comes back by [`Self::give_back`].
+    pub fn search(&mut self) -> Option<(Arc<Form>, &mut TouchRoom, Vec<Touch>)> {
+        let list = std::mem::take(&mut self.touches);
+        self.form.clone().map(|form| (form, &mut self.room.0, list))
+    }
+
+    /// Takes back the list of a search.
+    pub fn give_back(&mut self, list: Vec<Touch>) {
+        self.touches = list;
+    }
+
     /// What others gave since the last step.
     pub fn received(&mut self) -> &mut Received {
         &mut self.received
@@ -82,10 +122,11 @@ impl Company {
 
     /// Gathers those whose couplings with this tube it owns, for a step of `dt` seconds from `bounds`.
     pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) {
-        self.count = 0;
-        let Self { form, mates, count, exchange, .. } = self;
-        let Some(form) = form else { return };
-        for neighbour in around.neighbours.iter().filter(|n| n.owned) {
+        self.dismiss();
+        self.knock(around, bounds, dt);
+        let friction = self.friction();
+        let Self { mates, count, exchange, tanks, .. } = self;
+        for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
             let linked = around.links.iter().any(|link| link.other == neighbour.id);
             let touched = Mate::may_touch(neighbour, around, bounds, dt);
             if !(linked || touched) {
@@ -94,7 +135,8 @@ impl Company {
             if mates.len() == *count {
                 mates.push(Mate::default());
             }
-            if mates[*count].meet(neighbour, around, exchange, (form, touched)) {
+            if mates[*count].meet(neighbour, around, exchange, (friction, touched)) {
+                mates[*count].ask(tanks);
                 *count += 1;
             }
         }
@@ -103,6 +145,22 @@ impl Company {
     /// There is nobody in this step.
     pub fn dismiss(&mut self) {
         self.count = 0;
+        self.knocks.clear();
+    }
+
+    /// Finds those who own the pair with this tube and sleep where it may get within two steps of `dt` seconds.
+    fn knock(&mut self, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) {
+        if bounds.speed_m_s <= WAKE_M_S {
+            return;
+        }
+        let sleeps = |n: &&Neighbour| !n.owned && n.form.is_some() && n.law != Law::Off && n.snapshot.at_rest;
+        for neighbour in around.neighbours.iter().filter(sleeps) {
+            let Some(there) = neighbour.snapshot.bounds else { continue };
+            let apart = (there.low - bounds.high).max(bounds.low - there.high).max_element();
+            if apart < 2.0 * dt * bounds.speed_m_s {
+                self.knocks.push(neighbour.id);
+            }
+        }
     }
 
     /// Whether there is nobody.
@@ -129,6 +187,16 @@ impl Company {
             mate.add_contacts(list, (skin.h_s, slack_m), skin.slots, contacts);
         }
         contacts[first..].sort_unstable_by_key(|contact| contact.key);
+    }
+
+    /// Takes in what a solve found: the work of the contacts with others on both sides; `velocities` are those after it.
+    pub fn watch<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, velocities: &[DVec3]) {
+        let mates = &mut self.mates[..self.count];
+        mates.iter_mut().for_each(Mate::begin);
+        for (contact, impulse) in contacts {
+            let work_j = contact.slots.velocity(velocities).dot(*impulse);
+            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.spend(work_j));
+        }
     }
 
     /// Turns the impulses on the others, one a slot, into the velocities they cause; the tube's own slots are left alone.
@@ -164,7 +232,7 @@ impl Company {
         if self.is_empty() && ties.is_empty() {
             return;
         }
-        let Self { mates, count, impulses, exchange, .. } = self;
+        let Self { mates, count, impulses, exchange, tanks, .. } = self;
         let mates = &mut mates[..*count];
         impulses.clear();
         impulses.resize(mates.last().map_or(own, Mate::end), DVec3::ZERO);
@@ -188,15 +256,16 @@ impl Company {
             }
         }
         for mate in mates {
-            mate.take(impulses, exchange, (start, h));
+            mate.take(impulses, (exchange, tanks), (start, h));
         }
     }
 
     /// Ends a step of `dt` seconds.
     pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
         for mate in &mut self.mates[..self.count] {
-            mate.tell(&mut self.exchange);
+            mate.tell(&mut self.exchange, &mut self.tanks, self.mass_kg);
         }
+        self.tanks.close(dt);
         if !self.exchange.is_empty() {
             self.exchange.close(around, dt);
         }
@@ -211,7 +280,7 @@ impl Company {
     pub fn write(&self, into: &mut Snapshot) {
         self.exchange.write(into);
         let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
-        into.touches.extend(woken);
+        into.touches.extend(woken.chain(self.knocks.iter().copied()));
     }
 }
 

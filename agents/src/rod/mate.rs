@@ -5,8 +5,9 @@
 
 use super::company::is_let_in;
 use super::holds::Far;
-use crate::coupling::{Contact, Exchange, Form, FormKind, Law, Other, PairKind, Placed, Slots, Touch, WAKE_M_S};
-use crate::{Anchor, Bounds, Inertia, Neighbour, Surroundings};
+use super::tank::Tanks;
+use crate::coupling::{Contact, Exchange, FormKind, Law, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
+use crate::{Anchor, Body, Bounds, Inertia, Neighbour, Surroundings};
 use glam::DVec3;
 
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
@@ -34,6 +35,13 @@ pub struct Mate {
     depth_m: f64,
     /// Whether impulses passed in the step, and whether this tube woke it.
     acted: bool,
+    /// Linear impulse given in the step, N·s.
+    given: DVec3,
+    /// Contacts of the substep tried, and their work, J.
+    now: u32,
+    work_j: f64,
+    /// How much of push-out the pair's tank allows.
+    fade: f64,
     woken: bool,
     linked: bool,
 }
@@ -42,7 +50,7 @@ impl Mate {
     /// Whether a neighbour may come near enough to touch within `dt` seconds.
     pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
         let (Some(_), Some(there)) = (&neighbour.form, &neighbour.snapshot.bounds) else { return false };
-        if neighbour.law != Law::Ledger || is_let_in(neighbour, around.me) {
+        if neighbour.law != Law::Ledger || !neighbour.snapshot.is_finite() || is_let_in(neighbour, around.me) {
             return false;
         }
         let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
@@ -51,21 +59,65 @@ impl Mate {
         apart <= way
     }
 
-    /// Takes in a neighbour; whether it is one that can be touched or held.
+    /// Takes in a neighbour with whom it acts by the ledger; whether it is one that can be touched or held.
     pub fn meet(
         &mut self,
         neighbour: &Neighbour,
         around: &Surroundings<'_>,
         exchange: &Exchange,
-        (form, touched): (&Form, bool),
+        (friction, touched): (f64, bool),
     ) -> bool {
-        let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
-        let friction = (form.friction * there).sqrt();
-        let other = std::mem::take(&mut self.other);
-        *self = Self { other, touched, friction, ..Self::default() };
-        let known = self.other.meet(neighbour, around, exchange, around.time);
+        let known = self.look(neighbour, around, (exchange, friction), false);
+        self.touched = touched;
         self.other.stir(around, exchange);
         known
+    }
+
+    /// Takes in a neighbour, as it was published if `stale`; whether it is one that can be touched or held. `friction` is the
+    /// tube's.
+    pub fn look(
+        &mut self,
+        neighbour: &Neighbour,
+        around: &Surroundings<'_>,
+        (exchange, friction): (&Exchange, f64),
+        stale: bool,
+    ) -> bool {
+        let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
+        let other = std::mem::take(&mut self.other);
+        *self = Self { other, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
+        if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, around.time) }
+    }
+
+    /// Friction coefficient of the pair.
+    pub fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    /// How its centre, or the mean of its nodes, moves, m/s.
+    pub fn velocity(&self) -> DVec3 {
+        let list = self.other.velocities();
+        if self.is_tube() {
+            let count = list.len() / 2 + 1;
+            return list.iter().step_by(2).sum::<DVec3>() / count as f64;
+        }
+        list.first().copied().unwrap_or(DVec3::ZERO)
+    }
+
+    /// The reduced mass of the pair with a tube of `mass_kg`.
+    fn reduced_kg(&self, mass_kg: f64) -> f64 {
+        match self.other.neighbour().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Rigid { inverse_mass, .. }) => mass_kg / (1.0 + mass_kg * inverse_mass),
+            _ => mass_kg,
+        }
+    }
+
+    /// Lets the tank of the pair say how far push-out has to fade.
+    pub fn ask(&mut self, tanks: &mut Tanks) {
+        let velocity = self.velocity();
+        if let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) {
+            tank.correct(velocity);
+            self.fade = tank.fade();
+        }
     }
 
     /// Appends its velocities on the mean of a substep `h`.
@@ -79,7 +131,7 @@ impl Mate {
     }
 
     fn is_tube(&self) -> bool {
-        self.other.form().is_some_and(|form| matches!(form.kind, FormKind::Chain))
+        self.other.neighbour().is_some_and(|n| matches!(n.snapshot.body, Body::Curve(_)))
     }
 
     /// One past its last slot.
@@ -131,19 +183,31 @@ impl Mate {
 
     /// The contact of a place: this tube is the first of the two.
     fn contact(&self, touch: &Touch) -> Contact {
-        let mut slots = Slots::default();
-        touch.on_a.join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
-        self.other.join(&mut slots, self.slots.0 as u32, &touch.on_b, (touch.normal, -1.0));
+        let slots = self.slots_of(touch);
         let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
         Contact {
             key: self.key() | place,
             slots,
             normal: touch.normal,
-            gap_m: touch.gap_m,
+            gap_m: if touch.gap_m < 0.0 { touch.gap_m * self.fade } else { touch.gap_m },
             friction: self.friction,
             rebound_m_s: 0.0,
             age_s: self.other.age_s().max(0.0),
         }
+    }
+
+    /// The velocities that a place joins, arms brought to the middle of the gap: force and torque then balance exactly.
+    pub fn slots_of(&self, touch: &Touch) -> Slots {
+        let half = 0.5 * touch.gap_m;
+        let widened = |place: Place, out: DVec3| match place {
+            Place::Point(point) => Place::Point(point + out * half),
+            Place::Chain { segment, share, radius_m } => Place::Chain { segment, share, radius_m: radius_m + half },
+        };
+        let mut slots = Slots::default();
+        widened(touch.on_a, -touch.normal).join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
+        let there = widened(touch.on_b, touch.normal);
+        self.other.join(&mut slots, self.slots.0 as u32, &there, (touch.normal, -1.0));
+        slots
     }
 
     fn key(&self) -> u64 {
@@ -187,17 +251,41 @@ impl Mate {
         self.acted = true;
     }
 
-    /// Notes what one contact did in a substep.
+    /// Forgets the contacts of the substep before.
+    pub fn begin(&mut self) {
+        (self.now, self.work_j) = (0, 0.0);
+    }
+
+    /// Notes the work of one contact against the velocity after it, both sides', J.
+    pub fn spend(&mut self, work_j: f64) {
+        self.work_j += work_j;
+    }
+
+    /// Notes what one contact did in a substep that stands.
     pub fn note(&mut self, contact: &Contact, impulse: DVec3) {
-        self.acted |= impulse != DVec3::ZERO;
-        self.depth_m = self.depth_m.max(-contact.gap_m);
-        self.contacts += 1;
+        if impulse != DVec3::ZERO {
+            self.acted = true;
+            self.now += 1;
+            self.contacts = self.contacts.max(self.now);
+            self.depth_m = self.depth_m.max(-contact.gap_m / self.fade);
+        }
     }
 
     /// Takes its part of the impulses of a substep, books it, and goes on.
-    pub fn take(&mut self, impulses: &mut [DVec3], exchange: &mut Exchange, (start, h): (f64, f64)) {
+    pub fn take(
+        &mut self,
+        impulses: &mut [DVec3],
+        (exchange, tanks): (&mut Exchange, &mut Tanks),
+        (start, h): (f64, f64),
+    ) {
+        if let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) {
+            tank.spend(self.work_j);
+        }
         if self.acted {
-            let list = self.slots_mut(impulses);
+            let (first, end) = (self.slots.0, self.end());
+            let list = &mut impulses[first..end];
+            let linear = if self.is_tube() { list.len() } else { 1 };
+            self.given += list[..linear].iter().step_by(2).sum::<DVec3>();
             self.other.book(exchange, start, list);
             self.other.push(list);
         }
@@ -205,9 +293,12 @@ impl Mate {
     }
 
     /// Writes on the state of the pair.
-    pub fn tell(&mut self, exchange: &mut Exchange) {
+    pub fn tell(&mut self, exchange: &mut Exchange, tanks: &mut Tanks, mass_kg: f64) {
         if let (true, Some(id)) = (self.acted, self.other.id()) {
+            let tank = tanks.of(id, self.reduced_kg(mass_kg));
+            tank.expect(self.velocity(), self.given);
             let pair = exchange.pair_mut(id);
+            pair.tank_j = Some(tank.left_j);
             pair.kind = if self.linked { PairKind::Attachment } else { PairKind::Ledger };
             (pair.contacts, pair.penetration_m) = (self.contacts, self.depth_m);
         }

@@ -1,17 +1,14 @@
 //! What other agents gave a tube since its last step, and how the tube takes it.
 //!
 //! In: impulses at rest arc lengths, and how far they have carried by now. Out: the state with both in it.
-//! Never here: who gave them, and why. Theory: docs/theory/coupling.md.
+//! Never here: who gave them, and why. Theory: docs/theory/rod.md, eq. 37.
 
 use super::band::Factor;
 use super::config::{Config, Matter};
 use super::division::Division;
 use super::turn::{exp, unit};
-use crate::coupling::{Impulse, Site};
+use crate::coupling::{Impulse, Site, Slots};
 use glam::DVec3;
-
-/// What impulses have carried a tube by turns no segment further, radians: a reading that comes very late must not fold it.
-const TURN_MAX_RAD: f64 = 0.25;
 
 /// Impulses received, gathered in slots.
 #[derive(Debug, Clone, Default)]
@@ -39,45 +36,58 @@ impl Received {
     pub fn add(&mut self, division: &Division, site: Site, sum: Impulse, carried: Impulse) {
         let Site::Arc(arc_m) = site else { return };
         let (segment, share) = division.locate(arc_m);
+        self.begin();
+        for (list, what) in [(&mut self.sum, sum), (&mut self.carried, carried)] {
+            list[2 * segment] += what.linear * (1.0 - share);
+            list[2 * segment + 2] += what.linear * share;
+            list[2 * segment + 1] += what.angular;
+        }
+    }
+
+    /// Adds an impulse that acts now on what gathers from `slots`.
+    pub fn add_slots(&mut self, slots: &Slots, impulse: DVec3) {
+        self.begin();
+        slots.scatter(impulse, &mut self.sum);
+    }
+
+    fn begin(&mut self) {
         if !self.any {
             for list in [&mut self.sum, &mut self.carried] {
                 list.clear();
                 list.resize(self.slots, DVec3::ZERO);
             }
         }
-        for (list, what) in [(&mut self.sum, sum), (&mut self.carried, carried)] {
-            list[2 * segment] += what.linear * (1.0 - share);
-            list[2 * segment + 2] += what.linear * share;
-            list[2 * segment + 1] += what.angular;
-        }
         self.any = true;
     }
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
     ///
-    /// No node is carried farther than `way_m`: a tube must not be found beyond a wall.
+    /// No node is carried farther than `way_m`.
     pub fn apply(&mut self, state: &mut Config, factor: &Factor, (matter, division): (&Matter, &Division), way_m: f64) {
         let Self { sum, carried, .. } = self;
         for list in [&mut *sum, &mut *carried] {
-            let last = list.len() - 1;
-            for (end, slot) in [(0, 0), (1, last)] {
-                if matter.held[end] {
-                    list[slot] = DVec3::ZERO;
-                }
-            }
+            hold(list, matter.held);
             factor.solve(list);
         }
         if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
             return; // impulses past all measure: better to lose them than the tube
         }
-        let longest = |list: &[DVec3], from: usize| {
-            list.iter().skip(from).step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt()
-        };
-        let over = (longest(carried, 0) / way_m).max(longest(carried, 1) / TURN_MAX_RAD).max(1.0);
+        let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
+        let share = if longest > way_m { way_m / longest } else { 1.0 };
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
-        state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way / over);
+        state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
         let turns = carried.iter().skip(1).step_by(2);
-        state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn / over) * *q));
+        state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
         state.strain(matter, division);
+    }
+}
+
+/// Takes held ends out of an array of slots.
+fn hold(list: &mut [DVec3], held: [bool; 2]) {
+    let last = list.len() - 1;
+    for (end, slot) in [(0, 0), (1, last)] {
+        if held[end] {
+            list[slot] = DVec3::ZERO;
+        }
     }
 }

@@ -10,13 +10,13 @@ use super::config::{Config, Matter};
 use super::contact::TubeContacts;
 use super::division::{self, Division};
 use super::holds::{NodeSpring, Tie, springs};
-use super::publish::{bounds, smooth};
+use super::publish::smooth;
 use super::remesh::Remesher;
 use super::rest::RestWatch;
 use super::skeleton::Skeleton;
 use super::step::{Lost, Setting, Stepper, energy};
 use super::{Section, TubeSpec};
-use crate::coupling::{Form, FormKind, Law, Link};
+use crate::coupling::{Form, FormKind};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -35,7 +35,7 @@ pub struct Tube {
     pub(super) stepper: Stepper,
     remesher: Remesher,
     springs: Vec<NodeSpring>,
-    ties: Vec<Tie>,
+    pub(super) ties: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
     rest: RestWatch,
     pub(super) at_rest: bool,
@@ -43,7 +43,7 @@ pub struct Tube {
     pub(super) acceleration: DVec3,
     pub(super) resolution: Resolution,
     time: SimTime,
-    dt_s: f64,
+    pub(super) dt_s: f64,
     pub(super) steps: u64,
 }
 
@@ -91,7 +91,7 @@ impl Tube {
             steps: 0,
         };
         let form = Form { kind: FormKind::Chain, friction: tube.spec.friction, restitution: 0.0 };
-        tube.stepper.company = Company::new(Arc::new(form));
+        tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
         tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
         tube.prepare();
@@ -105,7 +105,11 @@ impl Tube {
     }
 
     /// Lends the stepper all it works on, for a step of `dt` seconds.
-    fn step_by<T>(&mut self, dt: f64, act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T) -> T {
+    pub(super) fn step_by<T>(
+        &mut self,
+        dt: f64,
+        act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T,
+    ) -> T {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
         act(stepper, now, &Setting { matter, division, springs, dt, substeps: self.spec.substeps }, ties)
     }
@@ -172,40 +176,12 @@ impl Tube {
     }
 
     /// The same at another time.
-    fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
+    pub(super) fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
         let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
         let Some(wave) = self.spec.peristalsis else { return radius };
         let phase = (arc_m - wave.speed_m_s * time.as_secs_f64()) / wave.wavelength_m;
         let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
         radius * (1.0 - wave.amplitude * lift)
-    }
-
-    /// Lists this step's pulls; none is forgotten and none is made up.
-    fn take_pulls(&mut self, around: &Surroundings<'_>) {
-        self.ties.clear();
-        self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
-        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
-        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
-        self.ties.extend(links.filter_map(|link| Tie::of_link(link, &self.division)));
-    }
-
-    /// Takes in what others gave since the last step, and looks who is near.
-    ///
-    /// # Errors
-    /// [`StepError::Diverged`] where what was given cannot be taken.
-    fn meet(&mut self, around: &Surroundings<'_>, dt_s: f64) -> Result<(), StepError> {
-        self.dt_s = dt_s;
-        self.stepper.company.open(around, &self.division);
-        let way_m = self.spec.section.radius_m;
-        let taken = self.step_by(dt_s, |stepper, now, setting, _| stepper.receive(now, setting, way_m));
-        taken.map_err(|lost| self.diverged(lost, dt_s))?;
-        if around.neighbours.iter().any(|n| n.owned) {
-            let bounds = bounds(&self.now, self.widest_m());
-            self.stepper.company.gather(around, &bounds, dt_s);
-        } else {
-            self.stepper.company.dismiss();
-        }
-        Ok(())
     }
 
     /// The widest its skin can be, metres.
@@ -226,7 +202,7 @@ impl Tube {
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
     }
 
-    fn diverged(&self, lost: Lost, dt_s: f64) -> StepError {
+    pub(super) fn diverged(&self, lost: Lost, dt_s: f64) -> StepError {
         let what = match lost.slot {
             Some(slot) if slot % 2 == 0 => format!("the system's pivot at node {}", slot / 2),
             Some(slot) => format!("the system's pivot at segment {}", slot / 2),

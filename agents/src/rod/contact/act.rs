@@ -82,6 +82,9 @@ impl TubeContacts {
             company.respond(impulses);
         };
         self.solve((solved.h, SETTINGS), velocities, met, &mut answer);
+        if met {
+            company.watch(self.impulses(), velocities);
+        }
         velocities[own..].fill(DVec3::ZERO); // what the others do is not this tube's work
         let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
         velocities.truncate(own);

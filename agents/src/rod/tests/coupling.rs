@@ -2,6 +2,7 @@
 //!
 //! The other bodies are stand-ins without models of their own: a free, led or driven solid that takes what it is given.
 
+mod bodies;
 mod capstan;
 mod meetings;
 mod received;

@@ -10,14 +10,14 @@ use crate::{AgentId, Anchor, Body, Inertia, Neighbour, Snapshot};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-const RADIUS: f64 = 0.015;
-const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+pub(super) const RADIUS: f64 = 0.015;
+pub(super) const GRAVITY: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Rates of the tube and of the other, Hz: 1:1 to 1:100 both ways.
 const RATES: [(f64, f64); 6] =
     [(1000.0, 1000.0), (1000.0, 100.0), (1000.0, 10.0), (250.0, 60.0), (100.0, 1000.0), (20.0, 1000.0)];
 
 /// A free tube of 1 MPa along `path_m` that moves by `velocity`.
-fn thrown(path_m: Vec<DVec3>, segments: usize, velocity: DVec3) -> Tube {
+pub(super) fn thrown(path_m: Vec<DVec3>, segments: usize, velocity: DVec3) -> Tube {
     let mut tube = Tube::new(TubeSpec { path_m, friction: 0.3, ..reference_spec(1e6, segments) }).unwrap();
     let mut state = tube.state().clone();
     state.u.iter_mut().step_by(2).for_each(|v| *v = velocity);
@@ -26,13 +26,13 @@ fn thrown(path_m: Vec<DVec3>, segments: usize, velocity: DVec3) -> Tube {
 }
 
 /// A round bar along y.
-fn bar(mass_kg: f64, position: DVec3, friction: f64) -> Prop {
+pub(super) fn bar(mass_kg: f64, position: DVec3, friction: f64) -> Prop {
     let mut bar = Prop::new(Solid::Cylinder { radius_m: 0.02, half_height_m: 0.15 }, mass_kg, position, friction);
     bar.state.rotation = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
     bar
 }
 
-fn nodes(snapshot: &Snapshot) -> &[DVec3] {
+pub(super) fn nodes(snapshot: &Snapshot) -> &[DVec3] {
     let Body::Curve(curve) = &snapshot.body else { panic!("a tube") };
     &curve.positions
 }
