@@ -3,6 +3,7 @@
 //! In: contacts, free velocities and how bodies answer impulses; what neighbours published. Out: impulses, and the account of
 //! them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
 
+pub mod audit;
 mod contact;
 mod exchange;
 mod form;
