@@ -38,6 +38,7 @@ const CHART_EXAMPLES: &str = "\
 Examples:
   metachron chart stability                            every experiment, into the folder charts/
   metachron chart stability --quick --only tube-map --out /tmp/charts
+  metachron chart coupling --quick
   metachron chart stability --json -q | jq '.experiments[].findings'
 
 Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
@@ -199,6 +200,8 @@ pub struct ChartArgs {
 pub enum Subject {
     /// Where integrators and couplings blow up, and where they are bounded but wrong
     Stability,
+    /// How far a scene with clocks apart is from the same under one tiny clock
+    Coupling,
 }
 
 /// `list`.

@@ -1,6 +1,7 @@
 //! The whole program as its users meet it; one binary, so that it links once.
 mod chart;
 mod cli;
+mod coupling;
 mod picture;
 mod play;
 mod run;

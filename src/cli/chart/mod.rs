@@ -2,10 +2,15 @@
 //!
 //! In: which subject, which folder. Out: files, a table, findings. Never here: what is measured (each experiment is a file).
 
+mod company;
+mod coupling;
 mod experiment;
 mod figure;
+mod play;
 mod rows;
+mod scenes;
 mod stability;
+mod stage;
 mod sweep;
 mod table;
 
@@ -53,15 +58,25 @@ const fn entry<E: Experiment>() -> Entry {
     Entry { name: E::NAME, run: run::<E> }
 }
 
-const STABILITY: &[Entry] = &[entry::<stability::tube_map::TubeMap>(), entry::<stability::incline::Incline>()];
+const STABILITY: &[Entry] = &[
+    entry::<stability::drop::Drop>(),
+    entry::<stability::penalty_limit::PenaltyLimit>(),
+    entry::<stability::pairs::Pairs>(),
+    entry::<stability::heavy::Heavy>(),
+    entry::<stability::closed::Closed>(),
+    entry::<stability::tube_map::TubeMap>(),
+    entry::<stability::capstan::Capstan>(),
+    entry::<stability::incline::Incline>(),
+    entry::<stability::impact::Impact>(),
+];
+
+const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 
 /// Runs the experiments of a subject.
 pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
-    let subject = match args.subject {
-        Subject::Stability => "stability",
-    };
-    let all = match args.subject {
-        Subject::Stability => STABILITY,
+    let (subject, all) = match args.subject {
+        Subject::Stability => ("stability", STABILITY),
+        Subject::Coupling => ("coupling", COUPLING),
     };
     let chosen = chosen(all, &args.only)?;
     let folder = prepared(&args.out)?;

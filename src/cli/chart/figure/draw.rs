@@ -126,6 +126,7 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
     let line = colour.stroke_width(pen.px(2));
     let dot = pen.px(3);
     let series = match &layer.mark {
+        Mark::Line(points) => chart.draw_series(LineSeries::new(finite(points), line)).map_err(undrawn)?,
         Mark::Dashed(points) => {
             let dashes = DashedLineSeries::new(finite(points), pen.px(5), pen.px(4), line);
             chart.draw_series(dashes).map_err(undrawn)?
@@ -144,6 +145,7 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
     }
     let (series, at) = (series.label(&layer.label), move |units| pen.at(units));
     match layer.mark {
+        Mark::Line(_) => series.legend(move |(x, y)| PathElement::new([(x, y), (x + at(16), y)], line)),
         Mark::Dashed(_) => series.legend(move |(x, y)| PathElement::new([(x + at(4), y), (x + at(10), y)], line)),
         Mark::Dots(_) => series.legend(move |(x, y)| Circle::new((x + at(8), y), dot, colour.filled())),
         Mark::Cells(_) => series

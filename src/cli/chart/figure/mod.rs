@@ -71,6 +71,8 @@ pub(in crate::cli::chart) struct Layer {
 /// What a layer is made of. Values outside the axes are drawn at their edge; those that are not finite are left out.
 #[derive(Debug, Clone)]
 pub(in crate::cli::chart) enum Mark {
+    /// A line through points: measured.
+    Line(Vec<(f64, f64)>),
     /// A broken line through points: theory, or a limit.
     Dashed(Vec<(f64, f64)>),
     /// Points.

@@ -4,13 +4,13 @@ use glam::{DQuat, DVec3};
 use metachron_agents::rigid::RigidSpec;
 use metachron_agents::rod::{Material, Section, TubeSpec};
 use metachron_agents::shape::Solid;
-use metachron_agents::{Resolution, ResolutionRange};
+use metachron_agents::{Anchor, Pull, Resolution, ResolutionRange};
 
 /// The pull of the Earth, m/s².
-pub(super) const GRAVITY: f64 = 9.81;
+pub(in super::super) const GRAVITY: f64 = 9.81;
 
 /// A free tube of 1 MPa with a wall of an eighth of its radius, no weight, no damping, no friction.
-pub(super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: usize) -> TubeSpec {
+pub(in super::super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: usize) -> TubeSpec {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let (section, mass_per_length_kg_m) = Section::hollow(radius_m, radius_m / 8.0, material);
     TubeSpec {
@@ -36,7 +36,7 @@ pub(super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: usize) -> 
 }
 
 /// A free rigid body at rest at `position`, no weight, no friction, no rebound.
-pub(super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
+pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
     RigidSpec {
         solid,
         position,
@@ -50,5 +50,18 @@ pub(super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSp
         obstacles: [].into(),
         joints: [].into(),
         sleep: false,
+    }
+}
+
+/// A constant force on the point of a tube at a rest arc length: a spring so soft and long that it does not notice motion.
+pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> Pull {
+    const STIFFNESS_N_M: f64 = 1e-9;
+    Pull {
+        by: None,
+        anchor: Anchor::Arc(arc_m),
+        target: force_n / STIFFNESS_N_M,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: STIFFNESS_N_M,
+        damping_n_s_m: 0.0,
     }
 }

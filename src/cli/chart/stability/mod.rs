@@ -1,6 +1,13 @@
 //! `chart stability`: where methods fail, and whether this one does.
 
-mod common;
+pub(super) mod capstan;
+pub(super) mod closed;
+pub(super) mod common;
+pub(super) mod drop;
 mod hanging;
+pub(super) mod heavy;
+pub(super) mod impact;
 pub(super) mod incline;
+pub(super) mod pairs;
+pub(super) mod penalty_limit;
 pub(super) mod tube_map;

@@ -1,0 +1,75 @@
+//! Agents in a run of their own in virtual time: what the program itself does with them, islands included.
+//!
+//! In: agents with rates. Out: a run whose turns cost nothing, and its agents' newest states. Never here: what is measured.
+
+use crate::runtime::{AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Run, RunError, StepPrice};
+use metachron_agents::coupling::audit::Member;
+use metachron_agents::{Agent, AgentId, SimSpan, Snapshot};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A run.
+pub(super) struct Company(Lockstep);
+
+/// An agent that steps `rate_hz` times a second and is called `name`.
+pub(super) fn spawn(name: &str, agent: Box<dyn Agent>, rate_hz: f64) -> AgentSpawn {
+    let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
+    AgentSpawn {
+        name: name.to_owned(),
+        agent,
+        rate_hz,
+        dt,
+        dt_range: (dt, dt),
+        range: None,
+        links: Vec::new(),
+        laws: Vec::new(),
+        attached: Vec::new(),
+        together: None,
+        faults: Faults::default(),
+        watches: Vec::new(),
+        governor: None,
+    }
+}
+
+/// A machine on which everything is done at once.
+fn tireless() -> Machine {
+    let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
+    Machine {
+        cores: 64,
+        steps: ["tube", "rigid", "instrument", "synthetic"].map(free).to_vec(),
+        draw: DrawPrice { setup_ms: 0.0, object_us: 0.0, triangle_us: 0.0, pixel_ns: 0.0 },
+        noise_sd: 0.0,
+        seed: 1,
+    }
+}
+
+impl Company {
+    /// Begins a run.
+    ///
+    /// # Errors
+    /// What the runtime refuses.
+    pub(super) fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
+        Ok(Self(Lockstep::start(spawns, tireless())?))
+    }
+
+    /// Goes on until all have come to `seconds`.
+    pub(super) fn run_to(&mut self, seconds: f64) {
+        self.0.wait_until(Duration::from_secs_f64(seconds));
+    }
+
+    /// The newest states.
+    pub(super) fn snapshots(&self) -> Vec<Arc<Snapshot>> {
+        self.0.agents().iter().map(|agent| agent.latest()).collect()
+    }
+
+    /// How many steps each has made, and who leads it.
+    pub(super) fn steps(&self) -> Vec<(u64, Option<AgentId>)> {
+        self.0.agents().iter().map(|agent| agent.stats()).map(|stats| (stats.steps, stats.led_by)).collect()
+    }
+}
+
+/// Rigid bodies for an audit.
+pub(super) fn members(snapshots: &[Arc<Snapshot>]) -> Vec<Member<'_>> {
+    let all = (0..).map(AgentId).zip(snapshots);
+    all.map(|(id, snapshot)| Member { id, snapshot, mass_per_length_kg_m: 0.0, rotary_kg_m: 0.0 }).collect()
+}

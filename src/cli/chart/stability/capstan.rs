@@ -1,0 +1,200 @@
+//! Capstan: how hard a tube around a fixed cylinder must be pulled before it slips.
+//!
+//! Both ends are pulled by dead loads; one is raised slowly until the other end moves. Euler and Eytelwein: T₂/T₁ = exp(μφ).
+//! The tube is thin beside the cylinder, so that it makes no difference that its tension works at its axis and friction at its
+//! skin (docs/theory/contact.md, eq. 24, says what difference it makes otherwise).
+
+use super::super::experiment::{Experiment, Finding, worst};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::table::Table;
+use super::common::{dead_load, plain_tube};
+use glam::{DQuat, DVec3};
+use metachron_agents::rod::{Tube, TubeSpec};
+use metachron_agents::shape::{Obstacle, Solid};
+use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Snapshot, Surroundings};
+use serde::{Deserialize, Serialize};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+/// The experiment.
+pub(in super::super) struct Capstan;
+
+/// Angles of wrap, radians, and coefficients of friction.
+const WRAPS: [f64; 5] = [FRAC_PI_2, PI, 1.5 * PI, TAU, 1.25 * TAU];
+const FRICTIONS: [f64; 3] = [0.1, 0.3, 0.5];
+/// The claim's.
+const CLAIMED_WRAPS: [f64; 3] = [FRAC_PI_2, PI, TAU];
+const CLAIMED_FRICTION: f64 = 0.3;
+const TOLERANCE: f64 = 0.05;
+/// Radii of the cylinder and of the tube, metres.
+const DRUM_M: f64 = 0.1;
+const TUBE_M: f64 = 0.001;
+/// Straight part at each end, metres.
+const TAIL_M: f64 = 0.05;
+/// Segments an angle of wrap of one radian is divided into: 2.4° each.
+const SEGMENTS_A_RADIAN: f64 = 24.0;
+/// The load at the end that follows, newtons.
+const LOAD_N: f64 = 2.0;
+/// The other load begins at this share of what theory gives, and rises by the second share every second up to the third.
+const RAMP: [f64; 3] = [0.7, 0.1, 1.4];
+const DT_S: f64 = 0.002;
+/// Seconds in which both loads come on.
+const SETTLE_S: f64 = 0.5;
+/// The end that follows has slipped when it moved so far, metres.
+const SLIP_M: f64 = 5e-4;
+
+/// An angle and a coefficient.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    wrap_rad: f64,
+    friction: f64,
+}
+
+/// What was measured.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    friction: f64,
+    wrap_rad: f64,
+    /// exp(μφ).
+    theory: f64,
+    /// T₂/T₁ at which the tube slipped; empty if it never did.
+    ratio: Option<f64>,
+}
+
+impl Row {
+    fn error(&self) -> f64 {
+        self.ratio.map_or(f64::NAN, |ratio| (ratio / self.theory - 1.0).abs())
+    }
+}
+
+impl Experiment for Capstan {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "capstan";
+    const TITLE: &'static str = "a tube around a fixed cylinder: the ratio of tensions at which it slips";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let frictions = if quick { &[CLAIMED_FRICTION][..] } else { &FRICTIONS[..] };
+        let wraps = if quick { &CLAIMED_WRAPS[..] } else { &WRAPS[..] };
+        let of = |&friction: &f64| wraps.iter().map(move |&wrap_rad| Case { wrap_rad, friction });
+        frictions.iter().flat_map(of).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let Case { wrap_rad, friction } = *case;
+        Row { friction, wrap_rad, theory: libm::exp(friction * wrap_rad), ratio: slips_at(case) }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { wrap_rad: row.wrap_rad, friction: row.friction }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let top = rows.iter().flat_map(|r| [r.theory, r.ratio.unwrap_or(1.0)]).fold(2.0, f64::max) * 1.2;
+        let mut layers = Vec::new();
+        for (friction, colour) in FRICTIONS.into_iter().zip(Colour::LINES) {
+            let here: Vec<&Row> = rows.iter().filter(|r| r.friction == friction).collect();
+            let Some(far) = here.iter().map(|r| r.wrap_rad).reduce(f64::max) else { continue };
+            let theory = (0..=60).map(|k| far * f64::from(k) / 60.0).map(|phi| (phi, libm::exp(friction * phi)));
+            let dots = here.iter().filter_map(|r| Some((r.wrap_rad, r.ratio?))).collect();
+            layers.push(Layer {
+                label: format!("exp(μφ), μ = {friction}"),
+                colour,
+                mark: Mark::Dashed(theory.collect()),
+            });
+            layers.push(Layer { label: format!("measured, μ = {friction}"), colour, mark: Mark::Dots(dots) });
+        }
+        let (x, y) = (Axis::linear("angle of wrap φ, rad", 0.0, 8.0), Axis::log("T₂/T₁ at which it slips", 1.0, top));
+        let panel = Panel { title: String::new(), x, y, layers };
+        Figure { title: "A tube around a fixed cylinder slips".to_owned(), panels: vec![panel], columns: 1 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["friction", "wrap_rad", "exp(μφ)", "ratio", "error"]);
+        table.rows.extend(rows.iter().map(|r| {
+            let ratio = r.ratio.unwrap_or(f64::NAN);
+            vec![
+                (r.friction, 1).into(),
+                (r.wrap_rad, 4).into(),
+                (r.theory, 4).into(),
+                (ratio, 4).into(),
+                (r.error(), 4).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let claimed = |r: &&Row| r.friction == CLAIMED_FRICTION && CLAIMED_WRAPS.contains(&r.wrap_rad);
+        let greatest = worst(rows.iter().filter(claimed).map(Row::error));
+        vec![Finding::at_most(
+            "T₂/T₁ at slip against exp(μφ), μ = 0.3, φ = π/2, π, 2π: relative error",
+            greatest,
+            TOLERANCE,
+        )]
+    }
+}
+
+/// The path: a tail along the tangent, the wrap, another tail. The cylinder stands along y.
+fn path(wrap_rad: f64) -> Vec<DVec3> {
+    let reach = DRUM_M + TUBE_M;
+    let on = |phi: f64| DVec3::new(libm::sin(phi), 0.0, libm::cos(phi)) * reach;
+    let along = |phi: f64| DVec3::new(libm::cos(phi), 0.0, -libm::sin(phi));
+    let count = libm::ceil(wrap_rad / 0.1) as u32;
+    let mut path = vec![on(0.0) - along(0.0) * TAIL_M, on(0.0) - along(0.0) * 0.5 * TAIL_M];
+    path.extend((0..=count).map(|k| on(wrap_rad * f64::from(k) / f64::from(count))));
+    path.extend([0.5, 1.0].map(|share| on(wrap_rad) + along(wrap_rad) * (share * TAIL_M)));
+    path
+}
+
+fn tube(case: &Case) -> Option<Tube> {
+    let drum = Obstacle {
+        name: "drum".to_owned(),
+        solid: Solid::Cylinder { radius_m: DRUM_M, half_height_m: 0.5 },
+        position: DVec3::ZERO,
+        rotation: DQuat::from_rotation_x(FRAC_PI_2),
+        friction: case.friction,
+        restitution: 0.0,
+    };
+    let segments = (case.wrap_rad * SEGMENTS_A_RADIAN * (1.0 + 2.0 * TAIL_M / (case.wrap_rad * DRUM_M))) as usize;
+    let mut spec = TubeSpec {
+        obstacles: [drum].into(),
+        friction: case.friction,
+        damping_per_s: 5.0,
+        ..plain_tube(path(case.wrap_rad), TUBE_M, segments)
+    };
+    // curved as the drum by itself, so that bending takes no force; limper still, and a taut tube chatters and creeps
+    (spec.section.ea_n, spec.section.ga_n) = (2e3, 1e3);
+    (spec.section.ei_n_m2, spec.section.gj_n_m2) = (1e-3, 1e-3);
+    spec.mass_per_length_kg_m = 0.05;
+    Tube::new(spec).ok()
+}
+
+/// Raises the load at the end until the start has moved; the ratio of the loads then.
+fn slips_at(case: &Case) -> Option<f64> {
+    let mut tube = tube(case)?;
+    let dt = SimSpan::from_secs_f64(DT_S)?;
+    let theory = libm::exp(case.friction * case.wrap_rad);
+    let [from, rate, to] = RAMP;
+    let length = tube.length_m();
+    let (first, last) = (DVec3::NEG_X, DVec3::new(libm::cos(case.wrap_rad), 0.0, -libm::sin(case.wrap_rad)));
+    let (mut time, mut snapshot, mut rested) = (SimTime::ZERO, Snapshot::default(), None);
+    loop {
+        let t = time.as_secs_f64();
+        let ratio = theory * (from + rate * (t - SETTLE_S).max(0.0));
+        if ratio > theory * to {
+            return None;
+        }
+        let on = (t / (0.5 * SETTLE_S)).min(1.0);
+        let hands = [dead_load(0.0, first * (LOAD_N * on)), dead_load(length, last * (LOAD_N * on * ratio))];
+        let around = Surroundings { hands: &hands, ..Surroundings::alone(AgentId(0), time) };
+        tube.step(dt, &around).ok()?;
+        time += dt;
+        tube.write_snapshot(&mut snapshot);
+        let (start, _) = snapshot.body.probe(0.0)?;
+        if t < SETTLE_S {
+            rested = Some(start);
+        } else if rested.is_some_and(|rested| start.distance(rested) > SLIP_M) {
+            return Some(ratio);
+        }
+    }
+}

@@ -1,0 +1,165 @@
+//! Agents in turn, without a runtime: so that a law of coupling is measured alone, without islands and without threads.
+//!
+//! In: agents, their rates, laws, springs and faults. Out: what each published last, and sums at a common time. Whoever's time
+//! is earliest steps next, of equals the lower number; what it publishes is seen at once, stamped with the end of its step, as
+//! in a run whose turns cost nothing. Never here: what is measured of it.
+
+use metachron_agents::coupling::audit::Member;
+use metachron_agents::coupling::{Form, Law, Link, Standing, owns};
+use metachron_agents::{Agent, AgentId, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, Surroundings};
+use std::sync::Arc;
+
+/// What goes wrong on purpose.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Faults {
+    /// Each step is longer or shorter by up to this share.
+    pub(super) jitter: f64,
+    /// The share of states that nobody ever sees.
+    pub(super) loss: f64,
+    /// Equal seeds disturb equally.
+    pub(super) seed: u64,
+}
+
+/// Agents that see each other.
+pub(super) struct Stage {
+    actors: Vec<Actor>,
+    law: Law,
+    faults: Faults,
+    noise: u64,
+}
+
+/// One of them.
+struct Actor {
+    agent: Box<dyn Agent>,
+    form: Option<Arc<Form>>,
+    rate_hz: f64,
+    /// What it is, seen by others or not.
+    own: Snapshot,
+    /// What others see.
+    shown: Arc<Snapshot>,
+    /// Springs from fixed points.
+    hands: Vec<Pull>,
+    links: Vec<Link>,
+    /// Mass per length and rotary inertia of a tube.
+    weight: [f64; 2],
+    /// Length of its last step, seconds.
+    last_s: f64,
+}
+
+impl Stage {
+    /// An empty stage whose pairs all touch by `law`.
+    pub(super) fn new(law: Law, faults: Faults) -> Self {
+        Self { actors: Vec::new(), law, faults, noise: faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1 }
+    }
+
+    /// Adds an agent that steps `rate_hz` times a second; `weight`: of a tube its mass per length and rotary inertia.
+    pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: [f64; 2]) -> AgentId {
+        let mut own = Snapshot::default();
+        agent.write_snapshot(&mut own);
+        let (form, shown) = (agent.form(), Arc::new(own.clone()));
+        self.actors.push(Actor {
+            agent,
+            form,
+            rate_hz,
+            own,
+            shown,
+            hands: Vec::new(),
+            links: Vec::new(),
+            weight,
+            last_s: 0.0,
+        });
+        AgentId(self.actors.len() as u32 - 1)
+    }
+
+    /// Lets fixed springs pull at an agent.
+    pub(super) fn hold(&mut self, id: AgentId, hands: Vec<Pull>) {
+        self.actors[id.0 as usize].hands = hands;
+    }
+
+    /// An agent's own newest state, seen by others or not.
+    pub(super) fn own(&self, id: AgentId) -> &Snapshot {
+        &self.actors[id.0 as usize].own
+    }
+
+    /// How long an agent's last step was, seconds.
+    pub(super) fn last_s(&self, id: AgentId) -> f64 {
+        self.actors[id.0 as usize].last_s
+    }
+
+    /// Ties `of` to the link's other end; both know it.
+    pub(super) fn link(&mut self, of: AgentId, link: Link) {
+        self.actors[of.0 as usize].links.push(link);
+        let back = Link { other: of, here: link.there, there: link.here, ..link };
+        self.actors[link.other.0 as usize].links.push(back);
+    }
+
+    /// The shape of an agent.
+    pub(super) fn form(&self, id: AgentId) -> Option<&Arc<Form>> {
+        self.actors[id.0 as usize].form.as_ref()
+    }
+
+    /// Everybody's newest own states, for an audit.
+    pub(super) fn members(&self) -> Vec<Member<'_>> {
+        let all = (0..).map(AgentId).zip(&self.actors);
+        all.map(|(id, actor)| Member {
+            id,
+            snapshot: &actor.own,
+            mass_per_length_kg_m: actor.weight[0],
+            rotary_kg_m: actor.weight[1],
+        })
+        .collect()
+    }
+
+    /// Who steps next; `None` where everybody has come to `seconds`.
+    pub(super) fn next(&self, seconds: f64) -> Option<AgentId> {
+        let first = (0..).zip(&self.actors).min_by_key(|(id, actor)| (actor.own.time, *id));
+        first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
+    }
+
+    /// Makes a step of an agent.
+    ///
+    /// # Errors
+    /// What the agent refuses.
+    pub(super) fn step(&mut self, me: AgentId) -> Result<(), StepError> {
+        let i = me.0 as usize;
+        let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
+        let lost = self.random() < self.faults.loss;
+        let neighbours: Vec<Neighbour> = (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(i, j)).collect();
+        let actor = &mut self.actors[i];
+        let time: SimTime = actor.own.time;
+        let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
+        let around = Surroundings { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        actor.agent.step(dt, &around)?;
+        actor.last_s = dt.as_secs_f64();
+        actor.agent.write_snapshot(&mut actor.own);
+        actor.own.time = time + dt;
+        if !lost {
+            actor.shown = Arc::new(actor.own.clone());
+        }
+        Ok(())
+    }
+
+    /// How one agent sees another.
+    fn sight(&self, me: usize, other: usize) -> Neighbour {
+        let standing = |i: usize| {
+            let actor = &self.actors[i];
+            Standing { id: AgentId(i as u32), model: actor.agent.model(), rate_hz: actor.rate_hz }
+        };
+        let actor = &self.actors[other];
+        Neighbour {
+            id: AgentId(other as u32),
+            snapshot: Arc::clone(&actor.shown),
+            form: actor.form.clone(),
+            law: self.law,
+            owned: owns(standing(me), standing(other)),
+        }
+    }
+
+    /// A number in 0 … 1, the same on every run.
+    fn random(&mut self) -> f64 {
+        self.noise ^= self.noise << 13;
+        self.noise ^= self.noise >> 7;
+        self.noise ^= self.noise << 17;
+        (self.noise >> 11) as f64 / (1_u64 << 53) as f64
+    }
+}
