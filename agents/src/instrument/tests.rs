@@ -1,10 +1,10 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
 use super::{Instrument, Keyframe, ToolError, ToolSpec};
-use crate::coupling::{Impulse, Ledger, Site};
+use crate::coupling::{Form, FormKind, Impulse, Ledger, Site};
 use crate::{
-    Agent, AgentId, Anchor, Body, CurveState, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, StepReport,
-    Surroundings, ToolState,
+    Agent, AgentId, Anchor, Body, Bounds, CurveState, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError,
+    StepReport, Surroundings, ToolState,
 };
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -290,5 +290,38 @@ fn scripts_that_are_none_are_refused() {
         assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
         let damped = Instrument::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
+    }
+}
+
+#[test]
+fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
+    let form = Arc::new(Form { kind: FormKind::Chain, friction: 0.2, restitution: 0.0 });
+    let asleep = |mut neighbour: Neighbour| {
+        let snapshot = Snapshot {
+            at_rest: true,
+            bounds: Some(Bounds { low: DVec3::splat(-0.01), high: DVec3::new(1.01, 0.01, 0.01), speed_m_s: 0.0 }),
+            body: neighbour.snapshot.body.clone(),
+            ..Snapshot::default()
+        };
+        (neighbour.snapshot, neighbour.form) = (Arc::new(snapshot), Some(Arc::clone(&form)));
+        neighbour
+    };
+    // 0.3 m down in a second, the jaws shut and open along z: the tip ends 0.1 m above the axis, or 5 mm
+    for (end_m, wakes) in [(0.1, false), (0.005, true)] {
+        let down = [key(0.0, DVec3::new(0.3, 0.0, 0.4), 0.0), key(1.0, DVec3::new(0.3, 0.0, end_m), 0.0)];
+        let turned = down.map(|key| Keyframe { rotation: DQuat::from_rotation_x(std::f64::consts::PI), ..key });
+        let mut stage = Stage::new(spec(turned.to_vec()));
+        stage.around = vec![asleep(tube())];
+        let mut woke_at_m = None;
+        for _ in 0..130 {
+            stage.step();
+            if snapshot(&stage.tool).touches == [TUBE] {
+                woke_at_m.get_or_insert(state(&stage.tool).tip.z);
+            }
+        }
+        assert_eq!(woke_at_m.is_some(), wakes, "down to {end_m} m");
+        // the jaws reach a centimetre beyond the tip, the skin of the tube one more, two steps at most one more
+        assert!(woke_at_m.is_none_or(|z| z > 0.01 && z < 0.06), "{woke_at_m:?}");
+        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool that stands wakes nobody");
     }
 }

@@ -10,7 +10,7 @@ use super::jaws::{Jaws, nearest};
 use super::script::{Pose, Script};
 use super::spec::REACH_MAX_M;
 use super::{ToolError, ToolSpec};
-use crate::coupling::{Form, FormKind};
+use crate::coupling::{Form, FormKind, Knock, Placed, View};
 use crate::shape::ToolShape;
 use crate::{
     Agent, Anchor, Body, Bounds, Inertia, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings,
@@ -28,6 +28,7 @@ pub struct Instrument {
     tool: ToolState,
     jaws: Jaws,
     felt: Felt,
+    knock: Knock,
     form: Arc<Form>,
     /// How fast any of its points went in the last step, m/s.
     speed_m_s: f64,
@@ -68,8 +69,8 @@ impl Instrument {
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
         let tool = ToolState { tip, rotation, velocity, jaw, grasp: None, force_n: 0.0 };
         let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
-        let (jaws, felt) = (Jaws::new(), Felt::default());
-        Ok(Self { spec, script, tool, jaws, felt, form, speed_m_s: 0.0, at_rest: false, steps: 0 })
+        let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
+        Ok(Self { spec, script, tool, jaws, felt, knock, form, speed_m_s: 0.0, at_rest: false, steps: 0 })
     }
 
     /// Where the hand wants the tip, and how fast it moves there.
@@ -109,6 +110,16 @@ impl Instrument {
             rotation,
             jaw: jaw.clamp(0.0, 1.0),
             ..self.tool
+        }
+    }
+
+    /// Finds who sleeps in its way.
+    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        let ToolState { tip, rotation, jaw, .. } = self.tool;
+        let bounds = bounds(&self.tool, self.speed_m_s);
+        if self.knock.begin(&bounds, around) {
+            let placed = Placed { form: &self.form, view: View::Tool { tip, rotation, jaw } };
+            self.knock.find(&placed, &bounds, (around, dt_s));
         }
     }
 
@@ -183,6 +194,7 @@ impl Agent for Instrument {
         self.tool = led;
         self.jaws.move_to(&self.spec, (was, led.jaw), led.tip, (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.wake_others(around, dt_s);
         self.felt.read(around);
         self.tool.force_n = self.felt.force_n();
         self.steps += 1;
@@ -205,6 +217,8 @@ impl Agent for Instrument {
         into.energy_j = 0.0;
         into.residual_m = 0.0;
         into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
+        into.touches
+            .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
         into.at_rest = self.at_rest;
         into.inertia = Inertia::Immovable;
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));

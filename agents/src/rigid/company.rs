@@ -228,6 +228,14 @@ impl Guest {
         matches!(inertia, Some(Inertia::Rigid { .. })) && !self.other.is_held()
     }
 
+    /// The reduced mass of it and a body of `mass_kg`, which it is alone beside what is led, and beside tubes.
+    pub(super) fn reduced_kg(&self, mass_kg: f64) -> f64 {
+        match self.other.neighbour().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Rigid { inverse_mass, .. }) => mass_kg / (1.0 + mass_kg * inverse_mass),
+            _ => mass_kg,
+        }
+    }
+
     /// Writes a scale of the inverse mass of each of its slots; a tube's are told by its contacts.
     pub(super) fn scale(&self, mobilities: &mut [f64]) {
         let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);

@@ -73,7 +73,7 @@ const BLOW: Settings = Settings { iterations: 400, tolerance_m_s: 1e-12 };
 const PRESS: Settings = Settings { iterations: 100, tolerance_m_s: 1e-8 };
 /// A body at rest is immovable until it is approached faster than this, m/s.
 pub(super) const WAKE_M_S: f64 = 5e-3;
-/// Contact that changes the velocity by less than this a second does not press, m/s².
+/// Contact that changes the relative velocity by less than this a second does not press, m/s².
 const PRESS_M_S2: f64 = 1e-3;
 
 impl Meeting {
@@ -255,9 +255,10 @@ impl Meeting {
         }
         let (guests, exchange, pairs, ..) = company.split();
         let Some(id) = guests[i].other.id().filter(|_| places > 0 || depth_m > 0.0) else { return };
-        let pair = pairs.of(id, me.spread.mass_kg);
+        let mass_kg = guests[i].reduced_kg(me.spread.mass_kg);
+        let pair = pairs.of(id, mass_kg);
         pair.touched = true;
-        pair.pressed |= along > me.spread.mass_kg * PRESS_M_S2 * h && h > 0.0;
+        pair.pressed |= along > mass_kg * PRESS_M_S2 * h && h > 0.0;
         pair.rigid = guests[i].is_rigid();
         pair.spend(work_j);
         let state = exchange.pair_mut(id);

@@ -271,3 +271,17 @@ fn a_heavy_fast_box_sinks_little_into_a_slow_light_one_before_they_are_bonded() 
         assert!(bonded && deepest < 1e-2, "light {light_hz} Hz, heavy {heavy_hz} Hz: {deepest} m, bonded {bonded}");
     }
 }
+
+#[test]
+fn a_body_of_a_millionth_of_the_mass_bonds_with_what_carries_it() {
+    for (light_hz, heavy_hz) in [(100.0, 240.0), (240.0, 100.0)] {
+        let mut stage = Stage::new(Faults::default());
+        let below = RigidSpec { mass_kg: 1e3, obstacles: [floor(0.5)].into(), ..cube(0.05, UP * 0.05) };
+        let above = RigidSpec { mass_kg: 1e-3, ..cube(0.05, UP * 0.1505) };
+        let below = stage.add(RigidBody::new(below).unwrap(), heavy_hz);
+        let above = stage.add(RigidBody::new(above).unwrap(), light_hz);
+        let mut bonded = false;
+        stage.run(0.4, |stage| bonded |= [below, above].into_iter().any(|id| !stage.newest(id).bonds.is_empty()));
+        assert!(bonded, "light {light_hz} Hz, heavy {heavy_hz} Hz");
+    }
+}

@@ -1,0 +1,69 @@
+//! Whom a mover wakes: who owns the contact with it, sleeps, and so does not see it come.
+//!
+//! In: a mover after its step, what is around. Out: the sleepers it may touch next, for [`crate::Snapshot::touches`].
+//! Never here: forces; rigid bodies, who look along their own flight (`rigid/company.rs`).
+
+use super::touch::{TouchRoom, gap};
+use super::{Law, Other, Placed, WAKE_M_S};
+use crate::{AgentId, Bounds, Neighbour, Surroundings};
+use std::fmt;
+
+/// Who sleeps in a mover's way.
+#[derive(Default)]
+pub(crate) struct Knock {
+    on: Vec<AgentId>,
+    other: Other,
+    room: TouchRoom,
+}
+
+/// How many of its own steps a mover looks ahead: one to be seen, one to be answered.
+const STEPS: f64 = 2.0;
+
+impl Knock {
+    /// Finds who sleeps within two steps of `dt_s` seconds of one who is at `placed`, inside `bounds`.
+    pub(crate) fn find(&mut self, placed: &Placed<'_>, bounds: &Bounds, (around, dt_s): (&Surroundings<'_>, f64)) {
+        let reach_m = STEPS * dt_s * bounds.speed_m_s;
+        for neighbour in around.neighbours.iter().filter(|n| sleeps(n)) {
+            let is_apart = neighbour
+                .snapshot
+                .bounds
+                .is_none_or(|there| (there.low - bounds.high).max(bounds.low - there.high).max_element() > reach_m);
+            if is_apart || !self.other.see(neighbour) {
+                continue;
+            }
+            let Some(there) = self.other.placed() else { continue };
+            if gap(placed, &there, reach_m, &mut self.room).is_some() {
+                self.on.push(neighbour.id);
+            }
+        }
+    }
+
+    /// Begins anew; whether one with these `bounds` is fast enough to wake anybody of those `around`.
+    pub(crate) fn begin(&mut self, bounds: &Bounds, around: &Surroundings<'_>) -> bool {
+        self.on.clear();
+        bounds.speed_m_s > WAKE_M_S && around.neighbours.iter().any(sleeps)
+    }
+
+    /// Those found since the last [`Self::begin`].
+    pub(crate) fn on(&self) -> &[AgentId] {
+        &self.on
+    }
+}
+
+/// Whether it sleeps and owns what happens between the two.
+fn sleeps(neighbour: &Neighbour) -> bool {
+    neighbour.snapshot.at_rest && !neighbour.owned && neighbour.form.is_some() && neighbour.law != Law::Off
+}
+
+/// A copy of a mover knows nobody yet: its next step finds them.
+impl Clone for Knock {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl fmt::Debug for Knock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Knock").field("on", &self.on).finish_non_exhaustive()
+    }
+}
