@@ -179,8 +179,11 @@ impl Exchange {
             }
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
             let mut on_its_way = DVec3::ZERO;
-            let taken = other.and_then(|n| acknowledged(n, around.me));
-            owned.ledger.since(taken, around.time, |_, sum, _| on_its_way += sum.linear);
+            // who is not looked at any more has settled
+            if let Some(other) = other {
+                let taken = acknowledged(other, around.me);
+                owned.ledger.since(taken, around.time, |_, sum, _| on_its_way += sum.linear);
+            }
             owned.state.in_flight_n_s = on_its_way.length();
         }
     }

@@ -52,7 +52,9 @@ impl BlockRoom {
             let Some(apart) = apart.filter(|apart| apart.gap_m <= reach_m) else { return };
             nearest = Some((apart.normal, apart.gap_m));
         });
-        nearest
+        // the corners are known in single precision only
+        let rounding_m = 0.5 * f64::from(f32::EPSILON) * (a.around.radius_m + b.around.radius_m);
+        nearest.map(|(normal, gap_m)| (normal, gap_m - rounding_m))
     }
 }
 
