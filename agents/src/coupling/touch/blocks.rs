@@ -54,7 +54,7 @@ impl BlockRoom {
         });
         // the corners are known in single precision only
         let rounding_m = 0.5 * f64::from(f32::EPSILON) * (a.around.radius_m + b.around.radius_m);
-        nearest.map(|(normal, gap_m)| (normal, gap_m - rounding_m))
+        nearest.map(|(normal, gap_m)| (normal, if gap_m > 0.0 { (gap_m - rounding_m).max(0.0) } else { gap_m }))
     }
 }
 

@@ -13,8 +13,9 @@ use plotters::prelude::*;
 
 type Chart<'a, D> = ChartContext<'a, D, Cartesian2d<Scale, Scale>>;
 
-/// Width and height of a panel, and height of the title above all of them.
+/// Width and height of a panel without its legend, width of a legend, and height of the title above all panels.
 const PANEL: [u32; 2] = [430, 330];
+const LEGEND: u32 = 190;
 const TITLE: u32 = 34;
 /// Heights of letters.
 const LARGE: u32 = 17;
@@ -62,7 +63,8 @@ fn lines(figure: &Figure) -> usize {
 }
 
 fn size(figure: &Figure) -> [u32; 2] {
-    [PANEL[0] * columns(figure) as u32, PANEL[1] * lines(figure) as u32 + TITLE]
+    let widest = figure.panels.iter().map(width).max().unwrap_or(PANEL[0]);
+    [widest * columns(figure) as u32, PANEL[1] * lines(figure) as u32 + TITLE]
 }
 
 /// How many pixels a unit has.
@@ -102,7 +104,7 @@ fn draw_panel<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pe
     let mut chart = ChartBuilder::on(area)
         .caption(&panel.title, pen.font(MIDDLE))
         .margin(pen.px(10))
-        .margin_right(pen.px(18))
+        .margin_right(pen.px(18 + width(panel) - PANEL[0]))
         .x_label_area_size(pen.px(40))
         .y_label_area_size(pen.px(56))
         .build_cartesian_2d(Scale(panel.x.clone()), Scale(panel.y.clone()))
@@ -113,19 +115,42 @@ fn draw_panel<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pe
     mesh.axis_style(BLACK.stroke_width(pen.px(1))).set_all_tick_mark_size(pen.px(4));
     mesh.label_style(pen.font(SMALL)).axis_desc_style(pen.font(SMALL + 1)).draw().map_err(undrawn)?;
     panel.layers.iter().try_for_each(|layer| draw_layer(&mut chart, layer, pen))?;
-    if panel.layers.iter().any(|l| !l.label.is_empty()) {
-        let legend = &mut chart.configure_series_labels();
-        legend.position(SeriesLabelPosition::UpperRight).label_font(pen.font(SMALL)).legend_area_size(pen.px(22));
-        legend.background_style(WHITE.mix(0.85)).margin(pen.px(6)).draw().map_err(undrawn)?;
+    draw_legend(area, panel, pen)
+}
+
+/// The legend beside the axes, where it hides nothing.
+fn draw_legend<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pen: Pen) -> anyhow::Result<()> {
+    let left = pen.at((width(panel) - LEGEND) as i32);
+    for (line, layer) in panel.layers.iter().filter(|l| !l.label.is_empty()).enumerate() {
+        let (colour, y) = (rgb(layer.colour), pen.at(44 + 19 * line as i32));
+        let thick = colour.stroke_width(pen.px(2));
+        let stroke = |from: i32, to: i32| PathElement::new([(left + pen.at(from), y), (left + pen.at(to), y)], thick);
+        match layer.mark {
+            Mark::Line(_) => area.draw(&stroke(0, 18)),
+            Mark::Dashed(_) => area.draw(&stroke(0, 5)).and_then(|()| area.draw(&stroke(11, 16))),
+            Mark::Dots(_) => area.draw(&Circle::new((left + pen.at(9), y), pen.px(3), colour.filled())),
+            Mark::Cells(_) => {
+                let corners = [(left + pen.at(3), y - pen.at(6)), (left + pen.at(15), y + pen.at(6))];
+                area.draw(&Rectangle::new(corners, colour.filled()))
+            }
+        }
+        .map_err(undrawn)?;
+        let at = (left + pen.at(24), y - pen.at(7));
+        area.draw_text(&layer.label, &pen.font(SMALL), at).map_err(undrawn)?;
     }
     Ok(())
+}
+
+/// How wide a panel is: with room for its legend, if it has one.
+fn width(panel: &Panel) -> u32 {
+    PANEL[0] + if panel.layers.iter().any(|l| !l.label.is_empty()) { LEGEND } else { 0 }
 }
 
 fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: Pen) -> anyhow::Result<()> {
     let colour = rgb(layer.colour);
     let line = colour.stroke_width(pen.px(2));
     let dot = pen.px(3);
-    let series = match &layer.mark {
+    match &layer.mark {
         Mark::Line(points) => chart.draw_series(LineSeries::new(finite(points), line)).map_err(undrawn)?,
         Mark::Dashed(points) => {
             let dashes = DashedLineSeries::new(finite(points), pen.px(5), pen.px(4), line);
@@ -139,17 +164,6 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
             let boxes = cells.iter().map(|&[a, b, c, d]| Rectangle::new([(a, c), (b, d)], colour.filled()));
             chart.draw_series(boxes).map_err(undrawn)?
         }
-    };
-    if layer.label.is_empty() {
-        return Ok(());
-    }
-    let (series, at) = (series.label(&layer.label), move |units| pen.at(units));
-    match layer.mark {
-        Mark::Line(_) => series.legend(move |(x, y)| PathElement::new([(x, y), (x + at(16), y)], line)),
-        Mark::Dashed(_) => series.legend(move |(x, y)| PathElement::new([(x + at(4), y), (x + at(10), y)], line)),
-        Mark::Dots(_) => series.legend(move |(x, y)| Circle::new((x + at(8), y), dot, colour.filled())),
-        Mark::Cells(_) => series
-            .legend(move |(x, y)| Rectangle::new([(x + at(2), y - at(5)), (x + at(14), y + at(5))], colour.filled())),
     };
     Ok(())
 }
@@ -181,7 +195,7 @@ mod tests {
         let panel = Panel { title: String::new(), x: axis(), y: axis(), layers: vec![] };
         let figure = Figure { title: title.to_owned(), panels: vec![panel], columns: 1 };
         let picture = image::load_from_memory(&png(&figure).unwrap()).unwrap().to_luma8();
-        assert_eq!(picture.dimensions(), (2 * 430, 2 * (330 + 34)));
+        assert_eq!(picture.dimensions(), (2 * PANEL[0], 2 * (PANEL[1] + TITLE)));
         picture.rows().take(2 * TITLE as usize).flatten().filter(|p| p.0[0] < 128).count()
     }
 
