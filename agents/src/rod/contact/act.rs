@@ -41,8 +41,12 @@ impl TubeContacts {
         solved: &Solved<'_>,
         (company, first): (&mut Company, bool),
     ) -> f64 {
+        if self.is_idle() && company.is_empty() {
+            self.contacts.clear(); // of those who have gone
+            return 0.0;
+        }
         // a system that was lost has no motion to correct: the step will see it and give up or divide
-        if (self.is_idle() && company.is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
+        if !velocities.iter().sum::<DVec3>().is_finite() {
             return 0.0;
         }
         let own = velocities.len();

@@ -6,6 +6,7 @@ mod bodies;
 mod capstan;
 mod meetings;
 mod received;
+mod tools;
 
 use crate::coupling::{Exchange, Form, FormKind, SolidForm};
 use crate::shape::Solid;
