@@ -33,9 +33,12 @@ pub struct Coupling {
     pub impulse_n_s: f64,
     /// What has been given and was not yet taken when it was last seen, N·s.
     pub in_flight_n_s: f64,
-    /// Largest difference of the two sides' accounts where both are of the same reading, as a share of the impulse exchanged;
+    /// Largest difference of the two sides' accounts seen where both were of the same reading, as a share of the impulse
+    /// exchanged; where they never were, what the newest differ by beyond what the owner says is on its way.
     /// `None` where there are no two accounts to compare.
     pub momentum_error: Option<f64>,
+    /// Whether both accounts were ever seen at the same reading.
+    pub(super) met: bool,
     /// What was left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
     /// The mass that the law added, kilograms.
@@ -68,6 +71,7 @@ impl Coupling {
             impulse_n_s: 0.0,
             in_flight_n_s: 0.0,
             momentum_error: None,
+            met: false,
             tank_j: None,
             parasitic_kg: 0.0,
         }
@@ -92,7 +96,20 @@ impl Coupling {
     }
 
     fn differ(&mut self, error: f64) {
-        self.momentum_error = Some(self.momentum_error.unwrap_or(0.0).max(error));
+        self.momentum_error = Some(self.momentum_error.filter(|_| self.met).unwrap_or(0.0).max(error));
+        self.met = true;
+    }
+
+    /// Compares the accounts of both sides, which differ by `apart_n_s`.
+    fn compare(&mut self, apart_n_s: f64, same_reading: bool) {
+        if self.impulse_n_s <= 0.0 {
+            return;
+        }
+        if same_reading {
+            self.differ(apart_n_s / self.impulse_n_s);
+        } else if !self.met {
+            self.momentum_error = Some((apart_n_s - self.in_flight_n_s).max(0.0) / self.impulse_n_s);
+        }
     }
 }
 
@@ -173,8 +190,8 @@ impl Couplings {
         }
         let coupling = self.at(a, b, state.kind.name());
         coupling.see(state);
-        if let Some(error) = difference_n_s((mine, owner), (theirs, other)).filter(|_| state.impulse_n_s > 0.0) {
-            coupling.differ(error / state.impulse_n_s);
+        if let Some((apart_n_s, same_reading)) = difference_n_s((mine, owner), (theirs, other)) {
+            coupling.compare(apart_n_s, same_reading);
         }
     }
 
@@ -193,16 +210,13 @@ fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Op
     theirs.pairs.iter().find(|back| pushes && back.with == owner && back.kind == PairKind::Penalty)
 }
 
-/// By how much the accounts of what `owner` gave and what `other` took differ, N·s, where both are of the same reading.
-fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<f64> {
+/// By how much the accounts of what `owner` gave and what `other` took differ, N·s, and whether both are of the same reading.
+fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<(f64, bool)> {
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
-    if given.revision != taken.revision {
-        return None;
-    }
     let mut apart = DVec3::ZERO;
     given.since(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
-    Some(apart.length())
+    Some((apart.length(), given.revision == taken.revision))
 }
 
 #[cfg(test)]
@@ -240,12 +254,18 @@ mod tests {
         given.give(Site::Whole, SimTime::ZERO, 0.0, pushed(2.0));
         let early = given.clone();
         given.give(Site::Whole, SimTime::ZERO, 0.1, pushed(2.0));
-        let state =
-            PairState { contacts: 1, impulse_n_s: 4.0, force_n: 3.0, ..PairState::new(AgentId(1), PairKind::Ledger) };
+        let state = PairState {
+            contacts: 1,
+            impulse_n_s: 4.0,
+            in_flight_n_s: 1.5,
+            force_n: 3.0,
+            ..PairState::new(AgentId(1), PairKind::Ledger)
+        };
         let scene = two_balls();
         let mut couplings = Couplings::of(&scene);
         couplings.note(&scene, &states(&given, early.clone(), state), alone);
-        assert_eq!(couplings.all()[0].momentum_error, None);
+        // two of four newton seconds are not taken yet, and the owner knows of one and a half
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
         couplings.note(&scene, &states(&given, given.clone(), state), alone);
         assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
         // a reader that lost half of it and does not know

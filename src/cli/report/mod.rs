@@ -120,8 +120,8 @@ pub struct CouplingReport {
     pub kind: String,
     /// Contacts, holds or joints at the end of the run.
     pub contacts: u64,
-    /// Difference of both sides' accounts of the same impulses, as a share of the impulse exchanged; `None` where there are no
-    /// two accounts, as in an island.
+    /// Difference of both sides' accounts of the same impulses, as a share of the impulse exchanged, without what is on its way;
+    /// `None` where there are no two accounts, as in an island.
     pub momentum_error: Option<f64>,
     /// Impulses exchanged, magnitudes summed, newton seconds.
     pub impulse_n_s: f64,
