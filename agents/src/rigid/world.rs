@@ -179,7 +179,8 @@ fn parameters() -> IntegrationParameters {
     }
 }
 
-fn collider(shape: SharedShape, friction: f64, restitution: f64) -> ColliderBuilder {
+/// A shape as the contact solver touches it; its mass comes from the body.
+pub(super) fn collider(shape: SharedShape, friction: f64, restitution: f64) -> ColliderBuilder {
     ColliderBuilder::new(shape)
         .density(0.0)
         .friction(friction as f32)

@@ -7,18 +7,18 @@
 //! are the truth; a body is told of its own only where something else has changed it.
 
 use super::super::motion::Motion;
+use super::super::world::collider;
 use super::Held;
 use super::member::{Ground, Member, pose_about};
 use super::pile_joints;
 use crate::rigid::Joint;
 use glam::{DQuat, DVec3};
 use rapier3d::dynamics::{
-    CoefficientCombineRule, FrictionModel, ImpulseJointHandle, IntegrationParameters, MassProperties, RigidBodyBuilder,
-    RigidBodyHandle, SpringCoefficients,
+    FrictionModel, ImpulseJointHandle, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
+    SpringCoefficients,
 };
-use rapier3d::geometry::{ColliderBuilder, ColliderHandle, ContactPair};
+use rapier3d::geometry::{ColliderHandle, ContactPair};
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
-use rapier3d::parry::shape::SharedShape;
 use rapier3d::pipeline::PhysicsWorld;
 
 /// The world of a pile.
@@ -253,13 +253,4 @@ fn parameters(size: f32, ratio: f64) -> IntegrationParameters {
         normalized_max_linear_velocity: f32::MAX,
         ..IntegrationParameters::default()
     }
-}
-
-fn collider(shape: SharedShape, friction: f64, restitution: f64) -> ColliderBuilder {
-    ColliderBuilder::new(shape)
-        .density(0.0)
-        .friction(friction as f32)
-        .friction_combine_rule(CoefficientCombineRule::GeometricMean)
-        .restitution(restitution as f32)
-        .restitution_combine_rule(CoefficientCombineRule::Max)
 }
