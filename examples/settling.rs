@@ -62,6 +62,7 @@ fn stage() -> Vec<ObjectView> {
         id: AgentId(id),
         kind,
         range,
+        shading: Default::default(),
         pixels,
         distance_m: 0.6,
         speed_px_s: 0.0,

@@ -4,6 +4,7 @@
 //! A tube that the camera does not see stays in the picture for its shadow.
 
 use super::gather::{Form, Look, Material, PropShape, Stage, Track};
+use super::level::Level;
 use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
     resolution_colour,
@@ -11,7 +12,7 @@ use super::picture::{
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
 use metachron_agents::shape::{Primitive, Rounding, SkinFrame, Solid, ToolShape};
-use metachron_agents::{AgentId, Anchor, Body, N_MAX, Resolution, ToolState};
+use metachron_agents::{AgentId, Anchor, Body, Resolution, ToolState};
 use std::f64::consts::TAU;
 
 /// Level at which fixed solids are drawn.
@@ -56,8 +57,8 @@ impl Stage {
         &self.picture
     }
 
-    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)).
-    pub fn compose(&mut self, camera: &Camera, levels: &[Resolution], style: Style, hand: Option<Hand>) -> &Picture {
+    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)); shadings are not heeded yet.
+    pub fn compose(&mut self, camera: &Camera, levels: &[Level], style: Style, hand: Option<Hand>) -> &Picture {
         let mut picture = std::mem::take(&mut self.picture);
         let mut scratch = std::mem::take(&mut self.scratch);
         picture.clear();
@@ -67,7 +68,10 @@ impl Stage {
         self.find_focus(camera, &mut picture);
         self.add_tubes(levels, &mut picture, &mut scratch);
         for (number, track) in self.tracks.iter().enumerate() {
-            add_solid(track, level(levels, number), &picture, &mut scratch.solids);
+            let at = level(levels, number);
+            if at.triangles > 0 {
+                add_solid(track, at.resolution, &picture, &mut scratch.solids);
+            }
         }
         self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
         self.add_grasps(&picture, &mut scratch.solids);
@@ -110,15 +114,16 @@ impl Stage {
     }
 
     /// Cuts every tube into its intervals, tubes of one level side by side.
-    fn add_tubes(&mut self, levels: &[Resolution], picture: &mut Picture, scratch: &mut Scratch) {
+    fn add_tubes(&mut self, levels: &[Level], picture: &mut Picture, scratch: &mut Scratch) {
         scratch.tubes.clear();
         let tubes = self.tracks.iter().enumerate().filter(|(_, t)| matches!(t.actor.form, Form::Tube));
-        scratch.tubes.extend(tubes.map(|(number, _)| (level(levels, number).n, number)));
+        let drawn = tubes.map(|(number, _)| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
+        scratch.tubes.extend(drawn.map(|(at, number)| (at.resolution.n, number)));
         scratch.tubes.sort_unstable();
         for &(n, number) in &scratch.tubes {
             let track = &mut self.tracks[number];
             let Body::Curve(curve) = &track.pose else { continue };
-            let at = level(levels, number);
+            let at = level(levels, number).resolution;
             let frames = track.skeleton.rebuild(curve, at.eps_m);
             let Some(last) = frames.len().checked_sub(1) else { continue };
             let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
@@ -173,9 +178,9 @@ impl Paint {
 }
 
 /// The level asked for an actor, made safe.
-fn level(levels: &[Resolution], number: usize) -> Resolution {
-    let asked = levels.get(number).copied().unwrap_or(Resolution { eps_m: 0.01, n: 3 });
-    Resolution { eps_m: asked.eps_m, n: asked.n.min(N_MAX) }
+fn level(levels: &[Level], number: usize) -> Level {
+    let usual = Resolution { eps_m: 0.01, n: 3 };
+    levels.get(number).copied().unwrap_or_else(|| usual.into()).safe()
 }
 
 fn tint(style: Style, at: Resolution, age_s: f64) -> [u8; 4] {
@@ -348,7 +353,7 @@ mod tests {
     fn later_frames_use_the_storage_of_the_first_ones() {
         let (mut stage, camera) = stage();
         let (mut seen, mut places) = (Vec::new(), Vec::new());
-        let levels = [Resolution { eps_m: 0.005, n: 4 }];
+        let levels = [Resolution { eps_m: 0.005, n: 4 }.into()];
         for frame in 0..6 {
             stage.see(AgentId(0), &tube_at(10 * frame), true);
             stage.pose(SimTime::from_nanos(10_000_000 * frame + 500_000), States::Interpolate);
@@ -367,11 +372,21 @@ mod tests {
         stage.see(AgentId(0), &tube_at(0), true);
         stage.pose(SimTime::ZERO, States::Latest);
         for (eps_m, n, intervals) in [(0.1, 0, 4), (0.005, 3, 80)] {
-            let picture = stage.compose(&camera, &[Resolution { eps_m, n }], Style::default(), None);
+            let picture = stage.compose(&camera, &[Resolution { eps_m, n }.into()], Style::default(), None);
             assert_eq!((picture.tubes[0].intervals, picture.samples.len()), (intervals, intervals as usize + 1));
             let caps = 2 * u64::from(Primitive::Ball.triangles(n));
             assert_eq!(picture.triangles(), u64::from(intervals) * (12 << n) + caps);
         }
+    }
+
+    #[test]
+    fn what_has_no_triangles_is_left_out_of_the_picture() {
+        let (mut stage, camera) = stage();
+        stage.see(AgentId(0), &tube_at(0), true);
+        stage.pose(SimTime::ZERO, States::Latest);
+        let gone = Level { triangles: 0, ..Resolution { eps_m: 0.005, n: 3 }.into() };
+        let picture = stage.compose(&camera, &[gone], Style::default(), None);
+        assert!(picture.tubes.is_empty() && picture.instances.is_empty());
     }
 
     #[test]

@@ -7,6 +7,7 @@
 mod compose;
 mod draw;
 mod gather;
+mod level;
 mod offscreen;
 mod pick;
 mod picture;
@@ -18,6 +19,7 @@ pub mod viewer;
 pub use compose::Hand;
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use gather::{Actor, Form, Look, Material, Prop, Stage, States};
+pub use level::{Level, Shading};
 pub use offscreen::{Gpu, GpuError, Lost, Offscreen, PictureFile};
 pub use pick::Hit;
 pub use picture::{Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, Style};

@@ -44,6 +44,9 @@ impl Span {
         let (least, full) = match view.kind {
             Kind::Tube { length_m, .. } => (count(length_m, eps.1, n.0), count(length_m, eps.0, n.1)),
             Kind::Primitive { triangles, .. } => (f64::from(triangles[level(n.0)]), f64::from(triangles[level(n.1)])),
+            Kind::Counted { least, most, .. } => (f64::from(least.max(1)), f64::from(most)),
+            // its members have polygons of their own
+            Kind::Group { .. } => (0.0, 0.0),
         };
         let full = full.max(least);
         let most = if view.pixels.is_nan() { full } else { full.min(view.pixels).max(least) };
@@ -75,8 +78,18 @@ impl Held {
         *self = Self::default();
     }
 
-    /// The pair (ε, n) for about `wish` polygons.
-    pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> Resolution {
+    /// The pair (ε, n) for about `wish` polygons, and the polygons it makes.
+    pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> (Resolution, f64) {
+        let at = self.resolution(view, span, wish);
+        let makes = match (view.kind, self.cut) {
+            // any count will do: no level of it is rounded to
+            (Kind::Counted { .. }, Some((cut, _))) => libm::floor(within(cut, span)),
+            _ => polygons(view, at),
+        };
+        (at, makes)
+    }
+
+    fn resolution(&mut self, view: &ObjectView, span: Span, wish: f64) -> Resolution {
         let end = if wish <= span.least * (1.0 + AT_AN_END) {
             Some(Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 })
         } else if wish >= span.full * (1.0 - AT_AN_END) {
@@ -96,6 +109,8 @@ impl Held {
         let n = match view.kind {
             Kind::Tube { length_m, radius_m } => tube_level(polygons, (length_m, radius_m), view.range, before),
             Kind::Primitive { ref triangles, .. } => primitive_level(polygons, triangles, view.range.n, before),
+            Kind::Counted { least, .. } => octaves(polygons / f64::from(least.max(1))),
+            Kind::Group { .. } => OPEN,
         };
         let n = n.clamp(view.range.n.0, view.range.n.1);
         self.cut = Some((polygons, n));
@@ -107,7 +122,7 @@ impl Held {
 fn spacing_m(view: &ObjectView, polygons: f64, n: u8) -> f64 {
     match view.kind {
         Kind::Tube { length_m, .. } => PATCH_TRIANGLES * two_to(n) * length_m / polygons,
-        Kind::Primitive { .. } => view.range.eps_m.1,
+        Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,
     }
 }
 
@@ -116,7 +131,30 @@ pub(super) fn polygons(view: &ObjectView, at: Resolution) -> f64 {
     match view.kind {
         Kind::Tube { length_m, .. } => count(length_m, at.eps_m, at.n),
         Kind::Primitive { triangles, .. } => f64::from(triangles[level(at.n)]),
+        Kind::Counted { least, most, .. } => {
+            (f64::from(least.max(1)) * two_to(at.n)).min(f64::from(most.max(least).max(1)))
+        }
+        Kind::Group { proxy_triangles, .. } => {
+            if at.n == OPEN {
+                0.0
+            } else {
+                f64::from(proxy_triangles)
+            }
+        }
     }
+}
+
+/// Level n of a group whose members are drawn as themselves.
+pub(super) const OPEN: u8 = 1;
+
+fn within(polygons: f64, span: Span) -> f64 {
+    polygons.max(span.least).min(span.full)
+}
+
+/// Whole doublings, 0 where there is none.
+fn octaves(times: f64) -> u8 {
+    // a cast of floats saturates, and takes NaN to 0
+    (libm::floor(libm::log2(times)) as u8).min(N_MAX)
 }
 
 /// ⌈L/ε⌉ patches of level n.
@@ -170,7 +208,18 @@ mod tests {
         let range = ResolutionRange { eps_m, n };
         let kind = Kind::Tube { length_m: 1.5, radius_m: 0.015 };
         let (pixels, distance_m, speed_px_s) = (1e9, 0.5, 0.0);
-        ObjectView { id: AgentId(0), kind, range, pixels, distance_m, speed_px_s, importance: 1.0, visible: true }
+        let shading = Default::default();
+        ObjectView {
+            id: AgentId(0),
+            kind,
+            range,
+            shading,
+            pixels,
+            distance_m,
+            speed_px_s,
+            importance: 1.0,
+            visible: true,
+        }
     }
 
     /// Length of a ring over length of a side.
@@ -186,7 +235,7 @@ mod tests {
         let mut levels = Vec::new();
         let mut wish = 1300.0;
         while wish < 4e5 {
-            let at = held.choose(&view, span, wish);
+            let (at, _) = held.choose(&view, span, wish);
             // the hold, and one interval of rounding in the 45 or more that there are
             assert!((polygons(&view, at) / wish).ln().abs() <= HOLD + 1.0 / 45.0, "{wish}: {at:?}");
             // half an octave to either side of the level, and the band
@@ -204,7 +253,7 @@ mod tests {
         for start in 0..200 {
             let (middle, mut held) = (3000.0 * 1.02_f64.powi(start), Held::default());
             let wish = |k: i32| middle * if k % 2 == 0 { 0.93 } else { 1.07 }; // less than the band, √2 wide
-            let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).n).collect();
+            let mut levels: Vec<_> = (0..20).map(|k| held.choose(&view, span, wish(k)).0.n).collect();
             levels.dedup();
             assert!(levels.len() <= 2, "{middle}: {levels:?}");
         }
@@ -217,7 +266,7 @@ mod tests {
         {
             let view = tube(eps_m, n);
             let (span, mut held) = (Span::of(&view), Held::default());
-            let mut ends = |wish| held.choose(&view, span, wish);
+            let mut ends = |wish| held.choose(&view, span, wish).0;
             assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
             assert_eq!(ends(span.full), Resolution { eps_m: eps_m.0, n: n.1 });
             assert_eq!(ends(span.least), Resolution { eps_m: eps_m.1, n: n.0 });
@@ -228,8 +277,21 @@ mod tests {
     fn a_tube_of_one_spacing_climbs_by_levels() {
         let view = tube((0.01, 0.01), (0, 6));
         let (span, mut held) = (Span::of(&view), Held::default());
-        let levels: Vec<_> = (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).n).collect();
+        let levels: Vec<_> = (0..160).map(|k| held.choose(&view, span, span.least * 1.03_f64.powi(k)).0.n).collect();
         assert!(levels.is_sorted() && levels[0] == 0 && *levels.last().unwrap() == 6, "{levels:?}");
+    }
+
+    #[test]
+    fn what_is_cut_by_triangles_has_as_many_as_are_wished_for() {
+        let kind = Kind::Counted { radius_m: 0.1, least: 40, most: 100_000 };
+        let view = ObjectView { kind, ..tube((1.0, 1.0), (0, 10)) };
+        let (span, mut held) = (Span::of(&view), Held::default());
+        for wish in [1.0, 40.0, 123.4, 9_999.0, 1e9] {
+            let (_, polygons) = held.choose(&view, span, wish);
+            assert_eq!(polygons, wish.floor().clamp(40.0, 100_000.0));
+        }
+        assert_eq!(polygons(&view, Resolution { eps_m: 1.0, n: 3 }), 320.0);
+        assert_eq!(polygons(&view, Resolution { eps_m: 1.0, n: 10 }), 40_960.0);
     }
 
     #[test]

@@ -14,4 +14,4 @@ pub use level::PRIMITIVE_LEVELS;
 pub use picture::{FrameWork, LevelDemand, PictureControl, Plan};
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure};
 pub use status::Status;
-pub use view::{Kind, Law, ObjectView, Policy};
+pub use view::{Kind, Law, ObjectView, Policy, Shading};

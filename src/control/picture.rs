@@ -7,7 +7,7 @@
 
 use super::level::{self, Held, Span};
 use super::status::Status;
-use super::view::{Kind, Law, ObjectView, Policy};
+use super::view::{Kind, Law, ObjectView, Policy, Shading};
 use metachron_agents::{AgentId, N_MAX, Resolution};
 use metachron_budget::grisoni::{GrisoniLaw, Limits};
 use metachron_budget::log_law::LogLaw;
@@ -39,10 +39,13 @@ pub struct FrameWork {
 pub struct LevelDemand {
     /// Which one.
     pub id: AgentId,
-    /// Its pair (ε, n), inside its range.
+    /// Its pair (ε, n), inside its range; of a group n = 0 is its proxy, 1 its members.
     pub resolution: Resolution,
-    /// Triangles that makes; 0 out of sight.
+    /// Triangles to draw it with: of what is cut by triangles exactly so many. 0: it is left out of the picture, as members of a group
+    /// are that is drawn by its proxy, and groups that are drawn as their members. Out of sight: its coarsest, for its shadow.
     pub polygons: f64,
+    /// How to shade it.
+    pub shading: Shading,
 }
 
 /// What to draw the next frame with.
@@ -135,7 +138,8 @@ impl PictureControl {
             (Policy::Feedback, Law::Corrected { .. }) => self.plan_corrected(),
             (Policy::Feedback, Law::Printed { .. }) => self.plan_printed(),
         }
-        self.plan.polygons = self.plan.levels.iter().map(|l| l.polygons).sum();
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
         self.plan.full_polygons = self.in_view().map(|(_, span)| span.full).sum();
         &self.plan
     }
@@ -172,8 +176,12 @@ impl PictureControl {
     fn plan_full(&mut self) {
         for (view, span) in &self.views {
             let resolution = Resolution { eps_m: view.range.eps_m.0, n: view.range.n.1 };
-            let polygons = if view.visible { span.full } else { 0.0 };
-            self.plan.levels.push(LevelDemand { id: view.id, resolution, polygons });
+            self.plan.levels.push(LevelDemand {
+                id: view.id,
+                resolution,
+                polygons: span.full,
+                shading: view.shading.1,
+            });
         }
     }
 
@@ -186,8 +194,9 @@ impl PictureControl {
         self.water = water_level(budget, self.in_view().map(share), self.water);
         let water = self.water;
         self.plan.levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
-        self.choose(water, |view| !is_tube(view));
-        let taken: f64 = self.plan.levels.iter().map(|level| level.polygons).sum();
+        self.choose(water, |view| !is_tube(view) && !is_group(view));
+        let bodies = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible && !is_tube(view));
+        let taken: f64 = bodies.map(|(_, level)| level.polygons).sum();
         let tubes = self.in_view().filter(|(view, _)| is_tube(view)).map(share);
         let water = water_level(budget - taken, tubes, water);
         self.choose(water, is_tube);
@@ -199,8 +208,7 @@ impl PictureControl {
         for (seen, level) in all.filter(|((view, _), _)| of(view)) {
             let held = self.held.entry(seen.0.id).or_default();
             if seen.0.visible {
-                level.resolution = held.choose(&seen.0, seen.1, share(seen).at(water));
-                level.polygons = level::polygons(&seen.0, level.resolution);
+                (level.resolution, level.polygons) = held.choose(&seen.0, seen.1, share(seen).at(water));
             } else {
                 held.forget();
             }
@@ -233,12 +241,13 @@ impl PictureControl {
             }
             let eps_m = match view.kind {
                 Kind::Tube { length_m, .. } => self.printed.eps() * length_m / INTERVALS_AT_ONE * weight(view, mean),
-                Kind::Primitive { .. } => view.range.eps_m.1,
+                Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,
             };
             let wish = Resolution { eps_m, n: self.printed.n() };
-            let resolution = if view.visible { view.range.clamp(wish) } else { coarsest(view) };
-            let polygons = if view.visible { level::polygons(view, resolution) } else { 0.0 };
-            self.plan.levels.push(LevelDemand { id: view.id, resolution, polygons });
+            let chosen = view.visible && !is_group(view);
+            let resolution = if chosen { view.range.clamp(wish) } else { coarsest(view) };
+            let polygons = level::polygons(view, resolution);
+            self.plan.levels.push(LevelDemand { id: view.id, resolution, polygons, shading: view.shading.1 });
         }
     }
 
@@ -365,17 +374,24 @@ fn is_tube(view: &ObjectView) -> bool {
     matches!(view.kind, Kind::Tube { .. })
 }
 
+fn is_group(view: &ObjectView) -> bool {
+    matches!(view.kind, Kind::Group { .. })
+}
+
 /// What an object in view may get of the polygons (control.md, eq. 14).
 fn share((view, span): &(ObjectView, Span)) -> Share {
     Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
 }
 
 fn unseen(view: &ObjectView) -> LevelDemand {
-    LevelDemand { id: view.id, resolution: coarsest(view), polygons: 0.0 }
+    let resolution = coarsest(view);
+    LevelDemand { id: view.id, resolution, polygons: level::polygons(view, resolution), shading: view.shading.1 }
 }
 
+/// Groups are opened by this law, always: their members make room for each other.
 fn coarsest(view: &ObjectView) -> Resolution {
-    Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 }
+    let n = if is_group(view) { level::OPEN } else { view.range.n.0 };
+    Resolution { eps_m: view.range.eps_m.1, n }
 }
 
 fn weight(view: &ObjectView, mean: f64) -> f64 {

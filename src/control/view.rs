@@ -16,6 +16,18 @@ pub enum Policy {
     Feedback,
 }
 
+/// How the light on a surface is worked out: the rendering algorithm of (FS93), cheapest first.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Shading {
+    /// One colour a triangle.
+    Flat,
+    /// Colours at corners, interpolated between them.
+    Gouraud,
+    /// Light at every pixel.
+    #[default]
+    PerPixel,
+}
+
 /// The feedback law and its gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
@@ -92,6 +104,24 @@ pub enum Kind {
         /// Triangles at each level n; rising, or the same from some level on.
         triangles: [u32; PRIMITIVE_LEVELS],
     },
+    /// A mesh that can be cut at any number of triangles.
+    Counted {
+        /// Radius of a ball that holds it, metres, > 0.
+        radius_m: f64,
+        /// The fewest triangles that it is drawn with, ≥ 1.
+        least: u32,
+        /// All its triangles, ≥ `least`.
+        most: u32,
+    },
+    /// Objects that can be drawn as one: at n = 0 by a proxy, at n = 1 as themselves.
+    Group {
+        /// Radius of a ball that holds it, metres, > 0.
+        radius_m: f64,
+        /// Its members among the objects given with it: the number of the first, and how many.
+        members: (usize, usize),
+        /// Triangles of its proxy, ≥ 1.
+        proxy_triangles: u32,
+    },
 }
 
 /// An object as the camera sees it.
@@ -101,8 +131,10 @@ pub struct ObjectView {
     pub id: AgentId,
     /// What is drawn.
     pub kind: Kind,
-    /// The pairs (ε, n) that its picture may have. Of a primitive, n alone counts.
+    /// The pairs (ε, n) that its picture may have. Of a primitive, n alone counts; of what is cut by triangles or a group, neither.
     pub range: ResolutionRange,
+    /// The cheapest and the best shading that it may have, alike where it is fixed.
+    pub shading: (Shading, Shading),
     /// Area it covers, pixels, ≥ 0. No object gets more than one triangle a pixel.
     pub pixels: f64,
     /// Distance of its centre from the eye, metres, > 0.
@@ -135,7 +167,9 @@ impl ObjectView {
     pub(super) fn surface_m2(&self) -> f64 {
         let area = match self.kind {
             Kind::Tube { length_m, radius_m } => std::f64::consts::TAU * radius_m * length_m,
-            Kind::Primitive { radius_m, .. } => 2.0 * std::f64::consts::TAU * radius_m * radius_m,
+            Kind::Primitive { radius_m, .. } | Kind::Counted { radius_m, .. } | Kind::Group { radius_m, .. } => {
+                2.0 * std::f64::consts::TAU * radius_m * radius_m
+            }
         };
         if area.is_finite() { area.max(1e-12) } else { 1.0 }
     }

@@ -6,8 +6,10 @@
 use super::error::SessionError;
 use super::governor::RateGovernor;
 use super::ties::{Ties, faults};
-use crate::compositor::{Actor, Camera, Form, Look, Material, Prop, Seen, Stage};
-use crate::control::{Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits};
+use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, Seen, Stage};
+use crate::control::{
+    self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits,
+};
 use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind};
 use crate::scene::{self, Member, Scene, Spec};
@@ -179,12 +181,24 @@ pub(super) fn view(seen: &Seen, member: &Member) -> ObjectView {
         id: seen.id,
         kind,
         range: member.picture,
+        shading: Default::default(),
         pixels: seen.pixels,
         distance_m: seen.distance_m,
         speed_px_s: seen.speed_px_s,
         importance: member.look.importance,
         visible: seen.visible,
     }
+}
+
+/// What control demands, as the compositor wants to know it.
+pub(super) fn level(demand: &LevelDemand) -> Level {
+    let shading = match demand.shading {
+        control::Shading::Flat => compositor::Shading::Flat,
+        control::Shading::Gouraud => compositor::Shading::Gouraud,
+        control::Shading::PerPixel => compositor::Shading::PerPixel,
+    };
+    // a cast of floats saturates
+    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading }
 }
 
 /// Triangles of an object that is one mesh a level, at every level.

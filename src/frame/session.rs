@@ -8,12 +8,12 @@ use super::couplings::{Coupling, Couplings};
 use super::error::SessionError;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 use super::trace::Trace;
-use crate::compositor::{Camera, Hand, Picture, Seen, Size, Stage, States, Style};
+use crate::compositor::{Camera, Hand, Level, Picture, Seen, Size, Stage, States, Style};
 use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
 use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
 use crate::scene::format::{ExecutorKind, LawKind, PolicyKind, StatesKind};
 use crate::scene::{Probe, Scene};
-use metachron_agents::{AgentId, Body, Pull, Resolution, SimTime, Snapshot};
+use metachron_agents::{AgentId, Body, Pull, SimTime, Snapshot};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -27,7 +27,7 @@ pub struct Session {
     newest: Vec<Arc<Snapshot>>,
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
-    levels: Vec<Resolution>,
+    levels: Vec<Level>,
     couplings: Couplings,
     trace: Option<Trace>,
     records: Vec<FrameRecord>,
@@ -203,7 +203,7 @@ impl Session {
 
     /// The level each agent was last drawn at, in their order.
     #[must_use]
-    pub fn levels(&self) -> &[Resolution] {
+    pub fn levels(&self) -> &[Level] {
         &self.levels
     }
 
@@ -281,7 +281,7 @@ impl Session {
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.run.shutdown();
-        let drawn = |at: usize| self.levels.get(at).copied();
+        let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
         Outcome {
             scene,
             policy,
@@ -347,7 +347,7 @@ impl Session {
         self.views.extend(self.seen.iter().zip(&self.scene.agents).map(|(seen, member)| cast::view(seen, member)));
         let plan = self.control.plan(&self.views);
         self.levels.clear();
-        self.levels.extend(plan.levels.iter().map(|level| level.resolution));
+        self.levels.extend(plan.levels.iter().map(cast::level));
         self.chosen.objects = self.seen.iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
     }
@@ -375,7 +375,8 @@ impl Session {
         let mean = |tubes_only: bool| {
             let drawn =
                 self.seen.iter().zip(&self.levels).filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
-            let (sum, count) = drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.n), count + 1.0));
+            let (sum, count) =
+                drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
             (count > 0.0).then(|| sum / count)
         };
         mean(true).or_else(|| mean(false)).unwrap_or(0.0)

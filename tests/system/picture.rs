@@ -9,9 +9,9 @@ mod stage;
 use glam::DVec3;
 use image::RgbaImage;
 use metachron::compositor::{
-    Camera, Colouring, DrawError, Gpu, GpuError, Hand, Offscreen, RendererOptions, Size, Stage, States, Style,
+    Camera, Colouring, DrawError, Gpu, GpuError, Hand, Level, Offscreen, RendererOptions, Size, Stage, States, Style,
 };
-use metachron_agents::{AgentId, Anchor, Body, CurveState, Resolution, SimTime, Snapshot};
+use metachron_agents::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -30,14 +30,14 @@ fn gpu() -> Option<Gpu> {
     }
 }
 
-fn draw(gpu: &Gpu, stage: &mut Stage, camera: &Camera, levels: &[Resolution], style: Style) -> RgbaImage {
+fn draw(gpu: &Gpu, stage: &mut Stage, camera: &Camera, levels: &[Level], style: Style) -> RgbaImage {
     draw_with(gpu, (stage, camera), levels, style, OPTIONS)
 }
 
 fn draw_with(
     gpu: &Gpu,
     (stage, camera): (&mut Stage, &Camera),
-    levels: &[Resolution],
+    levels: &[Level],
     style: Style,
     options: RendererOptions,
 ) -> RgbaImage {

@@ -1,7 +1,7 @@
 //! A still life for pictures: a folded tube in a tray, three rigid bodies, two tools. No physics runs.
 
 use glam::{DQuat, DVec3};
-use metachron::compositor::{Actor, Camera, Form, Look, Material, Prop, Stage, States};
+use metachron::compositor::{Actor, Camera, Form, Level, Look, Material, Prop, Stage, States};
 use metachron_agents::shape::{Obstacle, Solid, ToolShape};
 use metachron_agents::{
     AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState,
@@ -119,6 +119,6 @@ pub fn folded_tube(n: usize) -> CurveState {
 }
 
 /// One level for all actors.
-pub fn level(eps_m: f64, n: u8) -> Vec<Resolution> {
-    vec![Resolution { eps_m, n }; 6]
+pub fn level(eps_m: f64, n: u8) -> Vec<Level> {
+    vec![Resolution { eps_m, n }.into(); 6]
 }

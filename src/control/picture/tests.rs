@@ -24,6 +24,7 @@ fn object(id: u32, kind: Kind, range: ResolutionRange) -> ObjectView {
         id: AgentId(id),
         kind,
         range,
+        shading: Default::default(),
         pixels: kind_pixels,
         distance_m,
         speed_px_s,
@@ -199,13 +200,30 @@ fn what_is_out_of_sight_takes_nothing_and_comes_back_at_once() {
     run.objects.push(tube(6));
     run.frames(100);
     run.objects[6].visible = false;
-    let alone = run.control.plan(&run.objects);
-    assert_eq!(alone.levels[6].polygons, 0.0);
+    let alone = run.control.plan(&run.objects).clone();
+    let of_others: f64 = alone.levels[..6].iter().map(|level| level.polygons).sum();
+    assert_eq!(alone.polygons, of_others);
     assert!(alone.polygons > 0.0 && alone.levels[6].resolution == coarsest(&run.objects[6]));
     run.frames(100);
     run.objects[6].visible = true;
     let both = run.control.plan(&run.objects);
     assert!((both.levels[6].polygons / both.levels[0].polygons - 1.0).abs() < 0.05, "{both:?}"); // hold and rounding
+}
+
+#[test]
+fn feedback_draws_the_members_of_a_group_as_themselves() {
+    let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
+    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), proxy_triangles: 12 };
+    run.objects.push(object(9, kind, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
+    let mesh = Kind::Counted { radius_m: 0.1, least: 20, most: 50_000 };
+    run.objects.push(object(7, mesh, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) }));
+    for law in [Law::CORRECTED, Law::PRINTED] {
+        run.control.set_law(law);
+        run.frames(100);
+        let levels = &run.control.plan(&run.objects).levels;
+        assert_eq!((levels[6].resolution.n, levels[6].polygons), (1, 0.0), "{law:?}");
+        assert!(levels[..6].iter().chain(&levels[7..]).all(|level| level.polygons > 0.0), "{law:?}: {levels:?}");
+    }
 }
 
 #[test]
