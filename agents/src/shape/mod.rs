@@ -3,6 +3,7 @@
 mod convert;
 mod curve;
 pub(crate) mod field;
+mod generate;
 mod grid;
 mod mesh;
 mod mesh_field;
@@ -11,16 +12,19 @@ pub mod patch;
 mod primitive;
 mod solid;
 pub(crate) mod strand;
+mod tom;
 mod tool;
 
 pub use convert::ShapeError;
 pub(crate) use convert::{Triangles, bounds, hull_triangles, is_closed, mesh_triangles};
 pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
+pub use generate::{Generator, generate};
 pub(crate) use grid::Grid;
 pub use mesh::{creased_mesh, hull_mesh};
 pub(crate) use near::near_segments;
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use solid::{Obstacle, Solid};
+pub use tom::{Cut, Tom, TomError};
 pub use tool::{ToolPart, ToolShape};
 
 #[cfg(test)]

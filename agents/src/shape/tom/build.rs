@@ -1,0 +1,236 @@
+//! The order in which a mesh loses its vertices.
+//!
+//! In: a welded mesh. Out: a [`Tom`] without its errors. Never here: cuts.
+//! Each position waits in a heap with its cheapest sound collapse; whoever's surroundings change is looked at anew.
+
+use super::quadric::Quadric;
+use super::topology::{Surface, Verdict, direction};
+use super::weld::Welded;
+use super::{SAME_PLACE, Tom};
+use glam::{DVec3, Vec3};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// How far faces may turn in a collapse, as cosines: first no more than this, at last as far as it takes.
+const TURNS: [f64; 2] = [0.2, -2.0];
+/// Weight of a rim against a surface of the same width.
+const RIM_WEIGHT: f64 = 4.0;
+/// What a collapse costs for its length alone, as a share of what going off by that length costs: flat regions thin out evenly.
+const LENGTH_SHARE: f64 = 1e-4;
+
+/// A collapse that waits: the bits of its cost (not negative, so they sort as it does), who goes, to whom, at which look.
+type Waiting = Reverse<(u64, u32, u32, u32)>;
+
+struct Builder {
+    surface: Surface,
+    /// Wedges of each triangle as collapses leave them.
+    corners: Vec<[u32; 3]>,
+    /// The normal of each wedge.
+    normals: Vec<Vec3>,
+    /// Wedges at each position.
+    wedges: Vec<Vec<u32>>,
+    quadrics: Vec<Quadric>,
+    /// The substitute of each wedge; itself while it stands.
+    substitutes: Vec<u32>,
+    /// When each triangle vanished, counted in collapses from 1; 0 while it stands.
+    gone: Vec<u32>,
+    /// Positions in the order in which they went.
+    order: Vec<u32>,
+    heap: BinaryHeap<Waiting>,
+    /// How often each position was looked at: what waits from an earlier look is void.
+    looks: Vec<u32>,
+    neighbours: Vec<(u32, u8)>,
+    prices: Vec<(f64, u32)>,
+}
+
+/// Orders a mesh.
+pub(super) fn ordered(welded: Welded) -> Tom {
+    let full = welded.triangles.clone();
+    let mut builder = Builder::new(&welded);
+    for turn in TURNS {
+        builder.collapse_all(turn);
+    }
+    builder.sorted(&welded, &full)
+}
+
+impl Builder {
+    fn new(welded: &Welded) -> Self {
+        let points: Vec<DVec3> = welded.places.iter().map(|p| p.as_dvec3()).collect();
+        let count = points.len();
+        let triangles = welded.triangles.iter().map(|t| t.map(|w| welded.place_of[w as usize])).collect();
+        let mut wedges = vec![Vec::new(); count];
+        welded.place_of.iter().enumerate().for_each(|(w, &p)| wedges[p as usize].push(w as u32));
+        let surface = Surface::new(points, triangles);
+        Self {
+            quadrics: quadrics(&surface),
+            corners: welded.triangles.clone(),
+            normals: welded.wedges.iter().map(|w| w.normal).collect(),
+            wedges,
+            substitutes: (0..welded.wedges.len() as u32).collect(),
+            gone: vec![0; surface.triangles.len()],
+            order: Vec::with_capacity(count),
+            heap: BinaryHeap::with_capacity(2 * count),
+            looks: vec![0; count],
+            neighbours: Vec::new(),
+            prices: Vec::new(),
+            surface,
+        }
+    }
+
+    /// Collapses until nothing may go any more.
+    fn collapse_all(&mut self, turn: f64) {
+        (0..self.looks.len() as u32).for_each(|p| self.look(p, turn));
+        while let Some(Reverse((_, u, v, look))) = self.heap.pop() {
+            if self.looks[u as usize] != look {
+                continue;
+            }
+            // what is two steps away may have changed since
+            if self.surface.verdict(u, v, turn).is_some() {
+                self.collapse(u, v, turn);
+            } else {
+                self.look(u, turn);
+            }
+        }
+    }
+
+    /// Finds the cheapest sound collapse of `p` and lets it wait.
+    fn look(&mut self, p: u32, turn: f64) {
+        self.looks[p as usize] += 1;
+        if self.surface.around[p as usize].is_empty() {
+            return;
+        }
+        let mut neighbours = std::mem::take(&mut self.neighbours);
+        self.surface.neighbours(p, &mut neighbours);
+        self.prices.clear();
+        let area: f64 = self.surface.around[p as usize].iter().map(|&t| self.area(t)).sum();
+        for &(to, _) in &neighbours {
+            let (from, at) = (self.surface.points[p as usize], self.surface.points[to as usize]);
+            let slide = LENGTH_SHARE * area * from.distance_squared(at);
+            self.prices.push((self.quadrics[p as usize].at(at) + slide, to));
+        }
+        self.neighbours = neighbours;
+        self.prices.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict(p, to, turn)?));
+        let Some((price, to, verdict)) = self.prices.iter().find_map(judged) else { return };
+        let price = if verdict == Verdict::Vanishes { price + self.loss(p, to) } else { price };
+        self.heap.push(Reverse((price.to_bits(), p, to, self.looks[p as usize])));
+    }
+
+    /// What it costs that a small part loses triangles: all of their area goes off by the collapse's length.
+    fn loss(&self, u: u32, v: u32) -> f64 {
+        let both = |t: &&u32| self.surface.triangles[**t as usize].contains(&v);
+        let area: f64 = self.surface.around[u as usize].iter().filter(both).map(|&t| self.area(t)).sum();
+        area * self.surface.points[u as usize].distance_squared(self.surface.points[v as usize])
+    }
+
+    fn area(&self, t: u32) -> f64 {
+        let [a, b, c] = self.surface.triangles[t as usize].map(|p| self.surface.points[p as usize]);
+        0.5 * (b - a).cross(c - a).length()
+    }
+
+    fn collapse(&mut self, u: u32, v: u32, turn: f64) {
+        self.substitute_wedges(u, v);
+        self.order.push(u);
+        let step = self.order.len() as u32;
+        let mut touched = std::mem::take(&mut self.neighbours);
+        self.surface.neighbours(u, &mut touched);
+        let (gone, surface) = (&mut self.gone, &mut self.surface);
+        surface.collapse(u, v, |t| gone[t as usize] = step);
+        let of_u = self.quadrics[u as usize];
+        self.quadrics[v as usize] += of_u;
+        self.looks[u as usize] += 1;
+        let mut around: Vec<u32> = touched.iter().map(|(p, _)| *p).collect();
+        self.surface.neighbours(v, &mut touched);
+        around.extend(touched.iter().map(|(p, _)| *p).filter(|p| !around.contains(p)).collect::<Vec<_>>());
+        self.neighbours = touched;
+        for p in around {
+            match self.surface.around[p as usize].is_empty() {
+                true if p == v => {}
+                true => self.strand(p, v),
+                false => self.look(p, turn),
+            }
+        }
+        if self.surface.around[v as usize].is_empty() {
+            self.strand(v, v);
+        }
+    }
+
+    /// A position that no triangle uses any more goes at once; the last of its part stays where it is.
+    fn strand(&mut self, p: u32, v: u32) {
+        self.looks[p as usize] += 1;
+        self.order.push(p);
+        for &w in &self.wedges[p as usize] {
+            self.substitutes[w as usize] = if p == v { w } else { self.wedges[v as usize][0] };
+        }
+    }
+
+    /// Every wedge of `u` gets the wedge of `v` on its own side of the crease, else the one with the nearest normal.
+    fn substitute_wedges(&mut self, u: u32, v: u32) {
+        let place = |t: u32, i: usize| self.surface.triangles[t as usize][i];
+        let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(self.wedges[u as usize].len());
+        for &w in &self.wedges[u as usize] {
+            let beside = self.surface.around[u as usize].iter().find_map(|&t| {
+                let corners = self.corners[t as usize];
+                let own = (0..3).any(|i| corners[i] == w);
+                (0..3).find(|&i| own && place(t, i) == v).map(|i| corners[i])
+            });
+            let alike = |to: &&u32| self.normals[w as usize].dot(self.normals[**to as usize]);
+            let nearest = self.wedges[v as usize].iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
+            pairs.push((w, beside.or(nearest.copied()).unwrap_or(w)));
+        }
+        for &(w, to) in &pairs {
+            self.substitutes[w as usize] = to;
+        }
+        for &t in &self.surface.around[u as usize] {
+            let renamed = |w: u32| pairs.iter().find(|(from, _)| *from == w).map_or(w, |(_, to)| *to);
+            self.corners[t as usize] = self.corners[t as usize].map(renamed);
+        }
+    }
+
+    /// The finished mesh: what went last stands first.
+    fn sorted(&self, welded: &Welded, full: &[[u32; 3]]) -> Tom {
+        let mut went = vec![false; self.wedges.len()];
+        self.order.iter().for_each(|&p| went[p as usize] = true);
+        let stay = (0..self.wedges.len() as u32).filter(|&p| !went[p as usize]);
+        let places: Vec<u32> = stay.chain(self.order.iter().rev().copied()).collect();
+        let mut number = vec![0_u32; welded.wedges.len()];
+        let wedges: Vec<u32> = places.iter().flat_map(|&p| self.wedges[p as usize].iter().copied()).collect();
+        wedges.iter().enumerate().for_each(|(new, &old)| number[old as usize] = new as u32);
+        let substitute = |&old: &u32| {
+            let later = self.wedges[welded.place_of[old as usize] as usize][0] != old;
+            number[self.substitutes[old as usize] as usize] | if later { SAME_PLACE } else { 0 }
+        };
+        let mut triangles: Vec<u32> = (0..full.len() as u32).collect();
+        // what stands (0) first, then what vanished last
+        triangles.sort_by_key(|&t| Reverse(self.gone[t as usize].wrapping_sub(1)));
+        Tom {
+            vertices: wedges.iter().map(|&w| welded.wedges[w as usize]).collect(),
+            triangles: triangles.iter().map(|&t| full[t as usize].map(|w| number[w as usize])).collect(),
+            substitutes: wedges.iter().map(substitute).collect(),
+            least: 0,
+            errors: Vec::new(),
+        }
+    }
+}
+
+/// What every position stands for: the planes of its triangles by their areas, and at a rim the planes that stand upright on it.
+fn quadrics(surface: &Surface) -> Vec<Quadric> {
+    let mut quadrics = vec![Quadric::default(); surface.points.len()];
+    for t in &surface.triangles {
+        let corners = t.map(|p| surface.points[p as usize]);
+        let Some(normal) = direction(corners) else { continue };
+        let area = 0.5 * (corners[1] - corners[0]).cross(corners[2] - corners[0]).length();
+        t.iter().for_each(|&p| quadrics[p as usize] += Quadric::plane(normal, corners[0], area / 3.0));
+        for i in 0..3 {
+            let (p, q) = (t[i], t[(i + 1) % 3]);
+            let open =
+                surface.around[p as usize].iter().filter(|&&o| surface.triangles[o as usize].contains(&q)).count() == 1;
+            let edge = corners[(i + 1) % 3] - corners[i];
+            if let (true, Some(upright)) = (open, edge.cross(normal).try_normalize()) {
+                let plane = Quadric::plane(upright, corners[i], RIM_WEIGHT * edge.length_squared());
+                [p, q].iter().for_each(|&p| quadrics[p as usize] += plane);
+            }
+        }
+    }
+    quadrics
+}

@@ -1,0 +1,115 @@
+//! A mesh with each position once: what can be collapsed is positions; the normals at one are its wedges.
+//!
+//! In: a mesh as it is given. Out: positions, wedges, triangles with an area. Never here: order.
+
+use super::super::{PrimitiveMesh, PrimitiveVertex};
+use glam::Vec3;
+use std::collections::BTreeMap;
+
+/// Why a mesh cannot be ordered.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TomError {
+    /// A position is not finite.
+    #[error("vertex {vertex} is not finite")]
+    NotFinite {
+        /// Number of the vertex, from 0.
+        vertex: usize,
+    },
+    /// A triangle names a vertex that does not exist.
+    #[error("triangle {triangle} names vertex {corner}, but there are only {vertices}")]
+    BadCorner {
+        /// Number of the triangle, from 0.
+        triangle: usize,
+        /// The vertex it names.
+        corner: u32,
+        /// How many vertices there are.
+        vertices: usize,
+    },
+    /// No triangle has three corners at different positions.
+    #[error("none of the {triangles} triangles has three different corners")]
+    Empty {
+        /// How many triangles there are.
+        triangles: usize,
+    },
+    /// More vertices or triangles than can be numbered.
+    #[error("{count} vertices or triangles are too many: at most {} can be numbered", TomError::MOST)]
+    TooLarge {
+        /// How many there are.
+        count: usize,
+    },
+}
+
+impl TomError {
+    /// Most vertices, and most triangles.
+    pub const MOST: usize = 1 << 30;
+}
+
+/// A mesh with each position once.
+#[derive(Debug, Default)]
+pub(super) struct Welded {
+    /// Positions.
+    pub places: Vec<Vec3>,
+    /// Every different pair of a position and a normal that a triangle uses.
+    pub wedges: Vec<PrimitiveVertex>,
+    /// The position of each wedge.
+    pub place_of: Vec<u32>,
+    /// Wedges of each triangle.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+impl Welded {
+    pub fn new(mesh: &PrimitiveMesh) -> Result<Self, TomError> {
+        check(mesh)?;
+        let mut welded = Self::default();
+        let (mut places, mut wedges) = (BTreeMap::new(), BTreeMap::new());
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.vertices[i as usize].core + Vec3::ZERO);
+            if a == b || b == c || c == a {
+                continue;
+            }
+            let triangle = t.map(|i| welded.wedge(mesh.vertices[i as usize], &mut places, &mut wedges));
+            welded.triangles.push(triangle);
+        }
+        if welded.triangles.is_empty() {
+            return Err(TomError::Empty { triangles: mesh.triangles.len() });
+        }
+        Ok(welded)
+    }
+
+    fn wedge(
+        &mut self,
+        vertex: PrimitiveVertex,
+        places: &mut BTreeMap<[u32; 3], u32>,
+        wedges: &mut BTreeMap<[u32; 6], u32>,
+    ) -> u32 {
+        // adding zero makes one of the two zeros
+        let core = vertex.core + Vec3::ZERO;
+        let (p, n) = (core.to_array().map(f32::to_bits), (vertex.normal + Vec3::ZERO).to_array().map(f32::to_bits));
+        let place = *places.entry(p).or_insert_with(|| {
+            self.places.push(core);
+            self.places.len() as u32 - 1
+        });
+        *wedges.entry([p[0], p[1], p[2], n[0], n[1], n[2]]).or_insert_with(|| {
+            self.wedges.push(PrimitiveVertex { core, normal: vertex.normal });
+            self.place_of.push(place);
+            self.wedges.len() as u32 - 1
+        })
+    }
+}
+
+fn check(mesh: &PrimitiveMesh) -> Result<(), TomError> {
+    let (vertices, triangles) = (mesh.vertices.len(), mesh.triangles.len());
+    if vertices.max(triangles) > TomError::MOST {
+        return Err(TomError::TooLarge { count: vertices.max(triangles) });
+    }
+    if let Some(vertex) = mesh.vertices.iter().position(|v| !v.core.is_finite()) {
+        return Err(TomError::NotFinite { vertex });
+    }
+    for (triangle, t) in mesh.triangles.iter().enumerate() {
+        if let Some(&corner) = t.iter().find(|i| **i as usize >= vertices) {
+            return Err(TomError::BadCorner { triangle, corner, vertices });
+        }
+    }
+    Ok(())
+}
