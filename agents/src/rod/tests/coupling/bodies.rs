@@ -13,7 +13,7 @@ use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 /// A box of half height 2 cm, 10 cm long and wide, with its middle at `position`.
-fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody {
+pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody {
     let floor = Obstacle {
         name: String::new(),
         solid: Solid::Plane,
@@ -47,7 +47,9 @@ fn lowest_over(stage: &Stage, tube: AgentId, block: AgentId) -> f64 {
 
 #[test]
 fn a_tube_lies_over_a_block_on_the_floor_at_any_rates() {
-    for rates in [(250.0, 250.0), (1000.0, 60.0), (60.0, 1000.0), (60.0, 60.0), (500.0, 10.0), (120.0, 1000.0)] {
+    let equal = [(250.0, 250.0), (60.0, 60.0)];
+    let apart = [(1000.0, 60.0), (500.0, 10.0), (120.0, 1000.0), (60.0, 1000.0), (30.0, 1000.0), (20.0, 240.0)];
+    for rates in equal.into_iter().chain(apart) {
         let mut stage = Stage::new(Faults::default());
         let path_m = vec![DVec3::new(-0.15, 0.0, 0.07), DVec3::new(0.15, 0.0, 0.07)];
         let base = TubeSpec { friction: 0.5, damping_per_s: 3.0, ..reference_spec(1e6, 30) };
