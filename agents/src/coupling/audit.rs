@@ -127,11 +127,12 @@ fn rigid(
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
     let Inertia::Curve(inertia) = &member.snapshot.inertia else { return still(sum, member, state) };
     let mut pushed = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
-    let mut carried = pushed.clone();
+    let (mut carried, mut delivered) = (pushed.clone(), DVec3::ZERO);
     on_their_way(member, members, |_, site, dj, moved| {
         sum.on_its_way(dj);
         let Site::Arc(arc_m) = site else { return };
         let Some((segment, share)) = state.locate(arc_m) else { return };
+        delivered += dj.linear;
         for (list, impulse) in [(&mut pushed, dj), (&mut carried, moved)] {
             list[2 * segment] += impulse.linear * (1.0 - share);
             list[2 * segment + 2] += impulse.linear * share;
@@ -148,7 +149,10 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
     let velocity = |k: usize| state.velocities[k] + pushed[2 * k];
     let spin = |k: usize| inertia.spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
     let moved = CurveState { positions: (0..state.positions.len()).map(shifted).collect(), ..state.clone() };
-    Motion::of(member, &moved, velocity, spin).add(sum, member.snapshot.energy_j, before.kinetic_j);
+    // what a spring of the tube takes of them is its far end's: the sum over all is of what was given
+    let momentum = before.momentum + delivered;
+    let after = Motion { momentum, ..Motion::of(member, &moved, velocity, spin) };
+    after.add(sum, member.snapshot.energy_j, before.kinetic_j);
 }
 
 /// A tube that has not stepped yet, or that nobody could have touched: nothing is on its way to it.

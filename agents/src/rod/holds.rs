@@ -105,6 +105,10 @@ pub struct Tie {
     pub impulse: DVec3,
     /// The part of it that the last substep gave.
     pub given: DVec3,
+    /// What its stiffness in the factor of the substep that ended last resists a change of velocity with, kg.
+    resistance: Sym3,
+    /// What it has taken of impulses from others since and still owes to its far end, N·s.
+    taken: DVec3,
 }
 
 /// What holds the other end of a pull.
@@ -161,6 +165,8 @@ impl Tie {
             ease: DMat3::IDENTITY,
             impulse: DVec3::ZERO,
             given: DVec3::ZERO,
+            resistance: Sym3::default(),
+            taken: DVec3::ZERO,
         })
     }
 
@@ -192,10 +198,29 @@ impl Tie {
         a * (1.0 - self.share) + b * self.share
     }
 
-    /// Books what it gave in a substep of `h` seconds that ended `after` seconds into the step at `x`, moving by `v`.
+    /// Books what it gave in a substep of `h` seconds that ended `after` seconds into the step at `x`, moving by `v`, and what
+    /// it has taken since the last one.
     pub fn book(&mut self, (x, v): (DVec3, DVec3), (h, after): (f64, f64)) {
-        self.given = self.force(x, v, after) * h;
+        self.given = self.force(x, v, after) * h + self.taken;
         self.impulse += self.given;
+        (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
+    }
+
+    /// Notes what it takes where an impulse from another changes the velocities at the ends of its segment by `a` and `b`: the
+    /// factor that the tube answers with holds the tie too (eq. 37a).
+    pub fn take(&mut self, a: DVec3, b: DVec3) {
+        self.taken -= self.resistance * self.mix(a, b);
+    }
+
+    /// Goes on from the same tie of the step before: what that has taken is this one's to pass on.
+    pub fn follow(&mut self, before: &[Self]) {
+        let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
+        self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
+    }
+
+    /// Forgets what the factor held of it: there is a new one without it.
+    pub fn forget(&mut self) {
+        self.resistance = Sym3::default();
     }
 
     /// Force on the point at `x` moving by `v`, `after` seconds into the step, N (eq. 24, 35).

@@ -14,11 +14,13 @@ use crate::{StepError, Surroundings};
 impl Tube {
     /// Lists this step's pulls; none is forgotten and none is made up.
     pub(super) fn take_pulls(&mut self, around: &Surroundings<'_>) {
+        std::mem::swap(&mut self.ties, &mut self.ties_before);
         self.ties.clear();
         self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
         let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
         let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
         self.ties.extend(links.filter_map(|link| Tie::of_link(link, &self.division)));
+        self.ties.iter_mut().for_each(|tie| tie.follow(&self.ties_before));
     }
 
     /// Takes in what others gave since the last step, and looks who is near.
@@ -33,7 +35,7 @@ impl Tube {
         if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {
             self.act_on_itself(around, dt_s).map_err(|lost| self.diverged(lost, dt_s))?;
         }
-        let taken = self.step_by(dt_s, |stepper, now, setting, _| stepper.receive(now, setting, way_m));
+        let taken = self.step_by(dt_s, |stepper, now, setting, ties| stepper.receive(now, setting, (ties, way_m)));
         taken.map_err(|lost| self.diverged(lost, dt_s))?;
         if around.neighbours.iter().any(|n| n.form.is_some() || n.owned) {
             let bounds = bounds(&self.now, self.widest_m());

@@ -1,11 +1,12 @@
 //! What other agents gave a tube since its last step, and how the tube takes it.
 //!
-//! In: impulses at rest arc lengths, and how far they have carried by now. Out: the state with both in it.
-//! Never here: who gave them, and why. Theory: docs/theory/rod.md, eq. 37.
+//! In: impulses at rest arc lengths, and how far they have carried by now. Out: the state with both in it, and what springs
+//! from outside took of them. Never here: who gave them, and why. Theory: docs/theory/rod.md, eq. 37.
 
 use super::band::Factor;
 use super::config::{Config, Matter};
 use super::division::Division;
+use super::holds::Tie;
 use super::turn::{exp, unit};
 use crate::coupling::{Impulse, Site, Slots};
 use glam::DVec3;
@@ -62,8 +63,14 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
     ///
-    /// No node is carried farther than `way_m`.
-    pub fn apply(&mut self, state: &mut Config, factor: &Factor, (matter, division): (&Matter, &Division), way_m: f64) {
+    /// No node is carried farther than `way_m`. `ties` are those that the factor holds: each notes what it takes.
+    pub fn apply(
+        &mut self,
+        state: &mut Config,
+        (factor, ties): (&Factor, &mut [Tie]),
+        (matter, division): (&Matter, &Division),
+        way_m: f64,
+    ) {
         let Self { sum, carried, .. } = self;
         for list in [&mut *sum, &mut *carried] {
             hold(list, matter.held);
@@ -75,6 +82,7 @@ impl Received {
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
+        ties.iter_mut().for_each(|tie| tie.take(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
         state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
         let turns = carried.iter().skip(1).step_by(2);
         state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));

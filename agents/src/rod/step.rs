@@ -106,17 +106,23 @@ impl Stepper {
         Ok(taken)
     }
 
-    /// Takes what others gave into `now`: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is moved farther than `way_m`.
+    /// Takes what others gave into `now`: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is moved farther than `way_m`. `ties` are
+    /// those of the step before.
     ///
     /// # Errors
     /// [`Lost`] where the system cannot be factored; `now` is then untouched.
-    pub fn receive(&mut self, now: &mut Config, setting: &Setting<'_>, way_m: f64) -> Result<(), Lost> {
+    pub fn receive(
+        &mut self,
+        now: &mut Config,
+        setting: &Setting<'_>,
+        (ties, way_m): (&mut [Tie], f64),
+    ) -> Result<(), Lost> {
         if self.company.received().is_empty() {
             return Ok(());
         }
         self.prepare(now, setting)?;
         let Self { company, factor, .. } = self;
-        company.received().apply(now, factor, (setting.matter, setting.division), way_m);
+        company.received().apply(now, (factor, ties), (setting.matter, setting.division), way_m);
         Ok(())
     }
 

@@ -36,6 +36,7 @@ pub struct Tube {
     remesher: Remesher,
     springs: Vec<NodeSpring>,
     pub(super) ties: Vec<Tie>,
+    pub(super) ties_before: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
     rest: RestWatch,
     pub(super) at_rest: bool,
@@ -82,6 +83,7 @@ impl Tube {
             remesher: Remesher::default(),
             springs: vec![],
             ties: vec![],
+            ties_before: vec![],
             grips: vec![],
             rest: RestWatch::default(),
             at_rest: false,
@@ -307,6 +309,7 @@ impl Agent for Tube {
         self.now = next;
         springs(&self.spec.attachments, &self.division, &mut self.springs);
         self.stepper.forget();
+        self.ties.iter_mut().for_each(Tie::forget);
         self.rest.wake();
         self.at_rest = false;
         if self.stepper.company.is_watched() {

@@ -4,6 +4,7 @@
 
 mod bodies;
 mod capstan;
+mod closed;
 mod meetings;
 mod received;
 mod tools;
