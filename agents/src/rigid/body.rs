@@ -167,7 +167,7 @@ impl RigidBody {
     /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.
     fn parts(&mut self, dt: f64) -> u32 {
         let alone = self.ties.is_empty() && !self.company.has_tubes();
-        let free = alone && self.free_times(self.gravity, dt).into_iter().all(|free| free >= dt);
+        let free = alone && self.is_free(self.gravity, dt);
         if free { 1 } else { (dt / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32 }
     }
 

@@ -38,6 +38,39 @@ pub(super) struct Mover {
     pub swing_m: f64,
 }
 
+/// What lies ahead of a flight: seconds of it that are certainly free.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Ahead {
+    /// Until something is touched that does not bounce, or that hardly comes nearer.
+    pub near_s: f64,
+    /// Until something is touched that comes at the body and bounces off it.
+    pub coming_s: f64,
+}
+
+/// How far off something is: seconds of free flight until it may be touched, and how fast it comes nearer along the normal, m/s.
+pub(super) type Approach = (f64, f64);
+
+/// What comes nearer more slowly than this does not bounce, m/s: from the ground it would be back within 4 ms.
+const BOUNCE_M_S: f64 = 0.02;
+
+impl Ahead {
+    /// Nothing for `horizon` seconds.
+    pub(super) const fn clear(horizon: f64) -> Self {
+        Self { near_s: horizon, coming_s: horizon }
+    }
+
+    /// Takes in something whose contact with the body has this restitution.
+    pub(super) fn add(&mut self, (free_s, closing_m_s): Approach, restitution: f64) {
+        let ahead = if restitution > 0.0 && closing_m_s > BOUNCE_M_S { &mut self.coming_s } else { &mut self.near_s };
+        *ahead = ahead.min(free_s);
+    }
+
+    /// Seconds until anything may be touched.
+    pub(super) const fn free_s(&self) -> f64 {
+        self.near_s.min(self.coming_s)
+    }
+}
+
 /// The gap at which a body counts as touching, as a share of its radius: far above the 1e-6 that single-precision queries
 /// resolve, far below what can be seen. At most [`SKIN_MAX_M`].
 const SKIN_SHARE: f64 = 2e-4;
@@ -124,22 +157,22 @@ impl Fixed {
         (self.shape.clone(), pose(self.position, self.rotation))
     }
 
-    /// Seconds of free flight past this solid, at most `horizon`.
-    pub(super) fn free_time(&self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
+    /// How far off this solid is: at most `horizon` seconds.
+    pub(super) fn approach(&self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Approach {
         let reach = fall.reach(motion, mover, horizon);
         if self.bounds.is_some_and(|(low, high)| {
             motion.position.distance(motion.position.clamp(low, high)) > mover.radius_m + reach
         }) {
-            return horizon;
+            return (horizon, 0.0);
         }
-        let Some((normal, gap)) = self.gap(mover, motion, reach) else { return horizon };
-        let swing = fall.spin_max * mover.swing_m;
+        let Some((normal, gap)) = self.gap(mover, motion, reach) else { return (horizon, 0.0) };
+        let (swing, closing) = (fall.spin_max * mover.swing_m, -normal.dot(motion.velocity));
         let (a, b) = if self.convex && mover.convex {
-            (swing - normal.dot(motion.velocity), (-normal.dot(fall.gravity)).max(0.0))
+            (swing + closing, (-normal.dot(fall.gravity)).max(0.0))
         } else {
             (swing + motion.velocity.length(), fall.gravity.length())
         };
-        first_root(a, b, gap - mover.skin_m()).min(horizon)
+        (first_root(a, b, gap - mover.skin_m()).min(horizon), closing)
     }
 
     /// How high the body's lowest point is above this plane, metres.
@@ -251,7 +284,7 @@ mod tests {
             };
             motion.set_spin(&body, DVec3::new(libm::cos(seed), libm::sin(2.0 * seed), 1.0) * 8.0);
             let fall = Fall { gravity, spin_max: motion.spin_max(&body) };
-            let t = floor.free_time(&mover, &motion, fall, 10.0);
+            let (t, _) = floor.approach(&mover, &motion, fall, 10.0);
             motion.fly(&body, gravity, t);
             let gap = floor.gap(&mover, &motion, 100.0).unwrap().1;
             assert!(gap > 0.0, "case {i}: {gap:e} m inside after {t} s"); // the skin is 4e-5 m

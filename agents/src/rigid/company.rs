@@ -4,7 +4,7 @@
 //! advancement, MIR96, in the frame of the other); who touched whom for how long. Never here: what happens at a touch
 //! ([`super::meeting`]), fixed solids ([`super::clearance`]).
 
-use super::clearance::{Fall, Mover, first_root};
+use super::clearance::{Ahead, Approach, Fall, Mover, first_root};
 use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
@@ -98,7 +98,8 @@ impl Company {
                 guest.touchable &= !holds(neighbour, around.me); // jaws pass through what they hold
                 self.count += 1;
                 if let Some(pair) = self.pairs.get(neighbour.id) {
-                    pair.correct(guest.other.velocities());
+                    let on_their_way = on_their_way(&self.exchange, around, neighbour);
+                    pair.correct(guest.other.velocities(), on_their_way);
                 }
             }
         }
@@ -124,9 +125,7 @@ impl Company {
         for guest in &self.guests[..self.count] {
             let Some(neighbour) = guest.other.neighbour() else { continue };
             if let Some(pair) = self.pairs.get(neighbour.id) {
-                let mut on_their_way = Impulse::ZERO;
-                self.exchange.in_flight(around.me, neighbour, around.time, |_, sum, _| on_their_way += sum);
-                pair.expect(guest.other.velocities(), on_their_way);
+                pair.expect(guest.other.velocities());
             }
         }
         self.pairs.close(dt);
@@ -151,14 +150,16 @@ impl Company {
         (&mut guests[..*count], exchange, pairs, room, form)
     }
 
-    /// Seconds of flight, at most `horizon`, during which the body certainly touches nobody but tubes.
+    /// Who lies ahead of a flight of `horizon` seconds.
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.
-    pub(super) fn free_time(&mut self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
+    pub(super) fn ahead(&mut self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
         let Self { guests, count, room, form, .. } = self;
-        let me = placed(form, motion);
-        let apart = guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain);
-        apart.fold(horizon, |free, guest| free.min(guest.free_time(&me, (mover, motion, fall), free, room)))
+        let (me, mut ahead) = (placed(form, motion), Ahead::clear(horizon));
+        for guest in guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain) {
+            ahead.add(guest.approach(&me, (mover, motion, fall), horizon, room), guest.restitution);
+        }
+        ahead
     }
 
     /// Whether a tube is met.
@@ -176,6 +177,13 @@ impl Company {
 /// The body itself, for a search.
 pub(super) fn placed<'a>(form: &'a Form, motion: &Motion) -> Placed<'a> {
     Placed { form, view: View::Solid { position: motion.position, rotation: motion.rotation } }
+}
+
+/// What `neighbour` has been given and has not taken in the state that is seen.
+fn on_their_way(exchange: &Exchange, around: &Surroundings<'_>, neighbour: &Neighbour) -> Impulse {
+    let mut sum = Impulse::ZERO;
+    exchange.in_flight(around.me, neighbour, around.time, |_, impulse, _| sum += impulse);
+    sum
 }
 
 /// Whether `neighbour` has to be brought to the body's own time: the body owns contact or a link with it, or is held by it.
@@ -270,15 +278,15 @@ impl Guest {
         slots[0].distance(velocity) + slots[1].length() * self.swing_m
     }
 
-    /// Seconds of flight during which the body certainly does not touch this guest, at most `horizon`.
-    fn free_time(
+    /// How far off this guest is: at most `horizon` seconds.
+    fn approach(
         &self,
         me: &Placed<'_>,
         (mover, motion, fall): (&Mover, &Motion, Fall),
         horizon: f64,
         room: &mut TouchRoom,
-    ) -> f64 {
-        let Some(it) = self.other.placed() else { return horizon };
+    ) -> Approach {
+        let Some(it) = self.other.placed() else { return (horizon, 0.0) };
         let slots = self.other.velocities();
         let (velocity, pull) = (motion.velocity - slots[0], fall.gravity - self.other.acceleration());
         let swing = fall.spin_max * mover.swing_m + slots[1].length() * self.swing_m;
@@ -286,14 +294,15 @@ impl Guest {
         if let View::Solid { position, .. } = it.view
             && position.distance(motion.position) > mover.radius_m + self.radius_m + reach + self.skin_m
         {
-            return horizon;
+            return (horizon, 0.0);
         }
-        let Some((normal, gap_m)) = gap(me, &it, reach + self.skin_m, room) else { return horizon };
+        let Some((normal, gap_m)) = gap(me, &it, reach + self.skin_m, room) else { return (horizon, 0.0) };
+        let closing = -normal.dot(velocity);
         let (a, b) = if self.convex && mover.is_convex() {
-            (swing - normal.dot(velocity), (-normal.dot(pull)).max(0.0))
+            (swing + closing, (-normal.dot(pull)).max(0.0))
         } else {
             (swing + velocity.length(), pull.length())
         };
-        first_root(a, b, gap_m - self.skin_m).min(horizon)
+        (first_root(a, b, gap_m - self.skin_m).min(horizon), closing)
     }
 }

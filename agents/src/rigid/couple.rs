@@ -131,12 +131,16 @@ impl RigidBody {
 
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
     fn shift(&mut self, carried: Impulse) {
-        let Self { motion, spread, world, .. } = self;
-        let mut way = Motion { velocity: carried.linear / spread.mass_kg, angular: carried.angular, ..*motion };
-        let all_at_once = Fall { gravity: DVec3::ZERO, spin_max: way.spin_max(spread) };
-        let share = world.free_time(&way, all_at_once, 1.0);
-        way.fly(spread, DVec3::ZERO, share);
-        (motion.position, motion.rotation) = (way.position, way.rotation);
+        let Self { motion, spread, world, gravity, touching, .. } = self;
+        let way = carried.linear / spread.mass_kg;
+        let mut moved = Motion { velocity: way, angular: carried.angular, ..*motion };
+        let all_at_once = Fall { gravity: DVec3::ZERO, spin_max: moved.spin_max(spread) };
+        let share = world.free_time(&moved, all_at_once, 1.0);
+        moved.fly(spread, DVec3::ZERO, share);
+        (motion.position, motion.rotation) = (moved.position, moved.rotation);
+        if !*touching {
+            motion.slow_by(gravity.dot(way) * (1.0 - share), *gravity);
+        }
     }
 
     /// Writes what others couple by.

@@ -4,7 +4,7 @@
 //! foreseen ([`super::clearance`], [`super::company`]) or solved ([`super::world`], [`super::meeting`]), springs.
 
 use super::RigidBody;
-use super::clearance::Fall;
+use super::clearance::{Ahead, Fall};
 use super::meeting::{Me, Scope};
 use glam::DVec3;
 
@@ -21,45 +21,70 @@ impl RigidBody {
         let mut left = h;
         for _ in 0..EVENTS_MAX {
             let horizon = if self.touching { left.max(LEAVE_S) } else { left };
-            let [fixed, met] = self.free_times(gravity, horizon);
-            let free = fixed.min(met);
-            if self.touching && free < LEAVE_S {
-                return self.linger(left, gravity, [fixed < horizon, met < horizon]);
-            }
-            self.touching = free < left && free < TOUCH_S;
-            if self.touching {
-                self.take_blow(met < fixed)?;
-                continue;
-            }
-            let span = free.min(left);
-            self.travel(span, gravity);
+            let ahead = self.ahead(gravity, horizon);
+            let free = ahead.map(|side| side.free_s());
+            let soonest = free[0].min(free[1]);
+            let span = if self.touching && soonest < LEAVE_S {
+                let coming = ahead[0].coming_s.min(ahead[1].coming_s);
+                if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s)? {
+                    continue;
+                }
+                // until then it stays in touch with what does not bounce
+                let span = if coming < TOUCH_S { left } else { coming.min(left) };
+                self.stay(span, gravity, ahead.map(|side| side.near_s < horizon.min(span.max(LEAVE_S))))?;
+                span
+            } else {
+                self.touching = soonest < left && soonest < TOUCH_S;
+                if self.touching {
+                    self.take_blow(free[1] < free[0])?;
+                    continue;
+                }
+                let span = soonest.min(left);
+                self.travel(span, gravity);
+                span
+            };
             left -= span;
             if left <= 0.0 {
                 return if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it flew out of reach") };
             }
         }
         self.touching = true;
-        let near = self.free_times(gravity, left.max(LEAVE_S)).map(|free| free < left.max(LEAVE_S));
+        let horizon = left.max(LEAVE_S);
+        let near = self.ahead(gravity, horizon).map(|side| side.free_s() < horizon);
         self.linger(left, gravity, near)
     }
 
-    /// Seconds of certainly free flight past the fixed solids, and past everybody that can bounce; at most `horizon`.
-    pub(super) fn free_times(&mut self, gravity: DVec3, horizon: f64) -> [f64; 2] {
+    /// What lies ahead of a flight of `horizon` seconds: fixed solids, and everybody that can bounce.
+    fn ahead(&mut self, gravity: DVec3, horizon: f64) -> [Ahead; 2] {
         let fall = Fall { gravity, spin_max: self.motion.spin_max(&self.spread) };
-        let fixed = self.world.free_time(&self.motion, fall, horizon);
-        [fixed, self.company.free_time(&self.world.mover, &self.motion, fall, horizon)]
+        let fixed = self.world.ahead(&self.motion, fall, horizon);
+        [fixed, self.company.ahead(&self.world.mover, &self.motion, fall, horizon)]
     }
 
-    /// The blow of a first touch, with others where `met`.
-    fn take_blow(&mut self, met: bool) -> Result<(), &'static str> {
+    /// Whether nothing is touched for `h` seconds.
+    pub(super) fn is_free(&mut self, gravity: DVec3, h: f64) -> bool {
+        self.ahead(gravity, h).iter().all(|side| side.free_s() >= h)
+    }
+
+    /// The blow of a touch, with others where `met`. Whether it changed anything.
+    fn take_blow(&mut self, met: bool) -> Result<bool, &'static str> {
         self.steady = false;
         if !met {
             return self.world.blow(&mut self.motion, &self.spread);
         }
         let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
-        meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles);
+        let changed = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles);
         self.world.flew();
-        Ok(())
+        Ok(changed)
+    }
+
+    /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.
+    fn stay(&mut self, h: f64, gravity: DVec3, near: [bool; 2]) -> Result<(), &'static str> {
+        if near == [false; 2] {
+            self.travel(h, gravity);
+            return Ok(());
+        }
+        self.linger(h, gravity, near)
     }
 
     /// Flies for `h` seconds; tubes on the way are pressed on.

@@ -77,6 +77,18 @@ impl Motion {
         self.turn(body, t);
     }
 
+    /// Takes kinetic energy of `per_kg` J/kg out of the motion along `direction`, as far as there is any; gives some where it
+    /// is below zero.
+    ///
+    /// Who is kept from going down as far as its impulses would have carried it must not keep the height besides the speed.
+    pub(super) fn slow_by(&mut self, per_kg: f64, direction: DVec3) {
+        let along = self.velocity.dot(direction.normalize_or_zero());
+        if per_kg != 0.0 && along != 0.0 {
+            let left = (along * along - 2.0 * per_kg).max(0.0).sqrt();
+            self.velocity += direction.normalize_or_zero() * (left.copysign(along) - along);
+        }
+    }
+
     /// Turns freely for `t` seconds; the angular momentum in world axes stays.
     fn turn(&mut self, body: &Spread, t: f64) {
         if self.angular == DVec3::ZERO {

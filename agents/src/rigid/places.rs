@@ -26,13 +26,13 @@ impl Meeting {
         for (i, guest) in guests.iter().enumerate().filter(|(_, guest)| guest.touchable && !guest.is_chain()) {
             let Some(it) = guest.other.placed() else { continue };
             touches(&mine, &it, 2.0 * guest.skin_m + past, room, &mut self.touches);
-            let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
-            let bounce = guest.restitution * fade;
-            self.take_up(me, Some((i, guest)), (guest.friction, bounce));
+            let owed_j = guest.other.id().and_then(|id| pairs.get(id)).map_or(0.0, |pair| pair.owed_j());
+            let owed = 2.0 * owed_j / guest.reduced_kg(me.spread.mass_kg);
+            self.take_up(me, Some((i, guest)), (guest.friction, guest.restitution, owed));
         }
         for (solid, skin) in fixed.iter(me.motion.position) {
             touches(&mine, &solid, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
-            let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution));
+            let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution), 0.0);
             self.take_up(me, None, law);
         }
         for found in &mut self.found {
@@ -58,7 +58,7 @@ impl Meeting {
             let closing = guest.approach_m_s(me.motion.velocity) + swing + pull * h;
             touches(&mine, &it, closing * h + SLACK_M, room, &mut self.touches);
             let from = self.found.len();
-            self.take_up(me, Some((i, guest)), (guest.friction, 0.0));
+            self.take_up(me, Some((i, guest)), (guest.friction, 0.0, 0.0));
             self.keep_closing(from, h);
             let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
             let age_s = guest.other.age_s().abs() + after_s;
@@ -85,13 +85,14 @@ impl Meeting {
         for (solid, skin) in fixed.iter(me.motion.position) {
             touches(&mine, &solid, reach, room, &mut self.touches);
             let from = self.found.len();
-            self.take_up(me, None, ((form.friction * skin.friction).sqrt(), 0.0));
+            self.take_up(me, None, ((form.friction * skin.friction).sqrt(), 0.0, 0.0));
             self.keep_closing(from, h);
         }
     }
 
-    /// Turns the places that were found into contacts.
-    fn take_up(&mut self, me: &Me<'_>, guest: Option<(usize, &Guest)>, (friction, bounce): (f64, f64)) {
+    /// Turns the places that were found into contacts: with this friction and restitution, and with what a bounce has to pay
+    /// back, m²/s² of its speed.
+    fn take_up(&mut self, me: &Me<'_>, guest: Option<(usize, &Guest)>, (friction, bounce, owed): (f64, f64, f64)) {
         for touch in &self.touches {
             let mut slots = Slots::default();
             let (mine, theirs) = halfway(touch);
@@ -100,7 +101,8 @@ impl Meeting {
                 guest.other.join(&mut slots, self.bases[i], &theirs, (touch.normal, -1.0));
             }
             let approach_m_s = -slots.velocity(&self.velocities).dot(touch.normal);
-            let rebound_m_s = (bounce * approach_m_s).max(0.0);
+            let rebound = bounce * approach_m_s.max(0.0);
+            let rebound_m_s = (rebound * rebound - owed).max(0.0).sqrt();
             let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
             let key = mixed(touch.key ^ mixed(with));
             let (normal, gap_m) = (touch.normal, touch.gap_m);

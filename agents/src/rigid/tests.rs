@@ -8,6 +8,7 @@ use crate::{
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
+mod bounces;
 mod coupling;
 mod lasting;
 mod laws;

@@ -5,7 +5,7 @@
 //!
 //! A pair's friction is the geometric mean of both coefficients, its restitution the larger of both.
 
-use super::clearance::{Fall, Fixed, Mover, pose};
+use super::clearance::{Ahead, Fall, Fixed, Mover, pose};
 use super::mass::Spread;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
@@ -24,7 +24,8 @@ pub(super) struct World {
     sim: PhysicsWorld,
     body: RigidBodyHandle,
     collider: ColliderHandle,
-    fixed: Vec<Fixed>,
+    /// The fixed solids, each with the restitution of the body's contact with it.
+    fixed: Vec<(Fixed, f64)>,
     /// The moving shape.
     pub mover: Mover,
     /// The solver's copy of the motion is old: it must be told before the next contact.
@@ -36,6 +37,8 @@ pub(super) struct World {
 /// A blow is solved as if it lasted this long, seconds: long enough that a body at the skin's distance reaches the surface
 /// at any speed above 0.1 m/s, short enough that its arms do not turn.
 const BLOW_S: f32 = 1e-3;
+/// A blow that changes the velocity by less changes nothing, m/s.
+const CHANGED_M_S: f64 = 1e-3;
 /// Solver passes within a contact step; each is a small step of its own.
 const PASSES: usize = 4;
 /// Natural frequency of a contact, Hz: rapier's 60 lets a resting box sag 5e-5 m, this 2e-6 m.
@@ -54,7 +57,7 @@ impl World {
                 .map_err(|source| RigidError::Obstacle { name: obstacle.name.clone(), source })?;
             let (shape, at) = solid.placed();
             sim.colliders.insert(collider(shape, obstacle.friction, obstacle.restitution).position(at));
-            fixed.push(solid);
+            fixed.push((solid, obstacle.restitution.max(spec.restitution)));
         }
         let axes = spread.axes.as_quat();
         let properties = MassProperties::with_principal_inertia_frame(
@@ -77,12 +80,22 @@ impl World {
 
     /// Seconds of certainly free flight, at most `horizon`.
     pub(super) fn free_time(&self, motion: &Motion, fall: Fall, horizon: f64) -> f64 {
-        self.fixed.iter().fold(horizon, |free, solid| free.min(solid.free_time(&self.mover, motion, fall, free)))
+        let all = self.fixed.iter().map(|(solid, _)| solid);
+        all.fold(horizon, |free, solid| free.min(solid.approach(&self.mover, motion, fall, free).0))
+    }
+
+    /// What of the fixed solids lies ahead of a flight of `horizon` seconds.
+    pub(super) fn ahead(&self, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
+        let mut ahead = Ahead::clear(horizon);
+        for (solid, restitution) in &self.fixed {
+            ahead.add(solid.approach(&self.mover, motion, fall, horizon), *restitution);
+        }
+        ahead
     }
 
     /// The deepest overlap with a fixed solid, metres.
     pub(super) fn depth_m(&self, motion: &Motion) -> f64 {
-        self.fixed.iter().map(|solid| solid.depth_m(&self.mover, motion)).fold(0.0, f64::max)
+        self.fixed.iter().map(|(solid, _)| solid.depth_m(&self.mover, motion)).fold(0.0, f64::max)
     }
 
     /// The motion was changed from outside: by a spring, say.
@@ -96,13 +109,13 @@ impl World {
         self.remembers = true;
     }
 
-    /// Changes the velocities as the blow of a first touch does; no time passes and nothing moves.
-    pub(super) fn blow(&mut self, motion: &mut Motion, spread: &Spread) -> Result<(), &'static str> {
+    /// Changes the velocities as the blow of a first touch does; no time passes and nothing moves. Whether it changed anything.
+    pub(super) fn blow(&mut self, motion: &mut Motion, spread: &Spread) -> Result<bool, &'static str> {
         let before = *motion;
         self.solve(motion, spread, BLOW_S, DVec3::ZERO)?;
         (motion.position, motion.rotation) = (before.position, before.rotation);
         self.stale = true;
-        Ok(())
+        Ok(motion.velocity.distance_squared(before.velocity) > CHANGED_M_S * CHANGED_M_S)
     }
 
     /// Advances a touching body by `h` seconds.
