@@ -67,6 +67,8 @@ fn stage() -> Vec<ObjectView> {
         distance_m: 0.6,
         speed_px_s: 0.0,
         importance: 1.0,
+        off_centre: 0.0,
+        from_focus_m: 0.0,
         visible: true,
     };
     let tube = Kind::Tube { length_m: 1.6, radius_m: 0.015 };
@@ -83,7 +85,8 @@ fn draw(control: &mut PictureControl, stage: &[ObjectView], machine: Machine, ti
     let plan = control.plan(stage);
     let work_s = machine.frame_s + machine.triangle_s * plan.polygons;
     let (tube, polygons) = (plan.levels[0].resolution, plan.polygons);
-    control.observe(FrameWork { work: Duration::from_secs_f64(work_s), skip: false });
+    let work = Duration::from_secs_f64(work_s);
+    control.observe(FrameWork { work, draw: work, skip: false });
     Frame { time_s, work_s, eps_mm: 1e3 * tube.eps_m, n: tube.n, polygons }
 }
 

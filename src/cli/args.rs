@@ -1,6 +1,7 @@
 //! The arguments, and the help that teaches them.
 
 use super::report::Goal;
+use crate::scene::format::PolicyKind;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use std::path::PathBuf;
@@ -113,7 +114,7 @@ pub struct RunArgs {
     #[arg(long, value_name = "F", env = "METACHRON_TARGET_FPS", value_parser = target_fps)]
     pub target_fps: Option<f64>,
     /// Who chooses the level of every visible object
-    #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(["full", "feedback"]))]
+    #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(PolicyKind::ALL.map(PolicyKind::name)))]
     pub policy: Option<String>,
     /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]

@@ -22,6 +22,10 @@ pub struct Seen {
     pub speed_px_s: f64,
     /// Rest length and mean radius of a tube, metres.
     pub tube_m: Option<(f64, f64)>,
+    /// Distance of its centre from the middle of the picture, as a part of half the diagonal.
+    pub off_centre: f64,
+    /// Distance of its centre from the point that the camera looks at, metres.
+    pub from_focus_m: f64,
     /// Centre of a ball that holds it, metres.
     pub centre_m: DVec3,
     /// Radius of that ball, metres.
@@ -73,9 +77,16 @@ fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
         distance_m: bounds.centre.distance(camera.eye()),
         speed_px_s: speed_m_s * scale,
         tube_m,
+        off_centre: across(bounds.centre - camera.eye()).sqrt() * scale / half_diagonal_px(size),
+        from_focus_m: bounds.centre.distance(camera.target_m),
         centre_m: bounds.centre,
         radius_m: bounds.radius_m,
     }
+}
+
+/// Half the diagonal of the picture, pixels, at least 1.
+fn half_diagonal_px(size: Size) -> f64 {
+    (0.5 * f64::from(size.width).hypot(f64::from(size.height))).max(1.0)
 }
 
 /// Area of a tube on the screen: of each segment its projected length times its projected width.
@@ -139,6 +150,14 @@ mod tests {
         let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
         assert!((ball_at(DVec3::ZERO, DVec3::Y).speed_px_s - scale).abs() < 1e-9);
         assert!(ball_at(DVec3::ZERO, DVec3::X).speed_px_s < 1e-9);
+    }
+
+    #[test]
+    fn the_corner_of_the_picture_is_one_away_from_its_middle() {
+        let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        let corner = ball_at(DVec3::new(0.0, 400.0 / scale, 300.0 / scale), DVec3::ZERO);
+        assert!((corner.off_centre - 1.0).abs() < 1e-9 && (corner.from_focus_m - 500.0 / scale).abs() < 1e-9);
+        assert!(ball_at(DVec3::ZERO, DVec3::ZERO).off_centre < 1e-9);
     }
 
     #[test]

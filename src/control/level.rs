@@ -24,9 +24,6 @@ const NARROW: f64 = 2.83;
 /// Shares are met to 1e-9: a wish this near to an end of its range, in proportion, is that end.
 const AT_AN_END: f64 = 1e-6;
 
-/// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
-const SPEED_NEWS: f64 = 0.2;
-
 /// How many polygons an object can have.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
@@ -59,20 +56,9 @@ impl Span {
 pub(super) struct Held {
     /// The polygons wished for when it was last cut, and the level n that was chosen; `None` while it is out of sight.
     cut: Option<(f64, u8)>,
-    /// Speed on the screen, pixels a second, smoothed.
-    speed_px_s: Option<f64>,
 }
 
 impl Held {
-    /// The object with its speed smoothed over the last frames.
-    pub fn steady(&mut self, mut view: ObjectView) -> ObjectView {
-        let now = if view.speed_px_s.is_finite() { view.speed_px_s.max(0.0) } else { 0.0 };
-        let smooth = self.speed_px_s.map_or(now, |before| before + SPEED_NEWS * (now - before));
-        self.speed_px_s = Some(smooth);
-        view.speed_px_s = smooth;
-        view
-    }
-
     /// The object went out of sight: what it was drawn with says nothing any more.
     pub fn forget(&mut self) {
         *self = Self::default();
@@ -218,6 +204,8 @@ mod tests {
             distance_m,
             speed_px_s,
             importance: 1.0,
+            off_centre: 0.0,
+            from_focus_m: 0.0,
             visible: true,
         }
     }

@@ -1,17 +1,35 @@
 //! Numbers in, demands out: who decides how finely things are drawn and simulated.
 //!
 //! In: what is in view ([`ObjectView`]) and the frame's measured work ([`FrameWork`]); what an agent's turns take ([`TurnMeasure`]).
-//! Out: a resolution (ε, n) for every picture ([`Plan`]), dt and ε for every agent ([`RateDemand`]).
-//! Never here: agents, threads, scenes, the GPU. Theory: `docs/theory/control.md`, after (GDC04).
+//! Out: a level for every picture ([`Plan`]), dt and ε for every agent ([`RateDemand`]).
+//! Never here: agents, threads, scenes, the GPU. Theory: `docs/theory/control.md`, after (GDC04), and `docs/theory/budget.md`.
 
+mod adaptive;
+mod ask;
+mod changes;
+mod closing;
+mod feedback;
+mod groups;
+mod hierarchy;
+mod ladder;
 mod level;
 mod picture;
+mod policy;
+mod price;
 mod rate;
+mod select;
 mod status;
 mod view;
+mod worth;
 
+pub use ask::Promise;
 pub use level::PRIMITIVE_LEVELS;
+pub use metachron_budget::cost::benefit::Sliders;
+pub use metachron_budget::cost::stages::Stages;
+pub use metachron_budget::cost::value::Value;
 pub use picture::{FrameWork, LevelDemand, PictureControl, Plan};
+pub use policy::{Law, Policy};
+pub use price::{Backdrop, Prices};
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure};
 pub use status::Status;
-pub use view::{Kind, Law, ObjectView, Policy, Shading};
+pub use view::{Kind, ObjectView, Shading};

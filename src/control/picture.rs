@@ -1,34 +1,48 @@
-//! The picture's controller: one loop variable for the scene, a pair (ε, n) for every object in view (GDC04).
+//! The picture's controller: a level for every object in view, by whichever policy is asked for.
 //!
-//! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring.
-//! A frame is `plan`, draw, `observe`. The corrected law steers the polygons of the whole scene through ln ε̂, and the objects
-//! share them by what they cover, how far they are and how fast they move; the printed law steers ε̂ and n of all tubes alike.
-//! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
+//! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule.
+//! A frame is `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
 
-use super::level::{self, Held, Span};
+use super::adaptive::AdaptiveChoice;
+use super::ask::{Ask, Promise};
+use super::changes::Changes;
+use super::feedback::{Feedback, POLYGONS_AT_ONE, unseen};
+use super::groups::Groups;
+use super::hierarchy::Hierarchy;
+use super::ladder::Ladders;
+use super::level::{self, Span};
+use super::policy::{Law, Policy};
+use super::price::{Backdrop, Prices};
+use super::select::Select;
 use super::status::Status;
-use super::view::{Kind, Law, ObjectView, Policy, Shading};
-use metachron_agents::{AgentId, N_MAX, Resolution};
-use metachron_budget::grisoni::{GrisoniLaw, Limits};
-use metachron_budget::log_law::LogLaw;
-use metachron_budget::share::{Share, water_level};
-use std::collections::BTreeMap;
+use super::view::{Kind, ObjectView, Shading};
+use metachron_agents::{AgentId, Resolution};
+use metachron_budget::cost::benefit::Sliders;
+use metachron_budget::cost::value::Value;
 use std::time::Duration;
 
-/// Intervals of a tube at ε̂ = 1: ε̂ = 40 ε/L.
-const INTERVALS_AT_ONE: f64 = 40.0;
+/// An object and the polygons that it can have.
+pub(super) type Seen = (ObjectView, Span);
 
-/// Polygons of one tube at ε̂ = 1 and n = 0: by it the polygons of a scene are told as ε̂ (control.md, eq. 13).
-const POLYGONS_AT_ONE: f64 = 12.0 * INTERVALS_AT_ONE;
+/// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
+const SPEED_NEWS: f64 = 0.2;
 
-/// Where ε̂ and n of the printed law move while no tube is in view and n alone counts.
-const LIMITS_WITHOUT_TUBES: Limits = Limits { eps: (0.005, 1.0), n: (0, N_MAX) };
+/// The share of a new measurement in what a frame takes besides drawing.
+const OVERHEAD_NEWS: f64 = 0.1;
+
+/// The fixed part of a frame that moved by less than this part of the target is what it was: what trembles changes no level.
+const FIXED_TREMBLE: f64 = 0.01;
+
+/// The part of a frame that policies with a prediction leave free where nobody says otherwise.
+const MARGIN: f64 = 0.02;
 
 /// What the last frame took.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameWork {
     /// The work of the frame: gather, choose, draw. Without any wait for a display or for the frame's time to come.
     pub work: Duration,
+    /// Of it the drawing of the picture, which is what levels change; `work` at most.
+    pub draw: Duration,
     /// Whether the frame must not teach: one of the first three, one with a new size or a new pipeline, a hidden window,
     /// the first after a gap of more than five frames.
     pub skip: bool,
@@ -57,27 +71,40 @@ pub struct Plan {
     pub polygons: f64,
     /// Triangles of everything in view at its finest: what the policy `full` would draw.
     pub full_polygons: f64,
+    /// What the choice promises; zeros where the policy predicts nothing.
+    pub promise: Promise,
+    /// Objects in view whose level is another than in the frame before.
+    pub changes: u32,
+    /// Of these, objects that are back at a level which they had two or three frames before.
+    pub reversals: u32,
 }
 
-/// Chooses the resolution of every picture from the measured work of frames.
+/// Chooses the level of every picture.
 #[derive(Debug, Clone)]
 pub struct PictureControl {
     policy: Policy,
-    law: Law,
     target_hz: f64,
-    corrected: LogLaw,
-    printed: GrisoniLaw,
-    status: Status,
-    /// Whether the loop variable has a value: from the first plan with something to choose on.
-    started: bool,
-    /// ln of what [`PictureControl::coarsen`] asked for before that.
-    pushed: f64,
-    /// Whether anything in view can be drawn in more than one way.
-    steers: bool,
-    /// The level of the last sharing: a guess for the next.
-    water: f64,
-    held: BTreeMap<AgentId, Held>,
-    views: Vec<(ObjectView, Span)>,
+    /// The part of a frame to be left free, where somebody says so.
+    margin: Option<f64>,
+    sliders: Sliders,
+    value: Value,
+    prices: Prices,
+    backdrop: Backdrop,
+    frozen: bool,
+    /// What a frame takes besides drawing, seconds, smoothed.
+    overhead_s: Option<f64>,
+    /// What a frame takes whatever is chosen, seconds, as the last choice was made with.
+    fixed_s: f64,
+    feedback: Feedback,
+    select: Select,
+    hierarchy: Hierarchy,
+    adaptive: AdaptiveChoice,
+    ladders: Ladders,
+    groups: Groups,
+    changes: Changes,
+    /// Speeds on the screen, smoothed, by object.
+    speeds: Vec<(AgentId, Option<f64>)>,
+    views: Vec<Seen>,
     plan: Plan,
 }
 
@@ -85,19 +112,25 @@ impl PictureControl {
     /// A controller for `target_hz` frames a second (finite, > 0), which begins in the middle of what it may do.
     #[must_use]
     pub fn new(policy: Policy, law: Law, target_hz: f64) -> Self {
-        let limits = Limits { eps: (1e-6, 1e6), n: (0, N_MAX) };
         Self {
             policy,
-            law,
             target_hz,
-            corrected: LogLaw::new(law.log_gains(), (-20.0, 20.0), 0.0),
-            printed: GrisoniLaw::new(law.printed_gains(), limits, 1.0, 0.0),
-            status: Status::Waiting,
-            started: false,
-            pushed: 0.0,
-            steers: false,
-            water: 1.0,
-            held: BTreeMap::new(),
+            margin: None,
+            sliders: usual_sliders(),
+            value: Value::Plain,
+            prices: Prices::default(),
+            backdrop: Backdrop::default(),
+            frozen: false,
+            overhead_s: None,
+            fixed_s: 0.0,
+            feedback: Feedback::new(law),
+            select: Select::default(),
+            hierarchy: Hierarchy::default(),
+            adaptive: AdaptiveChoice::default(),
+            ladders: Ladders::default(),
+            groups: Groups::default(),
+            changes: Changes::default(),
+            speeds: Vec::new(),
             views: Vec::new(),
             plan: Plan::default(),
         }
@@ -105,43 +138,81 @@ impl PictureControl {
 
     /// Learns what the frame drawn by the last [`PictureControl::plan`] took.
     pub fn observe(&mut self, frame: FrameWork) {
-        let work_s = frame.work.as_secs_f64();
-        if frame.skip || work_s <= 0.0 || self.policy == Policy::Full || !self.started || !self.steers {
+        let (work_s, drawn_s) = (frame.work.as_secs_f64(), frame.draw.min(frame.work).as_secs_f64());
+        if frame.skip {
+            self.adaptive.disturb();
+        }
+        if frame.skip || work_s <= 0.0 {
             return;
         }
-        self.status = match self.law {
-            Law::Corrected { .. } => {
-                let granted = libm::log(POLYGONS_AT_ONE / self.plan.polygons);
-                self.corrected.observe(work_s / self.set_point_s(), Some(granted)).into()
+        let overhead_s = work_s - drawn_s;
+        self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
+        let target_s = 1.0 / self.target_hz;
+        if !steers(&self.views) {
+            return;
+        }
+        match self.policy {
+            Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
+            Policy::Threshold => self.select.observe(work_s, target_s),
+            Policy::Adaptive => {
+                let chosen_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
+                self.adaptive.observe(chosen_s, work_s, target_s);
             }
-            Law::Printed { .. } => self.observe_as_printed(work_s),
-        };
-    }
-
-    fn observe_as_printed(&mut self, work_s: f64) -> Status {
-        if !self.printed.observe(self.target_hz, 1.0 / work_s) {
-            return self.status;
-        }
-        match self.printed.rest() {
-            Some(bound) => Status::Clamped(bound),
-            None if (work_s * self.target_hz - 1.0).abs() <= 0.05 => Status::Settled,
-            None => Status::Moving,
+            _ => {}
         }
     }
 
-    /// Chooses (ε, n) of every object for the next frame.
+    /// Chooses the level of every object for the next frame.
     pub fn plan(&mut self, objects: &[ObjectView]) -> &Plan {
         self.look(objects);
-        self.plan.levels.clear();
-        match (self.policy, self.law) {
-            (Policy::Full, _) => self.plan_full(),
-            (Policy::Feedback, Law::Corrected { .. }) => self.plan_corrected(),
-            (Policy::Feedback, Law::Printed { .. }) => self.plan_printed(),
+        let same = self.plan.levels.len() == objects.len();
+        if self.frozen && same && self.plan.levels.iter().zip(objects).all(|(level, object)| level.id == object.id) {
+            self.count();
+            return &self.plan;
         }
-        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
-        self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
-        self.plan.full_polygons = self.in_view().map(|(_, span)| span.full).sum();
+        let mut levels = std::mem::take(&mut self.plan.levels);
+        levels.clear();
+        self.plan.promise = self.choose(&mut levels);
+        self.plan.levels = levels;
+        self.count();
         &self.plan
+    }
+
+    fn choose(&mut self, levels: &mut Vec<LevelDemand>) -> Promise {
+        match self.policy {
+            Policy::Full => self.plan_full(levels),
+            Policy::Feedback => self.feedback.plan(&self.views, levels),
+            _ => {
+                levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
+                return self.choose_by_cost(levels);
+            }
+        }
+        Promise { feasible: true, ..Promise::default() }
+    }
+
+    fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
+        self.ladders.update(&self.views, &self.prices, &self.sliders);
+        self.groups.update(&self.views);
+        let fixed_s = self.prices.backdrop_s(self.backdrop) + self.overhead_s.unwrap_or(0.0);
+        if (fixed_s - self.fixed_s).abs() * self.target_hz > FIXED_TREMBLE {
+            self.fixed_s = fixed_s;
+        }
+        let ask = Ask {
+            views: &self.views,
+            ladders: &self.ladders,
+            sliders: &self.sliders,
+            value: self.value,
+            target_s: 1.0 / self.target_hz,
+            margin: self.margin.unwrap_or(MARGIN),
+            fixed_s: self.fixed_s,
+        };
+        match self.policy {
+            Policy::Adaptive => self.adaptive.choose(&ask, &self.groups, levels),
+            Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
+                self.hierarchy.choose(self.policy, &ask, &self.groups, levels)
+            }
+            policy => self.select.choose(policy, &ask, levels),
+        }
     }
 
     /// What the last frame was to be drawn with.
@@ -153,128 +224,35 @@ impl PictureControl {
     /// Keeps what is in view with its polygons, its speed smoothed.
     fn look(&mut self, objects: &[ObjectView]) {
         self.views.clear();
-        for object in objects {
-            let held = self.held.entry(object.id).or_default();
-            let view = if object.visible { held.steady(*object) } else { *object };
+        self.speeds.resize(objects.len(), (AgentId(0), None));
+        for (object, (of, held)) in objects.iter().zip(&mut self.speeds) {
+            let mut view = *object;
+            if *of != view.id || !view.visible {
+                (*of, *held) = (view.id, None);
+            }
+            if view.visible {
+                let now = if view.speed_px_s.is_finite() { view.speed_px_s.max(0.0) } else { 0.0 };
+                view.speed_px_s = held.map_or(now, |before| before + SPEED_NEWS * (now - before));
+                *held = Some(view.speed_px_s);
+            }
             self.views.push((view, Span::of(&view)));
         }
-        let steers = self.in_view().any(|(_, span)| span.most > span.least);
-        self.steers = steers;
-        if self.policy == Policy::Full {
-            self.status = Status::Full;
-        } else if !self.steers && self.in_view().next().is_some() {
-            self.status = Status::Fixed;
-        } else if matches!(self.status, Status::Full | Status::Fixed) {
-            self.status = Status::Waiting;
-        }
     }
 
-    fn in_view(&self) -> impl Iterator<Item = &(ObjectView, Span)> + Clone {
-        self.views.iter().filter(|(view, _)| view.visible)
+    /// Sums up the plan.
+    fn count(&mut self) {
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
+        self.plan.full_polygons = in_view(&self.views).map(|(_, span)| span.full).sum();
+        (self.plan.changes, self.plan.reversals) = self.changes.count(&self.views, &self.plan.levels);
     }
 
-    fn plan_full(&mut self) {
-        for (view, span) in &self.views {
-            let resolution = Resolution { eps_m: view.range.eps_m.0, n: view.range.n.1 };
-            self.plan.levels.push(LevelDemand {
-                id: view.id,
-                resolution,
-                polygons: span.full,
-                shading: view.shading.1,
-            });
-        }
-    }
-
-    /// The polygons that ln ε̂ stands for, shared out (control.md, eq. 13 and 14).
-    ///
-    /// Bodies, whose levels are few and far apart, choose first; tubes, which follow exactly, share what is then left.
-    fn plan_corrected(&mut self) {
-        self.bound_corrected();
-        let budget = POLYGONS_AT_ONE * libm::exp(-self.corrected.value());
-        self.water = water_level(budget, self.in_view().map(share), self.water);
-        let water = self.water;
-        self.plan.levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
-        self.choose(water, |view| !is_tube(view) && !is_group(view));
-        let bodies = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible && !is_tube(view));
-        let taken: f64 = bodies.map(|(_, level)| level.polygons).sum();
-        let tubes = self.in_view().filter(|(view, _)| is_tube(view)).map(share);
-        let water = water_level(budget - taken, tubes, water);
-        self.choose(water, is_tube);
-    }
-
-    /// Chooses the level of those in view that are `of` the kind, by their shares at `water`.
-    fn choose(&mut self, water: f64, of: impl Fn(&ObjectView) -> bool) {
-        let all = self.views.iter().zip(&mut self.plan.levels);
-        for (seen, level) in all.filter(|((view, _), _)| of(view)) {
-            let held = self.held.entry(seen.0.id).or_default();
-            if seen.0.visible {
-                (level.resolution, level.polygons) = held.choose(&seen.0, seen.1, share(seen).at(water));
-            } else {
-                held.forget();
-            }
-        }
-    }
-
-    /// Keeps ln ε̂ between all finest and all coarsest of what is in view now.
-    fn bound_corrected(&mut self) {
-        let (least, most) = self.in_view().fold((0.0, 0.0), |(l, m), (_, span)| (l + span.least, m + span.most));
-        if least <= 0.0 {
-            return; // nothing is in view: wait with what is known
-        }
-        let range = (libm::log(POLYGONS_AT_ONE / most), libm::log(POLYGONS_AT_ONE / least));
-        self.corrected.set_range(range);
-        if !self.started && self.steers {
-            // whatever `coarsen` asked for before there was anything to see
-            self.corrected.set_value(0.5 * (range.0 + range.1) + self.pushed);
-            self.started = true;
-        }
-    }
-
-    /// ε̂ for all tubes, weighted; n = ⌊ρ⌋ for everything (GDC04, eq. 1).
-    fn plan_printed(&mut self) {
-        let mean = self.mean_coarseness();
-        self.bound_printed(mean);
-        for (view, _) in &self.views {
-            let held = self.held.entry(view.id).or_default();
-            if !view.visible {
-                held.forget();
-            }
-            let eps_m = match view.kind {
-                Kind::Tube { length_m, .. } => self.printed.eps() * length_m / INTERVALS_AT_ONE * weight(view, mean),
-                Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,
-            };
-            let wish = Resolution { eps_m, n: self.printed.n() };
-            let chosen = view.visible && !is_group(view);
-            let resolution = if chosen { view.range.clamp(wish) } else { coarsest(view) };
-            let polygons = level::polygons(view, resolution);
-            self.plan.levels.push(LevelDemand { id: view.id, resolution, polygons, shading: view.shading.1 });
-        }
-    }
-
-    /// Keeps ε̂ and n where they change at least one tube in view.
-    fn bound_printed(&mut self, mean: f64) {
-        let tubes = self.in_view().filter_map(|(view, _)| Some((view.range, eps_hat(view, mean)?)));
-        let widest = |a: Limits, b: Limits| Limits {
-            eps: (a.eps.0.min(b.eps.0), a.eps.1.max(b.eps.1)),
-            n: (a.n.0.min(b.n.0), a.n.1.max(b.n.1)),
-        };
-        let limits = tubes
-            .map(|(range, eps_hat)| Limits { eps: (range.eps_m.0 * eps_hat, range.eps_m.1 * eps_hat), n: range.n });
-        let limits = limits.reduce(widest).unwrap_or(LIMITS_WITHOUT_TUBES);
-        self.printed.set_limits(limits);
-        if !self.started && self.steers {
-            let eps = libm::sqrt(limits.eps.0 * limits.eps.1) * libm::exp(self.pushed);
-            let rho = 0.5 * (f64::from(limits.n.0) + f64::from(limits.n.1));
-            self.printed = GrisoniLaw::new(self.law.printed_gains(), limits, eps, rho);
-            self.started = true;
-        }
-    }
-
-    /// The geometric mean of the tubes' coarseness: one tube alone has weight 1, and the law is exactly the printed one.
-    fn mean_coarseness(&self) -> f64 {
-        let tubes = self.in_view().filter(|(view, _)| is_tube(view));
-        let (sum, count) = tubes.fold((0.0, 0.0), |(s, c), (view, _)| (s + libm::log(view.coarseness_m2()), c + 1.0));
-        if count > 0.0 { libm::exp(sum / count) } else { 1.0 }
+    fn plan_full(&self, levels: &mut Vec<LevelDemand>) {
+        levels.extend(self.views.iter().map(|(view, span)| {
+            let n = if matches!(view.kind, Kind::Group { .. }) { level::OPEN } else { view.range.n.1 };
+            let resolution = Resolution { eps_m: view.range.eps_m.0, n };
+            LevelDemand { id: view.id, resolution, polygons: span.full, shading: view.shading.1 }
+        }));
     }
 
     /// Changes the policy. The loop goes on from the picture as it is.
@@ -287,10 +265,8 @@ impl PictureControl {
 
     /// Changes the law or its gains. Another law goes on from the picture as it is.
     pub fn set_law(&mut self, law: Law) {
-        let other = std::mem::discriminant(&law) != std::mem::discriminant(&self.law);
-        self.law = law;
-        self.corrected.set_gains(law.log_gains());
-        self.printed.set_gains(law.printed_gains());
+        let other = std::mem::discriminant(&law) != std::mem::discriminant(&self.feedback.law());
+        self.feedback.set_law(law);
         if other {
             self.take_over();
         }
@@ -303,52 +279,115 @@ impl PictureControl {
         }
     }
 
-    /// Puts both laws where the last plan is.
+    /// Changes the part of a frame that policies with a prediction leave free, 0 … 0.9; feedback has its own in its law.
+    pub fn set_margin(&mut self, margin: f64) {
+        self.margin = margin.is_finite().then(|| margin.clamp(0.0, 0.9));
+    }
+
+    /// Changes how much each factor counts in what a level is worth.
+    pub fn set_sliders(&mut self, sliders: Sliders) {
+        if sliders != self.sliders {
+            self.sliders = sliders;
+            self.forget_ladders();
+        }
+    }
+
+    /// How much each factor counts in what a level is worth.
+    #[must_use]
+    pub fn sliders(&self) -> Sliders {
+        self.sliders
+    }
+
+    /// Changes what an object is worth to Robin Hood.
+    pub fn set_value(&mut self, value: Value) {
+        self.value = value;
+    }
+
+    /// Changes what drawing is taken to cost.
+    pub fn set_prices(&mut self, prices: Prices) {
+        let prices = prices.sound();
+        if prices != self.prices {
+            self.prices = prices;
+            self.forget_ladders();
+        }
+    }
+
+    /// What drawing is taken to cost.
+    #[must_use]
+    pub fn prices(&self) -> &Prices {
+        &self.prices
+    }
+
+    /// Says what is in the next picture whatever is chosen.
+    pub fn set_backdrop(&mut self, backdrop: Backdrop) {
+        self.backdrop = backdrop;
+    }
+
+    /// Keeps all levels as they are, or lets them be chosen again; objects that come or go are an exception.
+    pub fn freeze(&mut self, frozen: bool) {
+        self.frozen = frozen;
+    }
+
+    /// Whether levels are kept as they are.
+    #[must_use]
+    pub fn is_frozen(&self) -> bool {
+        self.frozen
+    }
+
+    fn forget_ladders(&mut self) {
+        self.ladders.clear();
+        self.adaptive.clear();
+    }
+
+    /// Puts the laws where the last plan is.
     fn take_over(&mut self) {
-        self.status = Status::Waiting;
-        if self.plan.polygons <= 0.0 {
-            return;
-        }
-        self.corrected.set_value(libm::log(POLYGONS_AT_ONE / self.plan.polygons));
-        let mean = self.mean_coarseness();
-        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
-        let mut tubes =
-            drawn.filter_map(|((view, _), at)| Some((eps_hat(view, mean)? * at.resolution.eps_m, at.resolution.n)));
-        if let Some((eps, n)) = tubes.next() {
-            let limits = Limits { eps: (1e-9, 1e9), n: (0, N_MAX) }; // until the next plan
-            self.printed = GrisoniLaw::new(self.law.printed_gains(), limits, eps, f64::from(n) + 0.5);
-        }
-        self.started = true;
+        self.feedback.take_over(&self.views, &self.plan.levels, self.plan.polygons);
     }
 
     /// Multiplies the scene's ε̂ by `factor` (finite, > 0; above 1 is coarser), as far as the ranges allow: another start, or a push.
+    /// Only feedback has such a state.
     pub fn coarsen(&mut self, factor: f64) {
         if factor.is_finite() && factor > 0.0 {
-            self.corrected.set_value(self.corrected.value() + libm::log(factor));
-            self.printed.coarsen(factor);
-            self.pushed += if self.started { 0.0 } else { libm::log(factor) };
+            self.feedback.coarsen(factor);
         }
     }
 
     /// What the controller is doing; its text is for the viewer and the report.
     #[must_use]
     pub fn status(&self) -> Status {
-        self.status
+        match self.policy {
+            Policy::Full => Status::Full,
+            _ if !steers(&self.views) && in_view(&self.views).next().is_some() => Status::Fixed,
+            Policy::Feedback => self.feedback.status(),
+            Policy::Adaptive => self.adaptive.status(),
+            _ => Status::of_promise(&self.plan.promise),
+        }
     }
 
-    /// The loop variable ε̂: as printed, or of the corrected law (480 over the scene's polygons).
+    /// The loop variable ε̂: of feedback its law's, of other policies 480 over the polygons in view.
     #[must_use]
     pub fn eps_hat(&self) -> f64 {
-        match self.law {
-            Law::Corrected { .. } => libm::exp(self.corrected.value()),
-            Law::Printed { .. } => self.printed.eps(),
+        match self.policy {
+            Policy::Feedback => self.feedback.eps_hat(),
+            _ => POLYGONS_AT_ONE / self.plan.polygons.max(1.0),
         }
     }
 
     /// The work a frame is to take, seconds: T_set = (1 − margin)/target.
     #[must_use]
     pub fn set_point_s(&self) -> f64 {
-        self.law.set_share() / self.target_hz
+        let share = match self.policy {
+            Policy::Feedback => self.law().set_share(),
+            Policy::Adaptive => 1.0 - self.adaptive.margin(),
+            _ => 1.0 - self.margin.unwrap_or(MARGIN),
+        };
+        share / self.target_hz
+    }
+
+    /// How much slower the machine is than its prices, as the default has learnt.
+    #[must_use]
+    pub fn kappa(&self) -> f64 {
+        self.adaptive.kappa()
     }
 
     /// The policy in use.
@@ -360,7 +399,7 @@ impl PictureControl {
     /// The law in use.
     #[must_use]
     pub fn law(&self) -> Law {
-        self.law
+        self.feedback.law()
     }
 
     /// The wanted frame rate, frames a second.
@@ -370,38 +409,18 @@ impl PictureControl {
     }
 }
 
-fn is_tube(view: &ObjectView) -> bool {
-    matches!(view.kind, Kind::Tube { .. })
+/// Size, accuracy and importance count as they are, motion by half: what the eye follows is not judged as strictly as what rests.
+fn usual_sliders() -> Sliders {
+    Sliders { accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
 }
 
-fn is_group(view: &ObjectView) -> bool {
-    matches!(view.kind, Kind::Group { .. })
+fn in_view(views: &[Seen]) -> impl Iterator<Item = &Seen> + Clone {
+    views.iter().filter(|(view, _)| view.visible)
 }
 
-/// What an object in view may get of the polygons (control.md, eq. 14).
-fn share((view, span): &(ObjectView, Span)) -> Share {
-    Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
-}
-
-fn unseen(view: &ObjectView) -> LevelDemand {
-    let resolution = coarsest(view);
-    LevelDemand { id: view.id, resolution, polygons: level::polygons(view, resolution), shading: view.shading.1 }
-}
-
-/// Groups are opened by this law, always: their members make room for each other.
-fn coarsest(view: &ObjectView) -> Resolution {
-    let n = if is_group(view) { level::OPEN } else { view.range.n.0 };
-    Resolution { eps_m: view.range.eps_m.1, n }
-}
-
-fn weight(view: &ObjectView, mean: f64) -> f64 {
-    view.coarseness_m2() / mean
-}
-
-/// ε̂ of a tube for each metre of its ε; `None` for a primitive.
-fn eps_hat(view: &ObjectView, mean: f64) -> Option<f64> {
-    let Kind::Tube { length_m, .. } = view.kind else { return None };
-    Some(INTERVALS_AT_ONE / (length_m * weight(view, mean)))
+/// Whether anything in view can be drawn in more than one way.
+pub(super) fn steers(views: &[Seen]) -> bool {
+    in_view(views).any(|(view, span)| span.most > span.least || view.shading.0 < view.shading.1)
 }
 
 #[cfg(test)]

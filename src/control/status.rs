@@ -2,6 +2,7 @@
 //!
 //! In: the laws' own words. Out: [`Status`], and its sentence for the viewer and the report. Never here: state.
 
+use super::ask::Promise;
 use metachron_budget::Bound;
 use metachron_budget::log_law::Rest;
 use std::fmt;
@@ -38,6 +39,11 @@ impl From<Rest> for Status {
 }
 
 impl Status {
+    /// Of a policy that predicts and does not learn: it is where it promises to be.
+    pub(super) fn of_promise(promise: &Promise) -> Self {
+        if promise.feasible { Self::Settled } else { Self::Clamped(Bound::Coarsest) }
+    }
+
     /// The end at which it is stopped.
     #[must_use]
     pub fn clamped(self) -> Option<Bound> {

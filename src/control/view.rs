@@ -1,20 +1,9 @@
-//! What control is told: the objects in view, the policy, the law and its gains.
+//! What control is told of the objects: what they are, and how the camera sees them.
 //!
 //! In: plain numbers. Out: the weight by which an object shares in the picture's polygons. Never here: state.
 
 use super::level::PRIMITIVE_LEVELS;
 use metachron_agents::{AgentId, ResolutionRange};
-use metachron_budget::{grisoni, log_law};
-
-/// Who chooses the level of every visible object.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Policy {
-    /// The finest of everything, whatever it costs.
-    Full,
-    /// Feedback on (ε, n) from the measured work of frames (GDC04).
-    #[default]
-    Feedback,
-}
 
 /// How the light on a surface is worked out: the rendering algorithm of (FS93), cheapest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -26,65 +15,6 @@ pub enum Shading {
     /// Light at every pixel.
     #[default]
     PerPixel,
-}
-
-/// The feedback law and its gains.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Law {
-    /// The law as printed (GDC04, eq. 1), on ε̂ = 40 ε/L.
-    Printed {
-        /// α: change of ε̂ for each frame per second that is missing, > 0. Past 2/(df/dε̂) the loop swings for ever.
-        alpha: f64,
-        /// β: change of ρ for each unit of ε̂, > 0.
-        beta: f64,
-    },
-    /// The law on the logarithm of the measured time (control.md, eq. 7).
-    Corrected {
-        /// κ, 0.01 … 0.99: the share of an error that one frame removes.
-        kappa: f64,
-        /// The share of the frame that is left free, 0 … 0.9: T_set = (1 − margin) T.
-        margin: f64,
-    },
-}
-
-impl Law {
-    /// The printed law with the gains of (GDC04).
-    pub const PRINTED: Self = Self::Printed { alpha: 1e-4, beta: 5.0 };
-
-    /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses
-    /// (is past 1.05 T in) fewer than 1 frame in 100.
-    pub const CORRECTED: Self = Self::Corrected { kappa: 0.5, margin: 0.1 };
-
-    /// The share of the frame's time that the work is to take: T_set/T.
-    #[must_use]
-    pub fn set_share(self) -> f64 {
-        match self {
-            Self::Printed { .. } => 1.0,
-            Self::Corrected { margin, .. } if margin.is_finite() => 1.0 - margin.clamp(0.0, 0.9),
-            Self::Corrected { .. } => 0.9,
-        }
-    }
-
-    pub(super) fn log_gains(self) -> log_law::Gains {
-        let default = log_law::Gains::default();
-        match self {
-            Self::Corrected { kappa, .. } => log_law::Gains { kappa, ..default },
-            Self::Printed { .. } => default,
-        }
-    }
-
-    pub(super) fn printed_gains(self) -> grisoni::Gains {
-        match self {
-            Self::Printed { alpha, beta } => grisoni::Gains { alpha, beta },
-            Self::Corrected { .. } => grisoni::Gains::default(),
-        }
-    }
-}
-
-impl Default for Law {
-    fn default() -> Self {
-        Self::CORRECTED
-    }
 }
 
 /// What is drawn.
@@ -143,6 +73,10 @@ pub struct ObjectView {
     pub speed_px_s: f64,
     /// Weight against the others, > 0; 1 is usual.
     pub importance: f64,
+    /// Distance of its centre from the middle of the picture, as a part of half the diagonal, ≥ 0.
+    pub off_centre: f64,
+    /// Distance of its centre from the point that the camera looks at, metres, ≥ 0.
+    pub from_focus_m: f64,
     /// Whether any of it may be in the picture.
     pub visible: bool,
 }

@@ -8,10 +8,11 @@ use super::governor::RateGovernor;
 use super::ties::{Ties, faults};
 use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, Seen, Stage};
 use crate::control::{
-    self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, RateControl, RateLimits,
+    self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
+    RateLimits, Stages, Value,
 };
-use crate::runtime::{AgentSpawn, Governor, Machine, StepPrice, Watch};
-use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind};
+use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, StepPrice, Watch};
+use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ValueKind};
 use crate::scene::{self, Member, Scene, Spec};
 use glam::DVec3;
 use metachron_agents::Agent;
@@ -145,15 +146,35 @@ const fn look(wish: &scene::Look) -> Look {
 
 /// The controller of the picture that `scene` asks for.
 pub(super) fn picture_control(scene: &Scene) -> PictureControl {
-    PictureControl::new(policy(scene.target.policy), law(&scene.target), scene.target.frame_hz)
+    let target = &scene.target;
+    let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
+    control.set_value(value(target.value));
+    control.set_prices(prices(&machine(scene).draw));
+    if let Some(margin) = target.gains.margin {
+        control.set_margin(margin);
+    }
+    control
 }
 
-/// Control's word for a policy.
-pub(super) const fn policy(kind: PolicyKind) -> Policy {
+/// Control's word for a policy: scenes and control call them alike.
+pub(super) fn policy(kind: PolicyKind) -> Policy {
+    Policy::named(kind.name()).unwrap_or_default()
+}
+
+const fn value(kind: ValueKind) -> Value {
     match kind {
-        PolicyKind::Full => Policy::Full,
-        PolicyKind::Feedback => Policy::Feedback,
+        ValueKind::Gentle => Value::Gentle,
+        ValueKind::Plain => Value::Plain,
+        ValueKind::Steep => Value::Steep,
+        ValueKind::Focus => Value::Focus,
+        ValueKind::FocusSteep => Value::FocusSteep,
     }
+}
+
+/// The declared prices of drawing as control wants them: one algorithm, whose pixels cost the same whatever covers them.
+fn prices(draw: &DrawPrice) -> Prices {
+    let object = Stages { setup: draw.object_us * 1e-6, polygon: draw.triangle_us * 1e-6, vertex: 0.0, pixel: 0.0 };
+    Prices { frame_s: draw.setup_ms * 1e-3, pixel_s: draw.pixel_ns * 1e-9, shading: [object; 3] }
 }
 
 /// The feedback law that a target asks for.
@@ -186,6 +207,8 @@ pub(super) fn view(seen: &Seen, member: &Member) -> ObjectView {
         distance_m: seen.distance_m,
         speed_px_s: seen.speed_px_s,
         importance: member.look.importance,
+        off_centre: seen.off_centre,
+        from_focus_m: seen.from_focus_m,
         visible: seen.visible,
     }
 }
@@ -243,4 +266,16 @@ fn overview(stage: &Stage) -> Camera {
     let distance = 1.1 * radius_m / libm::sin(0.5 * OVERVIEW_FOV_RAD);
     let towards = DVec3::new(0.35, -1.0, 0.55).normalize();
     Camera::looking(centre + towards * distance, centre, OVERVIEW_FOV_RAD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn scenes_and_control_have_the_same_names_for_policies() {
+        let written: Vec<_> = PolicyKind::ALL.into_iter().map(PolicyKind::name).collect();
+        let known: Vec<_> = Policy::ALL.into_iter().map(Policy::name).collect();
+        assert_eq!(written, known);
+    }
 }

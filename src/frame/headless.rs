@@ -86,6 +86,7 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
     let started = session.now();
     let camera = session.scene_camera();
     session.compose(&camera, plan.size, plan.style, None);
+    let composed = session.now();
     let gpu = match &mut plan.drawing {
         Drawing::Every(screen) => screen.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu,
         Drawing::Last(_) | Drawing::Nothing => {
@@ -93,8 +94,9 @@ fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, 
             None
         }
     };
-    let work = session.now().saturating_sub(started);
-    Ok(session.finish(started, Finished { work, gpu, skip: false }))
+    let done = session.now();
+    let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
+    Ok(session.finish(started, Finished { work, draw, gpu, skip: false }))
 }
 
 /// The last frame once more, with all the time it takes.

@@ -9,9 +9,9 @@ use super::error::SessionError;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 use super::trace::Trace;
 use crate::compositor::{Camera, Hand, Level, Picture, Seen, Size, Stage, States, Style};
-use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
+use crate::control::{Backdrop, FrameWork, Law, ObjectView, PictureControl, Policy, Shading, Status};
 use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
-use crate::scene::format::{ExecutorKind, LawKind, PolicyKind, StatesKind};
+use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
 use crate::scene::{Probe, Scene};
 use metachron_agents::{AgentId, Body, Pull, SimTime, Snapshot};
 use std::sync::Arc;
@@ -43,6 +43,8 @@ pub struct Session {
 pub struct Finished {
     /// All work of the frame until its picture was finished.
     pub work: Duration,
+    /// Of it the drawing of the picture: what levels change.
+    pub draw: Duration,
     /// The adapter's own time on the newest frame it has told of; `None` where it has no time stamps.
     pub gpu: Option<Duration>,
     /// Whether the controller must not learn from it.
@@ -55,6 +57,8 @@ struct Chosen {
     sim: SimTime,
     triangles: u64,
     more_triangles: f64,
+    /// Triangles that nobody chose: fixed solids, the floor, the caps of tubes.
+    other_triangles: f64,
     objects: u64,
 }
 
@@ -149,16 +153,13 @@ impl Session {
     /// The name of the policy that chooses levels, as scenes write it.
     #[must_use]
     pub fn policy_name(&self) -> &'static str {
-        match self.control.policy() {
-            Policy::Full => PolicyKind::Full.name(),
-            Policy::Feedback => PolicyKind::Feedback.name(),
-        }
+        self.control.policy().name()
     }
 
     /// Lets the policy of this name choose levels; an unknown name changes nothing.
     pub fn set_policy(&mut self, name: &str) {
-        if let Some(kind) = PolicyKind::ALL.into_iter().find(|kind| kind.name() == name) {
-            self.control.set_policy(cast::policy(kind));
+        if let Some(policy) = Policy::named(name) {
+            self.control.set_policy(policy);
         }
     }
 
@@ -232,9 +233,10 @@ impl Session {
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
         self.gather();
         self.stage.survey(camera, size, &mut self.seen);
-        self.choose();
+        self.choose(size);
         let picture = self.stage.compose(camera, &self.levels, style, hand);
         self.chosen.triangles = picture.triangles();
+        self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
         picture
     }
 
@@ -247,14 +249,14 @@ impl Session {
 
     /// Ends the frame that began at `started`.
     pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
-        let Finished { work, skip, .. } = finished;
+        let Finished { work, draw, skip, .. } = finished;
         let record = self.record(started, finished);
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
         self.warm_up += usize::from(cold);
         self.remember(record);
-        self.control.observe(FrameWork { work, skip: skip || cold });
+        self.control.observe(FrameWork { work, draw, skip: skip || cold });
         record
     }
 
@@ -342,9 +344,11 @@ impl Session {
         }
     }
 
-    fn choose(&mut self) {
+    fn choose(&mut self, size: Size) {
         self.views.clear();
         self.views.extend(self.seen.iter().zip(&self.scene.agents).map(|(seen, member)| cast::view(seen, member)));
+        // what is in the picture besides hardly changes from one frame to the next
+        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         let plan = self.control.plan(&self.views);
         self.levels.clear();
         self.levels.extend(plan.levels.iter().map(cast::level));
@@ -353,7 +357,7 @@ impl Session {
     }
 
     fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
-        let Chosen { sim, triangles, more_triangles, objects } = self.chosen;
+        let Chosen { sim, triangles, more_triangles, objects, .. } = self.chosen;
         let frame_ms = finished.work.as_secs_f64() * 1e3;
         let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
         FrameRecord {
@@ -362,7 +366,7 @@ impl Session {
             frame_ms,
             gpu_ms: finished.gpu.map(|time| time.as_secs_f64() * 1e3),
             interval_ms: interval.as_secs_f64() * 1e3,
-            full_ms: frame_ms + more_triangles * self.machine.draw.triangle_us * 1e-3,
+            full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
             triangles,
             objects,
             eps: self.control.eps_hat(),

@@ -321,9 +321,9 @@ impl Show for WindowShow<'_> {
             return;
         }
         let declared = || self.session.now().saturating_sub(self.started);
-        let work = if self.session.is_virtual() { declared() } else { times.work };
-        self.last =
-            self.session.finish(self.started, Finished { work, gpu: times.draw_gpu, skip: times.skip.is_some() });
+        let (work, draw) = if self.session.is_virtual() { (declared(), declared()) } else { (times.work, times.draw) };
+        let (gpu, skip) = (times.draw_gpu, times.skip.is_some());
+        self.last = self.session.finish(self.started, Finished { work, draw, gpu, skip });
     }
 
     fn status(&self) -> &Status {

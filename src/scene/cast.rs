@@ -3,7 +3,7 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
-use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind};
+use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind, ValueKind};
 use super::ties::{Coupling, Faults};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
@@ -56,6 +56,8 @@ pub struct Target {
     pub frame_hz: f64,
     /// Who chooses levels.
     pub policy: PolicyKind,
+    /// What an object is worth to `robin-hood`.
+    pub value: ValueKind,
     /// Which feedback law.
     pub law: LawKind,
     /// Gains of the laws.
@@ -71,7 +73,7 @@ pub struct Gains {
     pub beta: Option<f64>,
     /// κ of the corrected law, 0 < κ < 1.
     pub kappa: Option<f64>,
-    /// Share of the frame that the corrected law leaves free, 0 … 0.9.
+    /// Share of the frame that is left free, 0 … 0.9.
     pub margin: Option<f64>,
 }
 

@@ -38,6 +38,7 @@ pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile
     Target {
         frame_hz: c.number_or(&place, "frame_hz", (frame_hz, FRAME_DEFAULT_HZ), &allowed(1.0..=1000.0, "Hz")),
         policy: file.and_then(|f| f.policy).unwrap_or_default(),
+        value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
         gains,
     }

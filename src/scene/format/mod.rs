@@ -20,7 +20,7 @@ pub use joint::{JointFile, JointKind};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
     CameraFile, CameraKeyFile, ExecutorKind, LawKind, MachineFile, ModelCostFile, PolicyKind, ProbeFile, SceneFile,
-    StatesKind, TargetFile, WorldFile,
+    StatesKind, TargetFile, ValueKind, WorldFile,
 };
 pub use synthetic::SyntheticFile;
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};

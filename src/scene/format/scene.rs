@@ -66,6 +66,8 @@ pub struct TargetFile {
     pub frame_hz: Option<f64>,
     /// Who chooses the level of every visible object. Default `feedback`.
     pub policy: Option<PolicyKind>,
+    /// What an object is worth to `robin-hood`. Default `plain`.
+    pub value: Option<ValueKind>,
     /// Which feedback law. Default `corrected`.
     pub law: Option<LawKind>,
     /// Gain α of the printed law, 1e-9 … 1. Default 1e-4.
@@ -74,7 +76,7 @@ pub struct TargetFile {
     pub beta: Option<f64>,
     /// Gain κ of the corrected law, above 0, below 1. Default: the law's own.
     pub kappa: Option<f64>,
-    /// Share of the frame that the corrected law leaves free, 0 … 0.9. Default: the law's own.
+    /// Share of the frame that is left free, 0 … 0.9. Default: of feedback its law's own, of policies that predict 0.02.
     pub margin: Option<f64>,
 }
 
@@ -95,9 +97,55 @@ pub enum ExecutorKind {
 pub enum PolicyKind {
     /// The finest of everything, whatever it costs.
     Full,
-    /// Feedback on (ε, n) from the measured frame work.
+    /// The finest level whose polygons cover 1024 pixels each (FS93).
+    Static,
+    /// The same with a threshold that follows the time of the frame before (FS93).
+    Threshold,
+    /// Levels in falling benefit per cost (FS93).
+    Greedy,
+    /// The same from the levels of the frame before (FS93).
+    GreedyIncremental,
+    /// The better of the greedy answer and the best single object.
+    GreedyRepaired,
+    /// Objects and groups, from the cut of the frame before (MB97).
+    Hierarchical,
+    /// Objects and groups in falling benefit per cost (MB97).
+    HierarchicalFlat,
+    /// Objects and groups, always the most important opened next (MS95).
+    MacielShirley,
+    /// Every object its part of the time by value (RH05).
+    RobinHood,
+    /// Any number of triangles, the exact optimum (GB99).
+    Convex,
+    /// Any number of triangles, by interior point (GB99).
+    ConvexBarrier,
+    /// Steps in falling gain per cost, to the first that does not fit.
+    MarginalStop,
+    /// The same, and then whatever still fits.
+    MarginalFill,
+    /// Feedback on (ε, n) from the measured frame work (GDC04).
     #[default]
     Feedback,
+    /// Steps in falling gain per cost, by prices that learn, with hysteresis and a certificate.
+    Adaptive,
+}
+
+/// What an object is worth to `robin-hood` (RH05, eq. 8 … 11): its surface a over its depth z, or over its distance d from what
+/// the camera looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ValueKind {
+    /// a/√z.
+    Gentle,
+    /// a/z.
+    #[default]
+    Plain,
+    /// a/z².
+    Steep,
+    /// √(a/d²).
+    Focus,
+    /// √a/d².
+    FocusSteep,
 }
 
 /// Which feedback law.
@@ -220,14 +268,45 @@ impl ExecutorKind {
 
 impl PolicyKind {
     /// All of them.
-    pub const ALL: [Self; 2] = [Self::Full, Self::Feedback];
+    pub const ALL: [Self; 16] = [
+        Self::Full,
+        Self::Static,
+        Self::Threshold,
+        Self::Greedy,
+        Self::GreedyIncremental,
+        Self::GreedyRepaired,
+        Self::Hierarchical,
+        Self::HierarchicalFlat,
+        Self::MacielShirley,
+        Self::RobinHood,
+        Self::Convex,
+        Self::ConvexBarrier,
+        Self::MarginalStop,
+        Self::MarginalFill,
+        Self::Feedback,
+        Self::Adaptive,
+    ];
 
     /// The name as scenes write it.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Full => "full",
+            Self::Static => "static",
+            Self::Threshold => "threshold",
+            Self::Greedy => "greedy",
+            Self::GreedyIncremental => "greedy-incremental",
+            Self::GreedyRepaired => "greedy-repaired",
+            Self::Hierarchical => "hierarchical",
+            Self::HierarchicalFlat => "hierarchical-flat",
+            Self::MacielShirley => "maciel-shirley",
+            Self::RobinHood => "robin-hood",
+            Self::Convex => "convex",
+            Self::ConvexBarrier => "convex-barrier",
+            Self::MarginalStop => "marginal-stop",
+            Self::MarginalFill => "marginal-fill",
             Self::Feedback => "feedback",
+            Self::Adaptive => "adaptive",
         }
     }
 }

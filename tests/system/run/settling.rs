@@ -42,7 +42,7 @@ impl Play {
         self.session.compose(&camera, SIZE, Style::default(), None);
         self.session.spend_declared(SIZE);
         let work = self.session.now() - started;
-        self.session.finish(started, Finished { work, gpu: None, skip: false });
+        self.session.finish(started, Finished { work, draw: work, gpu: None, skip: false });
         self.due = (self.due + self.session.period()).max(self.session.now());
         work.as_secs_f64() / self.session.control().set_point_s()
     }

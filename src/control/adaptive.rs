@@ -1,0 +1,200 @@
+//! The default: every frame's time goes where it gains most, by prices that are corrected while it runs.
+//!
+//! In: ladders, groups, a time; what frames took. Out: a rung or a proxy for everything in view, and a promise with its certificate.
+//! Never here: the law (`metachron_budget::adaptive` has it). Theory: `docs/theory/budget.md`, section 7; `docs/theory/control.md`,
+//! section 6.
+
+use super::ask::{Ask, Promise, TICKS, demand};
+use super::closing::Closing;
+use super::groups::Groups;
+use super::hierarchy::leave_out_members;
+use super::ladder::Ladder;
+use super::picture::LevelDemand;
+use super::status::Status;
+use metachron_agents::AgentId;
+use metachron_budget::Bound;
+use metachron_budget::adaptive::{Adaptive, Offer, Plan, Settings, Time};
+
+/// A weight that moved by less than this, in proportion, is the weight it was: what trembles changes no level.
+const TREMBLE: f64 = 0.05;
+
+/// The stage of `budget` that drawing is.
+const DRAWING: usize = 0;
+
+/// This near to what was promised, as a part of the target, a frame is as was wanted.
+const ON_TARGET: f64 = 0.05;
+
+/// What of an object is on the menu.
+#[derive(Debug, Clone, Copy)]
+struct Dish {
+    id: AgentId,
+    /// The ladder it was put there with; 0 while it is not on it.
+    version: u64,
+    /// What its gains were last multiplied by.
+    weight: Option<f64>,
+}
+
+/// The law, and what is on its menu.
+#[derive(Debug, Clone)]
+pub(super) struct AdaptiveChoice {
+    law: Adaptive,
+    /// In the order in which objects are given.
+    dishes: Vec<Dish>,
+    closing: Closing,
+    offers: Vec<Offer>,
+    fixed_s: f64,
+    /// Number of the frame, as the law counts them.
+    frame: u64,
+    plan: Plan,
+    status: Status,
+    kept: Settings,
+}
+
+impl Default for AdaptiveChoice {
+    fn default() -> Self {
+        let kept = Settings::default();
+        Self {
+            law: Adaptive::new(kept),
+            dishes: Vec::new(),
+            closing: Closing::default(),
+            offers: Vec::new(),
+            fixed_s: 0.0,
+            frame: 0,
+            plan: Plan::default(),
+            status: Status::Waiting,
+            kept,
+        }
+    }
+}
+
+impl AdaptiveChoice {
+    /// Chooses; `levels` has one entry an object.
+    pub fn choose(&mut self, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
+        self.set_margin(ask);
+        self.closing.decide(ask, groups, (self.plan.lambda, self.kappa()));
+        self.lay(ask, groups);
+        self.fixed_s = ask.fixed_s;
+        let time = Time { target: TICKS * ask.target_s, fixed: TICKS * ask.fixed_s };
+        self.frame += 1;
+        self.plan = self.law.choose(self.frame, time);
+        self.serve(ask, levels);
+        leave_out_members(ask, groups, levels);
+        self.promise()
+    }
+
+    /// Learns what the frame took: the drawing of what was chosen, and all of it; seconds.
+    pub fn observe(&mut self, drawn_s: f64, work_s: f64, target_s: f64) {
+        self.law.observe(self.frame, DRAWING, TICKS * drawn_s);
+        self.law.finished(self.frame, TICKS * work_s);
+        let missing = work_s / target_s - self.plan.predicted / (TICKS * target_s);
+        self.status = match () {
+            () if !self.plan.feasible => Status::Clamped(Bound::Coarsest),
+            () if missing.abs() > ON_TARGET => Status::Moving,
+            () if self.plan.lambda == 0.0 => Status::Clamped(Bound::Finest),
+            () if self.plan.budget / (TICKS * target_s) - self.spent() / target_s > ON_TARGET => Status::BetweenLevels,
+            () => Status::Settled,
+        };
+    }
+
+    /// Something outside made frames unlike others: the next few teach nothing.
+    pub fn disturb(&mut self) {
+        self.law.disturb();
+    }
+
+    pub fn status(&self) -> Status {
+        self.status
+    }
+
+    /// κ as planned with: how much slower the machine is than its prices.
+    pub fn kappa(&self) -> f64 {
+        self.law.planned_kappa(DRAWING)
+    }
+
+    /// The part of the target that is left free now.
+    pub fn margin(&self) -> f64 {
+        self.law.margin()
+    }
+
+    /// Time of what was chosen, seconds.
+    fn spent(&self) -> f64 {
+        self.plan.predicted / TICKS - self.fixed_s
+    }
+
+    fn set_margin(&mut self, ask: &Ask<'_>) {
+        let hysteresis = Settings::default().hysteresis + ask.sliders.hysteresis;
+        let wanted = Settings { margin: ask.margin, hysteresis, ..Settings::default() };
+        if wanted != self.kept {
+            self.kept = wanted;
+            self.law.set_settings(wanted);
+        }
+    }
+
+    /// Puts on the menu what is in view, and takes off what is not.
+    fn lay(&mut self, ask: &Ask<'_>, groups: &Groups) {
+        let same = self.dishes.len() == ask.views.len();
+        if !same || self.dishes.iter().zip(ask.views).any(|(dish, (view, _))| dish.id != view.id) {
+            self.clear();
+            self.dishes.extend(ask.views.iter().map(|(view, _)| Dish { id: view.id, version: 0, weight: None }));
+        }
+        for at in 0..self.dishes.len() {
+            let within = groups.parent(at).is_some() && groups.is_within(at, |group| self.closing.is_closed(group));
+            let ladder = ask.ladders.of(at);
+            let proxy = self.closing.is_closed(at).then_some(ladder.proxy).flatten();
+            let offered = ask.views[at].0.visible && (proxy.is_some() || !ladder.rungs.is_empty());
+            if within || !offered {
+                self.take_off(at);
+                continue;
+            }
+            let weight = if proxy.is_some() { self.closing.proxy_worth(at) } else { ask.weight(at) };
+            self.put_on(at, ladder, weight);
+        }
+    }
+
+    fn put_on(&mut self, at: usize, ladder: &Ladder, weight: f64) {
+        let dish = &mut self.dishes[at];
+        let id = u64::from(dish.id.0);
+        if dish.version != ladder.version {
+            let rungs = ladder.rungs.iter().map(|rung| Offer { cost: TICKS * rung.cost_s, gain: rung.accuracy });
+            let proxy = ladder.proxy.iter().map(|proxy| Offer { cost: TICKS * proxy.cost_s, gain: 1.0 });
+            self.offers.clear();
+            self.offers.extend(rungs.chain(proxy));
+            dish.version = ladder.version;
+            self.law.set(id, DRAWING, false, &self.offers);
+        }
+        if dish.weight.is_none_or(|held| (weight - held).abs() > TREMBLE * held) {
+            dish.weight = Some(weight);
+            self.law.weigh(id, weight);
+        }
+    }
+
+    fn take_off(&mut self, at: usize) {
+        let dish = &mut self.dishes[at];
+        if dish.version > 0 {
+            self.law.remove(u64::from(dish.id.0));
+            (dish.version, dish.weight) = (0, None);
+        }
+    }
+
+    /// Takes everything off the menu: prices are others, or objects have come or gone.
+    pub fn clear(&mut self) {
+        (0..self.dishes.len()).for_each(|at| self.take_off(at));
+        self.dishes.clear();
+        self.closing = Closing::default();
+    }
+
+    fn serve(&self, ask: &Ask<'_>, levels: &mut [LevelDemand]) {
+        for (at, dish) in self.dishes.iter().enumerate().filter(|(_, dish)| dish.version > 0) {
+            let ladder = ask.ladders.of(at);
+            let level = self.law.level(u64::from(dish.id.0)).map_or(0, |level| level as usize);
+            if let Some(rung) = ladder.rungs.get(level).or(ladder.proxy.as_ref()) {
+                levels[at] = demand(at, ask.views, rung);
+            }
+        }
+    }
+
+    fn promise(&self) -> Promise {
+        let Plan { feasible, budget, predicted, value, upper, .. } = self.plan;
+        let seconds = |ticks: f64| ticks / TICKS;
+        Promise { budget_s: seconds(budget), predicted_s: seconds(predicted), value, upper, feasible, holes: 0 }
+    }
+}

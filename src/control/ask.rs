@@ -1,0 +1,105 @@
+//! What every policy that looks at costs is asked, and what it promises.
+//!
+//! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
+
+use super::ladder::{Ladder, Ladders, Rung};
+use super::picture::{LevelDemand, Seen};
+use super::view::Kind;
+use super::worth;
+use metachron_agents::Resolution;
+use metachron_budget::cost::benefit::Sliders;
+use metachron_budget::cost::value::Value;
+use metachron_budget::select::Entry;
+
+/// Ticks of a second: costs are whole nanoseconds.
+pub(super) const TICKS: f64 = 1e9;
+
+/// Benefit is told in parts of a pixel, so that the whole numbers of a knapsack tell fine levels apart.
+const PARTS_OF_A_PIXEL: f64 = 4096.0;
+
+/// A level that costs no number is taken to cost twice this, ticks: a small object on a slow machine.
+const USUAL: f64 = 1e5;
+
+/// What a policy is asked for one frame.
+#[derive(Clone, Copy)]
+pub(super) struct Ask<'a> {
+    pub views: &'a [Seen],
+    pub ladders: &'a Ladders,
+    pub sliders: &'a Sliders,
+    /// What an object is worth to Robin Hood.
+    pub value: Value,
+    /// What a frame may take, seconds, > 0.
+    pub target_s: f64,
+    /// The part of it that is left free at least, 0 … 0.9.
+    pub margin: f64,
+    /// What is taken whatever is chosen, seconds, ≥ 0.
+    pub fixed_s: f64,
+}
+
+/// What a choice promises.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Promise {
+    /// Time for what is chosen, seconds; below 0 where other things take the whole frame.
+    pub budget_s: f64,
+    /// What the frame is to take in all, seconds; 0 where the policy predicts nothing.
+    pub predicted_s: f64,
+    /// What the choice is worth, in a unit of its own.
+    pub value: f64,
+    /// The certificate: no choice within the budget is worth more; 0 where the policy gives none.
+    pub upper: f64,
+    /// Whether the cheapest choice fits the budget.
+    pub feasible: bool,
+    /// Objects in view that are left out for want of time.
+    pub holes: u32,
+}
+
+impl Promise {
+    /// Value over its bound, 0 … 1; `None` without a bound.
+    #[must_use]
+    pub fn value_over_bound(&self) -> Option<f64> {
+        (self.upper > 0.0).then(|| (self.value / self.upper).min(1.0))
+    }
+}
+
+impl Ask<'_> {
+    /// Time for what is chosen, seconds.
+    pub fn budget_s(&self) -> f64 {
+        self.target_s * (1.0 - self.margin) - self.fixed_s
+    }
+
+    /// The same in whole ticks.
+    pub fn budget(&self) -> i64 {
+        // a cast of floats saturates
+        libm::floor(self.budget_s() * TICKS) as i64
+    }
+
+    /// Numbers of the objects in view that have levels of their own.
+    pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
+        let ladder = |at: &usize| !self.ladders.of(*at).rungs.is_empty();
+        (0..self.views.len()).filter(|at| self.views[*at].0.visible).filter(ladder)
+    }
+
+    /// What an object in view is worth at an accuracy of 1.
+    pub fn weight(&self, at: usize) -> f64 {
+        worth::weight(&self.views[at].0, self.sliders, self.ladders.of(at).polygon_px())
+    }
+
+    /// A rung of an object as an entry of a knapsack.
+    pub fn entry(&self, weight: f64, rung: &Rung) -> Entry {
+        Entry::measured(TICKS * rung.cost_s, PARTS_OF_A_PIXEL * weight * rung.accuracy, USUAL).0
+    }
+}
+
+/// The demand for one rung.
+pub(super) fn demand(at: usize, views: &[Seen], rung: &Rung) -> LevelDemand {
+    LevelDemand { id: views[at].0.id, resolution: rung.resolution, polygons: rung.polygons, shading: rung.shading }
+}
+
+/// What an object has that is left out of the picture: its coarsest, without triangles.
+pub(super) fn left_out(at: usize, views: &[Seen], ladder: &Ladder) -> LevelDemand {
+    let view = &views[at].0;
+    let usual = Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 };
+    let resolution = ladder.rungs.first().map_or(usual, |rung| rung.resolution);
+    let n = if matches!(view.kind, Kind::Group { .. }) { super::level::OPEN } else { resolution.n };
+    LevelDemand { id: view.id, resolution: Resolution { n, ..resolution }, polygons: 0.0, shading: view.shading.1 }
+}

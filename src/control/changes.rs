@@ -1,0 +1,83 @@
+//! How often levels change, and change back: what the eye sees of a policy's unrest.
+//!
+//! In: the levels of every frame. Out: counts. Never here: a choice.
+
+use super::picture::{LevelDemand, Seen};
+use metachron_agents::AgentId;
+
+/// So many frames back a level that returns is a reversal.
+const REMEMBERED: usize = 3;
+
+/// The last levels of one object, newest first.
+#[derive(Debug, Clone, Copy)]
+struct Past {
+    id: AgentId,
+    levels: [Option<LevelDemand>; REMEMBERED],
+}
+
+/// The last levels of all objects, in the order in which they are given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Changes {
+    past: Vec<Past>,
+}
+
+impl Changes {
+    /// Takes the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
+    pub fn count(&mut self, views: &[Seen], levels: &[LevelDemand]) -> (u32, u32) {
+        let unknown = Past { id: AgentId(0), levels: [None; REMEMBERED] };
+        self.past.resize(views.len(), unknown);
+        let (mut changes, mut reversals) = (0, 0);
+        for (((view, _), level), past) in views.iter().zip(levels).zip(&mut self.past) {
+            if past.id != view.id || !view.visible {
+                *past = Past { id: view.id, ..unknown };
+            }
+            if !view.visible {
+                continue;
+            }
+            let changed = past.levels[0].is_some_and(|last| last != *level);
+            let had_it = past.levels[1..].iter().flatten().any(|before| before == level);
+            changes += u32::from(changed);
+            reversals += u32::from(changed && had_it);
+            past.levels.rotate_right(1);
+            past.levels[0] = Some(*level);
+        }
+        (changes, reversals)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::level::Span;
+    use super::super::view::{Kind, ObjectView, Shading};
+    use super::*;
+    use metachron_agents::{Resolution, ResolutionRange};
+
+    #[test]
+    fn a_level_that_comes_back_is_a_reversal_and_what_was_out_of_sight_is_new() {
+        let at = |n| Resolution { eps_m: 1.0, n };
+        let view = |visible| ObjectView {
+            id: AgentId(3),
+            kind: Kind::Counted { radius_m: 1.0, least: 4, most: 100 },
+            range: ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) },
+            shading: Default::default(),
+            pixels: 1.0,
+            distance_m: 1.0,
+            speed_px_s: 0.0,
+            importance: 1.0,
+            off_centre: 0.0,
+            from_focus_m: 0.0,
+            visible,
+        };
+        let mut changes = Changes::default();
+        let mut frame = |n, visible| {
+            let level = LevelDemand { id: AgentId(3), resolution: at(n), polygons: 4.0, shading: Shading::Flat };
+            changes.count(&[(view(visible), Span::of(&view(visible)))], &[level])
+        };
+        assert_eq!(frame(1, true), (0, 0));
+        assert_eq!(frame(2, true), (1, 0));
+        assert_eq!(frame(1, true), (1, 1));
+        assert_eq!(frame(1, true), (0, 0));
+        assert_eq!(frame(5, false), (0, 0));
+        assert_eq!(frame(2, true), (0, 0));
+    }
+}

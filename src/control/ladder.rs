@@ -1,0 +1,188 @@
+//! The levels that an object can be drawn at, as rungs with a cost and an accuracy: what selections choose among.
+//!
+//! In: what objects are, prices. Out: a [`Ladder`] an object, made anew only where something it depends on has changed.
+//! Never here: a choice, or what an object is worth now ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
+
+use super::level::{Held, Span};
+use super::picture::Seen;
+use super::price::Prices;
+use super::view::{Kind, ObjectView, Shading};
+use super::worth;
+use metachron_agents::{AgentId, Resolution, ResolutionRange};
+use metachron_budget::cost::benefit::Sliders;
+use metachron_budget::hysteresis;
+
+/// Rungs of all objects together, an octave of polygons each: one object may have fine steps, of hundreds each has coarse ones.
+const STEPS: usize = 256;
+
+/// Fewest and most rungs an octave: past the most, a step is below a twentieth of an object.
+const STEPS_AN_OCTAVE: (usize, usize) = (2, 16);
+
+/// Lengths and radii that differ by less than this factor make the same ladder: a tube that breathes keeps its own.
+const SAME: f64 = 1.1;
+
+/// One level of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rung {
+    pub resolution: Resolution,
+    pub polygons: f64,
+    pub shading: Shading,
+    /// Seconds by the prices.
+    pub cost_s: f64,
+    /// Part of the object's pixels that it draws right, 0 … 1.
+    pub accuracy: f64,
+}
+
+/// What the rungs depend on.
+#[derive(Debug, Clone, Copy)]
+struct Key {
+    id: AgentId,
+    kind: Kind,
+    range: ResolutionRange,
+    shading: (Shading, Shading),
+    /// Pixels that it covers, in half octaves.
+    size: u8,
+    steps: usize,
+}
+
+/// The levels of one object, cheapest first; none of a group, whose proxy is [`Ladder::proxy`].
+#[derive(Debug, Clone)]
+pub(super) struct Ladder {
+    key: Key,
+    /// Another number whenever the rungs are others.
+    pub version: u64,
+    pub rungs: Vec<Rung>,
+    /// Of a group, what it is drawn as where it is not opened.
+    pub proxy: Option<Rung>,
+}
+
+/// The ladders of all objects, in the order in which they are given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ladders {
+    all: Vec<Ladder>,
+    made: u64,
+}
+
+impl Ladders {
+    /// Brings the ladders of all objects in view up to date.
+    pub fn update(&mut self, views: &[Seen], prices: &Prices, sliders: &Sliders) {
+        let steps = steps_an_octave(views);
+        self.all.truncate(views.len());
+        for (at, (view, span)) in views.iter().enumerate() {
+            let before = self.all.get(at).map(|ladder| ladder.key);
+            let key = Key::of(view, steps, before);
+            if before.is_some_and(|before| before.id == key.id && (!view.visible || before.is_same(&key))) {
+                continue;
+            }
+            self.made += 1;
+            let ladder = Ladder::new(key, self.made, (view, *span), (prices, sliders));
+            match self.all.get_mut(at) {
+                Some(place) => *place = ladder,
+                None => self.all.push(ladder),
+            }
+        }
+    }
+
+    /// Forgets all ladders: prices or sliders are others.
+    pub fn clear(&mut self) {
+        self.all.clear();
+    }
+
+    /// The ladder of the object given as number `at`.
+    pub fn of(&self, at: usize) -> &Ladder {
+        &self.all[at]
+    }
+}
+
+/// Rungs an octave: the more objects there are, the less it matters that one of them is rounded.
+fn steps_an_octave(views: &[Seen]) -> usize {
+    let objects = views.iter().filter(|(_, span)| span.full > span.least).count().max(1);
+    let wish = (STEPS / objects).clamp(STEPS_AN_OCTAVE.0, STEPS_AN_OCTAVE.1);
+    1 << wish.ilog2()
+}
+
+impl Key {
+    fn of(view: &ObjectView, steps: usize, before: Option<Self>) -> Self {
+        let held = before.filter(|before| before.id == view.id).map(|before| before.size);
+        let size = hysteresis::floor(held, 2.0 * libm::log2(worth::pixels(view).max(1.0)));
+        Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let kinds = match (self.kind, other.kind) {
+            (Kind::Tube { length_m: l, radius_m: r }, Kind::Tube { length_m, radius_m }) => {
+                is_near(l, length_m) && is_near(r, radius_m)
+            }
+            (Kind::Primitive { triangles: a, .. }, Kind::Primitive { triangles: b, .. }) => a == b,
+            (Kind::Counted { least: a, most: b, .. }, Kind::Counted { least, most, .. }) => (a, b) == (least, most),
+            (Kind::Group { proxy_triangles: a, .. }, Kind::Group { proxy_triangles: b, .. }) => a == b,
+            _ => false,
+        };
+        kinds
+            && (self.range, self.shading, self.size, self.steps)
+                == (other.range, other.shading, other.size, other.steps)
+    }
+
+    /// The middle of its half octave of pixels.
+    fn pixels(&self) -> f64 {
+        libm::exp2(0.5 * f64::from(self.size) + 0.25)
+    }
+}
+
+fn is_near(a: f64, b: f64) -> bool {
+    a <= SAME * b && b <= SAME * a
+}
+
+impl Ladder {
+    fn new(key: Key, version: u64, (view, span): (&ObjectView, Span), with: (&Prices, &Sliders)) -> Self {
+        let rung = |(resolution, polygons), shading| key.rung(resolution, polygons, shading, with);
+        if let Kind::Group { proxy_triangles, .. } = key.kind {
+            let closed = Resolution { eps_m: key.range.eps_m.1, n: 0 };
+            let proxy = rung((closed, f64::from(proxy_triangles.max(1))), key.shading.1);
+            return Self { key, version, rungs: Vec::new(), proxy: Some(proxy) };
+        }
+        let shadings = [Shading::Flat, Shading::Gouraud, Shading::PerPixel];
+        let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
+        let mut rungs: Vec<Rung> = Vec::new();
+        for cut in key.cuts(view, span) {
+            rungs.extend(shadings.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
+        }
+        rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
+        Self { key, version, rungs, proxy: None }
+    }
+
+    /// What its triangles are to the eye, pixels across, halfway up the ladder: by it the blur of motion is judged.
+    pub fn polygon_px(&self) -> f64 {
+        let ends = self.rungs.first().zip(self.rungs.last()).map(|(a, b)| libm::sqrt(a.polygons * b.polygons));
+        libm::sqrt(self.key.pixels() / ends.unwrap_or(1.0).max(1.0)).max(1e-3)
+    }
+}
+
+impl Key {
+    /// The shapes that it can be cut to, each once, in rising polygons.
+    fn cuts(&self, view: &ObjectView, span: Span) -> Vec<(Resolution, f64)> {
+        // finer than one triangle a pixel nothing more is seen
+        let most = span.full.min(self.pixels()).max(span.least);
+        let fine = 1.0 / self.steps as f64;
+        let octaves = libm::log2(most / span.least);
+        let count = if octaves.is_finite() { libm::ceil(octaves / fine) as usize } else { 0 };
+        let wishes = (0..count).map(|k| span.least * libm::exp2(fine * k as f64)).chain([most]);
+        let mut cuts: Vec<_> = wishes.map(|wish| Held::default().choose(view, span, wish)).collect();
+        cuts.sort_by(|a, b| a.1.total_cmp(&b.1));
+        cuts.dedup_by(|a, b| a.1 <= b.1);
+        cuts
+    }
+
+    fn rung(
+        &self,
+        resolution: Resolution,
+        polygons: f64,
+        shading: Shading,
+        (prices, sliders): (&Prices, &Sliders),
+    ) -> Rung {
+        let pixels = self.pixels();
+        let accuracy = worth::accuracy(&self.kind, polygons, shading, pixels);
+        let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
+        Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
+    }
+}

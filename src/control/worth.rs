@@ -1,0 +1,56 @@
+//! What a level is worth to who looks (FS93, §5), for shapes that are cut and for surfaces that are shaded.
+//!
+//! In: an object as the camera sees it, triangles, a shading. Out: a weight for the object and an accuracy for the level; their product
+//! is the benefit, in pixels. Never here: costs. Theory: `docs/theory/control.md`, eq. 20 … 22.
+
+use super::view::{Kind, ObjectView, Shading};
+use metachron_budget::cost::benefit::{self, BASE_ERROR, Picture, Sliders};
+
+/// Triangles of the coarsest closed surface, a tetrahedron: half of what it covers is drawn wrong.
+const COARSEST: f64 = 4.0;
+
+/// No picture has more pixels: what covers more is no number.
+const PIXELS_MAX: f64 = 1e9;
+
+/// Speeds are judged over this long, seconds: a frame at 60 Hz.
+const BLUR_S: f64 = 1.0 / 60.0;
+
+/// Pixels that an object covers, 0 where that is no number.
+pub(super) fn pixels(view: &ObjectView) -> f64 {
+    if view.pixels > 0.0 { view.pixels.min(PIXELS_MAX) } else { 0.0 }
+}
+
+/// What all levels of an object are worth together: pixels · importance · focus · motion (control.md, eq. 20).
+pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f64 {
+    let importance = if view.importance > 0.0 { view.importance.min(1e6) } else { 0.0 };
+    let blur = if view.speed_px_s > 0.0 { view.speed_px_s * BLUR_S / polygon_px } else { 0.0 };
+    let off_centre = if view.off_centre.is_nan() { 1.0 } else { view.off_centre };
+    let factors = [
+        (importance, sliders.importance),
+        ((1.0 - off_centre).clamp(0.0, 1.0), sliders.focus),
+        // half of it is lost where it moves by a polygon a frame
+        (1.0 / (1.0 + blur), sliders.motion),
+    ];
+    factors.into_iter().fold(pixels(view), |all, (factor, slider)| all * (1.0 - slider * (1.0 - factor)).max(0.0))
+}
+
+/// The part of an object's pixels that a level draws right, 0 … 1: of its shape by the triangles, of its light by the shading
+/// (control.md, eq. 21 and 22).
+pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, pixels: f64) -> f64 {
+    let (pieces, coarsest) = match *kind {
+        // as many balls in a row as make its length
+        Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),
+        Kind::Primitive { .. } | Kind::Group { .. } => (1.0, COARSEST),
+        Kind::Counted { least, .. } => (1.0, f64::from(least.max(1))),
+    };
+    let most = (pixels / pieces).max(1.0);
+    let samples = (polygons / pieces / coarsest).min(most).max(1.0);
+    let shape = 1.0 - BASE_ERROR / samples;
+    let picture = |shading| Picture { level: 0, polygons, vertices: 0.5 * polygons + 2.0, shading };
+    let light = match shading {
+        Shading::Flat => benefit::accuracy(pixels, &picture(benefit::Shading::Flat)),
+        Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
+        Shading::PerPixel => 1.0,
+    };
+    shape * light
+}
