@@ -203,6 +203,8 @@ pub enum Subject {
     Stability,
     /// How far a scene with clocks apart is from the same under one tiny clock
     Coupling,
+    /// How well each policy of a frame's budget keeps to its time, on the scenes of the papers
+    Policies,
 }
 
 /// `list`.

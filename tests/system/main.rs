@@ -1,5 +1,6 @@
 //! The whole program as its users meet it; one binary, so that it links once.
 mod chart;
+mod chart_policies;
 mod cli;
 mod coupling;
 mod picture;

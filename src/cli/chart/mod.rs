@@ -7,6 +7,7 @@ mod coupling;
 mod experiment;
 mod figure;
 mod play;
+mod policies;
 mod rows;
 mod scenes;
 mod stability;
@@ -72,11 +73,23 @@ const STABILITY: &[Entry] = &[
 
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 
+const POLICIES: &[Entry] = &[
+    entry::<policies::auditorium::Auditorium>(),
+    entry::<policies::grove::Grove>(),
+    entry::<policies::values::Values>(),
+    entry::<policies::walkthrough::Walkthrough>(),
+    entry::<policies::disturbed::Disturbed>(),
+    entry::<policies::still::Still>(),
+    entry::<policies::selection::Selection>(),
+    entry::<policies::bound::Bound>(),
+];
+
 /// Runs the experiments of a subject.
 pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     let (subject, all) = match args.subject {
         Subject::Stability => ("stability", STABILITY),
         Subject::Coupling => ("coupling", COUPLING),
+        Subject::Policies => ("policies", POLICIES),
     };
     let chosen = chosen(all, &args.only)?;
     let folder = prepared(&args.out)?;

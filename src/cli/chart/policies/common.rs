@@ -1,0 +1,116 @@
+//! What the experiments of this room share: a case, the columns that are printed, the curves of frames.
+
+use super::super::experiment::Finding;
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::table::Table;
+use super::chooser::Policy;
+use super::closed_loop::{Frame, Show};
+use super::metrics::Row;
+
+/// A setting and a policy.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    pub(super) setting: String,
+    pub(super) policy: String,
+    /// Frames of all runs together, each run with a machine of another seed.
+    pub(super) frames: usize,
+}
+
+impl Case {
+    /// A case of some runs.
+    pub(super) fn new(setting: &str, policy: Policy, seeds: usize, frames: usize) -> Self {
+        Self { setting: setting.to_owned(), policy: policy.name().to_owned(), frames: seeds * frames }
+    }
+
+    /// The case of a row.
+    pub(super) fn of(row: &Row) -> Self {
+        Self { setting: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
+    }
+
+    /// The one of these policies that the case names; the last where it names none of them.
+    pub(super) fn policy_of(&self, policies: &[Policy]) -> Policy {
+        let named = policies.iter().find(|p| p.name() == self.policy);
+        *named.or(policies.last()).unwrap_or(&Policy::Full)
+    }
+
+    /// Plays the show once for every seed; the row of all their frames.
+    pub(super) fn measure(&self, show: &Show, policies: &[Policy]) -> Row {
+        let (policy, seeds) = (self.policy_of(policies), self.frames / show.frames.max(1));
+        let frames: Vec<Frame> = (1..=seeds as u64).flat_map(|seed| show.play(policy, seed)).collect();
+        Row::of(&self.setting, &self.policy, &frames)
+    }
+}
+
+/// The columns that tell policies apart.
+pub(super) fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new(&[
+        "setting",
+        "policy",
+        "mean",
+        "max",
+        "stddev",
+        "binding",
+        "b_stddev",
+        "avg_err",
+        "miss",
+        "model",
+        "value",
+        "proven",
+        "changes",
+        "reversals",
+        "holes",
+    ]);
+    table.rows.extend(rows.iter().map(|r| {
+        vec![
+            r.setting.clone().into(),
+            r.policy.clone().into(),
+            (r.mean, 3).into(),
+            (r.max, 3).into(),
+            (r.stddev, 4).into(),
+            (r.binding, 2).into(),
+            (r.binding_stddev, 4).into(),
+            (r.avg_err, 4).into(),
+            (r.misses, 4).into(),
+            (r.model_error, 4).into(),
+            (r.value_over_bound, 4).into(),
+            (r.certified, 3).into(),
+            (r.changes, 4).into(),
+            (r.reversals, 5).into(),
+            (r.holes, 4).into(),
+        ]
+    }));
+    table
+}
+
+/// A number of the row of a setting and a policy; NaN where there is no such row.
+pub(super) fn number(rows: &[Row], setting: &str, policy: &str, of: fn(&Row) -> f64) -> f64 {
+    rows.iter().find(|r| r.setting == setting && r.policy == policy).map_or(f64::NAN, of)
+}
+
+/// A claim that something is at least `limit`.
+pub(super) fn at_least(claim: impl Into<String>, measured: f64, limit: f64) -> Finding {
+    Finding { claim: claim.into(), measured, limit, holds: measured >= limit }
+}
+
+/// The time of every frame under some policies, beside the target.
+pub(super) fn curves(title: &str, show: &Show, policies: &[Policy], greatest: f64) -> Panel {
+    let line = |p: &Policy| {
+        let times = show.play(*p, 1);
+        Mark::Line(times.iter().enumerate().map(|(k, f)| (k as f64, f.time)).collect())
+    };
+    let mut layers = vec![Layer {
+        label: "target".to_owned(),
+        colour: Colour::Grey,
+        mark: Mark::Dashed(vec![(0.0, 1.0), (show.frames as f64, 1.0)]),
+    }];
+    let drawn = policies.iter().zip(Colour::LINES.into_iter().cycle());
+    layers.extend(drawn.map(|(p, colour)| Layer { label: p.name().to_owned(), colour, mark: line(p) }));
+    let (x, y) =
+        (Axis::linear("frame", 0.0, show.frames as f64), Axis::linear("time of a frame / target", 0.0, greatest));
+    Panel { title: title.to_owned(), x, y, layers }
+}
+
+/// Panels in a row.
+pub(super) fn figure(title: &str, panels: Vec<Panel>, columns: usize) -> Figure {
+    Figure { title: title.to_owned(), panels, columns }
+}

@@ -1,0 +1,95 @@
+//! The declared machine of these experiments: how far the time of a frame is from its table.
+//!
+//! In: a seed, and what is wrong with the machine. Out: for every frame the factor between its time and the table's.
+//! Never here: a clock; the same seed gives the same bits. The noise is that of `docs/theory/budget.md`, section 10.
+
+use std::ops::Range;
+
+/// Uniform and normal numbers from a seed: xorshift, and the sum of twelve uniforms.
+#[derive(Debug, Clone)]
+pub(super) struct Noise(u64);
+
+impl Noise {
+    pub(super) fn new(seed: u64) -> Self {
+        Self(seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1)
+    }
+
+    /// 0 … 1.
+    pub(super) fn uniform(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1_u64 << 53) as f64
+    }
+
+    /// Mean 0, standard deviation 1.
+    pub(super) fn normal(&mut self) -> f64 {
+        (0..12).map(|_| self.uniform()).sum::<f64>() - 6.0
+    }
+}
+
+/// What is wrong with a machine besides the noise that every machine has.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Fault {
+    /// The machine is this much slower than its table.
+    pub(super) slow: f64,
+    /// Frames in which everything takes this much longer.
+    pub(super) load: (Range<usize>, f64),
+    /// How often a frame takes half as long again.
+    pub(super) spikes: f64,
+    /// Standard deviation of the table's error that wanders with the view, nine parts in ten of which stay from frame to frame.
+    pub(super) wander: f64,
+    /// Standard deviation of the error that does not stay.
+    pub(super) tremble: f64,
+}
+
+impl Fault {
+    /// The table is right, but for the noise.
+    pub(super) const NONE: Self = Self { slow: 1.0, load: (0..0, 1.0), spikes: 0.0, wander: 0.05, tremble: 0.01 };
+}
+
+/// A machine on its way through a run.
+#[derive(Debug, Clone)]
+pub(super) struct Machine {
+    noise: Noise,
+    wander: f64,
+    fault: Fault,
+}
+
+/// How much of the wandering error stays from frame to frame.
+const MEMORY: f64 = 0.9;
+/// What a spike takes.
+const SPIKE: f64 = 1.5;
+
+impl Machine {
+    pub(super) fn new(seed: u64, fault: Fault) -> Self {
+        Self { noise: Noise::new(seed), wander: 0.0, fault }
+    }
+
+    /// What the next frame takes, over what the table says.
+    pub(super) fn slower(&mut self, frame: usize) -> f64 {
+        self.wander =
+            MEMORY * self.wander + libm::sqrt(1.0 - MEMORY * MEMORY) * self.fault.wander * self.noise.normal();
+        let spike = if self.noise.uniform() < self.fault.spikes { SPIKE } else { 1.0 };
+        let tremble = 1.0 + self.fault.tremble * self.noise.normal();
+        let (during, load) = &self.fault.load;
+        let load = if during.contains(&frame) { *load } else { 1.0 };
+        self.fault.slow * load * spike * (1.0 + self.wander) * tremble
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn table_errs_by_five_parts_in_a_hundred_that_stay_for_ten_frames() {
+        let mut machine = Machine::new(7, Fault::NONE);
+        let errors: Vec<f64> = (0..20_000).map(|frame| machine.slower(frame) - 1.0).collect();
+        let product =
+            |lag: usize| errors.iter().zip(&errors[lag..]).map(|(a, b)| a * b).sum::<f64>() / errors.len() as f64;
+        // √(0.05² + 0.01²), and 0.9 of the part that wanders: 20,000 frames hold 1000 independent ones, so to 5 %
+        assert!((product(0).sqrt() - 0.051).abs() < 0.003, "{}", product(0).sqrt());
+        assert!((product(1) / product(0) - 0.9 * 25.0 / 26.0).abs() < 0.02, "{}", product(1) / product(0));
+    }
+}
