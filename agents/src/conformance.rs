@@ -187,6 +187,10 @@ fn extents(body: &Body) -> (f64, f64) {
         Body::Curve(c) => (longest(&mut c.velocities.iter().copied()), longest(&mut c.positions.iter().copied())),
         Body::Rigid(b) => (b.velocity.length(), b.position.length()),
         Body::Tool(t) => (t.velocity.length(), t.tip.length()),
+        Body::Soft(s) => {
+            let most = |list: &[DVec3]| list.iter().map(|v| v.length()).fold(0.0, f64::max);
+            (most(&s.velocities), most(&s.positions))
+        }
     }
 }
 

@@ -6,12 +6,14 @@
 mod agent;
 pub mod conformance;
 pub mod coupling;
+mod envelope;
 pub mod instrument;
 mod resolution;
 pub mod rigid;
 pub mod rod;
 pub mod shape;
 mod snapshot;
+pub mod soft;
 pub mod synthetic;
 mod time;
 
@@ -20,6 +22,7 @@ pub use agent::{
 };
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
-    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, Stand, ToolState,
+    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, SoftState, Stand,
+    ToolState,
 };
 pub use time::{SimSpan, SimTime};

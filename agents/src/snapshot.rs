@@ -5,6 +5,7 @@
 
 use crate::coupling::{Ledger, PairState};
 use crate::rod::CurveInertia;
+use crate::soft::SoftInertia;
 use crate::{AgentId, Resolution, SimTime};
 use glam::{DMat3, DQuat, DVec3};
 
@@ -62,6 +63,8 @@ pub enum Inertia {
     },
     /// A tube.
     Curve(CurveInertia),
+    /// A soft body.
+    Soft(SoftInertia),
 }
 
 /// How a body stands on something fixed: pushed towards it, near the middle of its feet, the body does not yield.
@@ -98,6 +101,17 @@ pub enum Body {
     Rigid(RigidState),
     /// A driven tool with jaws.
     Tool(ToolState),
+    /// A sheet, solid or rope: vertices.
+    Soft(SoftState),
+}
+
+/// The vertices of a soft body. What joins them never changes ([`crate::coupling::SurfaceForm`]).
+#[derive(Debug, Clone, Default)]
+pub struct SoftState {
+    /// Where they are, metres, world axes.
+    pub positions: Vec<DVec3>,
+    /// Their velocities, m/s.
+    pub velocities: Vec<DVec3>,
 }
 
 /// A framed curve of N segments between N + 1 nodes. Positions are in metres, world axes.
@@ -165,6 +179,8 @@ pub enum Anchor {
     Arc(f64),
     /// A point of a rigid body in its own axes, metres from the centre of mass.
     Local(DVec3),
+    /// A vertex of a soft body.
+    Vertex(u32),
 }
 
 /// The force by which `by` holds this agent.
@@ -220,16 +236,24 @@ impl Body {
                 Some((body.position + arm, body.velocity + body.spin.cross(arm)))
             }
             (Self::Tool(tool), Anchor::Local(local)) => Some((tool.tip + tool.rotation * local, tool.velocity)),
+            (Self::Soft(soft), Anchor::Vertex(vertex)) => {
+                Some((*soft.positions.get(vertex as usize)?, *soft.velocities.get(vertex as usize)?))
+            }
             _ => None,
         }
     }
 
     /// The point a probe at `at` (0 start … 1 end of a curve's rest length) reports: position and velocity.
-    /// A body without length reports its centre of mass or tip.
+    /// A soft body reports the vertex at that share of their numbers: of its first corner at 0, of the opposite one at 1.
+    /// Any other body reports its centre of mass or tip.
     #[must_use]
     pub fn probe(&self, at: f64) -> Option<(DVec3, DVec3)> {
         match self {
             Self::Curve(curve) => curve.point_at(at * curve.arc_m.last()?),
+            Self::Soft(soft) => {
+                let last = soft.positions.len().checked_sub(1)?;
+                self.point(Anchor::Vertex((at.clamp(0.0, 1.0) * last as f64).round() as u32))
+            }
             Self::Nothing => None,
             _ => self.point(Anchor::Local(DVec3::ZERO)),
         }
@@ -250,6 +274,18 @@ impl Body {
                 b.position.is_finite() && b.rotation.is_finite() && b.velocity.is_finite() && b.spin.is_finite()
             }
             Self::Tool(t) => t.tip.is_finite() && t.rotation.is_finite() && t.velocity.is_finite() && t.jaw.is_finite(),
+            Self::Soft(s) => s.positions.iter().chain(&s.velocities).all(|p| p.is_finite()),
+        }
+    }
+
+    /// The soft body to write into, keeping its storage when this is one already.
+    pub fn soft_mut(&mut self) -> &mut SoftState {
+        if !matches!(self, Self::Soft(_)) {
+            *self = Self::Soft(SoftState::default());
+        }
+        match self {
+            Self::Soft(soft) => soft,
+            _ => unreachable!("made a soft body above"),
         }
     }
 
@@ -266,6 +302,17 @@ impl Body {
 }
 
 impl Inertia {
+    /// A soft body's to write into, keeping its storage when this is one already.
+    pub fn soft_mut(&mut self) -> &mut SoftInertia {
+        if !matches!(self, Self::Soft(_)) {
+            *self = Self::Soft(SoftInertia::default());
+        }
+        match self {
+            Self::Soft(soft) => soft,
+            _ => unreachable!("made a soft body above"),
+        }
+    }
+
     /// A tube's to write into, keeping its storage when this is one already.
     pub fn curve_mut(&mut self) -> &mut CurveInertia {
         if !matches!(self, Self::Curve(_)) {
@@ -320,6 +367,7 @@ impl Snapshot {
                 fold.rotation(t.rotation);
                 fold.word(t.jaw.to_bits());
             }
+            Body::Soft(s) => s.positions.iter().chain(&s.velocities).for_each(|v| fold.vector(*v)),
         }
         fold.0
     }

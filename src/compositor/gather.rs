@@ -237,6 +237,10 @@ impl Track {
                 let Some((low, high, skin)) = curve_box(curve) else { return Bounds::default() };
                 Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) + skin }
             }
+            Body::Soft(soft) => {
+                let Some((low, high)) = box_of(&soft.positions) else { return Bounds::default() };
+                Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) }
+            }
         }
     }
 
@@ -244,6 +248,7 @@ impl Track {
     pub fn half_extents(&self) -> DVec3 {
         match &self.pose {
             Body::Curve(curve) => curve_box(curve).map_or(DVec3::ZERO, |(low, high, skin)| 0.5 * (high - low) + skin),
+            Body::Soft(soft) => box_of(&soft.positions).map_or(DVec3::ZERO, |(low, high)| 0.5 * (high - low)),
             _ => DVec3::splat(self.bounds.radius_m),
         }
     }
@@ -270,9 +275,13 @@ impl PropShape {
 
 /// Lower and upper corner of the box around a curve's nodes, and its greatest radius, metres; `None` for one without nodes.
 fn curve_box(curve: &CurveState) -> Option<(DVec3, DVec3, f64)> {
-    let bound = |pick: fn(DVec3, DVec3) -> DVec3| curve.positions.iter().copied().reduce(pick);
     let skin = curve.radii_m.iter().copied().fold(0.0, f64::max);
-    Some((bound(DVec3::min)?, bound(DVec3::max)?, skin))
+    box_of(&curve.positions).map(|(low, high)| (low, high, skin))
+}
+
+/// Lower and upper corner of the box around points, metres; `None` for none.
+fn box_of(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
+    Some((points.iter().copied().reduce(DVec3::min)?, points.iter().copied().reduce(DVec3::max)?))
 }
 
 impl BodyShape {

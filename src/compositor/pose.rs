@@ -4,7 +4,7 @@
 //! Never here: which snapshots an object has. Curves that were divided anew in between are matched by rest arc length.
 
 use glam::{DQuat, DVec3};
-use metachron_agents::{Body, CurveState, RigidState, SimTime, Snapshot, ToolState};
+use metachron_agents::{Body, CurveState, RigidState, SimTime, Snapshot, SoftState, ToolState};
 
 /// Past this age states are no longer carried on, seconds: an agent that stopped must not fly apart.
 const BEYOND_MAX_S: f64 = 0.1;
@@ -40,6 +40,12 @@ pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
             rigid.rotation = DQuat::from_scaled_axis(rigid.spin * age_s) * rigid.rotation;
         }
         Body::Tool(tool) => tool.tip += tool.velocity * age_s,
+        Body::Soft(soft) => {
+            soft.positions
+                .iter_mut()
+                .zip(&soft.velocities)
+                .for_each(|(position, velocity)| *position += *velocity * age_s);
+        }
     }
     let ahead = (age_s * 1e9) as u64;
     SimTime::from_nanos(newest.time.as_nanos() + ahead)
@@ -55,6 +61,11 @@ pub fn copy(from: &Body, into: &mut Body) {
             to.velocities.clone_from(&curve.velocities);
             to.frames.clone_from(&curve.frames);
             to.radii_m.clone_from(&curve.radii_m);
+        }
+        Body::Soft(soft) => {
+            let to = into.soft_mut();
+            to.positions.clone_from(&soft.positions);
+            to.velocities.clone_from(&soft.velocities);
         }
         other => into.clone_from(other),
     }
@@ -82,9 +93,22 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
                 force_n: a.force_n + (b.force_n - a.force_n) * w,
             });
         }
+        (Body::Soft(a), Body::Soft(b)) if a.positions.len() == b.positions.len() => {
+            blend_soft(a, b, w, into.soft_mut());
+        }
         _ => return false,
     }
     true
+}
+
+/// Vertices at the share `w` of the way from `a` to `b`.
+fn blend_soft(a: &SoftState, b: &SoftState, w: f64, into: &mut SoftState) {
+    let between = |from: &[DVec3], to: &[DVec3], into: &mut Vec<DVec3>| {
+        into.clear();
+        into.extend(from.iter().zip(to).map(|(a, b)| a.lerp(*b, w)));
+    };
+    between(&a.positions, &b.positions, &mut into.positions);
+    between(&a.velocities, &b.velocities, &mut into.velocities);
 }
 
 /// Turns from `a` to `b` the short way round.

@@ -68,6 +68,13 @@ fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
         }
         Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
         Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
+        Body::Soft(soft) => {
+            let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
+            let half = track.half_extents();
+            // the mean side of its box: a sheet covers less, a ball about as much
+            let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
+            (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
+        }
         Body::Nothing => (0.0, 0.0, None),
     };
     Seen {

@@ -85,6 +85,7 @@ fn is_sound(command: &Command) -> bool {
             let anchor = match pull.anchor {
                 Anchor::Arc(arc_m) => arc_m.is_finite(),
                 Anchor::Local(point) => point.is_finite(),
+                Anchor::Vertex(_) => true,
             };
             let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
             anchor

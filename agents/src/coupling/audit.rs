@@ -51,7 +51,7 @@ pub fn audit(members: &[Member<'_>], at: SimTime, potential: &mut dyn FnMut(Agen
         match &member.snapshot.body {
             Body::Rigid(_) => rigid(&mut sum, member, members, at, potential),
             Body::Curve(state) => curve(&mut sum, member, members, state),
-            Body::Tool(_) | Body::Nothing => {}
+            Body::Soft(_) | Body::Tool(_) | Body::Nothing => {}
         }
     }
     sum

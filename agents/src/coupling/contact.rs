@@ -9,13 +9,13 @@ pub const PUSH_OUT_SHARE: f64 = 0.2;
 /// The fastest push-out, m/s: a body found deep inside another comes out slowly and not like a shot.
 const PUSH_OUT_MAX_M_S: f64 = 0.5;
 
-/// The velocities that a contact joins: u = Σ w v + Σ ω × r, over at most four of each.
+/// The velocities that a contact joins: u = Σ w v + Σ ω × r, over at most six linear ones and four spins.
 ///
 /// A slot is a place in the array of three-dimensional velocities that the owner of the contact keeps: the velocity of a
 /// node, or the spin of a segment.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Slots {
-    linear: [(u32, f64); 4],
+    linear: [(u32, f64); 6],
     angular: [(u32, DVec3); 4],
     counts: [u8; 2],
 }
@@ -24,7 +24,7 @@ impl Slots {
     /// Adds `weight` times the velocity in `slot`.
     ///
     /// # Panics
-    /// At the fifth call: a contact joins two bodies, each at one point between two nodes.
+    /// At the seventh call: a contact joins two bodies, each at one point between two or three nodes.
     pub fn add_linear(&mut self, slot: u32, weight: f64) {
         self.linear[usize::from(self.counts[0])] = (slot, weight);
         self.counts[0] += 1;
@@ -33,7 +33,7 @@ impl Slots {
     /// Adds the velocity that the spin in `slot` gives at the end of `arm_m`.
     ///
     /// # Panics
-    /// At the fifth call, like [`Slots::add_linear`].
+    /// At the fifth call: a point lies on one segment at most.
     pub fn add_angular(&mut self, slot: u32, arm_m: DVec3) {
         self.angular[usize::from(self.counts[1])] = (slot, arm_m);
         self.counts[1] += 1;

@@ -1,12 +1,13 @@
 //! What others must know of an agent's shape to touch it, and where it is.
 //!
-//! In: solids, tubes, tools. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
+//! In: solids, tubes, tools, soft surfaces. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
 //! Never here: how the nearest points are found ([`super::touch`]).
 
 use super::Slots;
 use crate::shape::{ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::SharedShape;
+use std::sync::Arc;
 
 /// An agent's shape and skin.
 #[derive(Debug, Clone)]
@@ -28,6 +29,25 @@ pub enum FormKind {
     Chain,
     /// A tool: its parts depend on how far its jaws are open.
     Tool(ToolShape),
+    /// The skin of a soft body: triangles and edges between vertices that move.
+    Surface(SurfaceForm),
+}
+
+/// What holds the skin of a soft body together; it never changes.
+#[derive(Debug, Clone)]
+pub struct SurfaceForm {
+    /// The vertices that lie on the skin, by rising numbers.
+    pub vertices: Arc<[u32]>,
+    /// Pairs of vertices of the skin.
+    pub edges: Arc<[[u32; 2]]>,
+    /// Vertices of each triangle, counter-clockwise seen from outside where the skin is closed; none for a rope.
+    pub triangles: Arc<[[u32; 3]]>,
+    /// How thick the skin is about its vertices, metres, ≥ 0: half a sheet's thickness, a rope's radius.
+    pub radius_m: f64,
+    /// Mean length of its edges at rest, metres.
+    pub edge_m: f64,
+    /// Whether it encloses a volume: then nothing may be behind a triangle.
+    pub closed: bool,
 }
 
 /// A solid as others touch it.
@@ -69,6 +89,8 @@ pub enum View<'a> {
         /// Opening, 0 … 1.
         jaw: f64,
     },
+    /// A soft body: where its vertices are, metres.
+    Surface(&'a [DVec3]),
 }
 
 /// A form at its place.
@@ -93,6 +115,13 @@ pub enum Place {
         share: f64,
         /// The radius there, metres.
         radius_m: f64,
+    },
+    /// A point of a soft body's skin, in the surface between its vertices: its thickness turns nothing.
+    Surface {
+        /// Three vertices.
+        vertices: [u32; 3],
+        /// What each counts, in sum one; vertices of share zero do not matter.
+        shares: [f64; 3],
     },
 }
 
@@ -132,7 +161,7 @@ impl SolidForm {
 
 impl Place {
     /// Adds `sign` times the velocity of this point to what `slots` gather. The body's slots begin at `base`: its centre's
-    /// velocity and its spin, or a tube's nodes and segments in turn. `towards` is the unit normal out of this body's skin.
+    /// velocity and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
     pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
         match *self {
             Self::Point(point) => {
@@ -143,6 +172,11 @@ impl Place {
                 slots.add_linear(base + 2 * segment, sign * (1.0 - share));
                 slots.add_linear(base + 2 * segment + 2, sign * share);
                 slots.add_angular(base + 2 * segment + 1, towards * (radius_m * sign));
+            }
+            Self::Surface { vertices, shares } => {
+                for (vertex, share) in vertices.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
+                    slots.add_linear(base + vertex, sign * share);
+                }
             }
         }
     }

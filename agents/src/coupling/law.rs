@@ -58,16 +58,21 @@ pub struct Standing {
     pub rate_hz: f64,
 }
 
-/// Whether `me` owns the pair with `other`: a tube does before a rigid body, else the faster, of equals the lower number.
-/// A tool is led and owns nothing.
+/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, else the faster, of
+/// equals the lower number. A tool is led and owns nothing.
 ///
-/// How a rigid body answers impulses is known exactly, however long the step; how a tube does is not (docs/decisions/0012).
+/// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not
+/// (docs/decisions/0012, 0013).
 #[must_use]
 pub fn owns(me: Standing, other: Standing) -> bool {
     let led = |s: Standing| s.model == "instrument";
     let tube = |s: Standing| s.model == "tube";
     if led(me) || led(other) {
         return led(other) && !led(me);
+    }
+    let soft = |s: Standing| matches!(s.model, "sheet" | "solid" | "rope");
+    if soft(me) != soft(other) {
+        return soft(me);
     }
     let faster = me.rate_hz.total_cmp(&other.rate_hz);
     tube(me).cmp(&tube(other)).then(faster).then(other.id.cmp(&me.id)).is_gt()
@@ -79,7 +84,7 @@ mod tests {
 
     #[test]
     fn of_every_pair_exactly_one_owns_unless_both_are_led() {
-        let all = ["tube", "rigid", "instrument"]
+        let all = ["tube", "rigid", "instrument", "sheet"]
             .into_iter()
             .flat_map(|model| [60.0, 1000.0].map(|rate_hz| (model, rate_hz)));
         let all: Vec<_> =
@@ -92,5 +97,6 @@ mod tests {
         }
         assert!(owns(all[1], all[0]), "the faster");
         assert!(owns(all[0], all[2]) && owns(all[0], all[3]), "the tube, however slow");
+        assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
     }
 }

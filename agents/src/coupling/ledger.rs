@@ -27,6 +27,8 @@ pub enum Site {
     Whole,
     /// A tube at this rest arc length, metres: the linear part acts on its axis there, the angular part on the segment there.
     Arc(f64),
+    /// A vertex of a soft body: only the linear part acts.
+    Vertex(u32),
 }
 
 /// What one site was given on one page.
@@ -112,11 +114,15 @@ impl Mul<f64> for Impulse {
 
 impl Site {
     fn order(&self, other: &Self) -> Ordering {
+        let kind = |site: &Self| match site {
+            Self::Whole => 0,
+            Self::Arc(_) => 1,
+            Self::Vertex(_) => 2,
+        };
         match (self, other) {
-            (Self::Whole, Self::Whole) => Ordering::Equal,
-            (Self::Whole, Self::Arc(_)) => Ordering::Less,
-            (Self::Arc(_), Self::Whole) => Ordering::Greater,
             (Self::Arc(a), Self::Arc(b)) => a.total_cmp(b),
+            (Self::Vertex(a), Self::Vertex(b)) => a.cmp(b),
+            _ => kind(self).cmp(&kind(other)),
         }
     }
 }

@@ -17,7 +17,7 @@ pub mod touch;
 
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
 pub use exchange::{Exchange, PairKind, PairState, acknowledged};
-pub use form::{Form, FormKind, Place, Placed, SolidForm, Touch, View};
+pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View};
 pub(crate) use knock::Knock;
 pub use law::{Law, Link, Standing, owns};
 pub use ledger::{Entry, Impulse, Ledger, Page, Site};

@@ -14,9 +14,9 @@ use std::sync::Arc;
 pub struct Other {
     neighbour: Option<Neighbour>,
     pose: Pose,
-    /// Velocities in slots: a rigid body's or tool's centre and spin; a tube's nodes and segments in turn.
+    /// Velocities in slots: a rigid body's or tool's centre and spin; a tube's nodes and segments in turn; a soft body's vertices.
     velocities: Vec<DVec3>,
-    /// A tube's nodes.
+    /// A tube's nodes, a soft body's vertices.
     positions: Vec<DVec3>,
     /// Room for two answers.
     answer: Vec<DVec3>,
@@ -80,7 +80,24 @@ impl Other {
                 self.interleave(&curve.velocities);
                 !self.positions.is_empty()
             }
+            Body::Soft(soft) => {
+                self.positions.extend_from_slice(&soft.positions);
+                self.velocities.extend_from_slice(&soft.velocities);
+                !self.positions.is_empty()
+            }
         }
+    }
+
+    /// Whether it is made of many points and not one piece.
+    #[must_use]
+    pub fn is_many(&self) -> bool {
+        !self.positions.is_empty()
+    }
+
+    /// From one point to the next, how many slots: between those of a tube's nodes stand its spins. A rigid body has one point.
+    #[must_use]
+    pub fn stride(&self) -> usize {
+        if self.neighbour.as_ref().is_some_and(|n| matches!(n.snapshot.body, Body::Soft(_))) { 1 } else { 2 }
     }
 
     /// Who.
@@ -123,7 +140,7 @@ impl Other {
         let Some(neighbour) = self.neighbour.clone().filter(|n| self.held && n.snapshot.at_rest) else { return };
         self.wake();
         self.deliver(&neighbour, around.me, exchange, around.time);
-        let moves = self.velocities.iter().step_by(2).any(|v| v.length_squared() > WAKE_M_S * WAKE_M_S);
+        let moves = self.velocities.iter().step_by(self.stride()).any(|v| v.length_squared() > WAKE_M_S * WAKE_M_S);
         self.held = self.held || !moves;
     }
 
@@ -157,6 +174,7 @@ impl Other {
             Body::Rigid(_) => View::Solid { position: centre, rotation },
             Body::Tool(tool) => View::Tool { tip: centre, rotation, jaw: tool.jaw },
             Body::Curve(curve) => View::Chain { positions: &self.positions, radii_m: &curve.radii_m },
+            Body::Soft(_) => View::Surface(&self.positions),
         };
         Some(Placed { form: neighbour.form.as_deref()?, view })
     }
@@ -178,6 +196,9 @@ impl Other {
                 let [a, b] = [segment, segment + 1].map(|node| self.positions[node as usize]);
                 a.lerp(b, share)
             }
+            Place::Surface { vertices, shares } => {
+                vertices.into_iter().zip(shares).map(|(vertex, share)| self.positions[vertex as usize] * share).sum()
+            }
         };
         Some((position, slots.velocity(&self.velocities)))
     }
@@ -197,6 +218,9 @@ impl Other {
             }
             (Body::Rigid(_) | Body::Tool(_), Anchor::Local(local)) => {
                 Some(Place::Point(self.pose.centre + self.pose.rotation * local))
+            }
+            (Body::Soft(soft), Anchor::Vertex(vertex)) if (vertex as usize) < soft.positions.len() => {
+                Some(Place::Surface { vertices: [vertex; 3], shares: [1.0, 0.0, 0.0] })
             }
             _ => None,
         }
@@ -235,6 +259,7 @@ impl Other {
                 }
             }
             Some(Inertia::Curve(curve)) if curve.slots() == impulses.len() => curve.respond(impulses),
+            Some(Inertia::Soft(soft)) if soft.slots() == impulses.len() => soft.respond(impulses),
             _ => impulses.fill(DVec3::ZERO),
         }
     }
@@ -273,7 +298,8 @@ impl Other {
             self.velocities[0] += a * h;
             return;
         }
-        for (x, v) in self.positions.iter_mut().zip(self.velocities.iter_mut().step_by(2)) {
+        let stride = self.stride();
+        for (x, v) in self.positions.iter_mut().zip(self.velocities.iter_mut().step_by(stride)) {
             *x += *v * h + a * (0.5 * h * h);
             *v += a * h;
         }
@@ -284,6 +310,13 @@ impl Other {
         let Some(neighbour) = &self.neighbour else { return };
         if self.held && !matches!(neighbour.snapshot.body, Body::Tool(_)) {
             return; // a body at rest stands on something else, which takes the impulse
+        }
+        if matches!(neighbour.snapshot.body, Body::Soft(_)) {
+            for (vertex, impulse) in impulses.iter().enumerate().filter(|(_, i)| **i != DVec3::ZERO) {
+                let impulse = Impulse { linear: *impulse, angular: DVec3::ZERO };
+                exchange.give(neighbour.id, Site::Vertex(vertex as u32), after_s, impulse);
+            }
+            return;
         }
         let Body::Curve(curve) = &neighbour.snapshot.body else {
             let impulse = Impulse { linear: impulses[0], angular: impulses[1] };
@@ -350,7 +383,8 @@ impl Other {
             self.pose.centre += by[0];
             self.pose.rotation = turned(self.pose.rotation, by[1]);
         } else {
-            self.positions.iter_mut().zip(by.iter().step_by(2)).for_each(|(x, dx)| *x += *dx);
+            let stride = self.stride();
+            self.positions.iter_mut().zip(by.iter().step_by(stride)).for_each(|(x, dx)| *x += *dx);
         }
     }
 }
@@ -364,7 +398,10 @@ fn spread(neighbour: &Neighbour, site: Site, mut visit: impl FnMut(usize, f64, b
             visit(2 * segment + 2, share, false);
             visit(2 * segment + 1, 1.0, true);
         }
-        (Body::Curve(_), Site::Whole) | (_, Site::Arc(_)) => {}
+        (Body::Soft(soft), Site::Vertex(vertex)) if (vertex as usize) < soft.positions.len() => {
+            visit(vertex as usize, 1.0, false);
+        }
+        (Body::Curve(_) | Body::Soft(_), _) | (_, Site::Arc(_) | Site::Vertex(_)) => {}
         (_, Site::Whole) => {
             visit(0, 1.0, false);
             visit(1, 1.0, true);

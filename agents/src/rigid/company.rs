@@ -221,7 +221,8 @@ impl Guest {
                 }
             }
             FormKind::Chain => (self.chain, self.restitution) = (true, 0.0),
-            FormKind::Tool(_) => {}
+            // a soft body owns its pairs
+            FormKind::Tool(_) | FormKind::Surface(_) => {}
         }
     }
 

@@ -36,7 +36,7 @@ impl Tie {
     pub(super) fn arm(&self, motion: &Motion) -> Option<DVec3> {
         match self.pull.anchor {
             Anchor::Local(local) => Some(motion.rotation * local),
-            Anchor::Arc(_) => None,
+            Anchor::Arc(_) | Anchor::Vertex(_) => None,
         }
     }
 }

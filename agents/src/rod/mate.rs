@@ -7,7 +7,7 @@ use super::company::is_let_in;
 use super::holds::Far;
 use super::tank::Tanks;
 use crate::coupling::{Contact, Exchange, FormKind, Law, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
-use crate::{Anchor, Body, Bounds, Inertia, Neighbour, Surroundings};
+use crate::{Anchor, Bounds, Inertia, Neighbour, Surroundings};
 use glam::DVec3;
 
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
@@ -96,9 +96,10 @@ impl Mate {
     /// How its centre, or the mean of its nodes, moves, m/s.
     pub fn velocity(&self) -> DVec3 {
         let list = self.other.velocities();
-        if self.is_tube() {
-            let count = list.len() / 2 + 1;
-            return list.iter().step_by(2).sum::<DVec3>() / count as f64;
+        if self.other.is_many() {
+            let points = list.iter().step_by(self.other.stride());
+            let count = points.len();
+            return points.sum::<DVec3>() / count as f64;
         }
         list.first().copied().unwrap_or(DVec3::ZERO)
     }
@@ -126,12 +127,8 @@ impl Mate {
         let list = self.other.velocities();
         self.slots = (velocities.len(), list.len());
         velocities.extend_from_slice(list);
-        let fallen = if self.is_tube() { list.len() } else { 1 };
-        velocities[self.slots.0..][..fallen].iter_mut().step_by(2).for_each(|v| *v += fall);
-    }
-
-    fn is_tube(&self) -> bool {
-        self.other.neighbour().is_some_and(|n| matches!(n.snapshot.body, Body::Curve(_)))
+        let fallen = if self.other.is_many() { list.len() } else { 1 };
+        velocities[self.slots.0..][..fallen].iter_mut().step_by(self.other.stride()).for_each(|v| *v += fall);
     }
 
     /// One past its last slot.
@@ -151,7 +148,7 @@ impl Mate {
             Some(FormKind::Solid(solid)) => list[1].length() * solid.radius_m,
             _ => 0.0,
         };
-        list.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt() + spin
+        list.iter().step_by(self.other.stride()).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt() + spin
     }
 
     /// Where it is, if it can be touched.
@@ -202,6 +199,7 @@ impl Mate {
         let widened = |place: Place, out: DVec3| match place {
             Place::Point(point) => Place::Point(point + out * half),
             Place::Chain { segment, share, radius_m } => Place::Chain { segment, share, radius_m: radius_m + half },
+            Place::Surface { .. } => place,
         };
         let mut slots = Slots::default();
         widened(touch.on_a, -touch.normal).join(&mut slots, 0, DVec3::ZERO, (-touch.normal, 1.0));
@@ -229,6 +227,7 @@ impl Mate {
                 mobilities.extend([*inverse_mass, trace / 3.0]);
             }
             Some(Inertia::Curve(curve)) if curve.slots() == self.slots.1 => curve.scale(mobilities),
+            Some(Inertia::Soft(soft)) if soft.slots() == self.slots.1 => soft.scale(mobilities),
             _ => mobilities.extend(std::iter::repeat_n(0.0, self.slots.1)),
         }
     }
@@ -284,8 +283,8 @@ impl Mate {
         if self.acted {
             let (first, end) = (self.slots.0, self.end());
             let list = &mut impulses[first..end];
-            let linear = if self.is_tube() { list.len() } else { 1 };
-            self.given += list[..linear].iter().step_by(2).sum::<DVec3>();
+            let linear = if self.other.is_many() { list.len() } else { 1 };
+            self.given += list[..linear].iter().step_by(self.other.stride()).sum::<DVec3>();
             self.other.book(exchange, start, list);
             self.other.push(list);
         }

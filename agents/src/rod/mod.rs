@@ -40,8 +40,11 @@ mod turn;
 
 pub use check::TubeError;
 pub use division::{SEGMENTS_MAX, SEGMENTS_MIN};
+pub(crate) use holds::Far;
 pub use inertia::CurveInertia;
+pub(crate) use mate::Mate;
 pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec};
+pub(crate) use tank::Tanks;
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 
 /// The most substeps a scene may ask of one step: past it a real-time step is no longer one.

@@ -21,7 +21,7 @@ pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, inte
 pub use generate::{Generator, generate};
 pub(crate) use grid::Grid;
 pub use mesh::{creased_mesh, hull_mesh};
-pub(crate) use near::near_segments;
+pub(crate) use near::{near_segments, near_triangle};
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use solid::{Obstacle, Solid};
 pub use tom::{Cut, Tom, TomError};

@@ -3,7 +3,8 @@
 //! In: two forms where they stand. Out: contacts with normals, gaps and places, each with a name that lasts; the nearest gap.
 //! Never here: velocities, forces, whose contact it is. Theory: `docs/theory/contact.md`, eq. 12–18.
 //!
-//! Everything is taken apart into strands (balls joined by spans: a ball, a capsule, a tube) and blocks (all the rest).
+//! Everything is taken apart into strands (balls joined by spans: a ball, a capsule, a tube), the surfaces of soft bodies, and
+//! blocks (all the rest).
 //! All gaps are found in double precision; where blocks rest on blocks the corners and edges are clipped by parry.
 //! A half space belongs to the fixed solids: a block does not feel it, a strand does.
 
@@ -13,6 +14,7 @@ mod chains;
 mod convex;
 mod overlap;
 mod pieces;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod tool;
@@ -25,6 +27,7 @@ use blocks::BlockRoom;
 use chains::ChainRoom;
 use glam::DVec3;
 use pieces::{Piece, Pieces};
+use surface::SurfaceRoom;
 use tool::Known;
 
 /// What a step of a segment's number is in the key of a contact between chains: of the second chain, and of the first.
@@ -36,6 +39,7 @@ pub struct TouchRoom {
     known: Known,
     chains: ChainRoom,
     blocks: BlockRoom,
+    surfaces: SurfaceRoom,
 }
 
 /// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; what `into` held before is gone.
@@ -44,7 +48,7 @@ pub struct TouchRoom {
 /// Forms without a shape and places that are not finite touch nothing.
 pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
     into.clear();
-    let TouchRoom { known, chains, blocks } = room;
+    let TouchRoom { known, chains, blocks, surfaces } = room;
     known.learn(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     for (i, piece) in first.iter() {
@@ -63,6 +67,11 @@ pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoo
                     into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
                 }
                 (Piece::Block(a), Piece::Block(b)) => blocks.touches(a, b, reach_m, into),
+                (Piece::Surface(a), other) => surfaces.touches(a, other, reach_m, into),
+                (other, Piece::Surface(b)) => {
+                    surfaces.touches(b, other, reach_m, into);
+                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+                }
             }
             let pair = (i as u64 * tool::PARTS as u64 + j as u64) << PAIR_SHIFT;
             into[from..].iter_mut().for_each(|touch| touch.key |= pair);
@@ -91,7 +100,7 @@ fn name(touches: &mut [Touch]) {
 /// The normal from b towards a where they are nearest, and a gap that is never larger than the true one there, metres;
 /// `None` beyond `reach_m`. For conservative advancement: near its end the bound is within a millionth of the sizes.
 pub fn gap(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom) -> Option<(DVec3, f64)> {
-    let TouchRoom { known, chains, blocks } = room;
+    let TouchRoom { known, chains, blocks, .. } = room;
     known.learn(a.form, b.form);
     let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
     let mut nearest: Option<(DVec3, f64)> = None;
@@ -106,6 +115,8 @@ pub fn gap(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom) -
                 (Piece::Strand(a), Piece::Block(b)) => chain_solid::gap(a, b, reach_m),
                 (Piece::Block(a), Piece::Strand(b)) => chain_solid::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m)),
                 (Piece::Block(a), Piece::Block(b)) => blocks.gap(a, b, reach_m),
+                (Piece::Surface(a), other) => Some(surface::gap(a, other)),
+                (other, Piece::Surface(b)) => Some(surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
             };
             nearest = found.filter(|&(_, gap_m)| nearest.is_none_or(|(_, least)| gap_m < least)).or(nearest);
         }

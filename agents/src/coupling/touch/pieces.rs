@@ -4,7 +4,7 @@
 
 use super::skin;
 use super::tool::{Known, PARTS};
-use crate::coupling::{FormKind, Place, Placed, SolidForm, View};
+use crate::coupling::{FormKind, Place, Placed, SolidForm, SurfaceForm, View};
 use crate::shape::Solid;
 use crate::shape::field::{Ball, Field};
 use crate::shape::strand::foot;
@@ -19,6 +19,16 @@ pub(super) struct Pieces<'a>([Option<Piece<'a>>; PARTS]);
 pub(super) enum Piece<'a> {
     Strand(Strand<'a>),
     Block(Block<'a>),
+    Surface(Surface<'a>),
+}
+
+/// The skin of a soft body.
+pub(super) struct Surface<'a> {
+    pub form: &'a SurfaceForm,
+    /// Where its vertices are, metres.
+    pub positions: &'a [DVec3],
+    /// Lowest and highest coordinates of the vertices.
+    pub bounds: (DVec3, DVec3),
 }
 
 /// Balls joined by spans.
@@ -83,6 +93,10 @@ impl<'a> Pieces<'a> {
                     *piece = Some(Piece::Block(Block { field, shape: &solid.shape, origin, rotation, around }));
                 }
             }
+            (FormKind::Surface(form), View::Surface(positions)) if !positions.is_empty() => {
+                let bounds = crate::shape::bounds(positions);
+                pieces.0[0] = Some(Piece::Surface(Surface { form, positions, bounds }));
+            }
             _ => {}
         }
         pieces
@@ -126,7 +140,22 @@ impl Piece<'_> {
                 let apart = a.around.centre.distance(b.around.centre);
                 apart <= a.around.radius_m + b.around.radius_m + reach_m
             }
+            (Self::Surface(surface), other) | (other, Self::Surface(surface)) => {
+                let ((low, high), (there_low, there_high)) = (surface.bounds, other.bounds());
+                let apart = (there_low - high).max(low - there_high).max(DVec3::ZERO).length();
+                apart <= surface.form.radius_m + reach_m
+            }
         }
+    }
+
+    /// The box around it; a surface's and a strand's own thickness counted.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let (low, high, radius_m) = match self {
+            Self::Strand(strand) => (strand.bounds.0, strand.bounds.1, strand.widest_m),
+            Self::Block(block) => (block.around.centre, block.around.centre, block.around.radius_m),
+            Self::Surface(surface) => (surface.bounds.0, surface.bounds.1, surface.form.radius_m),
+        };
+        (low - radius_m, high + radius_m)
     }
 }
 

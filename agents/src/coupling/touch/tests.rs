@@ -79,6 +79,9 @@ fn axis(place: Place, positions: &[DVec3]) -> (DVec3, f64) {
             let k = segment as usize;
             (positions[k].lerp(positions[k + 1], share), radius_m)
         }
+        Place::Surface { vertices, shares } => {
+            (vertices.into_iter().zip(shares).map(|(vertex, share)| positions[vertex as usize] * share).sum(), 0.0)
+        }
     }
 }
 

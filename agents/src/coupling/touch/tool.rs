@@ -85,10 +85,11 @@ impl Known {
     }
 }
 
-/// Whether a form is made of balls and spans.
+/// Whether a form is made of points and spans that are looked for in the fields of others.
 fn is_strand(kind: &FormKind) -> bool {
     let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
-    matches!(kind, FormKind::Chain) || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
+    matches!(kind, FormKind::Chain | FormKind::Surface(_))
+        || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
 }
 
 /// The field of a body: an open mesh counts as its hull, as its mass does.

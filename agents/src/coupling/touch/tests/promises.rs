@@ -13,6 +13,7 @@ fn place<'a>(form: &'a Form, (position, rotation): (DVec3, DQuat), nodes: &'a [D
         FormKind::Solid(_) => View::Solid { position, rotation },
         FormKind::Chain => View::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
         FormKind::Tool(_) => View::Tool { tip: position, rotation, jaw: 0.3 },
+        FormKind::Surface(_) => View::Surface(nodes),
     };
     Placed { form, view }
 }

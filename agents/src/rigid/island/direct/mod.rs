@@ -9,7 +9,6 @@
 //! pushed out by displacements alone: they leave no velocity behind.
 
 mod bodies;
-mod envelope;
 mod joints;
 mod near;
 mod newton;

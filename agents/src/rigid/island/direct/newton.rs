@@ -8,7 +8,7 @@
 //! millionth of the row's own inverse mass; what yields under R is taken back by λ₀ ← λ, a few times. Friction's
 //! disc takes its radius μ λₙ from the pass before: where the passes meet, the law is Coulomb's own, without dilation.
 
-use super::envelope::Envelope;
+use crate::envelope::Envelope;
 use glam::{DMat3, DVec3};
 
 /// Where a row has no second body.
@@ -76,7 +76,7 @@ pub(super) struct Outcome {
 /// Room to work in; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Newton {
-    matrix: Envelope,
+    matrix: Envelope<6>,
     first_body: Vec<u32>,
     /// R of each row.
     give: Vec<f64>,
@@ -127,7 +127,7 @@ impl Newton {
     /// What a factorisation of these rows' matrix costs.
     pub(super) fn work(&mut self, rows: &[Row], bodies: usize) -> usize {
         self.link(rows, bodies);
-        Envelope::work(&self.first_body)
+        Envelope::<6>::work(&self.first_body)
     }
 
     fn link(&mut self, rows: &[Row], bodies: usize) {
@@ -405,7 +405,7 @@ impl Row {
     }
 
     /// Adds weight · Jᵀ J.
-    fn stiffen(&self, weight: f64, matrix: &mut Envelope) {
+    fn stiffen(&self, weight: f64, matrix: &mut Envelope<6>) {
         let six = |sign: f64, turn: DVec3| {
             let (l, t) = (self.lin * sign, turn * sign);
             [l.x, l.y, l.z, t.x, t.y, t.z]

@@ -1,11 +1,11 @@
 //! Cholesky's factor of a symmetric positive matrix in double precision, each row stored from its first entry on.
 //!
-//! In: the first body that each body is joined to, and blocks. Out: the solution. Never here: where the matrix comes from.
+//! In: the first body that each body is joined to, and blocks of B rows. Out: the solution. Never here: where the matrix comes from.
 //! A chain's factor has a constant width, so it costs as much as the chain is long.
 
-/// A matrix of 6 rows a body, its lower half.
-#[derive(Debug, Clone, Default)]
-pub(super) struct Envelope {
+/// A matrix of B rows a body, its lower half.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub(crate) struct Envelope<const B: usize> {
     /// First column of each row.
     first: Vec<usize>,
     /// Where each row starts in `values`.
@@ -13,17 +13,17 @@ pub(super) struct Envelope {
     values: Vec<f64>,
 }
 
-impl Envelope {
+impl<const B: usize> Envelope<B> {
     /// Makes room, all zero: body i is joined to none lower than `first_body[i]` ≤ i.
-    pub(super) fn shape(&mut self, first_body: &[u32]) {
+    pub(crate) fn shape(&mut self, first_body: &[u32]) {
         self.first.clear();
         self.start.clear();
         let mut size = 0;
         for (body, &first) in first_body.iter().enumerate() {
-            for row in 6 * body..6 * body + 6 {
-                self.first.push(6 * first as usize);
+            for row in B * body..B * body + B {
+                self.first.push(B * first as usize);
                 self.start.push(size);
-                size += row + 1 - 6 * first as usize;
+                size += row + 1 - B * first as usize;
             }
         }
         self.values.clear();
@@ -31,23 +31,55 @@ impl Envelope {
     }
 
     /// What a factorisation costs: the sum of squares of the widths.
-    pub(super) fn work(first_body: &[u32]) -> usize {
-        first_body.iter().enumerate().map(|(body, &first)| 6 * (6 * (body + 1 - first as usize)).pow(2)).sum()
+    pub(crate) fn work(first_body: &[u32]) -> usize {
+        first_body.iter().enumerate().map(|(body, &first)| B * (B * (body + 1 - first as usize)).pow(2)).sum()
     }
 
     /// Adds `weight` · left rightᵀ to the block of the bodies `row` ≥ `column`; on the diagonal only the lower half counts.
-    pub(super) fn add(&mut self, (row, column): (usize, usize), weight: f64, left: [f64; 6], right: [f64; 6]) {
+    pub(crate) fn add(&mut self, (row, column): (usize, usize), weight: f64, left: [f64; B], right: [f64; B]) {
         for (i, &l) in left.iter().enumerate() {
-            let at = 6 * row + i;
-            let columns = if row == column { i + 1 } else { 6 };
-            let from = self.start[at] + 6 * column - self.first[at];
+            let at = B * row + i;
+            let columns = if row == column { i + 1 } else { B };
+            let from = self.start[at] + B * column - self.first[at];
             let scaled = weight * l;
             self.values[from..from + columns].iter_mut().zip(right).for_each(|(value, r)| *value += scaled * r);
         }
     }
 
+    /// Adds a whole block to that of the bodies `row` ≥ `column`, given by rows; on the diagonal only the lower half counts.
+    pub(crate) fn add_block(&mut self, (row, column): (usize, usize), block: [[f64; B]; B]) {
+        for (i, values) in block.iter().enumerate() {
+            let at = B * row + i;
+            let columns = if row == column { i + 1 } else { B };
+            let from = self.start[at] + B * column - self.first[at];
+            self.values[from..from + columns].iter_mut().zip(values).for_each(|(value, add)| *value += add);
+        }
+    }
+
+    /// Makes it zero again, as it was shaped.
+    pub(crate) fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// The diagonal, one number a row.
+    pub(crate) fn diagonal(&self, row: usize) -> f64 {
+        self.values[self.start[row] + row - self.first[row]]
+    }
+
+    /// Takes over `other` into the storage that is here.
+    pub(crate) fn copy_from(&mut self, other: &Self) {
+        self.first.clone_from(&other.first);
+        self.start.clone_from(&other.start);
+        self.values.clone_from(&other.values);
+    }
+
+    /// How many rows there are.
+    pub(crate) fn rows(&self) -> usize {
+        self.first.len()
+    }
+
     /// Replaces the matrix by its factor; `false` where it is not positive.
-    pub(super) fn factor(&mut self) -> bool {
+    pub(crate) fn factor(&mut self) -> bool {
         for i in 0..self.first.len() {
             let (done, rest) = self.values.split_at_mut(self.start[i]);
             let first_i = self.first[i];
@@ -69,7 +101,7 @@ impl Envelope {
     }
 
     /// Solves for `x` with the factor.
-    pub(super) fn solve(&self, x: &mut [f64]) {
+    pub(crate) fn solve(&self, x: &mut [f64]) {
         let count = self.first.len();
         for i in 0..count {
             let row = &self.values[self.start[i]..=self.start[i] + i - self.first[i]];
@@ -104,7 +136,7 @@ mod tests {
     #[test]
     fn the_factor_solves_its_system() {
         let first_body = [0, 0, 1, 0, 3];
-        let mut matrix = Envelope::default();
+        let mut matrix = Envelope::<6>::default();
         matrix.shape(&first_body);
         let mut full = vec![vec![0.0; 30]; 30];
         let unit = |i: usize| std::array::from_fn(|k| f64::from(u8::from(k == i)));

@@ -1,0 +1,409 @@
+//! The skins of soft bodies against all else: their vertices, edges and triangles.
+//!
+//! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
+//! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
+//!
+//! Vertices speak for a surface; an edge or a triangle adds its own place only where it is nearer than its corners by more than
+//! [`BETTER_SHARE`] of its size. A place of the other side is told in the surface itself, so that both sides are pushed at one point.
+
+use super::Touch;
+use super::pieces::{Block, Piece, Strand, Surface};
+use crate::coupling::Place;
+use crate::shape::field::{self, Ball, Field};
+use crate::shape::{near_segments, near_triangle};
+use glam::DVec3;
+
+/// An edge or a triangle counts where it is nearer than its corners by this share of its length.
+const BETTER_SHARE: f64 = 0.02;
+/// Shares of an edge nearer to its ends than this belong to its vertices.
+const END_SHARE: f64 = 0.02;
+/// Projections to and fro between a triangle and a block: both are convex, so the two points approach each other.
+const PROJECTIONS: usize = 8;
+/// Axes nearer than this cross: no way leads from one to the other, metres.
+const CROSSING_M: f64 = 1e-9;
+/// Two soft skins that have passed each other by more than this share of an edge are left alone: they came from elsewhere.
+const DEEP_SHARE: f64 = 0.5;
+/// What a place is of, in its key: a vertex of the surface, an edge, a triangle, a vertex of another surface.
+const KINDS: [u64; 4] = [0, 1 << 40, 2 << 40, 3 << 40];
+/// Where the number of the part stands in its key.
+const PART_SHIFT: u32 = 20;
+
+/// Room for searches.
+#[derive(Default)]
+pub(super) struct SurfaceRoom {
+    /// Of a closed surface, out of it at each vertex; of any length. Of the other one too.
+    normals: Vec<DVec3>,
+    others: Vec<DVec3>,
+}
+
+/// A point of a surface: three vertices with shares.
+#[derive(Clone, Copy)]
+struct Spot {
+    vertices: [u32; 3],
+    shares: [f64; 3],
+}
+
+impl Spot {
+    fn vertex(vertex: u32) -> Self {
+        Self { vertices: [vertex; 3], shares: [1.0, 0.0, 0.0] }
+    }
+
+    fn edge([a, b]: [u32; 2], share: f64) -> Self {
+        Self { vertices: [a, b, b], shares: [1.0 - share, share, 0.0] }
+    }
+
+    /// Out of a closed surface there, from the normals of its vertices; of any length. `None` where it is open.
+    fn out(self, normals: &[DVec3]) -> Option<DVec3> {
+        let of = |vertex: u32| normals.get(vertex as usize).copied();
+        let terms = self.vertices.into_iter().zip(self.shares).map(|(vertex, share)| of(vertex).map(|n| n * share));
+        terms.sum()
+    }
+
+    fn place(self) -> Place {
+        Place::Surface { vertices: self.vertices, shares: self.shares }
+    }
+}
+
+impl Surface<'_> {
+    fn at(&self, vertex: u32) -> DVec3 {
+        self.positions[vertex as usize]
+    }
+
+    fn corners(&self, triangle: [u32; 3]) -> [DVec3; 3] {
+        triangle.map(|vertex| self.at(vertex))
+    }
+
+    /// The edges within `low` … `high`, with their numbers.
+    fn edges_in(&self, (low, high): (DVec3, DVec3)) -> impl Iterator<Item = (u64, [u32; 2], [DVec3; 2])> {
+        let ends = (0..).zip(self.form.edges.iter()).map(|(i, edge)| (i, *edge, edge.map(|vertex| self.at(vertex))));
+        ends.filter(move |(_, _, [a, b])| a.min(*b).cmple(high).all() && a.max(*b).cmpge(low).all())
+    }
+
+    /// The triangles within `low` … `high`, with their numbers.
+    fn triangles_in(&self, (low, high): (DVec3, DVec3)) -> impl Iterator<Item = (u64, [u32; 3], [DVec3; 3])> {
+        let all = (0..).zip(self.form.triangles.iter()).map(|(i, triangle)| (i, *triangle, self.corners(*triangle)));
+        all.filter(move |(_, _, [a, b, c])| a.min(*b).min(*c).cmple(high).all() && a.max(*b).max(*c).cmpge(low).all())
+    }
+
+    /// The vertices of the skin within `low` … `high`.
+    fn vertices_in(&self, (low, high): (DVec3, DVec3)) -> impl Iterator<Item = (u32, DVec3)> {
+        let all = self.form.vertices.iter().map(|vertex| (*vertex, self.at(*vertex)));
+        all.filter(move |(_, at)| at.cmple(high).all() && at.cmpge(low).all())
+    }
+
+    /// The spot of a triangle nearest to `point`, and where it is; `None` unless it lies inside.
+    fn inside(&self, triangle: [u32; 3], [a, b, c]: [DVec3; 3], point: DVec3) -> Option<(Spot, DVec3)> {
+        let near = near_triangle(point, [a, b, c]);
+        let shares = shares(near, [a, b, c])?;
+        let deep = shares.into_iter().all(|share| share > END_SHARE);
+        deep.then_some((Spot { vertices: triangle, shares }, near))
+    }
+}
+
+/// What each corner counts at a point of a triangle; `None` for one without area.
+fn shares(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
+    let normal = (b - a).cross(c - a);
+    let area2 = normal.length_squared();
+    let of = |u: DVec3, v: DVec3| (u - p).cross(v - p).dot(normal) / area2;
+    (area2 > 0.0).then(|| [of(b, c), of(c, a), of(a, b)])
+}
+
+impl SurfaceRoom {
+    /// Every place within `reach_m`, with normals towards the surface.
+    pub(super) fn touches(&mut self, surface: &Surface<'_>, other: &Piece<'_>, reach_m: f64, into: &mut Vec<Touch>) {
+        let (low, high) = other.bounds();
+        let within_m = reach_m + surface.form.radius_m;
+        let region = (low - within_m, high + within_m);
+        learn_normals(surface, &mut self.normals);
+        let meeting = Meeting { surface, reach_m, region, normals: &self.normals };
+        match other {
+            Piece::Strand(strand) => meeting.strand(strand, into),
+            Piece::Block(block) => {
+                if let Some(field) = block.field {
+                    meeting.block(block, field, into);
+                }
+            }
+            Piece::Surface(there) => {
+                learn_normals(there, &mut self.others);
+                meeting.surface(there, &self.others, into);
+            }
+        }
+    }
+}
+
+/// Works out the normals of the vertices of a closed surface; none for an open one.
+fn learn_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
+    into.clear();
+    if !surface.form.closed {
+        return;
+    }
+    into.resize(surface.positions.len(), DVec3::ZERO);
+    for triangle in surface.form.triangles.iter() {
+        let [a, b, c] = surface.corners(*triangle);
+        let normal = (b - a).cross(c - a);
+        triangle.iter().for_each(|vertex| into[*vertex as usize] += normal);
+    }
+}
+
+/// A lower bound of the gap by the boxes around both, and a way from the other to the surface.
+pub(super) fn gap(surface: &Surface<'_>, other: &Piece<'_>) -> (DVec3, f64) {
+    let ((low, high), (there_low, there_high)) = (surface.bounds, other.bounds());
+    let apart = (low - there_high).max(DVec3::ZERO) - (there_low - high).max(DVec3::ZERO);
+    let between = 0.5 * (low + high) - 0.5 * (there_low + there_high);
+    let normal = apart.try_normalize().or(between.try_normalize()).unwrap_or(DVec3::Z);
+    (normal, apart.length() - surface.form.radius_m)
+}
+
+/// A surface in front of something else.
+struct Meeting<'a> {
+    surface: &'a Surface<'a>,
+    reach_m: f64,
+    /// Nothing outside this box is near.
+    region: (DVec3, DVec3),
+    normals: &'a [DVec3],
+}
+
+impl Meeting<'_> {
+    fn strand(&self, strand: &Strand<'_>, into: &mut Vec<Touch>) {
+        for (vertex, at) in self.surface.vertices_in(self.region) {
+            let (span, share) = nearest_span(strand, at);
+            let core = on_span(strand, span, share).centre;
+            // what is behind the skin of a closed body is its triangles' to push out
+            if self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0) {
+                into.extend(self.tell(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), strand, (span, share)));
+            }
+        }
+        for (number, edge, ends) in self.surface.edges_in(self.region) {
+            let better_m = BETTER_SHARE * ends[0].distance(ends[1]);
+            for span in 0..strand.spans() {
+                let (share, at) = near_segments(strand.ends(span).map(|ball| ball.centre), ends);
+                if !(END_SHARE..=1.0 - END_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
+                    continue;
+                }
+                let (point, ball) = (ends[0].lerp(ends[1], at), on_span(strand, span, share));
+                let nearer_m = ball.centre.distance(point) - ball.radius_m + better_m;
+                let corners = ends.into_iter().all(|end| nearer_m < gap_at(strand, end));
+                let outside = edge.iter().all(|vertex| {
+                    self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(ball.centre - point) >= 0.0)
+                });
+                if corners && outside {
+                    let key = KINDS[1] | number << PART_SHIFT | span as u64;
+                    into.extend(self.tell(key, (Spot::edge(edge, at), point), strand, (span, share)));
+                }
+            }
+        }
+        for (number, triangle, corners) in self.surface.triangles_in(self.region) {
+            for node in 0..strand.count() {
+                let ball = strand.ball(node);
+                let Some((spot, point)) = self.surface.inside(triangle, corners, ball.centre) else { continue };
+                let size = corners[0].distance(corners[1]);
+                let nearer_m = ball.centre.distance(point) - ball.radius_m + BETTER_SHARE * size;
+                if self.surface.form.closed || corners.into_iter().all(|corner| nearer_m < gap_at(strand, corner)) {
+                    let span = node.min(strand.spans() - 1);
+                    let share = (node - span) as f64;
+                    let key = KINDS[2] | number << PART_SHIFT | node as u64;
+                    into.extend(self.tell(key, (spot, point), strand, (span, share)));
+                }
+            }
+        }
+    }
+
+    /// The place between a spot and a strand, unless it is too far.
+    fn tell(
+        &self,
+        key: u64,
+        (spot, point): (Spot, DVec3),
+        strand: &Strand<'_>,
+        (span, share): (usize, f64),
+    ) -> Option<Touch> {
+        let ball = on_span(strand, span, share);
+        let way = point - ball.centre;
+        let out = if spot.shares[2] > 0.0 && self.surface.form.closed { self.out_of(spot) } else { None };
+        let across = || self.out_of(spot).unwrap_or(DVec3::Z);
+        let length = way.length();
+        let (mut normal, mut distance) = if length > CROSSING_M { (way / length, length) } else { (across(), 0.0) };
+        if out.is_some_and(|out| out.dot(normal) > 0.0) {
+            // the core is behind the skin: it has to come out where it went in
+            if length > 2.0 * ball.radius_m {
+                return None;
+            }
+            (normal, distance) = (-normal, -distance);
+        }
+        let gap_m = distance - ball.radius_m - self.surface.form.radius_m;
+        let half = 0.5 * gap_m;
+        let on_b = match strand.place(span, share, ball, normal) {
+            Place::Chain { segment, share, .. } => Place::Chain { segment, share, radius_m: distance - half },
+            _ => Place::Point(point - normal * half),
+        };
+        (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: spot.place(), on_b })
+    }
+
+    /// The normal of the triangle of a spot; `None` for a vertex or an edge.
+    fn out_of(&self, spot: Spot) -> Option<DVec3> {
+        let [a, b, c] = self.surface.corners(spot.vertices);
+        (b - a).cross(c - a).try_normalize()
+    }
+
+    fn block(&self, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) {
+        let radius_m = self.surface.form.radius_m;
+        let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
+        let nearest = |at: DVec3| {
+            let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
+            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
+            near.or_else(|| {
+                field
+                    .touches(inward(at).centre, 2.0 * block.around.radius_m)
+                    .iter()
+                    .next()
+                    .filter(|t| t.distance_m < 0.0)
+            })
+        };
+        for (vertex, at) in self.surface.vertices_in(self.region) {
+            if let Some(touch) = nearest(at) {
+                self.tell_block(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), (block, touch), into);
+            }
+        }
+        if !field.feels_spans() {
+            return;
+        }
+        let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
+        for (number, edge, ends) in self.surface.edges_in(self.region) {
+            let Some((share, touch)) = field.touches_span(ends.map(inward), self.reach_m) else { continue };
+            let better_m = BETTER_SHARE * ends[0].distance(ends[1]);
+            if ends.into_iter().all(|end| touch.distance_m + better_m < apart(end)) {
+                let key = KINDS[1] | number << PART_SHIFT;
+                let point = ends[0].lerp(ends[1], share);
+                self.tell_block(key, (Spot::edge(edge, share), point), (block, touch), into);
+            }
+        }
+        for (number, triangle, corners) in self.surface.triangles_in(self.region) {
+            let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
+            let size = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
+            let look_m = radius_m + self.reach_m + 2.0 * size;
+            let mut found = None;
+            for _ in 0..PROJECTIONS {
+                found = field.touches(inward(point).centre, look_m).iter().next();
+                let Some(touch) = found else { break };
+                let foot = point - block.rotation * touch.normal * touch.distance_m;
+                point = near_triangle(foot, corners);
+            }
+            let Some(touch) = found else { continue };
+            let Some((spot, point)) = self.surface.inside(triangle, corners, point) else { continue };
+            if corners.into_iter().all(|corner| touch.distance_m + BETTER_SHARE * size < apart(corner)) {
+                self.tell_block(KINDS[2] | number << PART_SHIFT, (spot, point), (block, touch), into);
+            }
+        }
+    }
+
+    fn tell_block(
+        &self,
+        key: u64,
+        (spot, point): (Spot, DVec3),
+        (block, touch): (&Block<'_>, field::Touch),
+        into: &mut Vec<Touch>,
+    ) {
+        let gap_m = touch.distance_m - self.surface.form.radius_m;
+        if gap_m <= self.reach_m {
+            let normal = block.rotation * touch.normal;
+            into.push(Touch {
+                key,
+                normal,
+                gap_m,
+                on_a: spot.place(),
+                on_b: Place::Point(point - normal * (0.5 * gap_m)),
+            });
+        }
+    }
+
+    fn surface(&self, there: &Surface<'_>, normals: &[DVec3], into: &mut Vec<Touch>) {
+        let thick_m = self.surface.form.radius_m + there.form.radius_m;
+        let deep_m = DEEP_SHARE * self.surface.form.edge_m.min(there.form.edge_m);
+        let mut tell = |key: u64, (a, at): (Spot, DVec3), (b, near): (Spot, DVec3)| {
+            // the way into the surface, out of the other: a closed body tells on which side the two are
+            let inward = a.out(self.normals).map(|out| -out).or(b.out(normals));
+            if let Some((normal, gap_m)) =
+                apart(at - near, inward, (thick_m, deep_m)).filter(|(_, gap)| *gap <= self.reach_m)
+            {
+                into.push(Touch { key, normal, gap_m, on_a: a.place(), on_b: b.place() });
+            }
+        };
+        for (vertex, at) in self.surface.vertices_in(self.region) {
+            if let Some(near) = self.nearest_on(there, at) {
+                tell(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), near);
+            }
+        }
+        let within_m = self.reach_m + thick_m;
+        let back = (self.surface.bounds.0 - within_m, self.surface.bounds.1 + within_m);
+        for (vertex, at) in there.vertices_in(back) {
+            if let Some(near) = self.nearest_on(self.surface, at) {
+                tell(KINDS[3] | u64::from(vertex), near, (Spot::vertex(vertex), at));
+            }
+        }
+        for (number, edge, ends) in self.surface.edges_in(self.region) {
+            let around = (ends[0].min(ends[1]) - within_m, ends[0].max(ends[1]) + within_m);
+            for (other, edge_b, ends_b) in there.edges_in(around) {
+                let (s, t) = near_segments(ends, ends_b);
+                let inner = END_SHARE..=1.0 - END_SHARE;
+                if inner.contains(&s) && inner.contains(&t) {
+                    let key = KINDS[1] | number << PART_SHIFT | other;
+                    let a = (Spot::edge(edge, s), ends[0].lerp(ends[1], s));
+                    tell(key, a, (Spot::edge(edge_b, t), ends_b[0].lerp(ends_b[1], t)));
+                }
+            }
+        }
+    }
+
+    /// The spot inside a triangle of `surface` that is nearest to a point, within reach.
+    fn nearest_on(&self, surface: &Surface<'_>, at: DVec3) -> Option<(Spot, DVec3)> {
+        let within_m = self.reach_m + surface.form.radius_m + self.surface.form.radius_m;
+        let near = surface.triangles_in((at - within_m, at + within_m));
+        let spots = near.filter_map(|(_, triangle, corners)| {
+            let near = near_triangle(at, corners);
+            Some((Spot { vertices: triangle, shares: shares(near, corners)? }, near))
+        });
+        spots.min_by(|a, b| a.1.distance_squared(at).total_cmp(&b.1.distance_squared(at)))
+    }
+}
+
+/// The normal along `way`, which leads from one surface to another, and the gap; `inward` is roughly that normal where it is
+/// known: against it the two have passed each other. `None` where they cross, or are too deep in each other to tell.
+fn apart(way: DVec3, inward: Option<DVec3>, (thick_m, deep_m): (f64, f64)) -> Option<(DVec3, f64)> {
+    let length = way.length();
+    if length <= CROSSING_M {
+        return inward.and_then(DVec3::try_normalize).map(|normal| (normal, -thick_m));
+    }
+    match inward {
+        Some(inward) if inward.dot(way) < 0.0 => (length <= deep_m).then(|| (way / -length, -length - thick_m)),
+        _ => Some((way / length, length - thick_m)),
+    }
+}
+
+/// The ball of a strand at a share of a span.
+fn on_span(strand: &Strand<'_>, span: usize, share: f64) -> Ball {
+    let [a, b] = strand.ends(span);
+    a.toward(b, share)
+}
+
+/// The span that a point is nearest to by its skin, and the share of it.
+fn nearest_span(strand: &Strand<'_>, at: DVec3) -> (usize, f64) {
+    let mut best = (0, 0.0, f64::INFINITY);
+    for span in 0..strand.spans() {
+        let [a, b] = strand.ends(span);
+        let way = b.centre - a.centre;
+        let length2 = way.length_squared();
+        let share = if length2 > 0.0 { ((at - a.centre).dot(way) / length2).clamp(0.0, 1.0) } else { 0.0 };
+        let ball = a.toward(b, share);
+        let gap = at.distance(ball.centre) - ball.radius_m;
+        if gap < best.2 {
+            best = (span, share, gap);
+        }
+    }
+    (best.0, best.1)
+}
+
+/// How far a point is from the skin of a strand, metres.
+fn gap_at(strand: &Strand<'_>, at: DVec3) -> f64 {
+    let (span, share) = nearest_span(strand, at);
+    let ball = on_span(strand, span, share);
+    at.distance(ball.centre) - ball.radius_m
+}

@@ -1,0 +1,193 @@
+//! The soft body as an agent: vertices, what joins them, its rest.
+//!
+//! In: a [`SoftSpec`], steps, pulls, neighbours. Out: snapshots ([`super::publish`]). Never here: how a step is solved
+//! ([`super::step`]), how others are met ([`super::company`]). Theory: docs/theory/soft.md.
+
+use super::company::Company;
+use super::contact::Contacts;
+use super::holds::Tie;
+use super::lattice::Lattice;
+use super::spec::{SoftError, SoftSpec};
+use super::system::System;
+use crate::coupling::{Form, FormKind, Law, Link};
+use crate::{Agent, Bounds, Grip, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings, check_span};
+use glam::DVec3;
+use std::sync::Arc;
+
+/// A sheet, solid or rope that lives by its own steps.
+pub struct SoftBody {
+    pub(super) spec: SoftSpec,
+    pub(super) lattice: Lattice,
+    pub(super) system: System,
+    pub(super) positions: Vec<DVec3>,
+    pub(super) velocities: Vec<DVec3>,
+    /// The velocities a substep would end with, if nothing were touched.
+    pub(super) free: Vec<DVec3>,
+    pub(super) ties: Vec<Tie>,
+    pub(super) company: Company,
+    pub(super) contacts: Contacts,
+    pub(super) grips: Vec<Grip>,
+    pub(super) touching: bool,
+    /// Of the centre of mass in the last step, without what others gave, m/s².
+    pub(super) acceleration: DVec3,
+    pub(super) at_rest: bool,
+    before: Vec<DVec3>,
+    quiet_s: f64,
+    pub(super) steps: u64,
+}
+
+/// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is not seen on any screen.
+const SPEED_MAX_M_S: f64 = 1e-4;
+/// A vertex is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
+const ACCELERATION_MAX_M_S2: f64 = 1e-2;
+/// For so long all vertices must have been quiet, seconds of the body's own time.
+const QUIET_S: f64 = 0.5;
+
+impl SoftBody {
+    /// Builds the body of `spec` in its rest shape.
+    ///
+    /// # Errors
+    /// [`SoftError`] for a number outside its range, a side it does not have, an obstacle that is no shape.
+    pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
+        spec.check()?;
+        let lattice = Lattice::new(&spec);
+        let rotation = spec.rotation.normalize();
+        let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
+        let velocities: Vec<_> =
+            lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
+        let surface = lattice.surface();
+        let edge_m = surface.edge_m;
+        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
+        let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
+        Ok(Self {
+            system: lattice.system(),
+            free: positions.clone(),
+            before: velocities.clone(),
+            positions,
+            velocities,
+            lattice,
+            contacts,
+            ties: vec![],
+            company: Company::default(),
+            grips: vec![],
+            touching: false,
+            acceleration: spec.gravity,
+            at_rest: false,
+            quiet_s: 0.0,
+            steps: 0,
+            spec,
+        })
+    }
+
+    /// What it was built from.
+    #[must_use]
+    pub fn spec(&self) -> &SoftSpec {
+        &self.spec
+    }
+
+    /// Kinetic, elastic and gravitational energy, J.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let of =
+            |((mass, v), x): ((&f64, &DVec3), &DVec3)| mass * (0.5 * v.length_squared() - self.spec.gravity.dot(*x));
+        moving.map(of).sum::<f64>() + self.lattice.energy_j(&self.positions)
+    }
+
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Bounds {
+        let (low, high) = crate::shape::bounds(&self.positions);
+        let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let radius_m = match &self.contacts.form.kind {
+            FormKind::Surface(surface) => surface.radius_m,
+            _ => 0.0,
+        };
+        Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
+    }
+
+    /// Lists this step's springs: hands, tools that hold it, and links whose pair it owns.
+    pub(super) fn take_ties(&mut self, around: &Surroundings<'_>) {
+        let count = self.positions.len();
+        self.ties.clear();
+        self.ties.extend(around.pulls().filter_map(|pull| Tie::of_pull(&pull, count)));
+        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        self.ties.extend(links.filter_map(|link| Tie::of_link(link, count)));
+    }
+
+    /// Counts quiet time; whether it has been quiet for long enough.
+    fn watch_rest(&mut self, dt: f64) -> bool {
+        let Self { velocities, before, .. } = self;
+        let pairs = velocities.iter().zip(before.iter());
+        let limit = (SPEED_MAX_M_S, ACCELERATION_MAX_M_S2 * dt);
+        let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
+        let calm = self.spec.sleep && self.ties.is_empty() && self.company.is_calm();
+        let quiet = calm && still.all(|still| still);
+        self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
+        let at_rest = self.quiet_s >= QUIET_S;
+        if at_rest {
+            velocities.fill(DVec3::ZERO); // what is drawn of a sleeping body must not drift
+        }
+        before.clone_from(velocities);
+        at_rest
+    }
+
+    /// Ends a step of `dt` seconds: books, grips, what others may expect.
+    fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let mass_kg = self.mass_kg();
+        self.company.close(around, (dt, mass_kg));
+        self.grips.clear();
+        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
+        self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
+        self.steps += 1;
+        self.at_rest = self.watch_rest(dt);
+    }
+}
+
+impl Agent for SoftBody {
+    fn model(&self) -> &'static str {
+        self.spec.shape.model()
+    }
+
+    /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        let substeps = self.advance(around, dt_s)?;
+        self.settle(around, dt_s);
+        Ok(StepReport { work: self.work() * f64::from(substeps), substeps, at_rest: self.at_rest })
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    /// The division of a soft body is fixed by its scene: nothing changes.
+    fn retune(&mut self, _wanted: Resolution) {}
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.contacts.form.clone())
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        self.publish(into);
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        moving.fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), ((mass, v), x)| {
+            let momentum = *v * *mass;
+            (linear + momentum, angular + x.cross(momentum))
+        })
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.lattice.mass_kg.iter().sum()
+    }
+}
+
+impl SoftBody {
+    /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
+    fn work(&self) -> f64 {
+        1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64
+    }
+}

@@ -1,0 +1,204 @@
+//! The other agents near a soft body during one step: what they gave it, where they are, and what it gives them.
+//!
+//! In: neighbours as they were published; the impulses of the contacts and links that this body owns. Out: contacts for the
+//! body's own solve, far ends of links, ledgers. Never here: the body's own state and its solve.
+//! Theory: docs/theory/coupling.md; a soft body owns every pair but those with faster soft bodies.
+
+use super::holds::Tie;
+use crate::coupling::touch::{TouchRoom, touches};
+use crate::coupling::{Contact, Exchange, Impulse, PairKind, Placed, Site, Touch};
+use crate::rod::{Mate, Tanks};
+use crate::{Body, Bounds, Snapshot, Surroundings};
+use glam::DVec3;
+
+/// The agents near one soft body.
+#[derive(Default)]
+pub(super) struct Company {
+    exchange: Exchange,
+    mates: Vec<Mate>,
+    /// How many of `mates` are here in this step; the rest is room.
+    count: usize,
+    touches: Vec<Touch>,
+    impulses: Vec<DVec3>,
+    tanks: Tanks,
+    /// What others gave since the last step: impulses, and how far they have carried, one a vertex.
+    received: Vec<DVec3>,
+    carried: Vec<DVec3>,
+    was_given: bool,
+    watched: bool,
+}
+
+impl Company {
+    /// Begins a step: takes in what others gave since the last one.
+    pub fn open(&mut self, around: &Surroundings<'_>, vertices: usize) {
+        // only another soft body may own a pair with this one
+        self.watched = around.neighbours.iter().any(|n| !n.owned && matches!(n.snapshot.body, Body::Soft(_)));
+        self.was_given = false;
+        if around.neighbours.is_empty() && self.exchange.is_empty() {
+            return;
+        }
+        let Self { exchange, received, carried, was_given, .. } = self;
+        exchange.open(around);
+        exchange.take(around, |_, site, sum, moved| {
+            let Site::Vertex(vertex) = site else { return };
+            if !std::mem::replace(was_given, true) {
+                for list in [&mut *received, &mut *carried] {
+                    list.clear();
+                    list.resize(vertices, DVec3::ZERO);
+                }
+            }
+            if let Some(place) = received.get_mut(vertex as usize) {
+                *place += sum.linear;
+                carried[vertex as usize] += moved.linear;
+            }
+        });
+    }
+
+    /// What others gave since the last step, one a vertex: impulses, and how far they carried; `None` for nothing.
+    pub fn received(&mut self) -> Option<[&mut Vec<DVec3>; 2]> {
+        self.was_given.then_some([&mut self.received, &mut self.carried])
+    }
+
+    /// Whether a soft body is near that needs to know how this one answers impulses.
+    pub fn is_watched(&self) -> bool {
+        self.watched
+    }
+
+    /// Gathers those whose couplings with this body it owns, for a step of `dt` seconds from `bounds`.
+    pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, (dt, friction): (f64, f64)) {
+        self.count = 0;
+        let Self { mates, count, exchange, tanks, .. } = self;
+        for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
+            let linked = around.links.iter().any(|link| link.other == neighbour.id);
+            let touched = Mate::may_touch(neighbour, around, bounds, dt);
+            if !(linked || touched) {
+                continue;
+            }
+            if mates.len() == *count {
+                mates.push(Mate::default());
+            }
+            if mates[*count].meet(neighbour, around, exchange, (friction, touched)) {
+                mates[*count].ask(tanks);
+                *count += 1;
+            }
+        }
+    }
+
+    /// Whether there is nobody.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// Appends the velocities that the others would have without this body, in slots.
+    pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
+        self.mates[..self.count].iter_mut().for_each(|mate| mate.extend(velocities, h));
+    }
+
+    /// Finds the contacts with the others, whose velocities stand behind the body's own.
+    pub fn find(
+        &mut self,
+        here: &Placed<'_>,
+        (h, slack_m, speed): (f64, f64, f64),
+        velocities: &[DVec3],
+        (room, contacts): (&mut TouchRoom, &mut Vec<Contact>),
+    ) {
+        for mate in &mut self.mates[..self.count] {
+            let reach_m = slack_m + (speed + mate.speed()) * h;
+            let Some(there) = mate.to_touch() else { continue };
+            touches(here, &there, reach_m, room, &mut self.touches);
+            mate.add_contacts(&self.touches, (h, slack_m), velocities, contacts);
+        }
+    }
+
+    /// Takes in what a solve found: the work of the contacts with others on both sides; `velocities` are those after it.
+    pub fn watch<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, velocities: &[DVec3]) {
+        let mates = &mut self.mates[..self.count];
+        mates.iter_mut().for_each(Mate::begin);
+        for (contact, impulse) in contacts {
+            let work_j = contact.slots.velocity(velocities).dot(*impulse);
+            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.spend(work_j));
+        }
+    }
+
+    /// Turns the impulses on the others, one a slot, into the velocities they cause; the body's own slots are left alone.
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        self.mates[..self.count].iter().for_each(|mate| mate.other.respond(mate.slots_mut(impulses)));
+    }
+
+    /// The size of the inverse mass of each slot of the others, behind those of the body.
+    pub fn scale(&self, mobilities: &mut Vec<f64>) {
+        self.mates[..self.count].iter().for_each(|mate| mate.scale(mobilities));
+    }
+
+    /// Tells links where their far ends are for a substep of `h` seconds.
+    pub fn aim(&mut self, ties: &mut [Tie], positions: &[DVec3], h: f64) {
+        for i in 0..ties.len() {
+            let Some(link) = ties[i].link else { continue };
+            let shared = ties.iter().filter(|tie| tie.link.is_some_and(|l| l.other == link.other)).count();
+            let mate = self.mates[..self.count].iter_mut().find(|mate| mate.other.id() == Some(link.other));
+            let Some(far) = mate.and_then(|mate| mate.far(link.there, h)) else { continue };
+            ties[i].aim(&far, positions[ties[i].vertex], (h, shared));
+        }
+    }
+
+    /// Gives what the contacts and ties of a substep gave, `start` seconds into the step, and lets the others go on by `h`.
+    pub fn accept<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>,
+        ties: &[Tie],
+        (own, start, h): (usize, f64, f64),
+    ) {
+        if self.is_empty() && ties.is_empty() {
+            return;
+        }
+        let Self { mates, count, impulses, exchange, tanks, .. } = self;
+        let mates = &mut mates[..*count];
+        impulses.clear();
+        impulses.resize(mates.last().map_or(own, Mate::end), DVec3::ZERO);
+        for (contact, impulse) in contacts {
+            contact.slots.scatter(*impulse, impulses);
+            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.note(contact, *impulse));
+        }
+        for tie in ties {
+            let Some(by) = tie.by else { continue };
+            match tie.link {
+                // a tool is led: it only learns of it
+                None => {
+                    exchange.give(by, Site::Whole, start, Impulse { linear: -tie.given, angular: DVec3::ZERO });
+                    let pair = exchange.pair_mut(by);
+                    (pair.kind, pair.contacts) = (PairKind::Grasp, 1);
+                }
+                Some(link) => {
+                    let mate = mates.iter_mut().find(|mate| mate.other.id() == Some(by));
+                    mate.into_iter().for_each(|mate| mate.pull(link.there, -tie.given, impulses));
+                }
+            }
+        }
+        for mate in mates {
+            mate.take(impulses, (exchange, tanks), (start, h));
+        }
+    }
+
+    /// Ends a step of `dt` seconds of a body of `mass_kg`.
+    pub fn close(&mut self, around: &Surroundings<'_>, (dt, mass_kg): (f64, f64)) {
+        for mate in &mut self.mates[..self.count] {
+            mate.tell(&mut self.exchange, &mut self.tanks, mass_kg);
+        }
+        self.tanks.close(dt);
+        if !self.exchange.is_empty() {
+            self.exchange.close(around, dt);
+        }
+    }
+
+    /// Whether everybody that the body touches rests or never moves: only then may it rest itself.
+    pub fn is_calm(&self) -> bool {
+        !self.was_given && self.mates[..self.count].iter().all(Mate::is_calm)
+    }
+
+    /// Writes ledgers and pairs, and who must stay awake.
+    pub fn write(&self, into: &mut Snapshot) {
+        self.exchange.write(into);
+        let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
+        into.touches.extend(woken);
+    }
+}

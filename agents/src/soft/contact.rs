@@ -1,0 +1,135 @@
+//! Where contact meets a soft body's own step: between its solve and its move.
+//!
+//! In: free velocities, the factor, fixed solids, the company. Out: velocities that keep the skin apart.
+//! Never here: where two forms touch ([`crate::coupling::touch`]). Theory: docs/theory/contact.md, eq. 5–11.
+
+use super::company::Company;
+use super::spec::{SoftError, SoftSpec};
+use super::system::System;
+use crate::coupling::touch::{TouchRoom, touches};
+use crate::coupling::{Contact, Form, FormKind, Placed, Problem, Settings, Slots, SolidForm, Solver, Touch, View};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+/// When contacts are good enough: 10 µm/s, a tenth of what counts as rest.
+const SETTINGS: Settings = Settings { iterations: 40, tolerance_m_s: 1e-5 };
+/// Contacts are foreseen this far beyond where they close within a substep, as a share of the mean edge.
+const SLACK_SHARE: f64 = 0.02;
+/// Where the number of a fixed solid stands in a key; the bit above tells agents from them.
+const WALL_SHIFT: u32 = 48;
+
+/// The contacts of one soft body.
+pub(super) struct Contacts {
+    /// The body's own form.
+    pub form: Arc<Form>,
+    walls: Vec<Wall>,
+    list: Vec<Contact>,
+    solver: Solver,
+    touches: Vec<Touch>,
+    /// The size of the inverse mass of each slot, 1/kg: the body's own first.
+    pub mobilities: Vec<f64>,
+    room: TouchRoom,
+    slack_m: f64,
+}
+
+/// A fixed solid where it stands.
+struct Wall {
+    form: Form,
+    position: DVec3,
+    rotation: DQuat,
+}
+
+impl Contacts {
+    /// The contacts of a body of this skin, whose edges are `edge_m` long on average.
+    ///
+    /// # Errors
+    /// [`SoftError::Obstacle`] for a fixed solid that is no shape.
+    pub fn new(spec: &SoftSpec, form: Arc<Form>, edge_m: f64) -> Result<Self, SoftError> {
+        let wall = |obstacle: &crate::shape::Obstacle| {
+            let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
+                .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
+            let form = Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
+            Ok(Wall { form, position: obstacle.position, rotation: obstacle.rotation.normalize() })
+        };
+        let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
+        Ok(Self {
+            form,
+            walls,
+            list: vec![],
+            solver: Solver::default(),
+            touches: vec![],
+            mobilities: vec![],
+            room: TouchRoom::default(),
+            slack_m: SLACK_SHARE * edge_m,
+        })
+    }
+
+    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; they stay one a vertex.
+    pub fn act(
+        &mut self,
+        positions: &[DVec3],
+        velocities: &mut Vec<DVec3>,
+        (system, company): (&mut System, &mut Company),
+        h: f64,
+    ) {
+        let own = velocities.len();
+        self.list.clear();
+        if (self.walls.is_empty() && company.is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
+            return;
+        }
+        company.extend(velocities, h);
+        self.find(positions, velocities, company, h);
+        if self.list.is_empty() {
+            self.solver.forget();
+            velocities.truncate(own);
+            return;
+        }
+        self.list.sort_unstable_by_key(|contact| contact.key);
+        company.scale(&mut self.mobilities);
+        let mut answer = |impulses: &mut [DVec3]| {
+            system.respond(&mut impulses[..own]);
+            company.respond(impulses);
+        };
+        let Self { list: contacts, mobilities, .. } = self;
+        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings: SETTINGS };
+        self.solver.solve(&problem, velocities, &mut answer);
+        company.watch(self.list.iter().zip(self.solver.impulses()), velocities);
+        velocities.truncate(own);
+        self.mobilities.truncate(own);
+    }
+
+    /// Finds what may close within the substep.
+    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) {
+        let Self { form, walls, list, touches: places, room, slack_m, .. } = self;
+        let here = Placed { form, view: View::Surface(positions) };
+        let own = &velocities[..positions.len()];
+        let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        for (wall, number) in walls.iter().zip(0_u64..) {
+            let view = View::Solid { position: wall.position, rotation: wall.rotation };
+            touches(&here, &Placed { form: &wall.form, view }, *slack_m + speed * h, room, places);
+            let friction = (form.friction * wall.form.friction).sqrt();
+            for place in places.iter() {
+                let mut slots = Slots::default();
+                place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
+                let closing = slots.velocity(velocities).dot(place.normal);
+                if place.gap_m + closing * h <= *slack_m {
+                    let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
+                    let Touch { normal, gap_m, .. } = *place;
+                    list.push(Contact { key, slots, normal, gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 });
+                }
+            }
+        }
+        company.find(&here, (h, *slack_m, speed), velocities, (room, list));
+    }
+
+    /// The contacts of the last substep and their impulses, N·s.
+    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
+        let solved = if self.list.is_empty() { &[] } else { self.solver.impulses() };
+        self.list.iter().zip(solved)
+    }
+
+    /// Whether anything is touched.
+    pub fn is_idle(&self) -> bool {
+        self.list.is_empty()
+    }
+}

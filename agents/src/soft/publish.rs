@@ -1,0 +1,30 @@
+//! What a soft body tells the world: its snapshot.
+//!
+//! In: a body between two steps. Out: its vertices, and what others need to touch it. Never here: any change of its state.
+
+use super::body::SoftBody;
+use crate::{Inertia, Snapshot};
+
+impl SoftBody {
+    /// Writes everything but the time.
+    pub(super) fn publish(&self, into: &mut Snapshot) {
+        into.clear();
+        into.steps = self.steps;
+        into.resolution = None;
+        into.energy_j = self.energy_j();
+        into.residual_m = self.lattice.residual_m(&self.positions);
+        into.grips.clone_from(&self.grips);
+        into.at_rest = self.at_rest;
+        into.acceleration = self.acceleration;
+        into.bounds = Some(self.bounds());
+        let soft = into.body.soft_mut();
+        soft.positions.clone_from(&self.positions);
+        soft.velocities.clone_from(&self.velocities);
+        if self.company.is_watched() && self.steps > 0 {
+            into.inertia.soft_mut().copy_from(&self.system, &self.contacts.mobilities);
+        } else {
+            into.inertia = Inertia::Immovable;
+        }
+        self.company.write(into);
+    }
+}

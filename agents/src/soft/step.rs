@@ -1,0 +1,98 @@
+//! One substep of a soft body, told as a contents page: linearly implicit Euler, contacts between solve and move.
+//!
+//! In: a state, and what is around. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
+
+use super::body::SoftBody;
+use crate::{StepError, Surroundings};
+use glam::{DMat3, DVec3};
+
+/// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
+const HASTE_MAX: f64 = 0.3;
+/// A step is divided into no more substeps than this.
+pub(super) const SUBSTEPS_MAX: u32 = 16;
+
+impl SoftBody {
+    /// Advances by `dt` seconds; into how many substeps it was divided.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the state stops being finite.
+    pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<u32, StepError> {
+        self.receive(around, dt)?;
+        let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
+        while left > 0 {
+            let h = dt / f64::from(parts);
+            self.foresee(h).map_err(|what| self.lost(what, dt))?;
+            self.touch(h);
+            if self.lattice.haste(&self.free, h) > HASTE_MAX && parts < SUBSTEPS_MAX {
+                (parts, left) = (2 * parts, 2 * left);
+                continue;
+            }
+            self.act(f64::from(parts - left) * h, h);
+            if !self.velocities.iter().chain(&self.positions).all(|v| v.is_finite()) {
+                return Err(self.lost("a vertex", dt));
+            }
+            (left, done) = (left - 1, done + 1);
+        }
+        Ok(done)
+    }
+
+    /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
+    fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
+        let Self { system, lattice, positions, velocities, free, spec, ties, company, contacts, .. } = self;
+        company.aim(ties, positions, h);
+        system.begin(h);
+        lattice.add(positions, system);
+        let inertia = 1.0 + h * spec.matter.damping_per_s;
+        for (vertex, &mass) in lattice.mass_kg.iter().enumerate() {
+            system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
+            system.push(vertex as u32, spec.gravity * mass);
+        }
+        ties.iter_mut().for_each(|tie| tie.add(positions[tie.vertex], h, system));
+        contacts.mobilities.clear();
+        contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
+        if !system.factor() {
+            return Err("its stiffness");
+        }
+        free.clear();
+        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
+        free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
+        system.respond(free);
+        Ok(())
+    }
+
+    /// Lets contact act on the foreseen velocities.
+    fn touch(&mut self, h: f64) {
+        let Self { system, positions, free, company, contacts, .. } = self;
+        contacts.act(positions, free, (system, company), h);
+    }
+
+    /// Moves along the foreseen velocities, and gives the others their part.
+    fn act(&mut self, start: f64, h: f64) {
+        let Self { positions, velocities, free, ties, company, contacts, .. } = self;
+        std::mem::swap(velocities, free);
+        positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
+        ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
+        company.accept(contacts.impulses(), ties, (positions.len(), start, h));
+        self.touching = !contacts.is_idle();
+    }
+
+    /// Takes in what others gave since the last step, and looks who is near.
+    fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
+        let Self { system, positions, velocities, company, .. } = self;
+        company.open(around, positions.len());
+        if let Some([sums, carried]) = company.received() {
+            system.respond(sums);
+            system.respond(carried);
+            velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
+            positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);
+        }
+        self.take_ties(around);
+        let bounds = self.bounds();
+        self.company.gather(around, &bounds, (dt, self.spec.friction));
+        Ok(())
+    }
+
+    fn lost(&self, what: &str, dt_s: f64) -> StepError {
+        StepError::Diverged { model: self.spec.shape.model(), dt_s, what: what.to_owned() }
+    }
+}

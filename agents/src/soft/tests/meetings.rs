@@ -1,0 +1,206 @@
+//! Soft bodies meet rigid ones, tubes, tools, the ground and each other.
+
+use super::*;
+use crate::coupling::harness::{Faults, Stage};
+use crate::rigid::{RigidBody, RigidSpec};
+use crate::shape::{Obstacle, Solid};
+use std::sync::Arc;
+
+const BALL_M: f64 = 0.03;
+
+fn ball(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> RigidBody {
+    RigidBody::new(RigidSpec {
+        solid: Solid::Ball { radius_m: BALL_M },
+        position,
+        rotation: DQuat::IDENTITY,
+        velocity,
+        spin: DVec3::ZERO,
+        mass_kg,
+        restitution: 0.0,
+        friction: 0.5,
+        gravity,
+        obstacles: Arc::from([]),
+        joints: Arc::from([]),
+        sleep: false,
+    })
+    .unwrap()
+}
+
+/// A sheet of 30 cm held at all four edges, its middle at the origin.
+fn trampoline(young_pa: f64) -> SoftSpec {
+    SoftSpec {
+        matter: SoftMatter { young_pa, damping_per_s: 10.0, ..MATTER },
+        position: DVec3::new(-0.15, -0.15, 0.0),
+        held: vec![Side::Left, Side::Right, Side::Near, Side::Far],
+        gravity: G,
+        ..spec(SoftShape::Sheet { size_m: [0.3, 0.3], thickness_m: 0.002, segments: [8, 8] })
+    }
+}
+
+/// A block of 20 × 20 × 10 cm held at its bottom, its top in z = 0.
+fn cushion(young_pa: f64) -> SoftSpec {
+    SoftSpec {
+        matter: SoftMatter { young_pa, damping_per_s: 10.0, ..MATTER },
+        position: DVec3::new(-0.1, -0.1, -0.1),
+        held: vec![Side::Bottom],
+        gravity: G,
+        ..spec(SoftShape::Box { size_m: DVec3::new(0.2, 0.2, 0.1), segments: [5, 5, 3] })
+    }
+}
+
+/// The impulse that passed between `seconds` of a run.
+fn passed(stage: &mut Stage, id: AgentId, from: f64, to: f64) -> f64 {
+    stage.run(from, |_| {});
+    let so_far = |stage: &Stage| stage.newest(id).pairs.first().map_or(0.0, |pair| pair.impulse_n_s);
+    let before = so_far(stage);
+    stage.run(to, |_| {});
+    so_far(stage) - before
+}
+
+#[test]
+fn a_ball_rests_on_a_sheet_and_on_a_solid_at_any_rates() {
+    for (name, made) in [("sheet", trampoline(3e5)), ("solid", cushion(3e4))] {
+        for rates in [(240.0, 240.0), (60.0, 1000.0), (500.0, 60.0)] {
+            let mut stage = Stage::new(Faults::default());
+            let soft = stage.add(SoftBody::new(made.clone()).unwrap(), rates.0);
+            let body = stage.add(ball(0.2, DVec3::Z * (BALL_M + 0.002), DVec3::ZERO, G), rates.1);
+            let impulse = passed(&mut stage, soft, 1.5, 2.5);
+            let pair = stage.newest(soft).pairs[0];
+            let ball = stage.settled(body, 2.5).state;
+            let weight = impulse / (0.2 * 9.81);
+            println!("{name} {rates:?}: weight {weight} deep {} at {}", pair.penetration_m, ball.position);
+            assert!((weight - 1.0).abs() < 0.02, "{name} {rates:?}: carries {weight} of the weight");
+            assert!(pair.penetration_m < 1e-3, "{name} {rates:?}: {} m deep", pair.penetration_m);
+            assert!((BALL_M - 0.05..BALL_M).contains(&ball.position.z), "{name} {rates:?}: at {}", ball.position);
+        }
+    }
+}
+
+#[test]
+fn a_falling_ball_is_caught_at_any_rates_and_gains_nothing() {
+    for (name, made) in [("sheet", trampoline(3e5)), ("solid", cushion(3e4))] {
+        for rates in [(240.0, 240.0), (60.0, 1000.0), (500.0, 60.0), (60.0, 60.0)] {
+            let mut stage = Stage::new(Faults::default());
+            let soft = stage.add(SoftBody::new(made.clone()).unwrap(), rates.0);
+            let body = stage.add(ball(0.1, DVec3::new(0.001, 0.002, 0.33), DVec3::ZERO, G), rates.1);
+            // above the lowest that it can have: all of the sheet's and the ball's fall to -10 cm
+            let energy = |stage: &Stage, t: f64| {
+                let ball = stage.settled(body, t);
+                let lift = ball.mass_kg * 9.81 * (ball.state.position.z + 0.1);
+                stage.newest(soft).energy_j + ball.kinetic_j() + lift
+            };
+            let (start, mut most, mut deep, mut time) = (energy(&stage, 0.0), f64::MIN, 0.0_f64, 0.0_f64);
+            stage.run(0.6, |stage| {
+                time = time.max(stage.newest(soft).time.as_secs_f64());
+                most = most.max(energy(stage, time) - start);
+                deep = deep.max(stage.newest(soft).pairs.first().map_or(0.0, |pair| pair.penetration_m));
+            });
+            let at = stage.settled(body, 0.6).state.position;
+            println!("{name} {rates:?}: most {most} of {} deep {deep} at {at}", 0.1 * 9.81 * 0.33);
+            assert!(most < 0.01 * 0.1 * 9.81 * 0.33, "{name} {rates:?}: {most} J more than at the start");
+            assert!(deep > 0.0 && deep < 2e-3, "{name} {rates:?}: {deep} m deep");
+            assert!(at.z > -0.03, "{name} {rates:?}: it fell through to {at}");
+        }
+    }
+}
+
+#[test]
+fn free_bodies_and_a_ball_keep_their_momentum() {
+    let rates = [(240.0, 240.0), (60.0, 1000.0), (500.0, 60.0), (60.0, 60.0)];
+    for (shape, rates) in all().into_iter().zip(rates) {
+        let mut stage = Stage::new(Faults { jitter: 0.2, loss: 0.0, late: 2, seed: 3 });
+        let soft = stage.add(SoftBody::new(spec(shape.clone())).unwrap(), rates.0);
+        let aim = if shape == rope() { DVec3::new(0.33, 0.001, 0.15) } else { DVec3::new(0.1, 0.05, 0.15) };
+        stage.add(ball(0.1, aim, DVec3::new(0.05, 0.0, -1.0), DVec3::ZERO), rates.1);
+        let (start, mut drift, mut touched) = (stage.momentum(), 0.0_f64, 0.0_f64);
+        stage.run(5.0, |stage| {
+            drift = drift.max((stage.momentum() - start).length() / start.length());
+            touched = touched.max(stage.newest(soft).pairs.first().map_or(0.0, |pair| pair.impulse_n_s));
+        });
+        println!("{shape:?} {rates:?}: drift {drift:e} impulse {touched}");
+        assert!(touched > 1e-3, "they never met");
+        assert!(drift < 1e-9, "{shape:?} {rates:?}: momentum drifts by {drift}");
+    }
+}
+
+#[test]
+fn what_falls_on_the_ground_comes_to_rest() {
+    for shape in all() {
+        let floor = Obstacle {
+            name: String::new(),
+            solid: Solid::Plane,
+            position: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            friction: 0.5,
+            restitution: 0.0,
+        };
+        let radius_m = match shape {
+            SoftShape::Sheet { thickness_m, .. } => 0.5 * thickness_m,
+            SoftShape::Rope { radius_m, .. } => radius_m,
+            _ => 0.0,
+        };
+        let spec = spec(shape.clone());
+        let made = SoftSpec { gravity: G, obstacles: [floor].into(), position: DVec3::Z * 0.15, sleep: true, ..spec };
+        let mut body = SoftBody::new(made).unwrap();
+        let slept = (0..1000).any(|_| {
+            let around = Surroundings::alone(AgentId(0), SimTime::ZERO);
+            body.step(dt(0.005), &around).unwrap().at_rest
+        });
+        let lowest = state(&body).positions.iter().map(|x| x.z).fold(f64::INFINITY, f64::min);
+        assert!(slept, "{shape:?} still moves at {}", body.bounds().speed_m_s);
+        assert!((lowest - radius_m).abs() < 1e-5, "{shape:?} lies at {lowest}");
+    }
+}
+
+#[test]
+fn a_box_s_corner_does_not_pass_between_the_vertices_of_a_sheet() {
+    let corner = RigidSpec {
+        solid: Solid::Box { half_extents_m: DVec3::splat(0.02) },
+        position: DVec3::new(0.02, 0.012, 0.12),
+        rotation: DQuat::from_rotation_x(0.9) * DQuat::from_rotation_y(0.7),
+        velocity: DVec3::NEG_Z,
+        spin: DVec3::ZERO,
+        mass_kg: 0.1,
+        restitution: 0.0,
+        friction: 0.5,
+        gravity: G,
+        obstacles: Arc::from([]),
+        joints: Arc::from([]),
+        sleep: false,
+    };
+    let mut stage = Stage::new(Faults::default());
+    stage.add(SoftBody::new(trampoline(3e5)).unwrap(), 240.0);
+    let body = stage.add(RigidBody::new(corner).unwrap(), 500.0);
+    stage.run(1.0, |_| {});
+    let at = stage.settled(body, 1.0).state.position;
+    assert!(at.z > -0.01 && at.z < 0.04, "the box is at {at}");
+}
+
+#[test]
+fn a_soft_solid_lies_on_a_sheet_whoever_is_faster() {
+    for rates in [(120.0, 240.0), (240.0, 120.0)] {
+        let mut stage = Stage::new(Faults::default());
+        let sheet = stage.add(SoftBody::new(trampoline(3e5)).unwrap(), rates.0);
+        let shape = SoftShape::Box { size_m: DVec3::splat(0.06), segments: [2; 3] };
+        let matter = SoftMatter { damping_per_s: 2.0, ..MATTER };
+        let position = DVec3::new(-0.03, -0.03, 0.005);
+        let lying = SoftSpec { gravity: G, matter, position, ..spec(shape) };
+        let lying = stage.add(SoftBody::new(lying).unwrap(), rates.1);
+        let owner = if rates.0 > rates.1 { sheet } else { lying };
+        stage.run(1.0, |_| {});
+        let (mut force_n, mut seen, mut steps, mut deep) = (0.0, 0, 0_u64, 0.0_f64);
+        stage.run(1.5, |stage| {
+            let newest = stage.newest(owner);
+            if newest.steps > seen {
+                (seen, steps) = (newest.steps, steps + 1);
+                force_n += newest.pairs[0].force_n;
+                deep = deep.max(newest.pairs[0].penetration_m);
+            }
+        });
+        let weight = force_n / (steps as f64 * 0.216 * 9.81);
+        let lowest = stage.newest(lying).bounds.unwrap().low.z;
+        println!("{rates:?}: weight {weight} lowest {lowest} deep {deep}");
+        assert!((weight - 1.0).abs() < 0.03, "{rates:?}: {weight} of the weight");
+        assert!(lowest > -0.04 && deep < 5e-3, "{rates:?}: at {lowest}, {deep} m deep");
+    }
+}
