@@ -3,7 +3,7 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
-use crate::coupling::{Ledger, PairState};
+use crate::coupling::{Impulse, Ledger, PairState};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
 use crate::{AgentId, Resolution, SimTime};
@@ -76,6 +76,30 @@ pub struct Stand {
     pub centre: DVec3,
     /// A push whose line passes the middle no farther than this does not tip it, metres.
     pub reach_m: f64,
+}
+
+impl Stand {
+    /// Whether an impulse on a body whose centre of mass is at `centre` only presses it down: its line meets the ground
+    /// between the feet (docs/theory/coupling.md, eq. 7a).
+    #[must_use]
+    pub fn bears(&self, centre: DVec3, impulse: Impulse) -> bool {
+        let Self { normal, centre: feet, reach_m } = *self;
+        let along = impulse.linear.dot(normal);
+        if along >= 0.0 {
+            return false;
+        }
+        let feet = feet - centre;
+        let depth = feet.dot(normal);
+        let met = (normal.cross(impulse.angular) + (impulse.linear - normal * along) * depth) / along;
+        met.distance(feet - normal * depth) <= reach_m
+    }
+
+    /// What the ground leaves of an impulse that it bears, and of the way that it would have carried the body.
+    #[must_use]
+    pub fn leaves(&self, impulse: Impulse) -> Impulse {
+        let linear = impulse.linear - self.normal * impulse.linear.dot(self.normal);
+        Impulse { linear, angular: DVec3::ZERO }
+    }
 }
 
 /// Where matter is and how fast it may leave.

@@ -216,7 +216,7 @@ fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapsh
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
     let mut apart = DVec3::ZERO;
     given.since(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
-    Some((apart.length(), given.revision == taken.revision))
+    Some((apart.length(), given.revision == taken.revision && taken.coming.is_empty()))
 }
 
 #[cfg(test)]

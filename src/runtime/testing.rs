@@ -129,7 +129,7 @@ impl Dummy {
     fn trade(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let taken = &mut self.taken;
         self.exchange.open(around);
-        self.exchange.take(around, |_, _, impulse, _| *taken += impulse.linear.x);
+        self.exchange.take(around, around.time, |_, _, impulse, _| *taken += impulse.linear.x);
         if self.steps <= self.gifts {
             for other in around.neighbours.iter().filter(|n| n.owned && n.form.is_some()) {
                 let push = Impulse { linear: DVec3::X, angular: DVec3::ZERO };

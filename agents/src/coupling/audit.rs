@@ -2,7 +2,7 @@
 //!
 //! In: what each published last, and of tubes what they weigh. Out: the sums, with every impulse that was given and not yet
 //! taken delivered as its taker will: v + W dJ, x + W (t dJ − dS) at the taker's own time (docs/theory/coupling.md, eq. 3).
-//! After that rigid bodies fly to the common time. Never here: how anybody steps. Energies simply added over two clocks count
+//! After that rigid bodies fly to the common time; what presses a body on the ground that it stands on goes into the ground. Never here: how anybody steps. Energies simply added over two clocks count
 //! the half of a blow that its owner has felt and the other not yet.
 //!
 //! Exact for rigid bodies whose acceleration is constant meanwhile. Of tubes the state counts as it was published, with the
@@ -66,7 +66,7 @@ pub fn on_their_way(
     for giver in members {
         let Some(given) = giver.snapshot.given.iter().find(|l| l.with == member.id) else { continue };
         let taken: Option<&Ledger> = member.snapshot.taken.iter().find(|l| l.with == giver.id);
-        if taken.is_none_or(|t| t.revision < given.revision) {
+        if taken.is_none_or(|taken| given.is_beyond(taken)) {
             given.since(taken, member.snapshot.time, |site, dj, carried| visit(giver.id, site, dj, carried));
         }
     }
@@ -80,12 +80,18 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     else {
         return None;
     };
-    on_their_way(member, members, |_, _, dj, carried| {
-        state.velocity += dj.linear * *inverse_mass;
-        state.position += carried.linear * *inverse_mass;
-        state.spin += *inverse_inertia * dj.angular;
-        state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
+    let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
+    on_their_way(member, members, |_, _, dj, way| {
+        given += dj;
+        carried += way;
     });
+    if let Some(stand) = member.snapshot.stand.filter(|stand| stand.bears(state.position, given)) {
+        (given, carried) = (stand.leaves(given), stand.leaves(carried));
+    }
+    state.velocity += given.linear * *inverse_mass;
+    state.position += carried.linear * *inverse_mass;
+    state.spin += *inverse_inertia * given.angular;
+    state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
     let h = at.secs_after(member.snapshot.time);
     let a = member.snapshot.acceleration;
     state.position += state.velocity * h + a * (0.5 * h * h);

@@ -99,6 +99,8 @@ struct Owned {
 pub struct Exchange {
     owned: Vec<Owned>,
     taken: Vec<Ledger>,
+    /// Room for one reading.
+    reading: Option<Ledger>,
     now: SimTime,
 }
 
@@ -118,23 +120,31 @@ impl Exchange {
         }
     }
 
-    /// Takes what owners have given since the last reading: `apply` gets who, where, dJ, and t dJ − dS at the step's start.
+    /// Takes what owners have given since the last reading and what acts before `until`: `apply` gets who, where, dJ, and
+    /// t dJ − dS at the step's start.
     ///
     /// A reading that is not newer than the last one, or that is not finite, gives nothing.
-    pub fn take(&mut self, around: &Surroundings<'_>, mut apply: impl FnMut(AgentId, Site, Impulse, Impulse)) {
+    pub fn take(
+        &mut self,
+        around: &Surroundings<'_>,
+        until: SimTime,
+        mut apply: impl FnMut(AgentId, Site, Impulse, Impulse),
+    ) {
         for neighbour in around.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|l| l.with == around.me) else { continue };
             let at = self.taken.iter().position(|t| t.with == neighbour.id);
             let known = at.map(|at| &self.taken[at]);
-            if known.is_some_and(|k| k.revision >= ledger.revision) || !ledger.is_finite() {
+            if known.is_some_and(|known| !ledger.is_beyond(known)) || !ledger.is_finite() {
                 continue;
             }
-            ledger.since(known, around.time, |site, sum, carried| apply(neighbour.id, site, sum, carried));
+            let reading = self.reading.get_or_insert_with(|| Ledger::new(neighbour.id));
+            reading.read(ledger, until);
+            reading.since(known, around.time, |site, sum, carried| apply(neighbour.id, site, sum, carried));
             let at = at.unwrap_or_else(|| {
                 self.taken.push(Ledger::new(neighbour.id));
                 self.taken.len() - 1
             });
-            self.taken[at].copy_from(ledger);
+            self.taken[at].copy_from(reading);
             self.taken[at].with = neighbour.id;
         }
     }

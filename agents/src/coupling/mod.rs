@@ -20,7 +20,7 @@ pub use exchange::{Exchange, PairKind, PairState, acknowledged};
 pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View};
 pub(crate) use knock::Knock;
 pub use law::{Law, Link, Standing, owns};
-pub use ledger::{Entry, Impulse, Ledger, Page, Site};
+pub use ledger::{Coming, Entry, Impulse, Ledger, Page, Site};
 pub use other::{Other, WAKE_M_S};
 pub use solver::{Problem, Response, Settings, Solver, SolverReport};
 

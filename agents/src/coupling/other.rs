@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 5–7: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
-use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Stand, Surroundings, ToolState};
+use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
 use glam::{DMat3, DQuat, DVec3};
 use std::sync::Arc;
 
@@ -264,18 +264,10 @@ impl Other {
         }
     }
 
-    /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a): its line meets the ground
-    /// between the feet.
+    /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a).
     fn stands(&self, linear: DVec3, angular: DVec3) -> Option<DVec3> {
-        let Stand { normal, centre, reach_m } = self.neighbour.as_ref()?.snapshot.stand?;
-        let along = linear.dot(normal);
-        if along >= 0.0 {
-            return None;
-        }
-        let feet = centre - self.pose.centre;
-        let depth = feet.dot(normal);
-        let met = (normal.cross(angular) + (linear - normal * along) * depth) / along;
-        (met.distance(feet - normal * depth) <= reach_m).then_some(normal)
+        let stand = self.neighbour.as_ref()?.snapshot.stand?;
+        stand.bears(self.pose.centre, Impulse { linear, angular }).then_some(stand.normal)
     }
 
     /// Lets impulses, one a slot, act on it.

@@ -43,7 +43,9 @@ impl Felt {
             }
         }
         from.retain(|f| f.here);
-        exchange.take(around, |id, _, Impulse { linear, .. }, _| {
+        // all of it, what is still to act too: the mean is over all of the giver's time
+        let newest = around.neighbours.iter().map(|other| other.snapshot.time).fold(around.time, SimTime::max);
+        exchange.take(around, newest, |id, _, Impulse { linear, .. }, _| {
             from.iter_mut().filter(|f| f.id == id).for_each(|f| f.given += linear);
         });
         for other in around.neighbours {

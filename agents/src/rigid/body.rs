@@ -91,7 +91,7 @@ impl RigidBody {
         let world = World::new(&spec, &spread)?;
         let form = form_of(&spec, &spread, &world);
         let obstacles = Obstacles::new(&spec.obstacles, world.mover.radius_m)?;
-        Ok(Self {
+        let mut body = Self {
             spread,
             gravity: spec.gravity,
             may_sleep: spec.sleep,
@@ -117,7 +117,9 @@ impl RigidBody {
             island: None,
             jointed: None,
             sunk_m: 0.0,
-        })
+        };
+        body.put_down();
+        Ok(body)
     }
 
     /// The centre of mass in the shape's own axes, metres.
@@ -137,7 +139,7 @@ impl RigidBody {
 
     /// Begins a step of `dt` seconds: takes what others gave, and what pulls; `fellows`, by rising ids, share its world.
     pub(super) fn begin(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
-        self.receive(around, fellows);
+        self.receive(around, fellows, dt);
         self.push_alone(around, dt);
         self.ties.gather(around, &self.company);
         self.grips.clear();

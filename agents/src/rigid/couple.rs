@@ -11,7 +11,7 @@ use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use crate::coupling::touch::touches;
 use crate::coupling::{Impulse, Place};
-use crate::{AgentId, Bounds, Inertia, Snapshot, Stand, Surroundings};
+use crate::{AgentId, Bounds, Inertia, SimSpan, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -26,22 +26,27 @@ const STANDING_M_S: f64 = 0.05;
 const LEVEL: f64 = 0.99;
 
 impl RigidBody {
-    /// Begins a step: takes what the owners of its contacts gave, and brings everybody that it meets to its own time.
+    /// Begins a step of `dt` seconds: takes what the owners of its contacts gave, and brings everybody that it meets to its
+    /// own time.
     ///
     /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
-    pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId]) {
+    pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+        let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
         let before = motion.velocity;
         company.exchange.open(around);
         company.pairs.open();
-        let mut carried = None;
-        company.exchange.take(around, |_, _, sum, way| {
+        let mut taken = None;
+        company.exchange.take(around, until, |_, _, sum, way| {
             motion.velocity += sum.linear / spread.mass_kg;
             motion.angular += sum.angular;
-            carried = Some(carried.unwrap_or(Impulse::ZERO) + way);
+            let (given, carried) = taken.unwrap_or((Impulse::ZERO, Impulse::ZERO));
+            taken = Some((given + sum, carried + way));
         });
-        if let Some(carried) = carried {
-            self.shift(carried);
+        if let Some((given, carried)) = taken {
+            // what the ground bears carries nothing, and what is still to act lifts nothing off it
+            let stand = self.stand.filter(|stand| stand.bears(self.motion.position, given));
+            self.shift(stand.map_or(carried, |stand| stand.leaves(carried)));
             self.world.moved();
         }
         self.received = self.motion.velocity - before;
@@ -86,6 +91,15 @@ impl RigidBody {
         self.stand = if seen { self.feet() } else { None };
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         self.company.settle(around, dt);
+    }
+
+    /// Says what others may expect of a body that has not stepped yet: it stands where it was put down, and does not fall into
+    /// the ground.
+    pub(super) fn put_down(&mut self) {
+        self.stand = self.feet();
+        if let Some(Stand { normal, .. }) = self.stand {
+            self.acceleration -= normal * self.gravity.dot(normal).min(0.0);
+        }
     }
 
     /// What holds a body up in lasting contact, beside gravity and couplings, m/s²; nothing in flight.

@@ -9,7 +9,7 @@ use super::sided::{Now, is_sided};
 use super::step::Lost;
 use super::tube::Tube;
 use crate::coupling::{Law, Link};
-use crate::{StepError, Surroundings};
+use crate::{SimSpan, StepError, Surroundings};
 
 impl Tube {
     /// Lists this step's pulls; none is forgotten and none is made up.
@@ -27,9 +27,10 @@ impl Tube {
     ///
     /// # Errors
     /// [`StepError::Diverged`] where what was given cannot be taken.
-    pub(super) fn meet(&mut self, around: &Surroundings<'_>, dt_s: f64) -> Result<(), StepError> {
+    pub(super) fn meet(&mut self, around: &Surroundings<'_>, dt: SimSpan) -> Result<(), StepError> {
+        let dt_s = dt.as_secs_f64();
         self.dt_s = dt_s;
-        self.stepper.company.open(around, &self.division);
+        self.stepper.company.open(around, &self.division, around.time + dt);
         // past a radius a tube could be found beyond a wall
         let way_m = if self.spec.obstacles.is_empty() { f64::INFINITY } else { self.spec.section.radius_m };
         if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {

@@ -113,7 +113,8 @@ impl Tube {
         act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T,
     ) -> T {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
-        act(stepper, now, &Setting { matter, division, springs, dt, substeps: self.spec.substeps }, ties)
+        let substeps = self.spec.substeps.max(stepper.company.parts(dt));
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps }, ties)
     }
 
     /// The numbers it was built from.
@@ -265,7 +266,7 @@ impl Agent for Tube {
     /// rest     whether it could sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        self.meet(around, dt_s)?;
+        self.meet(around, dt)?;
         self.take_pulls(around);
         self.widen(around.time + dt);
         let watched = self.stepper.company.is_watched();

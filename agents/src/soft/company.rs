@@ -8,7 +8,7 @@ use super::holds::Tie;
 use crate::coupling::touch::{TouchRoom, touches};
 use crate::coupling::{Contact, Exchange, Impulse, PairKind, Placed, Site, Touch};
 use crate::rod::{Mate, Tanks};
-use crate::{Body, Bounds, Snapshot, Surroundings};
+use crate::{Body, Bounds, SimSpan, Snapshot, Surroundings};
 use glam::DVec3;
 
 /// The agents near one soft body.
@@ -29,8 +29,8 @@ pub(super) struct Company {
 }
 
 impl Company {
-    /// Begins a step: takes in what others gave since the last one.
-    pub fn open(&mut self, around: &Surroundings<'_>, vertices: usize) {
+    /// Begins a step of `dt` seconds: takes in what others gave since the last one.
+    pub fn open(&mut self, around: &Surroundings<'_>, vertices: usize, dt: f64) {
         // only another soft body may own a pair with this one
         self.watched = around.neighbours.iter().any(|n| !n.owned && matches!(n.snapshot.body, Body::Soft(_)));
         self.was_given = false;
@@ -39,7 +39,8 @@ impl Company {
         }
         let Self { exchange, received, carried, was_given, .. } = self;
         exchange.open(around);
-        exchange.take(around, |_, site, sum, moved| {
+        let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
+        exchange.take(around, until, |_, site, sum, moved| {
             let Site::Vertex(vertex) = site else { return };
             if !std::mem::replace(was_given, true) {
                 for list in [&mut *received, &mut *carried] {

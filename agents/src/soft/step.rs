@@ -79,7 +79,7 @@ impl SoftBody {
     /// Takes in what others gave since the last step, and looks who is near.
     fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
         let Self { system, positions, velocities, company, .. } = self;
-        company.open(around, positions.len());
+        company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             system.respond(sums);
             system.respond(carried);

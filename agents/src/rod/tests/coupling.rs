@@ -6,6 +6,7 @@ mod bodies;
 mod capstan;
 mod closed;
 mod meetings;
+mod rates;
 mod received;
 mod tools;
 
@@ -68,13 +69,13 @@ impl Prop {
         self.mass_kg.is_infinite()
     }
 
-    fn receive(&mut self, around: &Surroundings<'_>) {
+    fn receive(&mut self, around: &Surroundings<'_>, until: SimTime) {
         let wi = self.inverse_inertia();
         let Self { exchange, state, given, mass_kg, .. } = self;
         let w = mass_kg.recip();
         let held = mass_kg.is_infinite();
         exchange.open(around);
-        exchange.take(around, |_, _, sum, carried| {
+        exchange.take(around, until, |_, _, sum, carried| {
             *given += sum.linear;
             if !held {
                 state.velocity += sum.linear * w;
@@ -104,7 +105,7 @@ impl Agent for Prop {
 
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let h = dt.as_secs_f64();
-        self.receive(around);
+        self.receive(around, around.time + dt);
         if !self.is_held() {
             let a = self.force / self.mass_kg;
             let before = self.state.velocity;
