@@ -93,6 +93,8 @@ pub enum StyleWord {
     Resolution,
     /// Colour by the age of what is shown
     Age,
+    /// Shade by detail: dark is an object's coarsest level, white its finest
+    Detail,
 }
 
 /// `run`.
@@ -137,7 +139,7 @@ pub struct RunArgs {
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
-    /// How pictures without a window show things: wireframe, and colours by resolution or by age; more than one with a comma
+    /// How pictures without a window show things: wireframe, and colours by resolution, by age or by detail; more than one with a comma
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,
     /// Write the report here (JSON); - is standard output

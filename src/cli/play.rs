@@ -4,7 +4,7 @@
 
 use super::report::{
     AgentReport, BudgetReport, CouplingError, CouplingReport, OracleReport, OverlapReport, ProbeReport, Quantiles,
-    Report, summarise,
+    Report, summarise, summarise_choices,
 };
 use super::run::{Played, Request, RunLength, Step};
 use crate::compositor::viewer::WindowError;
@@ -136,7 +136,11 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
         overlaps: scene.overlaps().iter().map(|one| overlap(scene, one)).collect(),
         oracle: None,
-        budget: BudgetReport { spent_share, clamped: outcome.clamp },
+        budget: BudgetReport {
+            spent_share,
+            clamped: outcome.clamp,
+            choices: summarise_choices(&outcome.frames[warm..]),
+        },
         probes: outcome.probes.iter().map(probe).collect(),
     };
     Played { report, frames: outcome.frames, no_window: None, picture, interrupted: outcome.interrupted }

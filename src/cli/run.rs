@@ -155,6 +155,7 @@ fn style(words: &[StyleWord]) -> Style {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
         StyleWord::Resolution => Style { colouring: Colouring::Resolution, ..style },
         StyleWord::Age => Style { colouring: Colouring::Age, ..style },
+        StyleWord::Detail => Style { colouring: Colouring::Detail, ..style },
     })
 }
 

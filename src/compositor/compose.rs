@@ -7,7 +7,7 @@ use super::gather::{Form, Look, Material, PropShape, Stage, Track};
 use super::level::Level;
 use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
-    resolution_colour,
+    detail_colour, resolution_colour,
 };
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
@@ -70,7 +70,7 @@ impl Stage {
         for (number, track) in self.tracks.iter().enumerate() {
             let at = level(levels, number);
             if at.triangles > 0 {
-                add_solid(track, at.resolution, &picture, &mut scratch.solids);
+                add_solid(track, at, &picture, &mut scratch.solids);
             }
         }
         self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
@@ -123,10 +123,11 @@ impl Stage {
         for &(n, number) in &scratch.tubes {
             let track = &mut self.tracks[number];
             let Body::Curve(curve) = &track.pose else { continue };
-            let at = level(levels, number).resolution;
+            let asked = level(levels, number);
+            let at = asked.resolution;
             let frames = track.skeleton.rebuild(curve, at.eps_m);
             let Some(last) = frames.len().checked_sub(1) else { continue };
-            let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+            let paint = Paint::of(track.actor.look, tint(picture.style, asked, track.age_s));
             let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
             let texture_per_m = TEXTURE_AROUND / (TAU * mean.max(1e-6));
             let (first, origin) = (picture.samples.len() as u32, picture.origin);
@@ -183,11 +184,12 @@ fn level(levels: &[Level], number: usize) -> Level {
     levels.get(number).copied().unwrap_or_else(|| usual.into()).safe()
 }
 
-fn tint(style: Style, at: Resolution, age_s: f64) -> [u8; 4] {
+fn tint(style: Style, at: Level, age_s: f64) -> [u8; 4] {
     let with = |[r, g, b]: [u8; 3], share: u8| [r, g, b, share];
     match style.colouring {
         Colouring::Material => [0; 4],
-        Colouring::Resolution => with(resolution_colour(at), 220),
+        Colouring::Resolution => with(resolution_colour(at.resolution), 220),
+        Colouring::Detail => with(detail_colour(at.detail), 235),
         Colouring::Age => with(age_colour(age_s), 190),
     }
 }
@@ -228,14 +230,16 @@ fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Roundin
     Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
 }
 
-fn add_solid(track: &Track, at: Resolution, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+fn add_solid(track: &Track, at: Level, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
     let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
     match (&track.actor.form, &track.pose) {
         (Form::Solid(solid), Body::Rigid(rigid)) => {
-            let Some((mesh, size)) = mesh_of(solid, track.body.given, at.n) else { return };
+            let Some((mesh, size)) = mesh_of(solid, track.body.given, at.resolution.n) else { return };
             solids.push((mesh, instance(rigid.position - picture.origin, rigid.rotation, size, paint)));
         }
-        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at.n, paint, picture.origin), solids),
+        (Form::Tool(shape), Body::Tool(tool)) => {
+            add_tool(shape, tool, (at.resolution.n, paint, picture.origin), solids)
+        }
         _ => {}
     }
 }

@@ -25,6 +25,8 @@ pub struct Level {
     pub triangles: u32,
     /// How it is shaded.
     pub shading: Shading,
+    /// How much of what it can have it is drawn with: 0 its coarsest … 1 its finest. It shows in [`super::Colouring::Detail`] alone.
+    pub detail: f32,
 }
 
 impl Level {
@@ -38,6 +40,6 @@ impl Level {
 impl From<Resolution> for Level {
     /// All triangles that there are, lit at every pixel.
     fn from(resolution: Resolution) -> Self {
-        Self { resolution, triangles: u32::MAX, shading: Shading::default() }
+        Self { resolution, triangles: u32::MAX, shading: Shading::default(), detail: 1.0 }
     }
 }

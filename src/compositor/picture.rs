@@ -19,6 +19,8 @@ pub enum Colouring {
     Resolution,
     /// The age of what is shown: from blue (now) to red (0.1 s and older).
     Age,
+    /// How much of its detail an object is drawn with, from nearly black (its coarsest) to white (its finest), as (FS93) shows it.
+    Detail,
 }
 
 /// How a picture is drawn.
@@ -210,6 +212,13 @@ pub fn resolution_colour(at: Resolution) -> [u8; 3] {
     HUES[usize::from(at.n).min(HUES.len() - 1)]
 }
 
+/// The shade of a level: dark grey is the coarsest an object has, white its finest.
+#[must_use]
+pub fn detail_colour(detail: f32) -> [u8; 3] {
+    // a cast of floats saturates, and takes NaN to 0
+    [(28.0 + 227.0 * detail.clamp(0.0, 1.0)) as u8; 3]
+}
+
 /// Past this age what is shown is as red as it gets, seconds.
 const AGE_RED_S: f64 = 0.1;
 
@@ -227,6 +236,12 @@ pub fn age_colour(age_s: f64) -> [u8; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn detail_runs_from_dark_to_white_and_takes_any_number() {
+        assert_eq!([0.0, 0.5, 1.0, 7.0].map(|d| detail_colour(d)[0]), [28, 141, 255, 255]);
+        assert_eq!(detail_colour(f32::NAN), [0; 3]);
+    }
 
     #[test]
     fn age_runs_from_blue_to_red_and_takes_any_number() {

@@ -9,7 +9,7 @@ use super::closing::Closing;
 use super::groups::Groups;
 use super::hierarchy::leave_out_members;
 use super::ladder::Ladder;
-use super::picture::LevelDemand;
+use super::plan::LevelDemand;
 use super::status::Status;
 use metachron_agents::AgentId;
 use metachron_budget::Bound;

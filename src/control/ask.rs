@@ -3,7 +3,7 @@
 //! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
 
 use super::ladder::{Ladder, Ladders, Rung};
-use super::picture::{LevelDemand, Seen};
+use super::plan::{LevelDemand, Seen};
 use super::view::Kind;
 use super::worth;
 use metachron_agents::Resolution;

@@ -2,7 +2,7 @@
 //!
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
-use super::picture::{LevelDemand, Seen};
+use super::plan::{LevelDemand, Seen};
 use metachron_agents::AgentId;
 
 /// So many frames back a level that returns is a reversal.

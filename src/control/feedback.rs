@@ -6,7 +6,7 @@
 //! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
 
 use super::level::{self, Held};
-use super::picture::{LevelDemand, Seen, steers};
+use super::plan::{LevelDemand, Seen, steers};
 use super::policy::Law;
 use super::status::Status;
 use super::view::{Kind, ObjectView};

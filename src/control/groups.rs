@@ -3,7 +3,7 @@
 //! In: objects of which some are groups. Out: a forest. Never here: which group is opened.
 
 use super::ask::Ask;
-use super::picture::Seen;
+use super::plan::Seen;
 use super::view::Kind;
 
 /// What a proxy is worth of what its members are worth in their lowest forms.

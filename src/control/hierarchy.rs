@@ -6,7 +6,7 @@
 use super::ask::{Ask, Promise, TICKS, demand, left_out};
 use super::groups::Groups;
 use super::ladder::Rung;
-use super::picture::LevelDemand;
+use super::plan::LevelDemand;
 use super::policy::Policy;
 use super::select;
 use metachron_agents::AgentId;

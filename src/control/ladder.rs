@@ -4,7 +4,7 @@
 //! Never here: a choice, or what an object is worth now ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
 
 use super::level::{Held, Span};
-use super::picture::Seen;
+use super::plan::Seen;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
 use super::worth;

@@ -11,18 +11,15 @@ use super::groups::Groups;
 use super::hierarchy::Hierarchy;
 use super::ladder::Ladders;
 use super::level::{self, Span};
+use super::plan::{FrameWork, LevelDemand, Plan, Seen, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
 use super::select::Select;
 use super::status::Status;
-use super::view::{Kind, ObjectView, Shading};
+use super::view::{Kind, ObjectView};
 use metachron_agents::{AgentId, Resolution};
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::cost::value::Value;
-use std::time::Duration;
-
-/// An object and the polygons that it can have.
-pub(super) type Seen = (ObjectView, Span);
 
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
 const SPEED_NEWS: f64 = 0.2;
@@ -35,49 +32,6 @@ const FIXED_TREMBLE: f64 = 0.01;
 
 /// The part of a frame that policies with a prediction leave free where nobody says otherwise.
 const MARGIN: f64 = 0.02;
-
-/// What the last frame took.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct FrameWork {
-    /// The work of the frame: gather, choose, draw. Without any wait for a display or for the frame's time to come.
-    pub work: Duration,
-    /// Of it the drawing of the picture, which is what levels change; `work` at most.
-    pub draw: Duration,
-    /// Whether the frame must not teach: one of the first three, one with a new size or a new pipeline, a hidden window,
-    /// the first after a gap of more than five frames.
-    pub skip: bool,
-}
-
-/// What to draw one object with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LevelDemand {
-    /// Which one.
-    pub id: AgentId,
-    /// Its pair (ε, n), inside its range; of a group n = 0 is its proxy, 1 its members.
-    pub resolution: Resolution,
-    /// Triangles to draw it with: of what is cut by triangles exactly so many. 0: it is left out of the picture, as members of a group
-    /// are that is drawn by its proxy, and groups that are drawn as their members. Out of sight: its coarsest, for its shadow.
-    pub polygons: f64,
-    /// How to shade it.
-    pub shading: Shading,
-}
-
-/// What to draw the next frame with.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Plan {
-    /// One entry for each object, in the order they were given.
-    pub levels: Vec<LevelDemand>,
-    /// Triangles of everything in view.
-    pub polygons: f64,
-    /// Triangles of everything in view at its finest: what the policy `full` would draw.
-    pub full_polygons: f64,
-    /// What the choice promises; zeros where the policy predicts nothing.
-    pub promise: Promise,
-    /// Objects in view whose level is another than in the frame before.
-    pub changes: u32,
-    /// Of these, objects that are back at a level which they had two or three frames before.
-    pub reversals: u32,
-}
 
 /// Chooses the level of every picture.
 #[derive(Debug, Clone)]
@@ -412,15 +366,6 @@ impl PictureControl {
 /// Size, accuracy and importance count as they are, motion by half: what the eye follows is not judged as strictly as what rests.
 fn usual_sliders() -> Sliders {
     Sliders { accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
-}
-
-fn in_view(views: &[Seen]) -> impl Iterator<Item = &Seen> + Clone {
-    views.iter().filter(|(view, _)| view.visible)
-}
-
-/// Whether anything in view can be drawn in more than one way.
-pub(super) fn steers(views: &[Seen]) -> bool {
-    in_view(views).any(|(view, span)| span.most > span.least || view.shading.0 < view.shading.1)
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@
 
 use super::ask::{Ask, Promise, TICKS, demand, left_out};
 use super::level::Held;
-use super::picture::LevelDemand;
+use super::plan::LevelDemand;
 use super::policy::Policy;
 use metachron_agents::AgentId;
 use metachron_budget::select::barrier::{Limits, interior_point};

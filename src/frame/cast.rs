@@ -11,7 +11,7 @@ use crate::control::{
     self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
     RateLimits, Stages, Value,
 };
-use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, StepPrice, Watch};
+use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, StepPrice, Watch};
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ValueKind};
 use crate::scene::{self, Member, Scene, Spec};
 use glam::DVec3;
@@ -108,10 +108,16 @@ pub(super) fn machine(scene: &Scene) -> Machine {
     }
     let draw = &mut machine.draw;
     draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
-    draw.object_us = wish.draw_object_us.unwrap_or(draw.object_us);
-    draw.triangle_us = wish.draw_triangle_us.unwrap_or(draw.triangle_us);
     draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
+    for (price, own) in draw.objects.iter_mut().zip(&wish.shading) {
+        price.setup_us = own.object_us.or(wish.draw_object_us).unwrap_or(price.setup_us);
+        price.triangle_us = own.triangle_us.or(wish.draw_triangle_us).unwrap_or(price.triangle_us);
+        price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);
+        price.pixel_ns = own.pixel_ns.unwrap_or(price.pixel_ns);
+    }
     machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
+    machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
+    machine.spikes = wish.spikes.unwrap_or(machine.spikes);
     machine.seed = wish.seed.unwrap_or(machine.seed);
     machine
 }
@@ -171,10 +177,19 @@ const fn value(kind: ValueKind) -> Value {
     }
 }
 
-/// The declared prices of drawing as control wants them: one algorithm, whose pixels cost the same whatever covers them.
-fn prices(draw: &DrawPrice) -> Prices {
-    let object = Stages { setup: draw.object_us * 1e-6, polygon: draw.triangle_us * 1e-6, vertex: 0.0, pixel: 0.0 };
-    Prices { frame_s: draw.setup_ms * 1e-3, pixel_s: draw.pixel_ns * 1e-9, shading: [object; 3] }
+/// The declared prices of drawing as control wants them.
+pub(super) fn prices(draw: &DrawPrice) -> Prices {
+    let object = |price: &ObjectPrice| Stages {
+        setup: price.setup_us * 1e-6,
+        polygon: price.triangle_us * 1e-6,
+        vertex: price.vertex_us * 1e-6,
+        pixel: price.pixel_ns * 1e-9,
+    };
+    Prices {
+        frame_s: draw.setup_ms * 1e-3,
+        pixel_s: draw.pixel_ns * 1e-9,
+        shading: draw.objects.each_ref().map(object),
+    }
 }
 
 /// The feedback law that a target asks for.
@@ -214,14 +229,15 @@ pub(super) fn view(seen: &Seen, member: &Member) -> ObjectView {
 }
 
 /// What control demands, as the compositor wants to know it.
-pub(super) fn level(demand: &LevelDemand) -> Level {
+pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
     let shading = match demand.shading {
         control::Shading::Flat => compositor::Shading::Flat,
         control::Shading::Gouraud => compositor::Shading::Gouraud,
         control::Shading::PerPixel => compositor::Shading::PerPixel,
     };
     // a cast of floats saturates
-    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading }
+    let detail = control::detail(view, demand) as f32;
+    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
 }
 
 /// Triangles of an object that is one mesh a level, at every level.

@@ -28,6 +28,24 @@ pub struct FrameRecord {
     pub triangles: u64,
     /// Objects in view.
     pub objects: u64,
+    /// Gathering states and finding what is seen, milliseconds; zero in lockstep, as choosing is.
+    pub cull_ms: f64,
+    /// Choosing levels, milliseconds.
+    pub select_ms: f64,
+    /// Making the picture and drawing it, milliseconds.
+    pub draw_ms: f64,
+    /// From where the camera was read to the finished picture, milliseconds.
+    pub lag_ms: f64,
+    /// What the policy said that the frame would take, milliseconds; `None` of one that says nothing.
+    pub predicted_ms: Option<f64>,
+    /// Value of the choice over what no choice can exceed; `None` of a policy without a certificate.
+    pub value_over_bound: Option<f64>,
+    /// Objects in view whose level is another than in the frame before.
+    pub changes: u32,
+    /// Of these, objects that are back at a level which they had two or three frames before.
+    pub reversals: u32,
+    /// Objects in view that were left out for want of time.
+    pub holes: u32,
     /// The loop's ε̂ = 40·ε/L of the printed law, or the corrected law's scene-wide ε in metres.
     pub eps: f64,
     /// Mean level n of the tubes in view, else of everything in view.

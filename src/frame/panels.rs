@@ -2,9 +2,10 @@
 //!
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
+use super::outcome::FrameRecord;
 use super::session::Session;
-use crate::compositor::viewer::{AgentRow, AgentState, CouplingRow, Law, Status};
-use crate::control;
+use crate::compositor::viewer::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
+use crate::control::{self, Policy};
 use crate::runtime::{self, AgentStats};
 use crate::scene::Spec;
 use crate::scene::format::PolicyKind;
@@ -13,6 +14,8 @@ use std::time::Duration;
 
 /// Mass at which the user's hand takes hold of something that has none of its own, kilograms.
 const HAND_MASS_KG: f64 = 0.1;
+/// Frames over which the budget bar is smoothed.
+const SHARES_FRAMES: usize = 30;
 /// A hand moves a stretch of a tube, not all of it: no more than this mass of it, kilograms.
 const STRETCH_MASS_KG: f64 = 0.1;
 
@@ -76,11 +79,16 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     let mut news = Vec::new();
     let control = session.control();
     status.target_hz = control.target_hz();
-    status.law = Some(viewer_law(control.law()));
+    let policy = control.policy();
+    let blind = [Policy::Full, Policy::Static, Policy::Threshold, Policy::Feedback];
+    status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
+    status.sliders = (!blind.contains(&policy)).then(|| control.sliders());
+    status.frozen = control.is_frozen();
     status.loop_value = Some(control.eps_hat());
     status.policy = session.policy_name().to_owned();
     status.clamp = session.clamp();
     status.triangles = session.picture().triangles();
+    status.shares = shares(session, meter);
     fill_couplings(status, session);
     status.energy_j = 0.0;
     for (at, agent) in session.agents().iter().enumerate() {
@@ -100,6 +108,21 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
         status.energy_j += stats.energy_j;
     }
     news
+}
+
+/// Where the time went in the newest frames.
+fn shares(session: &Session, meter: &Meter) -> Shares {
+    let newest = session.newest_frames(SHARES_FRAMES);
+    let target_ms = session.period().as_secs_f64() * 1e3;
+    let mean =
+        |of: fn(&FrameRecord) -> f64| newest.iter().map(of).sum::<f64>() / (newest.len().max(1) as f64 * target_ms);
+    Shares {
+        simulation: meter.shares.iter().sum::<f64>() / f64::from(session.cores()),
+        cull: mean(|row| row.cull_ms),
+        select: mean(|row| row.select_ms),
+        draw: mean(|row| row.draw_ms),
+        rest: mean(|row| (row.frame_ms - row.cull_ms - row.select_ms - row.draw_ms).max(0.0)),
+    }
 }
 
 /// The couplings of all agents, each told by the agent that owns it.

@@ -9,7 +9,9 @@ use super::error::SessionError;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 use super::trace::Trace;
 use crate::compositor::{Camera, Hand, Level, Picture, Seen, Size, Stage, States, Style};
-use crate::control::{Backdrop, FrameWork, Law, ObjectView, PictureControl, Policy, Shading, Status};
+use crate::control::{
+    Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Shading, Status,
+};
 use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
 use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
 use crate::scene::{Probe, Scene};
@@ -21,6 +23,8 @@ use std::time::Duration;
 pub struct Session {
     scene: Scene,
     machine: Machine,
+    /// What drawing costs on the declared machine.
+    declared: Prices,
     run: Box<dyn Run>,
     stage: Stage,
     control: PictureControl,
@@ -43,7 +47,7 @@ pub struct Session {
 pub struct Finished {
     /// All work of the frame until its picture was finished.
     pub work: Duration,
-    /// Of it the drawing of the picture: what levels change.
+    /// Of it the drawing of the composed picture.
     pub draw: Duration,
     /// The adapter's own time on the newest frame it has told of; `None` where it has no time stamps.
     pub gpu: Option<Duration>,
@@ -51,12 +55,18 @@ pub struct Finished {
     pub skip: bool,
 }
 
-/// What the last composition asks of the adapter.
+/// What the last composition asks of the adapter, and what it took.
 #[derive(Debug, Clone, Copy, Default)]
 struct Chosen {
     sim: SimTime,
     triangles: u64,
     more_triangles: f64,
+    /// Gathering states and finding what is seen.
+    cull: Duration,
+    /// Choosing levels.
+    select: Duration,
+    /// Making the picture at these levels.
+    build: Duration,
     /// Triangles that nobody chose: fixed solids, the floor, the caps of tubes.
     other_triangles: f64,
     objects: u64,
@@ -81,6 +91,7 @@ impl Session {
             control: cast::picture_control(&scene),
             newest: run.agents().iter().map(AgentHandle::latest).collect(),
             stage: cast::stage(&scene),
+            declared: cast::prices(&machine.draw),
             machine,
             run,
             seen: Vec::new(),
@@ -126,6 +137,17 @@ impl Session {
     #[must_use]
     pub fn frames(&self) -> u64 {
         self.finished
+    }
+
+    /// The newest frames that are remembered, at most `count`.
+    pub(super) fn newest_frames(&self, count: usize) -> &[FrameRecord] {
+        &self.records[self.records.len().saturating_sub(count)..]
+    }
+
+    /// Cores that agents and the frame loop share.
+    pub(super) fn cores(&self) -> u32 {
+        let real = || std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32);
+        if self.is_virtual() { self.machine.cores.max(1) } else { real() }
     }
 
     /// Remembers at least the newest `frames` frames from now on, and never twice as many: for runs without an end.
@@ -231,25 +253,38 @@ impl Session {
 
     /// Takes the newest states, finds what `camera` sees of them, chooses levels and makes the picture.
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
+        let started = self.now();
         self.gather();
         self.stage.survey(camera, size, &mut self.seen);
+        let culled = self.now();
         self.choose(size);
+        let chosen = self.now();
         let picture = self.stage.compose(camera, &self.levels, style, hand);
         self.chosen.triangles = picture.triangles();
         self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
-        picture
+        self.chosen.cull = culled.saturating_sub(started);
+        self.chosen.select = chosen.saturating_sub(culled);
+        self.chosen.build = self.run.now().saturating_sub(chosen);
+        self.stage.picture()
     }
 
     /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself.
     pub fn spend_declared(&mut self, size: Size) {
-        let Chosen { objects, triangles, .. } = self.chosen;
-        let cost = self.machine.draw_time(objects, triangles, size.pixels() as u64, self.frames());
+        let backdrop = Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles };
+        let prices = &self.declared;
+        let of = |(view, level): (&ObjectView, &LevelDemand)| {
+            let drawn = view.visible && level.polygons > 0.0;
+            if drawn { prices.object_s(level.shading, level.polygons, view.pixels) } else { 0.0 }
+        };
+        let objects_s: f64 = self.views.iter().zip(&self.control.last_plan().levels).map(of).sum();
+        let cost = self.machine.frame_time(prices.backdrop_s(backdrop) + objects_s, self.frames());
         self.run.spend(cost);
     }
 
     /// Ends the frame that began at `started`.
     pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
-        let Finished { work, draw, skip, .. } = finished;
+        let Finished { work, skip, .. } = finished;
+        let draw = finished.draw + self.chosen.build;
         let record = self.record(started, finished);
         self.finished += 1;
         self.last_start = Some(started);
@@ -351,24 +386,36 @@ impl Session {
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         let plan = self.control.plan(&self.views);
         self.levels.clear();
-        self.levels.extend(plan.levels.iter().map(cast::level));
+        self.levels.extend(self.views.iter().zip(&plan.levels).map(cast::level));
         self.chosen.objects = self.seen.iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
     }
 
     fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
-        let Chosen { sim, triangles, more_triangles, objects, .. } = self.chosen;
-        let frame_ms = finished.work.as_secs_f64() * 1e3;
+        let Chosen { sim, triangles, more_triangles, objects, cull, select, build, .. } = self.chosen;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let plan = self.control.last_plan();
+        let promise = plan.promise;
+        let frame_ms = ms(finished.work);
         let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
         FrameRecord {
             frame: self.frames(),
             sim_s: sim.as_secs_f64(),
             frame_ms,
-            gpu_ms: finished.gpu.map(|time| time.as_secs_f64() * 1e3),
-            interval_ms: interval.as_secs_f64() * 1e3,
+            gpu_ms: finished.gpu.map(ms),
+            interval_ms: ms(interval),
             full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
             triangles,
             objects,
+            cull_ms: ms(cull),
+            select_ms: ms(select),
+            draw_ms: ms(build + finished.draw),
+            lag_ms: ms(cull + select + build + finished.draw),
+            predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
+            value_over_bound: promise.value_over_bound(),
+            changes: plan.changes,
+            reversals: plan.reversals,
+            holes: promise.holes,
             eps: self.control.eps_hat(),
             n: self.mean_level(),
         }

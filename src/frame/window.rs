@@ -144,15 +144,17 @@ impl<'a> WindowShow<'a> {
         self.refresh();
     }
 
-    /// The same scene from its beginning, under the target, policy and law that the user has set.
+    /// The same scene from its beginning, under the target, policy, law and sliders that the user has set.
     fn reset(&mut self) {
         let policy = self.session.policy_name();
         let control = self.session.control();
-        let (hz, law) = (control.target_hz(), control.law());
+        let (hz, law, sliders) = (control.target_hz(), control.law(), control.sliders());
         self.restart(self.session.scene().clone());
         self.session.set_policy(policy);
-        self.session.control().set_law(law);
-        self.session.control().set_target_hz(hz);
+        let control = self.session.control();
+        control.set_law(law);
+        control.set_sliders(sliders);
+        control.set_target_hz(hz);
         self.refreshed = None;
         self.refresh();
     }
@@ -283,6 +285,8 @@ impl Show for WindowShow<'_> {
             Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
             Action::Policy(name) => self.session.set_policy(&name),
             Action::Law(law) => self.session.control().set_law(panels::control_law(law)),
+            Action::Sliders(sliders) => self.session.control().set_sliders(sliders),
+            Action::Freeze(frozen) => self.session.control().freeze(frozen),
             Action::DragStart(hit) => {
                 self.pull(Some(Hand { object: hit.object, anchor: hit.anchor, target: hit.point_m }));
             }

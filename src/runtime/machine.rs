@@ -17,6 +17,10 @@ pub struct Machine {
     pub draw: DrawPrice,
     /// Relative standard deviation of every cost, `0..=1`.
     pub noise_sd: f64,
+    /// Relative standard deviation of a factor on frames that wanders, nine tenths of it kept from one frame to the next, `0..=1`.
+    pub wander_sd: f64,
+    /// Share of frames that take half as long again, `0..=1`.
+    pub spikes: f64,
     /// Which noise: equal seeds give equal runs.
     pub seed: u64,
 }
@@ -32,16 +36,27 @@ pub struct StepPrice {
     pub unit_us: f64,
 }
 
-/// What a frame costs: setup + object · objects + triangle · triangles + pixel · pixels.
+/// What a frame costs: setup + pixel · pixels of the picture + what its objects cost.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawPrice {
     /// Milliseconds a frame, ≥ 0.
     pub setup_ms: f64,
-    /// Microseconds a visible object, ≥ 0.
-    pub object_us: f64,
+    /// Nanoseconds a pixel of the picture, whatever covers it, ≥ 0.
+    pub pixel_ns: f64,
+    /// What objects cost by their shading: flat, Gouraud, light at every pixel.
+    pub objects: [ObjectPrice; 3],
+}
+
+/// What an object costs: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ObjectPrice {
+    /// Microseconds an object, ≥ 0.
+    pub setup_us: f64,
     /// Microseconds a triangle, ≥ 0.
     pub triangle_us: f64,
-    /// Nanoseconds a shaded pixel, ≥ 0.
+    /// Microseconds a vertex, ≥ 0.
+    pub vertex_us: f64,
+    /// Nanoseconds a pixel, ≥ 0.
     pub pixel_ns: f64,
 }
 
@@ -73,8 +88,10 @@ impl Machine {
                 price("instrument", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
-            draw: DrawPrice { setup_ms: 1.4, object_us: 5.0, triangle_us: 0.22, pixel_ns: 6.0 },
+            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 3] },
             noise_sd: 0.0,
+            wander_sd: 0.0,
+            spikes: 0.0,
             seed: 1,
         }
     }
@@ -83,14 +100,13 @@ impl Machine {
     #[must_use]
     pub fn workstation() -> Self {
         let base = Self::two_cores_software();
-        let DrawPrice { setup_ms, object_us, triangle_us, pixel_ns } = base.draw;
+        let DrawPrice { setup_ms, pixel_ns, .. } = base.draw;
         Self {
             cores: 8,
             draw: DrawPrice {
                 setup_ms: setup_ms / 20.0,
-                object_us: object_us / 20.0,
-                triangle_us: triangle_us / 20.0,
                 pixel_ns: pixel_ns / 20.0,
+                objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 3],
             },
             ..base
         }
@@ -104,15 +120,28 @@ impl Machine {
         us * 1e-6 * self.noise(stream, count)
     }
 
-    /// What the frame `count` costs that draws so much.
+    /// What the frame `count` takes that should take `seconds`: white noise, noise that wanders, spikes.
     #[must_use]
-    pub fn draw_time(&self, objects: u64, triangles: u64, pixels: u64, count: u64) -> Duration {
-        let price = &self.draw;
-        let seconds = price.setup_ms * 1e-3
-            + price.object_us * 1e-6 * objects as f64
-            + price.triangle_us * 1e-6 * triangles as f64
-            + price.pixel_ns * 1e-9 * pixels as f64;
-        duration(seconds * self.noise(FRAME_STREAM, count))
+    pub fn frame_time(&self, seconds: f64, count: u64) -> Duration {
+        let spike = if uniform(self.seed, SPIKE_STREAM, count) < sound(self.spikes) { SPIKE } else { 1.0 };
+        duration(seconds * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
+    }
+
+    /// A log-normal factor of mean 1 whose logarithm keeps nine tenths of itself from one frame to the next: the sum of what
+    /// is left of the last frames' news, so that it depends on nothing but the seed and the frame.
+    fn wander(&self, count: u64) -> f64 {
+        let sd = sound(self.wander_sd).min(1.0);
+        if sd == 0.0 {
+            return 1.0;
+        }
+        let (mut left, mut sum) = (1.0, 0.0);
+        for back in 0..WANDER_FRAMES {
+            sum += left * normal(self.seed, WANDER_STREAM, count.wrapping_sub(back));
+            left *= WANDER_KEPT;
+        }
+        let variance = libm::log1p(sd * sd);
+        let news = libm::sqrt(variance * (1.0 - WANDER_KEPT * WANDER_KEPT));
+        libm::exp(news * sum - 0.5 * variance)
     }
 
     /// A log-normal factor of mean 1 and relative deviation `noise_sd`, the same for equal arguments.
@@ -135,9 +164,22 @@ impl Default for Machine {
 
 /// The noise stream of the frame loop; agents use their numbers, which are below.
 const FRAME_STREAM: u64 = u64::MAX;
+/// The stream of the noise that wanders, and of spikes.
+const WANDER_STREAM: u64 = u64::MAX - 1;
+const SPIKE_STREAM: u64 = u64::MAX - 2;
+/// What a spike multiplies a frame by.
+const SPIKE: f64 = 1.5;
+/// What is kept of the wandering from one frame to the next.
+const WANDER_KEPT: f64 = 0.9;
+/// Past so many frames a thousandth of the news is left.
+const WANDER_FRAMES: u64 = 64;
 
 const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
     StepPrice { model: Cow::Borrowed(model), base_us, unit_us }
+}
+
+const fn price_of_objects(setup_us: f64, triangle_us: f64) -> ObjectPrice {
+    ObjectPrice { setup_us, triangle_us, vertex_us: 0.0, pixel_ns: 0.0 }
 }
 
 /// `x`, or zero where it is negative or no number: a price is never a debt.
@@ -154,14 +196,27 @@ pub(super) fn duration(seconds: f64) -> Duration {
 /// A number of mean 0 and deviation 1 that depends on nothing but its arguments: twelve uniform numbers less six,
 /// close to normal out to three deviations and never beyond six.
 fn normal(seed: u64, stream: u64, count: u64) -> f64 {
-    const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
-    let mut state = mix(mix(seed ^ mix(stream)) ^ count);
+    let mut state = start(seed, stream, count);
     let mut sum = -6.0;
     for _ in 0..12 {
         state = state.wrapping_add(GOLDEN);
-        sum += (mix(state) >> 11) as f64 / TWO_POW_53;
+        sum += part(state);
     }
     sum
+}
+
+/// A number between 0 and 1 that depends on nothing but its arguments.
+fn uniform(seed: u64, stream: u64, count: u64) -> f64 {
+    part(start(seed, stream, count).wrapping_add(GOLDEN))
+}
+
+fn start(seed: u64, stream: u64, count: u64) -> u64 {
+    mix(mix(seed ^ mix(stream)) ^ count)
+}
+
+fn part(state: u64) -> f64 {
+    const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
+    (mix(state) >> 11) as f64 / TWO_POW_53
 }
 
 /// 2⁶⁴ over the golden ratio: the increment of SplitMix64.
@@ -199,6 +254,20 @@ mod tests {
     }
 
     #[test]
+    fn frames_wander_and_spike_as_declared() {
+        let machine = Machine { wander_sd: 0.05, spikes: 0.01, ..Machine::default() };
+        let n = 20_000_u64;
+        let x: Vec<f64> = (0..n).map(|frame| machine.frame_time(1.0, frame).as_secs_f64()).collect();
+        let spikes = x.iter().filter(|x| **x > 1.3).count() as f64 / n as f64;
+        let calm: Vec<f64> = x.iter().map(|x| if *x > 1.3 { x / SPIKE } else { *x } - 1.0).collect();
+        let moment = |lag: usize| calm.iter().zip(&calm[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;
+        // 19 frames of memory leave about a thousand independent ones: errors of 2 % of the deviation, four of them
+        assert!((moment(0).sqrt() - 0.05).abs() < 0.004, "deviation {}", moment(0).sqrt());
+        assert!((moment(1) / moment(0) - 0.9).abs() < 0.03, "kept {}", moment(1) / moment(0));
+        assert!((spikes - 0.01).abs() < 0.003, "spikes {spikes}");
+    }
+
+    #[test]
     fn equal_seeds_give_equal_noise_and_streams_differ() {
         let machine = Machine { noise_sd: 0.2, ..Machine::default() };
         assert_eq!(machine.noise(1, 7).to_bits(), machine.clone().noise(1, 7).to_bits());
@@ -208,9 +277,8 @@ mod tests {
 
     #[test]
     fn prices_that_are_no_price_cost_nothing() {
-        let mut machine = Machine::default();
-        machine.draw.setup_ms = f64::NAN;
-        assert_eq!(machine.draw_time(1, 1, 1, 0), Duration::ZERO);
+        let machine = Machine { spikes: f64::NAN, ..Machine::default() };
+        assert_eq!(machine.frame_time(f64::NAN, 0), Duration::ZERO);
         assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);
     }
 

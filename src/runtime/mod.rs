@@ -35,7 +35,7 @@ pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
 pub use lockstep::Lockstep;
-pub use machine::{DrawPrice, Machine, OTHER_STEP_US, PRESETS, StepPrice};
+pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
 pub use mailbox::{Command, SendError};
 pub use pace::{Drive, LAG_CAP, Pace, SPEED_RANGE, SharedTimeline, Start, Timeline};
 pub use slot::{LatestSlot, SlotWriter};

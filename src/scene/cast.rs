@@ -126,10 +126,29 @@ pub struct Machine {
     pub draw_triangle_us: Option<f64>,
     /// Nanoseconds a pixel.
     pub draw_pixel_ns: Option<f64>,
+    /// What objects cost by their shading: flat, Gouraud, light at every pixel.
+    pub shading: [ObjectCost; 3],
     /// Relative standard deviation of every cost, 0 … 1.
     pub noise: Option<f64>,
+    /// Relative standard deviation of the factor on frames that wanders, 0 … 1.
+    pub wander: Option<f64>,
+    /// Share of frames that take half as long again, 0 … 1.
+    pub spikes: Option<f64>,
     /// Seed of the noise.
     pub seed: Option<u64>,
+}
+
+/// What an object costs, where a scene says so.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ObjectCost {
+    /// Microseconds an object.
+    pub object_us: Option<f64>,
+    /// Microseconds a triangle.
+    pub triangle_us: Option<f64>,
+    /// Microseconds a vertex.
+    pub vertex_us: Option<f64>,
+    /// Nanoseconds a pixel that it covers.
+    pub pixel_ns: Option<f64>,
 }
 
 /// An agent of the scene.

@@ -37,9 +37,8 @@ fn tireless() -> Machine {
     Machine {
         cores: 64,
         steps: ["tube", "rigid", "instrument", "synthetic"].map(free).to_vec(),
-        draw: DrawPrice { setup_ms: 0.0, object_us: 0.0, triangle_us: 0.0, pixel_ns: 0.0 },
-        noise_sd: 0.0,
-        seed: 1,
+        draw: DrawPrice { setup_ms: 0.0, pixel_ns: 0.0, objects: Default::default() },
+        ..Machine::default()
     }
 }
 

@@ -2,10 +2,12 @@
 //!
 //! In: measured numbers. Out: JSON, CSV rows, verdicts. Never here: measuring (the frame loop does), and where files go.
 
+mod choices;
 mod frames;
 mod goal;
 mod summary;
 
+pub use choices::{ChoiceSummary, summarise_choices};
 pub use frames::{FrameSummary, Spread, summarise};
 pub use goal::{Goal, GoalError, Verdict};
 
@@ -189,6 +191,9 @@ pub struct BudgetReport {
     pub spent_share: Option<f64>,
     /// On which limit the control rested at the end, in words; `None` where it did not.
     pub clamped: Option<String>,
+    /// What frames came to.
+    #[serde(flatten)]
+    pub choices: ChoiceSummary,
 }
 
 /// Where a probe was.
@@ -299,6 +304,27 @@ mod tests {
             "/probes/0/at",
             "/probes/0/position_m",
             "/probes/0/velocity_m_s",
+        ] {
+            assert!(json.pointer(path).is_some(), "{path} is missing");
+        }
+    }
+
+    #[test]
+    fn the_report_says_what_choices_came_to() {
+        let json = serde_json::to_value(Report::template()).unwrap();
+        for path in [
+            "/budget/value_over_bound",
+            "/budget/certificate",
+            "/budget/reversals",
+            "/budget/level_changes",
+            "/budget/model_error",
+            "/budget/select_ms/mean",
+            "/budget/select_ms/max",
+            "/budget/cull_ms/mean",
+            "/budget/draw_ms/mean",
+            "/budget/lag_ms/p99",
+            "/budget/lag_ms/max",
+            "/budget/holes",
         ] {
             assert!(json.pointer(path).is_some(), "{path} is missing");
         }

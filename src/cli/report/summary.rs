@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, CouplingReport, OracleReport, Report};
+use super::{AgentReport, ChoiceSummary, CouplingReport, OracleReport, Report};
 use std::fmt::Write;
 
 impl Report {
@@ -22,6 +22,7 @@ impl Report {
         );
         let adapter = self.adapter.as_deref().unwrap_or("nothing was drawn");
         let _ = writeln!(out, "drawn by  {adapter}; agents' CPU {cpu_s:.2} s; state {}", self.state_hash);
+        choices_line(&mut out, &self.budget.choices);
         if let Some(clamped) = &self.budget.clamped {
             let _ = writeln!(out, "note  {clamped}");
         }
@@ -37,6 +38,20 @@ impl Report {
         }
         out
     }
+}
+
+fn choices_line(out: &mut String, choices: &ChoiceSummary) {
+    let ChoiceSummary { level_changes, reversals, cull_ms, select_ms, draw_ms, .. } = choices;
+    let (cull, select, draw) = (cull_ms.mean, select_ms.mean, draw_ms.mean);
+    let _ = write!(out, "cull {cull:.2} ms, select {select:.3}, draw {draw:.2}; ");
+    let _ = write!(out, "{:.2} % of levels change, {:.2} % back", 100.0 * level_changes, 100.0 * reversals);
+    if let Some(error) = choices.model_error {
+        let _ = write!(out, "; predicted to {:.1} %", 100.0 * error);
+    }
+    if let Some(gap) = choices.certificate {
+        let _ = write!(out, "; within {:.2} % of the best", 100.0 * gap);
+    }
+    let _ = writeln!(out);
 }
 
 fn agent_row(out: &mut String, agent: &AgentReport) {

@@ -12,7 +12,9 @@ mod icons;
 mod mouse;
 mod overlays;
 mod plots;
+mod presenting;
 mod screen;
+mod shares;
 mod shell;
 mod show;
 mod side;
@@ -24,8 +26,8 @@ pub use commands::{Command, Group, MOUSE, SHORTCUTS, Shortcut, keys_text};
 pub use history::{FrameSummary, History};
 pub use shell::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use show::{
-    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Show, Skip, Status, ViewRequest,
-    Weight,
+    Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Shares, Show, Skip, Status,
+    ViewRequest, Weight,
 };
 
 use super::{Colouring, Size, Style};
@@ -62,6 +64,8 @@ pub struct Looks {
     pub colours: bool,
     /// Colour objects by the age of their state; not together with `colours`.
     pub ages: bool,
+    /// Shade objects by their detail; not together with the other two.
+    pub details: bool,
     /// Draw the edges of triangles.
     pub wireframe: bool,
 }
@@ -71,6 +75,7 @@ impl Looks {
         let colouring = match self {
             Self { colours: true, .. } => Colouring::Resolution,
             Self { ages: true, .. } => Colouring::Age,
+            Self { details: true, .. } => Colouring::Detail,
             _ => Colouring::Material,
         };
         Style { colouring, wireframe: self.wireframe }
@@ -267,9 +272,9 @@ impl Viewer {
             Command::Track => self.hand.track = !self.hand.track && status.selected.is_some(),
             Command::SceneCamera => self.hand.follow_scene(),
             Command::Free => self.leave(show, actions),
-            Command::Colours => (looks.colours, looks.ages) = (!looks.colours, false),
+            Command::Colours => *looks = Looks { colours: !looks.colours, ages: false, details: false, ..*looks },
             Command::Wireframe => looks.wireframe = !looks.wireframe,
-            Command::Ages => (looks.ages, looks.colours) = (!looks.ages, false),
+            Command::Ages => *looks = Looks { ages: !looks.ages, colours: false, details: false, ..*looks },
             Command::HideUi => self.layout.panels = !self.layout.panels,
             Command::Theme => wishes.theme = true,
             Command::Screenshot => wishes.screenshot = true,

@@ -79,6 +79,11 @@ impl GpuScreen {
         self.renderer.lost()
     }
 
+    /// Whether a processor draws and shows what is drawn.
+    pub fn is_software(&self) -> bool {
+        self.gpu.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// Whether the next call of [`Screen::draw`] makes a new picture.
     pub fn set_due(&mut self, due: bool) {
         self.due = due;

@@ -5,6 +5,7 @@
 //! [`run_window`] hears of it from wgpu, closes the window and opens it again on a new device. The show runs on meanwhile.
 
 use super::super::Lost;
+use super::presenting::Presenting;
 use super::screen::GpuScreen;
 use super::show::{FrameTimes, Message, Show, Skip, Weight};
 use super::{Layout, Screen, Viewer, Wishes};
@@ -67,6 +68,8 @@ const CALM: f64 = 0.5;
 const WARM_UP: u64 = 3;
 /// A picture this much before its time is drawn rather than waited for.
 const EARLY: Duration = Duration::from_micros(500);
+/// A picture this much after its time was kept from it by the one before.
+const LATE: Duration = Duration::from_millis(1);
 
 /// Opens the window and shows `show` in it until the user or the show closes it.
 ///
@@ -180,6 +183,7 @@ struct Shell<'a> {
     fate: Rc<Cell<Fate>>,
     screenshots: PathBuf,
     pace: Pace,
+    presenting: Presenting,
     /// Time that [`Viewer::ui`] spent on the picture in the frame before.
     drawing: Duration,
     hidden: bool,
@@ -223,7 +227,18 @@ impl<'a> Shell<'a> {
         (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
     ) -> Self {
         let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
-        Self { show, viewer, screen, fate, screenshots, pace, drawing: Duration::ZERO, hidden: false, touched_s: 0.0 }
+        Self {
+            show,
+            viewer,
+            screen,
+            fate,
+            screenshots,
+            pace,
+            presenting: Presenting::default(),
+            drawing: Duration::ZERO,
+            hidden: false,
+            touched_s: 0.0,
+        }
     }
 
     /// Whether pictures may come slowly: time stands still and the user's hands lie still.
@@ -246,6 +261,8 @@ impl<'a> Shell<'a> {
     /// Puts together where the time of the picture just drawn went, and tells the show and the plots.
     fn account(&mut self, interval: Duration, panels: Duration) {
         let Some(drawn) = self.screen.take_times() else { return };
+        // where an adapter presents by itself, waiting for it is no work
+        let present = if self.screen.is_software() { self.presenting.time() } else { Duration::ZERO };
         let skip = if self.pace.pictures <= WARM_UP {
             Some(Skip::WarmUp)
         } else if std::mem::take(&mut self.hidden) {
@@ -262,10 +279,12 @@ impl<'a> Shell<'a> {
             draw: drawn.draw,
             draw_gpu: drawn.gpu,
             panels,
-            work: drawn.compose + drawn.draw + panels,
+            present,
+            work: drawn.compose + drawn.draw + panels + present,
             interval,
             skip,
         };
+        self.presenting.worked(drawn.compose + drawn.draw + panels, skip.is_none());
         self.show.measured(&times);
         self.viewer.measured(&times);
     }
@@ -311,7 +330,11 @@ impl eframe::App for Shell<'_> {
         let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
         let still = self.is_still(ui.ctx());
         let due = first_pass && self.pace.is_due(now, still);
+        let late = now.saturating_duration_since(self.pace.next(still)) > LATE;
         let interval = if due { self.pace.start(now, period) } else { Duration::ZERO };
+        if due {
+            self.presenting.started(interval, late);
+        }
         self.screen.set_due(due);
         let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
         self.drawing = if first_pass { drawing } else { self.drawing + drawing };

@@ -6,6 +6,7 @@
 use super::super::{Camera, Hit, Picture, Ray, Size, Style};
 use glam::DVec3;
 use metachron_agents::{AgentId, Resolution, SimTime};
+use metachron_budget::cost::benefit::Sliders;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -64,6 +65,10 @@ pub enum Action {
     Policy(String),
     /// The feedback law and its gains.
     Law(Law),
+    /// How much each factor counts in what a level is worth.
+    Sliders(Sliders),
+    /// Keep all levels as they are, or let them be chosen again.
+    Freeze(bool),
     /// Take hold of an object with a spring.
     DragStart(Hit),
     /// Move the free end of that spring to this point, metres.
@@ -135,6 +140,8 @@ pub struct FrameTimes {
     pub draw_gpu: Option<Duration>,
     /// Panels and plots, as measured in the frame before.
     pub panels: Duration,
+    /// Showing what was drawn, where the processor does it: as it was lately.
+    pub present: Duration,
     /// All work of the frame until the picture was finished: what the controller holds at its set point.
     pub work: Duration,
     /// From the start of the frame before to the start of this one.
@@ -179,6 +186,12 @@ pub struct Status {
     pub policies: Vec<String>,
     /// The feedback law and its gains; `None` where the policy has none.
     pub law: Option<Law>,
+    /// How much each factor counts in what a level is worth; `None` where the policy does not weigh levels.
+    pub sliders: Option<Sliders>,
+    /// Whether levels are kept as they are.
+    pub frozen: bool,
+    /// Where the time goes.
+    pub shares: Shares,
     /// Every law with its default gains; the scene's own where it gives them.
     pub laws: Vec<Law>,
     /// The loop's variable as its law keeps it, for the plots.
@@ -201,6 +214,21 @@ pub struct Status {
     pub couplings: Vec<CouplingRow>,
     /// What the user should know, oldest first.
     pub messages: Vec<Message>,
+}
+
+/// Where the time goes, lately.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Shares {
+    /// Share of all cores that agents work on, 0 … 1.
+    pub simulation: f64,
+    /// Gathering states and finding what is seen, as a part of the time of a frame.
+    pub cull: f64,
+    /// Choosing levels.
+    pub select: f64,
+    /// Making the picture and drawing it.
+    pub draw: f64,
+    /// Everything else that is work of a frame: panels, presenting.
+    pub rest: f64,
 }
 
 /// A coupling of two agents in numbers.

@@ -9,6 +9,7 @@ use super::show::{Action, AgentRow, AgentState, Law, Status};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, RichText, Slider, SliderClamping, Ui};
+use metachron_budget::cost::benefit::Sliders;
 
 /// Wanted frame rates that the slider offers, per second.
 const TARGET_HZ: (f64, f64) = (5.0, 144.0);
@@ -42,6 +43,7 @@ fn section(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
 
 fn frame(ui: &mut Ui, status: &Status, history: &History, summary: &FrameSummary, out: &mut Vec<Action>) {
     plots::frame_times(ui, history, status.target_hz);
+    super::shares::show(ui, &status.shares);
     let late = format!("{:.1} %", 100.0 * summary.late_share);
     ui.add_space(2.0);
     ui.columns_const(|[work, tail, lateness]| {
@@ -77,10 +79,37 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
     if policy != status.policy {
         out.push(Action::Policy(policy));
     }
-    let Some(law) = status.law else {
-        ui.label(RichText::new("This policy has no gains.").color(palette(ui).weak));
-        return;
-    };
+    let mut frozen = status.frozen;
+    if ui.checkbox(&mut frozen, "Freeze selection").on_hover_text("Every object keeps the level it has").changed() {
+        out.push(Action::Freeze(frozen));
+    }
+    if let Some(sliders) = status.sliders {
+        worth(ui, sliders, out);
+    }
+    if let Some(law) = status.law {
+        feedback(ui, law, status, out);
+    }
+}
+
+/// How much each factor counts in what a level is worth.
+fn worth(ui: &mut Ui, sliders: Sliders, out: &mut Vec<Action>) {
+    let mut wanted = sliders;
+    let Sliders { accuracy, importance, focus, motion, hysteresis } = &mut wanted;
+    for (name, value) in [
+        ("Accuracy", accuracy),
+        ("Importance", importance),
+        ("Focus", focus),
+        ("Motion", motion),
+        ("Hysteresis", hysteresis),
+    ] {
+        slider(ui, name, value, (0.0, 1.0), |s| s.max_decimals(2));
+    }
+    if wanted != sliders {
+        out.push(Action::Sliders(wanted));
+    }
+}
+
+fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
     let mut wanted = law;
     choose_law(ui, &mut wanted, &status.laws);
     gains(ui, &mut wanted);
@@ -142,12 +171,15 @@ fn as_toml(status: &Status, law: &Law) -> String {
 fn picture(ui: &mut Ui, looks: &mut Looks, status: &Status) {
     egui::Grid::new("looks").num_columns(2).spacing(egui::vec2(18.0, 4.0)).show(ui, |ui| {
         if ui.checkbox(&mut looks.colours, "Colour by resolution").changed() && looks.colours {
-            looks.ages = false;
+            (looks.ages, looks.details) = (false, false);
         }
         ui.checkbox(&mut looks.wireframe, "Wireframe");
         ui.end_row();
         if ui.checkbox(&mut looks.ages, "Colour by age").changed() && looks.ages {
-            looks.colours = false;
+            (looks.colours, looks.details) = (false, false);
+        }
+        if ui.checkbox(&mut looks.details, "Shade by detail").changed() && looks.details {
+            (looks.colours, looks.ages) = (false, false);
         }
         ui.end_row();
     });

@@ -2,10 +2,12 @@
 
 mod policies;
 
+use super::super::view::Shading;
 use super::*;
 use metachron_agents::ResolutionRange;
 use metachron_budget::Bound;
 use proptest::prelude::*;
+use std::time::Duration;
 
 /// A frame in which nothing is done but drawing.
 fn frame_work(work: Duration, skip: bool) -> FrameWork {

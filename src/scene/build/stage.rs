@@ -1,7 +1,7 @@
 //! Target, camera, machine and probes of the file.
 
 use super::{Names, POSITION_MAX_M};
-use crate::scene::cast::{Camera, Gains, Machine, Probe, Target, View};
+use crate::scene::cast::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CameraFile, CameraKeyFile, MODELS, MachineFile, ProbeFile, TargetFile};
 use crate::scene::problem::{Problem, did_you_mean};
@@ -135,9 +135,41 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
     let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
     let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
     let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
+    let wander = number("wander", file.wander, allowed(0.0..=1.0, ""));
+    let spikes = number("spikes", file.spikes, allowed(0.0..=1.0, ""));
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
-    Machine { preset, cores, steps, draw_setup_ms, draw_object_us, draw_triangle_us, draw_pixel_ns, noise, seed }
+    let shading = object_costs(c, &place.table("shading"), file);
+    Machine {
+        preset,
+        cores,
+        steps,
+        draw_setup_ms,
+        draw_object_us,
+        draw_triangle_us,
+        draw_pixel_ns,
+        shading,
+        noise,
+        wander,
+        spikes,
+        seed,
+    }
+}
+
+/// Costs of objects by their shading, in the order of control.
+fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 3] {
+    let Some(files) = &file.shading else { return Default::default() };
+    [("flat", files.flat), ("gouraud", files.gouraud), ("per-pixel", files.per_pixel)].map(|(name, file)| {
+        let (place, file) = (place.table(name), file.unwrap_or_default());
+        let mut number =
+            |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+        ObjectCost {
+            object_us: number("object_us", file.object_us, allowed(0.0..=1e6, "µs")),
+            triangle_us: number("triangle_us", file.triangle_us, allowed(0.0..=1e4, "µs")),
+            vertex_us: number("vertex_us", file.vertex_us, allowed(0.0..=1e4, "µs")),
+            pixel_ns: number("pixel_ns", file.pixel_ns, allowed(0.0..=1e6, "ns")),
+        }
+    })
 }
 
 fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {

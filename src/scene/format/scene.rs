@@ -222,13 +222,47 @@ pub struct MachineFile {
     pub draw_object_us: Option<f64>,
     /// Microseconds a triangle, 0 … 1e4.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds a pixel, 0 … 1e6.
+    /// Nanoseconds a pixel of the picture, 0 … 1e6.
     pub draw_pixel_ns: Option<f64>,
+    /// What objects of one shading cost that differs from `draw_object_us` and `draw_triangle_us`.
+    pub shading: Option<ShadingCostsFile>,
     /// Relative standard deviation of every cost, 0 … 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub noise: Option<f64>,
+    /// Relative standard deviation of a factor on frames that keeps nine tenths of itself from frame to frame, 0 … 1. Default 0.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub wander: Option<f64>,
+    /// Share of frames that take half as long again, 0 … 1. Default 0.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub spikes: Option<f64>,
     /// Seed of the noise.
     pub seed: Option<u32>,
+}
+
+/// `[machine.shading]`: what objects cost by the way the light on them is worked out.
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, rename_all = "kebab-case")]
+pub struct ShadingCostsFile {
+    /// One colour a triangle.
+    pub flat: Option<ShadingCostFile>,
+    /// Colours at corners.
+    pub gouraud: Option<ShadingCostFile>,
+    /// Light at every pixel.
+    pub per_pixel: Option<ShadingCostFile>,
+}
+
+/// What an object costs: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
+#[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ShadingCostFile {
+    /// Microseconds an object, 0 … 1e6.
+    pub object_us: Option<f64>,
+    /// Microseconds a triangle, 0 … 1e4.
+    pub triangle_us: Option<f64>,
+    /// Microseconds a vertex, 0 … 1e4. Default 0.
+    pub vertex_us: Option<f64>,
+    /// Nanoseconds a pixel that the object covers, 0 … 1e6. Default 0.
+    pub pixel_ns: Option<f64>,
 }
 
 /// What a step of a model costs: base + unit · work.

@@ -1,0 +1,85 @@
+//! What a run's choices of levels came to: promises, certificates, unrest, and the time of each stage of a frame.
+//!
+//! In: one row a frame. Out: shares, errors and spreads. Never here: measuring.
+
+use super::frames::Spread;
+use crate::frame::FrameRecord;
+use serde::Serialize;
+
+/// What the choices of a run's frames say together.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ChoiceSummary {
+    /// Mean of the value of a choice over its bound; `None` of a policy without a certificate.
+    pub value_over_bound: Option<f64>,
+    /// The certificate: 19 of 20 choices are proven to be worth at least all but this part of the best.
+    pub certificate: Option<f64>,
+    /// Levels that changed, an object and frame in view.
+    pub level_changes: f64,
+    /// Levels that changed back within three frames, an object and frame in view.
+    pub reversals: f64,
+    /// 19 of 20 frames took what was predicted to within this part of it; `None` of a policy that predicts nothing.
+    pub model_error: Option<f64>,
+    /// Gathering states and finding what is seen.
+    pub cull_ms: Spread,
+    /// Choosing levels.
+    pub select_ms: Spread,
+    /// Making the picture and drawing it.
+    pub draw_ms: Spread,
+    /// From where the camera was read to the finished picture.
+    pub lag_ms: Spread,
+    /// Objects in view that were left out for want of time, all frames together.
+    pub holes: u64,
+}
+
+/// The choices of `frames`.
+#[must_use]
+pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
+    let spread = |of: fn(&FrameRecord) -> f64| Spread::of(frames.iter().map(of));
+    let some = |of: fn(&FrameRecord) -> Option<f64>| {
+        let all: Vec<f64> = frames.iter().filter_map(of).collect();
+        (!all.is_empty()).then(|| Spread::of(all))
+    };
+    let seen = frames.iter().map(|row| row.objects).sum::<u64>().max(1) as f64;
+    let share = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| f64::from(of(row))).sum::<f64>() / seen;
+    ChoiceSummary {
+        value_over_bound: some(|row| row.value_over_bound).map(|s| s.mean),
+        certificate: some(|row| row.value_over_bound.map(|part| 1.0 - part)).map(|s| s.p95),
+        level_changes: share(|row| row.changes),
+        reversals: share(|row| row.reversals),
+        model_error: some(|row| row.predicted_ms.map(|told| (row.frame_ms / told - 1.0).abs())).map(|s| s.p95),
+        cull_ms: spread(|row| row.cull_ms),
+        select_ms: spread(|row| row.select_ms),
+        draw_ms: spread(|row| row.draw_ms),
+        lag_ms: spread(|row| row.lag_ms),
+        holes: frames.iter().map(|row| u64::from(row.holes)).sum(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choices_are_counted_by_objects_in_view_and_errors_by_what_was_promised() {
+        let frame = |k: u32| FrameRecord {
+            objects: 10,
+            frame_ms: 10.0 + f64::from(k) * 0.01,
+            predicted_ms: Some(10.0),
+            value_over_bound: Some(1.0 - 1e-4 * f64::from(k)),
+            changes: k % 2,
+            reversals: u32::from(k == 7),
+            holes: 3,
+            lag_ms: f64::from(k),
+            ..FrameRecord::default()
+        };
+        let frames: Vec<_> = (1..=100).map(frame).collect();
+        let summary = summarise_choices(&frames);
+        assert_eq!((summary.level_changes, summary.reversals, summary.holes), (50.0 / 1000.0, 1.0 / 1000.0, 300));
+        let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-9;
+        assert!(near(summary.model_error, 0.095) && near(summary.certificate, 95e-4), "{summary:?}");
+        assert!(near(summary.value_over_bound, 1.0 - 50.5e-4));
+        assert_eq!((summary.lag_ms.p99, summary.lag_ms.max), (99.0, 100.0));
+        let none = summarise_choices(&[FrameRecord::default()]);
+        assert_eq!((none.value_over_bound, none.certificate, none.model_error), (None, None, None));
+    }
+}
