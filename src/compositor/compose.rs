@@ -4,14 +4,14 @@
 //! A tube that the camera does not see stays in the picture for its shadow.
 
 use super::gather::{Form, Look, Material, PropShape, Stage, Track};
-use super::level::Level;
+use super::level::{Level, Shading};
 use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
     detail_colour, resolution_colour,
 };
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
-use metachron_agents::shape::{Primitive, Rounding, SkinFrame, Solid, ToolShape};
+use metachron_agents::shape::{Model, Primitive, Rounding, Rung, SkinFrame, Solid, ToolShape};
 use metachron_agents::{AgentId, Anchor, Body, Resolution, ToolState};
 use std::f64::consts::TAU;
 
@@ -43,10 +43,13 @@ pub struct Hand {
     pub target: DVec3,
 }
 
+/// Solids by the way they are drawn, before they are put in order.
+type Solids = Vec<((Shading, MeshKey), SolidInstance)>;
+
 /// Lists that are filled anew every frame.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    solids: Vec<(MeshKey, SolidInstance)>,
+    solids: Solids,
     tubes: Vec<(u8, usize)>,
 }
 
@@ -57,7 +60,7 @@ impl Stage {
         &self.picture
     }
 
-    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)); shadings are not heeded yet.
+    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)).
     pub fn compose(&mut self, camera: &Camera, levels: &[Level], style: Style, hand: Option<Hand>) -> &Picture {
         let mut picture = std::mem::take(&mut self.picture);
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -67,7 +70,7 @@ impl Stage {
         scratch.solids.clear();
         self.find_focus(camera, &mut picture);
         self.add_tubes(levels, &mut picture, &mut scratch);
-        for (number, track) in self.tracks.iter().enumerate() {
+        for (number, track) in self.tracks.iter_mut().enumerate() {
             let at = level(levels, number);
             if at.triangles > 0 {
                 add_solid(track, at, &picture, &mut scratch.solids);
@@ -124,7 +127,7 @@ impl Stage {
             let track = &mut self.tracks[number];
             let Body::Curve(curve) = &track.pose else { continue };
             let asked = level(levels, number);
-            let at = asked.resolution;
+            let Level { resolution: at, shading, .. } = asked;
             let frames = track.skeleton.rebuild(curve, at.eps_m);
             let Some(last) = frames.len().checked_sub(1) else { continue };
             let paint = Paint::of(track.actor.look, tint(picture.style, asked, track.age_s));
@@ -137,13 +140,13 @@ impl Stage {
             for end in [&frames[0], &frames[last]] {
                 let size = Rounding { extents: Vec3::ZERO, radius_m: end.radius_m as f32 };
                 let ball = instance(end.position - origin, DQuat::IDENTITY, size, paint);
-                scratch.solids.push((MeshKey::Primitive(Primitive::Ball, n), ball));
+                scratch.solids.push(((shading, MeshKey::Primitive(Primitive::Ball, n)), ball));
             }
         }
     }
 
     /// A small ball at every point that is held, from white to red by the force.
-    fn add_grasps(&self, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+    fn add_grasps(&self, picture: &Picture, solids: &mut Solids) {
         for track in &self.tracks {
             let (Body::Tool(tool), Form::Tool(shape)) = (&track.pose, &track.actor.form) else { continue };
             let Some(grasp) = tool.grasp else { continue };
@@ -154,7 +157,7 @@ impl Stage {
             let size = Rounding { extents: Vec3::ZERO, radius_m: (0.9 * shape.shaft_radius_m) as f32 };
             let paint = Paint { colour, material: Material::Plastic, tint: [colour[0], colour[1], colour[2], 200] };
             let ball = instance(point - picture.origin, DQuat::IDENTITY, size, paint);
-            solids.push((MeshKey::Primitive(Primitive::Ball, 2), ball));
+            solids.push(((Shading::PerPixel, MeshKey::Primitive(Primitive::Ball, 2)), ball));
         }
     }
 }
@@ -230,34 +233,57 @@ fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Roundin
     Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
 }
 
-fn add_solid(track: &Track, at: Level, picture: &Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+fn add_solid(track: &mut Track, at: Level, picture: &Picture, solids: &mut Solids) {
     let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+    if matches!(track.actor.form, Form::Scenery(..)) {
+        return add_scenery(track, at, (paint, picture.origin), solids);
+    }
     match (&track.actor.form, &track.pose) {
         (Form::Solid(solid), Body::Rigid(rigid)) => {
             let Some((mesh, size)) = mesh_of(solid, track.body.given, at.resolution.n) else { return };
-            solids.push((mesh, instance(rigid.position - picture.origin, rigid.rotation, size, paint)));
+            let place = rigid.position - picture.origin;
+            solids.push(((at.shading, mesh), instance(place, rigid.rotation, size, paint)));
         }
-        (Form::Tool(shape), Body::Tool(tool)) => {
-            add_tool(shape, tool, (at.resolution.n, paint, picture.origin), solids)
-        }
+        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at, paint, picture.origin), solids),
         _ => {}
     }
 }
 
-fn add_tool(
-    shape: &ToolShape,
-    tool: &ToolState,
-    (n, paint, origin): (u8, Paint, DVec3),
-    solids: &mut Vec<(MeshKey, SolidInstance)>,
-) {
+/// Scenery that is seen: as much of its mesh as its level says.
+fn add_scenery(track: &mut Track, level: Level, (paint, origin): (Paint, DVec3), solids: &mut Solids) {
+    let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.given, track.seen) else {
+        return;
+    };
+    let (mesh, growth) = match model {
+        Model::Mesh(tom) => {
+            let cut = match track.cut {
+                Some((asked, cut)) if asked == level.triangles => cut,
+                _ => tom.cut(level.triangles),
+            };
+            track.cut = Some((level.triangles, cut));
+            (MeshKey::Cut(number, cut), 0.0)
+        }
+        Model::Foliage(foliage) => {
+            let prefix = foliage.cut(level.triangles);
+            // a mesh is not swept: only strokes grow
+            let is_mesh = matches!(foliage.rungs().get(usize::from(prefix.rung)), Some(Rung::Mesh(_)));
+            (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth })
+        }
+    };
+    let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
+    solids.push(((level.shading, mesh), instance(at.position - origin, at.rotation, size, paint)));
+}
+
+fn add_tool(shape: &ToolShape, tool: &ToolState, (level, paint, origin): (Level, Paint, DVec3), solids: &mut Solids) {
+    let n = level.resolution.n;
     for part in shape.parts(tool.jaw) {
         let position = tool.tip + tool.rotation * part.position - origin;
         let mesh = MeshKey::Primitive(part.primitive, n);
-        solids.push((mesh, instance(position, tool.rotation * part.rotation, part.size, paint)));
+        solids.push(((level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint)));
     }
 }
 
-fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Vec<(MeshKey, SolidInstance)>) {
+fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Solids) {
     if matches!(prop.solid, Solid::Plane) {
         let point = prop.position - picture.origin;
         let floor = FloorDraw { point, normal: prop.rotation * DVec3::Z, colour: prop.look.colour };
@@ -267,7 +293,8 @@ fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Vec<(MeshKey, 
     let slab = slab_of(prop, picture.focus_radius_m);
     let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.given, PROP_LEVEL)) else { return };
     let paint = Paint::of(prop.look, [0; 4]);
-    solids.push((mesh, instance(prop.position - picture.origin, prop.rotation, size, paint)));
+    let key = (Shading::PerPixel, mesh);
+    solids.push((key, instance(prop.position - picture.origin, prop.rotation, size, paint)));
 }
 
 /// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and cut into cells small enough to be lit at their
@@ -310,16 +337,16 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
     picture.tubes.push(TubeRun { first, intervals: count as u32, n: 1, tissue: false, shown: true });
 }
 
-/// Sorts solids by mesh and cuts them into runs.
-fn sort_solids(solids: &mut [(MeshKey, SolidInstance)], picture: &mut Picture) {
+/// Sorts solids by shading and mesh and cuts them into runs.
+fn sort_solids(solids: &mut Solids, picture: &mut Picture) {
     // the order among equals does not show, so the sort need not allocate to keep it
-    solids.sort_unstable_by_key(|(mesh, _)| *mesh);
-    for (mesh, solid) in solids.iter() {
+    solids.sort_unstable_by_key(|(key, _)| *key);
+    for ((shading, mesh), solid) in solids.iter() {
         let first = picture.instances.len() as u32;
         picture.instances.push(*solid);
         match picture.solids.last_mut() {
-            Some(run) if run.mesh == *mesh => run.count += 1,
-            _ => picture.solids.push(SolidRun { mesh: *mesh, first, count: 1 }),
+            Some(run) if (run.shading, run.mesh) == (*shading, *mesh) => run.count += 1,
+            _ => picture.solids.push(SolidRun { mesh: *mesh, shading: *shading, first, count: 1 }),
         }
     }
 }

@@ -6,8 +6,10 @@
 use super::picture::Picture;
 use super::pose;
 use glam::{DQuat, DVec3};
-use metachron_agents::shape::{Obstacle, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh};
-use metachron_agents::{AgentId, Body, CurveState, SimTime, Snapshot};
+use metachron_agents::shape::{
+    Cut, Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
+};
+use metachron_agents::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use std::sync::Arc;
 
 /// Which states a frame shows.
@@ -56,6 +58,8 @@ pub enum Form {
     Solid(Solid),
     /// A grasping tool.
     Tool(ToolShape),
+    /// What never moves and has no snapshots; it is drawn with as many triangles as its level says.
+    Scenery(Model, Placement),
 }
 
 /// An agent as the picture knows it.
@@ -102,6 +106,8 @@ pub(super) struct Track {
     pub bounds: Bounds,
     pub seen: bool,
     pub skeleton: Skeleton,
+    /// The triangles last asked for of a mesh, and the cut that has them.
+    pub cut: Option<(u32, Cut)>,
 }
 
 /// A fixed solid with what drawing needs to know of it.
@@ -117,9 +123,11 @@ pub(super) struct PropShape {
 /// The mesh of a solid that is not made of primitives, and the size of any.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BodyShape {
-    /// Number among the given meshes.
+    /// Number among the given meshes, or of scenery among the models.
     pub given: Option<u32>,
-    /// Radius of a ball about its origin that holds it, metres.
+    /// Centre of a ball that holds it, from its origin in its own axes, metres.
+    pub middle_m: DVec3,
+    /// Radius of that ball, metres.
     pub radius_m: f64,
     /// A quarter of its surface, m²: the mean area it covers seen from any side (Cauchy), exact for convex bodies.
     pub mean_area_m2: f64,
@@ -136,10 +144,11 @@ impl Stage {
     /// A stage with these actors and props on it.
     #[must_use]
     pub fn new(actors: Vec<Actor>, props: Vec<Prop>) -> Self {
-        let mut meshes = Vec::new();
+        let (mut meshes, mut models) = (Vec::new(), Models::default());
         let props = props.into_iter().map(|prop| PropShape::new(prop, &mut meshes)).collect();
-        let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes)).collect();
-        let picture = Picture { meshes: meshes.into(), ..Picture::default() };
+        let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
+        let models = models.0.into_iter().map(|(model, _)| model).collect();
+        let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
         Self { tracks, props, picture, scratch: Default::default() }
     }
 
@@ -172,29 +181,39 @@ impl Stage {
 }
 
 impl Track {
-    fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+    fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>, models: &mut Models) -> Self {
         let body = match &actor.form {
             Form::Solid(solid) => BodyShape::of(solid, meshes),
+            Form::Scenery(model, at) => models.body(model, at),
             Form::Tool(tool) => {
                 let radius_m = tool.shaft_length_m + 12.0 * tool.shaft_radius_m;
                 let side = 2.0 * tool.shaft_radius_m * tool.shaft_length_m;
-                BodyShape { given: None, radius_m, mean_area_m2: side }
+                BodyShape { radius_m, mean_area_m2: side, ..BodyShape::default() }
             }
             Form::Tube | Form::Unseen => BodyShape::default(),
         };
-        Self {
+        let pose = match &actor.form {
+            Form::Scenery(_, at) => {
+                Body::Rigid(RigidState { position: at.position, rotation: at.rotation, ..RigidState::default() })
+            }
+            _ => Body::Nothing,
+        };
+        let mut track = Self {
             actor,
             body,
             before: None,
             newest: None,
             awake: true,
-            pose: Body::Nothing,
+            pose,
             shown: SimTime::ZERO,
             age_s: 0.0,
             bounds: Bounds::default(),
             seen: true,
             skeleton: Skeleton::default(),
-        }
+            cut: None,
+        };
+        track.bounds = track.find_bounds();
+        track
     }
 
     fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
@@ -228,7 +247,10 @@ impl Track {
     fn find_bounds(&self) -> Bounds {
         match &self.pose {
             Body::Nothing => Bounds::default(),
-            Body::Rigid(rigid) => Bounds { centre: rigid.position, radius_m: self.body.radius_m },
+            Body::Rigid(rigid) => {
+                let centre = rigid.position + rigid.rotation * self.body.middle_m;
+                Bounds { centre, radius_m: self.body.radius_m }
+            }
             Body::Tool(tool) => {
                 let half = 0.5 * self.body.radius_m;
                 Bounds { centre: tool.tip - tool.rotation * DVec3::Z * half, radius_m: 1.2 * half }
@@ -284,6 +306,26 @@ fn box_of(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
     Some((points.iter().copied().reduce(DVec3::min)?, points.iter().copied().reduce(DVec3::max)?))
 }
 
+/// Every model once, with its extent: copies share both.
+#[derive(Default)]
+struct Models(Vec<(Model, Extent)>);
+
+impl Models {
+    fn body(&mut self, model: &Model, at: &Placement) -> BodyShape {
+        let number = self.0.iter().position(|(known, _)| known.is(model)).unwrap_or_else(|| {
+            self.0.push((model.clone(), model.extent()));
+            self.0.len() - 1
+        });
+        let extent = self.0[number].1;
+        BodyShape {
+            given: Some(number as u32),
+            middle_m: extent.centre * at.scale,
+            radius_m: extent.radius * at.scale,
+            mean_area_m2: 0.25 * extent.area * at.scale * at.scale,
+        }
+    }
+}
+
 impl BodyShape {
     fn of(solid: &Solid, meshes: &mut Vec<PrimitiveMesh>) -> Self {
         use std::f64::consts::PI;
@@ -298,9 +340,10 @@ impl BodyShape {
                 })
                 .sum();
             meshes.push(mesh);
-            Self { given: Some(meshes.len() as u32 - 1), radius_m: far, mean_area_m2: 0.25 * area }
+            let given = Some(meshes.len() as u32 - 1);
+            Self { given, radius_m: far, mean_area_m2: 0.25 * area, ..Self::default() }
         };
-        let plain = |radius_m: f64, area: f64| Self { given: None, radius_m, mean_area_m2: 0.25 * area };
+        let plain = |radius_m: f64, area: f64| Self { radius_m, mean_area_m2: 0.25 * area, ..Self::default() };
         match solid {
             Solid::Ball { radius_m: r } => plain(*r, 4.0 * PI * r * r),
             Solid::Box { half_extents_m: h } => plain(h.length(), 8.0 * (h.x * h.y + h.y * h.z + h.z * h.x)),

@@ -3,10 +3,11 @@
 //! In: what [`super::Stage`] composes. Out: what [`super::Renderer`] draws. Never here: snapshots, the GPU.
 //! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its bits.
 
+use super::level::Shading;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use metachron_agents::Resolution;
-use metachron_agents::shape::{Primitive, PrimitiveMesh, patch};
+use metachron_agents::shape::{Cut, Model, Primitive, PrimitiveMesh, patch};
 use std::sync::Arc;
 
 /// What colours mean.
@@ -66,9 +67,9 @@ pub struct SolidInstance {
     pub rotation: [f32; 4],
     /// Position.
     pub position: [f32; 3],
-    /// Radius of the ball swept over the core, metres.
+    /// Radius of the ball swept over the core, metres; of points how many times larger they are drawn.
     pub radius_m: f32,
-    /// Half extents of the core, metres.
+    /// Half extents of the core, metres; of models their scale.
     pub extents: [f32; 3],
     /// Free.
     pub pad: f32,
@@ -87,6 +88,10 @@ pub enum MeshKey {
     Primitive(Primitive, u8),
     /// Number of a mesh in [`Picture::meshes`].
     Given(u32),
+    /// A cut of the mesh of this number in [`Picture::models`].
+    Cut(u32, Cut),
+    /// So many triangles from the start of a rung of the foliage of this number in [`Picture::models`]: model, rung, triangles.
+    Part(u32, u8, u32),
     /// A sharp box whose sides are cut into so many cells along x, y and z, each at least 1.
     Slab([u8; 3]),
 }
@@ -111,6 +116,8 @@ pub struct TubeRun {
 pub struct SolidRun {
     /// Their mesh.
     pub mesh: MeshKey,
+    /// How they are shaded.
+    pub shading: Shading,
     /// The first instance.
     pub first: u32,
     /// How many.
@@ -153,6 +160,8 @@ pub struct Picture {
     pub floor: Option<FloorDraw>,
     /// Meshes that are no primitives.
     pub meshes: Arc<[PrimitiveMesh]>,
+    /// What is drawn with any number of triangles.
+    pub models: Arc<[Model]>,
 }
 
 impl Default for Picture {
@@ -169,6 +178,7 @@ impl Default for Picture {
             solids: Vec::new(),
             floor: None,
             meshes: Arc::default(),
+            models: Arc::default(),
         }
     }
 }
@@ -199,6 +209,8 @@ impl Picture {
                 let [x, y, z] = [x, y, z].map(u64::from);
                 4 * (x * y + y * z + z * x)
             }
+            MeshKey::Cut(_, cut) => u64::from(cut.triangles),
+            MeshKey::Part(_, _, triangles) => u64::from(triangles),
             MeshKey::Given(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
         }
     }

@@ -12,15 +12,15 @@ use crate::control::{
     RateLimits, Stages, Value,
 };
 use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, StepPrice, Watch};
-use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ValueKind};
-use crate::scene::{self, Member, Scene, Spec};
+use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ShadingKind, ValueKind};
+use crate::scene::{self, Member, Scene, Scenery, Spec};
 use glam::DVec3;
-use metachron_agents::Agent;
 use metachron_agents::instrument::Instrument;
 use metachron_agents::rigid::RigidBody;
 use metachron_agents::rod::Tube;
 use metachron_agents::shape::{Primitive, Solid, ToolShape};
 use metachron_agents::synthetic::Synthetic;
+use metachron_agents::{Agent, AgentId, N_MAX, ResolutionRange};
 use std::borrow::Cow;
 
 /// The agents of `scene`, ready to run.
@@ -122,13 +122,23 @@ pub(super) fn machine(scene: &Scene) -> Machine {
     machine
 }
 
-/// Everything that can be seen.
+/// Everything that can be seen: agents, then scenery, then what stands for groups.
 pub(super) fn stage(scene: &Scene) -> Stage {
-    let actors =
+    let agents =
         scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
+    let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
+        let form = Form::Scenery(it.model.clone(), it.at);
+        Actor { id: AgentId(id), form, look: look(&it.look) }
+    });
+    let actors = agents.chain(still);
     let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
     let props = props.map(|(obstacle, wish)| Prop { obstacle: obstacle.clone(), look: look(wish) });
     Stage::new(actors.collect(), props.collect())
+}
+
+/// All scenery in the order of its actors.
+fn scenery(scene: &Scene) -> impl Iterator<Item = &Scenery> {
+    scene.scenery.iter().chain(scene.groups.iter().map(|group| &group.proxy))
 }
 
 fn form(spec: &Spec) -> Form {
@@ -207,21 +217,58 @@ pub(super) fn law(target: &scene::Target) -> Law {
     }
 }
 
-/// An object in view as control wants to know it.
-pub(super) fn view(seen: &Seen, member: &Member) -> ObjectView {
+/// Everything on the stage as control wants to know it, in the order of its actors.
+pub(super) fn views<'a>(seen: &'a [Seen], scene: &'a Scene) -> impl Iterator<Item = ObjectView> + 'a {
+    let (agents, members) = (scene.agents.len(), scene.scenery.len());
+    let (moving, still) = seen.split_at(agents.min(seen.len()));
+    let (single, groups) = still.split_at(members.min(still.len()));
+    let moving = moving.iter().zip(&scene.agents).map(|(seen, member)| view(seen, member));
+    let single = single.iter().zip(&scene.scenery).map(|(seen, it)| {
+        let (least, most) = it.model.range();
+        still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most })
+    });
+    let groups = groups.iter().zip(&scene.groups).map(move |(seen, group)| {
+        let members = (agents + group.members.start, group.members.len());
+        let proxy_triangles = group.proxy.model.range().1;
+        still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, proxy_triangles })
+    });
+    moving.chain(single).chain(groups)
+}
+
+fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
+    let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
+    view_of(seen, (kind, range), &it.look)
+}
+
+/// The cheapest and the best shading that an object may have.
+const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
+    use control::Shading::{Flat, Gouraud, PerPixel};
+    match kind {
+        ShadingKind::Flat => (Flat, Flat),
+        ShadingKind::Gouraud => (Gouraud, Gouraud),
+        ShadingKind::PerPixel => (PerPixel, PerPixel),
+        ShadingKind::Any => (Flat, PerPixel),
+    }
+}
+
+fn view(seen: &Seen, member: &Member) -> ObjectView {
     let kind = match seen.tube_m {
         Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
         None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
     };
+    view_of(seen, (kind, member.picture), &member.look)
+}
+
+fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &scene::Look) -> ObjectView {
     ObjectView {
         id: seen.id,
         kind,
-        range: member.picture,
-        shading: Default::default(),
+        range,
+        shading: shading(look.shading),
         pixels: seen.pixels,
         distance_m: seen.distance_m,
         speed_px_s: seen.speed_px_s,
-        importance: member.look.importance,
+        importance: look.importance,
         off_centre: seen.off_centre,
         from_focus_m: seen.from_focus_m,
         visible: seen.visible,

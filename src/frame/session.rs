@@ -381,7 +381,7 @@ impl Session {
 
     fn choose(&mut self, size: Size) {
         self.views.clear();
-        self.views.extend(self.seen.iter().zip(&self.scene.agents).map(|(seen, member)| cast::view(seen, member)));
+        self.views.extend(cast::views(&self.seen, &self.scene));
         // what is in the picture besides hardly changes from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         let plan = self.control.plan(&self.views);

@@ -3,15 +3,16 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
-use super::format::{ExecutorKind, LawKind, Material, PolicyKind, StatesKind, ValueKind};
+use super::format::{ExecutorKind, LawKind, Material, PolicyKind, ShadingKind, StatesKind, ValueKind};
 use super::ties::{Coupling, Faults};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
 use metachron_agents::rigid::{Joint, RigidSpec};
 use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::Obstacle;
+use metachron_agents::shape::{Model, Obstacle, Placement};
 use metachron_agents::synthetic::SyntheticSpec;
 use metachron_agents::{AgentId, Resolution, ResolutionRange, SimSpan};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// A scene that can be run.
@@ -39,6 +40,10 @@ pub struct Scene {
     pub obstacles: Arc<[Obstacle]>,
     /// How each obstacle looks, in their order.
     pub obstacle_looks: Vec<Look>,
+    /// What is seen and never moves; the members of a group side by side.
+    pub scenery: Vec<Scenery>,
+    /// Scenery that may be drawn as one.
+    pub groups: Vec<Group>,
     /// Whether agents touch each other where no coupling says otherwise.
     pub contacts: bool,
     /// What holds rigid agents together; each of them has all of them in its spec.
@@ -176,6 +181,28 @@ pub struct Member {
     pub faults: Faults,
 }
 
+/// Something that is seen and never moves, and nothing touches.
+#[derive(Debug, Clone)]
+pub struct Scenery {
+    /// Its name, unique in the scene.
+    pub name: String,
+    /// What it is.
+    pub model: Model,
+    /// Where it stands.
+    pub at: Placement,
+    /// How it looks.
+    pub look: Look,
+}
+
+/// Scenery that may be drawn as one.
+#[derive(Debug, Clone)]
+pub struct Group {
+    /// What stands for all of it, with the group's name.
+    pub proxy: Scenery,
+    /// Which of [`Scene::scenery`] it is.
+    pub members: Range<usize>,
+}
+
 /// How an agent wants to keep time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaceWish {
@@ -222,6 +249,8 @@ pub struct Look {
     pub material: Material,
     /// Weight of its picture against the others', 0.001 … 1000.
     pub importance: f64,
+    /// How the light on it is worked out.
+    pub shading: ShadingKind,
 }
 
 /// A material point whose state is reported.

@@ -15,7 +15,7 @@ mod schema;
 mod source;
 pub mod ties;
 
-pub use cast::{Camera, Gains, Look, Machine, Member, PaceWish, Probe, Scene, Spec, Target, View};
+pub use cast::{Camera, Gains, Group, Look, Machine, Member, PaceWish, Probe, Scene, Scenery, Spec, Target, View};
 pub use overlap::Overlap;
 pub use problem::{SceneError, SceneProblem};
 pub use schema::json_schema;
@@ -107,6 +107,7 @@ fn assemble(
     let joints: Arc<[Joint]> = joints.into();
     objects.hold(&joints);
     let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
+    let groups = if sound { build::groups(c, &file.group, (&mut objects, source)) } else { Vec::new() };
     Scene {
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
@@ -119,6 +120,8 @@ fn assemble(
         agents: objects.agents,
         obstacles: objects.obstacles,
         obstacle_looks: objects.obstacle_looks,
+        scenery: objects.scenery,
+        groups,
         contacts: file.world.as_ref().and_then(|w| w.contacts).unwrap_or(true),
         joints,
         couplings,

@@ -2,7 +2,9 @@
 //!
 //! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys; a schema cannot say them all.
 
-use super::format::{CommonFile, InstrumentFile, MODELS, RigidFile, SceneFile, SyntheticFile, TubeFile};
+use super::format::{
+    CommonFile, InstrumentFile, MODELS, MeshFile, RigidFile, SceneFile, SyntheticFile, TreeFile, TubeFile,
+};
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
 
@@ -15,6 +17,8 @@ pub fn json_schema() -> Value {
         object::<RigidFile>(&mut generator),
         object::<InstrumentFile>(&mut generator),
         object::<SyntheticFile>(&mut generator),
+        object::<MeshFile>(&mut generator),
+        object::<TreeFile>(&mut generator),
     ];
     let mut root = generator.root_schema_for::<SceneFile>().to_value();
     // made above, and the root generator forgets definitions that it does not use itself

@@ -8,6 +8,7 @@ mod play;
 mod run;
 mod scene;
 mod scene_ties;
+mod scenery;
 mod scenes;
 mod scenes_coupled;
 mod viewer;

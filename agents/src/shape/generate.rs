@@ -19,11 +19,13 @@ pub enum Generator {
     Terrain,
     /// A theatre seat that faces +y: cushion, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
     Seat,
+    /// A rod along z from −1 to 1, a twentieth thick.
+    Strut,
 }
 
 impl Generator {
     /// All of them, in the order of their names' list.
-    pub const ALL: [Self; 5] = [Self::Sphere, Self::Torus, Self::Blob, Self::Terrain, Self::Seat];
+    pub const ALL: [Self; 6] = [Self::Sphere, Self::Torus, Self::Blob, Self::Terrain, Self::Seat, Self::Strut];
 
     /// The name as scenes write it.
     #[must_use]
@@ -34,6 +36,7 @@ impl Generator {
             Self::Blob => "blob",
             Self::Terrain => "terrain",
             Self::Seat => "seat",
+            Self::Strut => "strut",
         }
     }
 }
@@ -49,6 +52,7 @@ pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
         Generator::Torus => sheet.ring(triangles),
         Generator::Terrain => sheet.hills(side(triangles, 2), seed),
         Generator::Seat => sheet.seat(side(triangles, 12 * 5)),
+        Generator::Strut => sheet.rod(triangles),
     }
     creased_mesh(&sheet.points, &sheet.triangles)
 }
@@ -113,6 +117,25 @@ impl Sheet {
             let out = 1.0 + libm::cos(tilt) / 3.0;
             DVec3::new(libm::cos(turn) * out, libm::sin(turn) * out, libm::sin(tilt) / 3.0)
         });
+        self.weld(0);
+    }
+
+    /// A wall of quads and a fan at each end.
+    fn rod(&mut self, triangles: u32) {
+        let around = (libm::sqrt(0.5 * f64::from(triangles)) as u32).clamp(4, 96);
+        let rows = (triangles.saturating_sub(2 * around)).div_ceil(2 * around).max(1);
+        self.grid((around, rows), |c, r| {
+            let turn = std::f64::consts::TAU * f64::from(c % around) / f64::from(around);
+            let along = 2.0 * f64::from(r) / f64::from(rows) - 1.0;
+            DVec3::new(0.05 * libm::cos(turn), 0.05 * libm::sin(turn), along)
+        });
+        for (side, row) in [(-1.0, 0), (1.0, rows)] {
+            let middle = self.points.len() as u32;
+            self.points.push(DVec3::Z * side);
+            let corner = |c: u32| row * (around + 1) + c;
+            let fan = (0..around).map(|c| [middle, corner(c), corner(c + 1)]);
+            self.triangles.extend(fan.map(|t| if side > 0.0 { t } else { [t[0], t[2], t[1]] }));
+        }
         self.weld(0);
     }
 

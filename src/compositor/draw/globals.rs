@@ -64,6 +64,7 @@ impl Globals {
         let radius = picture.focus_radius_m;
         let four = |v: DVec3, w: f64| v.extend(w).as_vec4().to_array();
         let stripes = f64::from(picture.style.colouring == Colouring::Resolution);
+        let pixel = 1.0 / camera.pixels_per_metre(1.0, size);
         let floor = picture.floor.as_ref();
         let colour = floor.map_or([0; 3], |f| f.colour).map(|c| (f64::from(c) / 255.0).powf(2.2));
         let patch = floor.map_or_else(Patch::default, |floor| frame.patch(floor, picture.origin));
@@ -74,7 +75,7 @@ impl Globals {
             eye: four(camera.eye() - picture.origin, frame.texel_m),
             texel: [1.0 / shadow_px as f32; 4],
             focus: four(focus, radius),
-            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, 0.0).as_vec4().to_array(),
+            viewport: DVec4::new(f64::from(size.width), f64::from(size.height), stripes, pixel).as_vec4().to_array(),
             floor_point: four(floor.map_or(DVec3::ZERO, |f| f.point), 0.0),
             floor_normal: four(floor.map_or(DVec3::Z, |f| f.normal), 0.0),
             floor_colour: four(DVec3::from(colour), frame.range_m),

@@ -5,7 +5,7 @@
 use super::{MeshKey, Picture};
 use glam::Vec3;
 use metachron_agents::N_MAX;
-use metachron_agents::shape::{PrimitiveMesh, PrimitiveVertex, patch};
+use metachron_agents::shape::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
@@ -37,7 +37,13 @@ impl Mesh {
 
     /// Draws `count` instances, as triangles or as edges; the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, count: u32) -> u32 {
-        let (indices, corners) = if edges { (&self.edges, self.ends) } else { (&self.triangles, self.corners) };
+        self.draw_first(pass, (edges, u32::MAX), count)
+    }
+
+    /// Draws its first `triangles` (all edges, where edges are wanted) for `count` instances; the number of draws.
+    pub fn draw_first(&self, pass: &mut wgpu::RenderPass<'_>, (edges, triangles): (bool, u32), count: u32) -> u32 {
+        let first = self.corners.min(triangles.saturating_mul(3));
+        let (indices, corners) = if edges { (&self.edges, self.ends) } else { (&self.triangles, first) };
         if corners == 0 || count == 0 {
             return 0;
         }
@@ -61,6 +67,9 @@ pub struct Meshes {
     patches: [Option<Mesh>; N_MAX as usize + 1],
     solids: HashMap<MeshKey, Mesh>,
     given: Option<Arc<[PrimitiveMesh]>>,
+    /// Rungs of foliage by model and rung, and whether they are strokes.
+    parts: HashMap<(u32, u8), (Mesh, bool)>,
+    models: Option<Arc<[Model]>>,
 }
 
 impl Meshes {
@@ -77,9 +86,39 @@ impl Meshes {
                 }
             }
         }
-        for run in &picture.solids {
-            self.solids.entry(run.mesh).or_insert_with(|| solid_mesh(device, run.mesh, &picture.meshes));
+        if self.models.as_ref().is_none_or(|models| !Arc::ptr_eq(models, &picture.models)) {
+            self.parts.clear();
+            self.models = Some(Arc::clone(&picture.models));
         }
+        for run in &picture.solids {
+            match run.mesh {
+                MeshKey::Cut(..) => {}
+                MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
+                key => {
+                    self.solids.entry(key).or_insert_with(|| solid_mesh(device, key, &picture.meshes));
+                }
+            }
+        }
+    }
+
+    fn make_part(&mut self, device: &wgpu::Device, picture: &Picture, key: (u32, u8)) {
+        let Some(Model::Foliage(foliage)) = picture.models.get(key.0 as usize) else { return };
+        let Some(rung) = foliage.rungs().get(usize::from(key.1)) else { return };
+        self.parts.entry(key).or_insert_with(|| match rung {
+            Rung::Mesh(mesh) => (primitive_mesh(device, mesh), false),
+            Rung::Points(strokes) => (strokes_mesh(device, strokes, &POINT), true),
+            Rung::Lines(strokes) => (strokes_mesh(device, strokes, &LINE), true),
+        });
+    }
+
+    /// A rung of foliage.
+    pub fn part(&self, model: u32, rung: u8) -> Option<&Mesh> {
+        self.parts.get(&(model, rung)).map(|(mesh, _)| mesh)
+    }
+
+    /// Whether a mesh is of points or lines that turn to the eye.
+    pub fn is_strokes(&self, key: MeshKey) -> bool {
+        matches!(key, MeshKey::Part(model, rung, _) if self.parts.get(&(model, rung)).is_some_and(|(_, strokes)| *strokes))
     }
 
     /// The patch of level `n`.
@@ -114,7 +153,26 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> M
             Some(mesh) => mesh,
             None => &PrimitiveMesh::default(),
         },
+        MeshKey::Cut(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
     };
+    primitive_mesh(device, mesh)
+}
+
+/// The corners of a point and of a line, by the numbers that the shader knows them by, and their triangles.
+const POINT: (&[u8], &[[u32; 3]]) = (&[0, 1, 2], &[[0, 1, 2]]);
+const LINE: (&[u8], &[[u32; 3]]) = (&[4, 5, 6, 7], &[[0, 1, 2], [0, 2, 3]]);
+
+fn strokes_mesh(device: &wgpu::Device, strokes: &[Stroke], (corners, faces): &(&[u8], &[[u32; 3]])) -> Mesh {
+    let corner = |s: &Stroke, c: u8| [s.from.extend(s.radius_m).to_array(), s.way.extend(f32::from(c)).to_array()];
+    let vertices: Vec<[[f32; 4]; 2]> =
+        strokes.iter().flat_map(|stroke| corners.iter().map(move |&c| corner(stroke, c))).collect();
+    let stride = corners.len() as u32;
+    let face = |i: u32| faces.iter().map(move |t| t.map(|c| i * stride + c));
+    let triangles: Vec<[u32; 3]> = (0..strokes.len() as u32).flat_map(face).collect();
+    Mesh::new(device, bytemuck::cast_slice(&vertices), &triangles)
+}
+
+fn primitive_mesh(device: &wgpu::Device, mesh: &PrimitiveMesh) -> Mesh {
     let vertices: Vec<[[f32; 3]; 2]> = mesh.vertices.iter().map(|v| [v.core.to_array(), v.normal.to_array()]).collect();
     Mesh::new(device, bytemuck::cast_slice(&vertices), &mesh.triangles)
 }

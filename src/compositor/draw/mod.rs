@@ -4,16 +4,19 @@
 //! A renderer can be dropped and made anew with another device at any time; it holds nothing that a picture does not give.
 
 mod buffers;
+mod cuts;
 mod globals;
 mod meshes;
 mod pipelines;
 mod timing;
 mod tissue;
 
+use super::level::Shading;
 use super::offscreen::Lost;
 use super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
 use super::view::{Camera, Size};
 use buffers::{Growing, Targets};
+use cuts::Cuts;
 use globals::Globals;
 use meshes::{Mesh, Meshes};
 use pipelines::{Bindings, Pipelines};
@@ -109,6 +112,7 @@ pub struct Renderer {
     pipelines: Pipelines,
     bindings: Bindings,
     meshes: Meshes,
+    cuts: Cuts,
     samples: Growing,
     instances: Growing,
     targets: Option<Targets>,
@@ -146,6 +150,7 @@ impl Renderer {
             pipelines,
             bindings,
             meshes: Meshes::default(),
+            cuts: Cuts::default(),
             samples: Growing::new("tube samples", size_of::<SkinSample>()),
             instances: Growing::new("solid instances", size_of::<SolidInstance>()),
             targets: None,
@@ -227,6 +232,7 @@ impl Renderer {
         self.samples.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.samples));
         self.instances.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.instances));
         self.meshes.prepare(&self.device, picture);
+        self.cuts.prepare(&self.device, &self.queue, picture);
         if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
             self.targets = Some(Targets::new(&self.device, self.format, size, self.options.samples));
         }
@@ -250,9 +256,11 @@ impl Renderer {
             let mesh = self.meshes.patch(tube.n.min(SHADOW_LEVEL));
             draws += self.draw_tube(&mut pass, tube, mesh, false);
         }
-        pass.set_pipeline(&self.pipelines.solid_shadow);
-        for run in &picture.solids {
-            draws += self.draw_solids(&mut pass, run, false);
+        for strokes in [false, true] {
+            pass.set_pipeline(if strokes { &self.pipelines.stroke_shadow } else { &self.pipelines.solid_shadow });
+            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.mesh) == strokes) {
+                draws += self.draw_solids(&mut pass, run, false);
+            }
         }
         draws
     }
@@ -282,8 +290,8 @@ impl Renderer {
             }
         }
         for slab in [false, true] {
-            pass.set_pipeline(if slab { &self.pipelines.slab } else { &self.pipelines.solid });
             for run in picture.solids.iter().filter(|run| matches!(run.mesh, MeshKey::Slab(_)) == slab) {
+                pass.set_pipeline(self.pipeline_of(run));
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
@@ -311,10 +319,21 @@ impl Renderer {
             draws += self.draw_tube(pass, tube, self.meshes.patch(tube.n), true);
         }
         pass.set_pipeline(&self.pipelines.solid_edges);
-        for run in &picture.solids {
+        for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.mesh)) {
             draws += self.draw_solids(pass, run, true);
         }
         draws
+    }
+
+    /// What a run of solids is drawn with: points, lines and slabs are lit at their corners.
+    fn pipeline_of(&self, run: &SolidRun) -> &wgpu::RenderPipeline {
+        match (run.mesh, run.shading) {
+            (MeshKey::Slab(_), _) => &self.pipelines.slab,
+            _ if self.meshes.is_strokes(run.mesh) => &self.pipelines.stroke,
+            (_, Shading::Flat) => &self.pipelines.solid_flat,
+            (_, Shading::Gouraud) => &self.pipelines.solid_gouraud,
+            (_, Shading::PerPixel) => &self.pipelines.solid,
+        }
     }
 
     /// One tube: the patch once an interval, between each sample and the next of the one buffer of all tubes.
@@ -328,11 +347,18 @@ impl Renderer {
     }
 
     fn draw_solids(&self, pass: &mut wgpu::RenderPass<'_>, run: &SolidRun, edges: bool) -> u32 {
-        let (Some(mesh), Some(instances)) = (self.meshes.solid(run.mesh), self.instances.buffer()) else { return 0 };
+        let Some(instances) = self.instances.buffer() else { return 0 };
         let stride = size_of::<SolidInstance>() as u64;
         let from = u64::from(run.first) * stride;
         pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
-        mesh.draw(pass, edges, run.count)
+        match run.mesh {
+            MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut), edges, run.count),
+            MeshKey::Part(model, rung, triangles) => {
+                let mesh = self.meshes.part(model, rung);
+                mesh.map_or(0, |mesh| mesh.draw_first(pass, (edges, triangles), run.count))
+            }
+            key => self.meshes.solid(key).map_or(0, |mesh| mesh.draw(pass, edges, run.count)),
+        }
     }
 }
 

@@ -14,6 +14,7 @@ pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 const COMMON: &str = include_str!("shaders/common.wgsl");
 const SKIN: &str = include_str!("shaders/skin.wgsl");
 const SOLID: &str = include_str!("shaders/solid.wgsl");
+const STROKE: &str = include_str!("shaders/stroke.wgsl");
 const FLOOR: &str = include_str!("shaders/floor.wgsl");
 
 /// What passes may read: the light's pass the numbers only, the picture's pass the light's depths too.
@@ -169,6 +170,14 @@ pub struct Pipelines {
     pub skin: RenderPipeline,
     /// Solids.
     pub solid: RenderPipeline,
+    /// Solids of one colour a triangle.
+    pub solid_flat: RenderPipeline,
+    /// Solids lit at their corners.
+    pub solid_gouraud: RenderPipeline,
+    /// Points and lines that turn to the eye.
+    pub stroke: RenderPipeline,
+    /// Points and lines as the light sees them.
+    pub stroke_shadow: RenderPipeline,
     /// Boxes in cells.
     pub slab: RenderPipeline,
     /// The floor in its parts, and how many vertices each has.
@@ -213,6 +222,18 @@ const FLOOR_RINGS: u32 = 8;
 const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
 const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
 
+/// A solid's instance.
+const BODY: [wgpu::VertexAttribute; 5] =
+    wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4];
+
+fn layout(
+    array_stride: u64,
+    step_mode: wgpu::VertexStepMode,
+    attributes: &[wgpu::VertexAttribute],
+) -> Option<VertexBufferLayout<'_>> {
+    Some(VertexBufferLayout { array_stride, step_mode, attributes })
+}
+
 impl Pipelines {
     /// All pipelines for targets of `format`.
     pub fn new(device: &Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
@@ -226,18 +247,13 @@ impl Pipelines {
         let begin = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
         let end = wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
         let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
-        let body =
-            wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4];
-        let vertex = wgpu::VertexStepMode::Vertex;
-        let instance = wgpu::VertexStepMode::Instance;
-        let layout =
-            |array_stride, step_mode, attributes| Some(VertexBufferLayout { array_stride, step_mode, attributes });
+        let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
             layout(16, vertex, &wgpu::vertex_attr_array![0 => Float32x4]),
             layout(SAMPLE_STRIDE, instance, &begin),
             layout(SAMPLE_STRIDE, instance, &end),
         ];
-        let solids = [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &body)];
+        let solids = [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &BODY)];
         use wgpu::PrimitiveTopology::{LineList, TriangleList, TriangleStrip};
         let tube = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
@@ -248,6 +264,7 @@ impl Pipelines {
         let plain = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment: Some(fragment), buffers: &[], topology, module: &floor })
         };
+        let [stroke, stroke_shadow] = kitchen.strokes(&module("stroke", &[SOLID, STROKE].concat()));
         let lean = |entry: [&'static str; 2]| entry[usize::from(options.lean)];
         let skin_vertex = lean(["vs_skin", "vs_skin_lean"]);
         Self {
@@ -261,6 +278,10 @@ impl Pipelines {
                 Some(lean(["fs_solid", "fs_solid_lean"])),
                 TriangleList,
             ),
+            solid_flat: solid("flat solid", "vs_flat", Some("fs_flat"), TriangleList),
+            solid_gouraud: solid("gouraud solid", "vs_slab", Some("fs_slab"), TriangleList),
+            stroke,
+            stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
             solid_edges: solid("solid edges", "vs_solid", Some("fs_solid_edge"), LineList),
             solid_shadow: solid("solid shadow", "vs_solid_shadow", None, TriangleList),
@@ -287,6 +308,19 @@ impl<'a> Kitchen<'a> {
             })
         });
         Self { device, layouts, format, samples: options.samples, shadow_taps: options.shadow_taps }
+    }
+
+    /// Points and lines, as the eye and as the light sees them.
+    fn strokes(&self, module: &ShaderModule) -> [RenderPipeline; 2] {
+        let tip = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
+        let buffers = [
+            layout(32, wgpu::VertexStepMode::Vertex, &tip),
+            layout(SAMPLE_STRIDE, wgpu::VertexStepMode::Instance, &BODY),
+        ];
+        let topology = wgpu::PrimitiveTopology::TriangleList;
+        [("vs_stroke", Some("fs_slab")), ("vs_stroke_shadow", None)].map(|(vertex, fragment)| {
+            self.cook(&Recipe { label: "stroke", vertex, fragment, buffers: &buffers, topology, module })
+        })
     }
 
     fn cook(&self, recipe: &Recipe<'_>) -> RenderPipeline {

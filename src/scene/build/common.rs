@@ -112,7 +112,7 @@ pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, de
         }),
     };
     let importance = c.number_or(place, "importance", (file.importance, 1.0), &IMPORTANCE);
-    Look { colour, material, importance }
+    Look { colour, material, importance, shading: file.shading.unwrap_or_default() }
 }
 
 fn colour_of(material: Material) -> [u8; 3] {
@@ -124,7 +124,7 @@ fn colour_of(material: Material) -> [u8; 3] {
     }
 }
 
-fn parse_colour(text: &str) -> Option<[u8; 3]> {
+pub(super) fn parse_colour(text: &str) -> Option<[u8; 3]> {
     let digits = text.strip_prefix('#').filter(|d| d.len() == 6 && d.bytes().all(|b| b.is_ascii_hexdigit()))?;
     let value = u32::from_str_radix(digits, 16).ok()?;
     let [_, r, g, b] = value.to_be_bytes();

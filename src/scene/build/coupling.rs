@@ -72,7 +72,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
 fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<Named> {
     let (what, expected) = match objects.names.get(name) {
         None => {
-            let moves = |named| !matches!(named, Named::Fixed | Named::Synthetic(_));
+            let moves = |named| !matches!(named, Named::Fixed | Named::Scenery | Named::Synthetic(_));
             c.reference(place, key, name, objects.names.only(moves));
             return None;
         }
@@ -80,6 +80,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
             "which is fixed",
             "expected an object that moves: what is fixed is touched by everything, without a coupling",
         ),
+        Some(Named::Scenery) => ("which is only seen", "expected a tube, a rigid object or an instrument"),
         Some(Named::Synthetic(_)) => ("which has no matter", "expected a tube, a rigid object or an instrument"),
         Some(named) => return Some(named),
     };

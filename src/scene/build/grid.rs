@@ -76,6 +76,7 @@ pub(super) fn copies(
         let scatter = common.scatter_m.is_some();
         let strays = [
             ("spacing_m", common.spacing_m.is_some()),
+            ("rise_m", common.rise_m.is_some()),
             ("scatter_m", scatter),
             ("scatter_seed", common.scatter_seed.is_some()),
         ];
@@ -85,7 +86,12 @@ pub(super) fn copies(
         return Copies::single();
     };
     if !can_move {
-        c.wrong(place, "grid", "repeats an object without a place", "expected a rigid object or a tube");
+        c.wrong(
+            place,
+            "grid",
+            "repeats an object without a place",
+            "expected a rigid object, a tube, a mesh or a tree",
+        );
         return Copies::single();
     }
     let count = grid.iter().map(|n| u64::from(*n)).product::<u64>();
@@ -101,7 +107,12 @@ pub(super) fn copies(
     let spacing = c.point(place, "spacing_m", spacing, SPACING_MAX_M);
     let scatter_m = c.number_or(place, "scatter_m", (common.scatter_m, 0.0), &allowed(0.0..=SPACING_MAX_M, "m"));
     let seed = u64::from(common.scatter_seed.unwrap_or(0));
-    let at = |k: u32| DVec3::from(grid_place(grid, k)) * spacing + scatter_m * random_cube(seed, k);
+    let [rise_x, rise_y] = common.rise_m.unwrap_or_default();
+    let rise = c.point(place, "rise_m", [rise_x, rise_y, 0.0], SPACING_MAX_M);
+    let at = |k: u32| {
+        let steps = DVec3::from(grid_place(grid, k));
+        steps * spacing + DVec3::Z * rise.dot(steps) + scatter_m * random_cube(seed, k)
+    };
     let offsets_m: Vec<DVec3> = (0..count as u32).map(at).collect();
     if offsets_m.iter().any(|o| o.abs().max_element() > POSITION_MAX_M) {
         let expected = format!("expected a grid that ends within {POSITION_MAX_M} m");

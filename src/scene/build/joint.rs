@@ -108,6 +108,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
             "expected a rigid object; an instrument holds by its jaws, or by a `[[coupling]]` of `kind = \"attach\"`",
         ),
         Some(Named::Synthetic(_)) => wrong(c, "which has no matter", "expected a rigid object"),
+        Some(Named::Scenery) => wrong(c, "which is only seen", "expected a rigid object"),
         None => {
             let held = |named| matches!(named, Named::Rigid(_) | Named::Fixed);
             c.reference(place, key, name, objects.names.only(held));

@@ -5,7 +5,9 @@
 
 mod common;
 mod coupling;
+mod glb;
 mod grid;
+mod group;
 mod instrument;
 mod joint;
 mod joint_keys;
@@ -13,12 +15,14 @@ mod joint_rules;
 mod mesh;
 mod object;
 mod rigid;
+mod scenery;
 mod stage;
 mod synthetic;
 mod tube;
 
 pub(super) use common::world_faults;
 pub(super) use coupling::couplings;
+pub(super) use group::groups;
 pub(super) use joint::joints;
 pub(super) use object::{Around, Names, Objects, read_objects};
 pub(super) use stage::{camera, machine, probes, target};

@@ -2,11 +2,12 @@
 
 use super::common::{faults, levels, look, pace};
 use super::grid::{Copies, copies};
-use super::{instrument, rigid, synthetic, tube};
-use crate::scene::cast::{Look, Member, Spec};
+use super::{instrument, rigid, scenery, synthetic, tube};
+use crate::scene::cast::{Look, Member, Scenery, Spec};
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{
-    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, RigidFile, SyntheticFile, TubeFile,
+    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, MeshFile, RigidFile, SyntheticFile,
+    TreeFile, TubeFile,
 };
 use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
@@ -27,7 +28,7 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 /// Most agents of a scene: each has a thread of its own.
 const AGENTS_MAX: usize = 1000;
 /// Most fixed objects of a scene.
-const OBSTACLES_MAX: usize = 10_000;
+pub(super) const OBSTACLES_MAX: usize = 10_000;
 /// Longest name, in characters.
 const NAME_MAX: usize = 64;
 
@@ -37,6 +38,7 @@ pub(in crate::scene) struct Objects {
     pub(in crate::scene) agents: Vec<Member>,
     pub(in crate::scene) obstacles: Arc<[Obstacle]>,
     pub(in crate::scene) obstacle_looks: Vec<Look>,
+    pub(in crate::scene) scenery: Vec<Scenery>,
     /// Names of fixed objects and of agents.
     pub(in crate::scene) names: Names,
 }
@@ -70,6 +72,8 @@ pub(in crate::scene) struct Names(BTreeMap<String, Named>);
 pub(in crate::scene) enum Named {
     /// A fixed object.
     Fixed,
+    /// What is seen only.
+    Scenery,
     /// A rigid object that moves.
     Rigid(AgentId),
     /// An instrument.
@@ -84,7 +88,7 @@ impl Named {
     /// The number of what moves.
     pub(in crate::scene) const fn agent(self) -> Option<AgentId> {
         match self {
-            Self::Fixed => None,
+            Self::Fixed | Self::Scenery => None,
             Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) => Some(id),
         }
     }
@@ -96,7 +100,7 @@ impl Names {
     }
 
     pub(in crate::scene) fn agents(&self) -> impl Iterator<Item = &str> + Clone {
-        self.0.iter().filter(|(_, n)| **n != Named::Fixed).map(|(name, _)| name.as_str())
+        self.0.iter().filter(|(_, n)| n.agent().is_some()).map(|(name, _)| name.as_str())
     }
 
     /// The names of those that `wanted` takes.
@@ -122,19 +126,28 @@ impl Names {
 }
 
 /// An object as the file has it.
-struct Entry {
-    place: Place,
-    common: CommonFile,
-    model: ModelFile,
+pub(super) struct Entry {
+    pub(super) place: Place,
+    pub(super) common: CommonFile,
+    pub(super) model: ModelFile,
     fixed: bool,
-    copies: Copies,
+    pub(super) copies: Copies,
 }
 
-enum ModelFile {
+pub(super) enum ModelFile {
     Tube(TubeFile),
     Rigid(RigidFile),
     Instrument(InstrumentFile),
     Synthetic(SyntheticFile),
+    Mesh(MeshFile),
+    Tree(TreeFile),
+}
+
+impl ModelFile {
+    /// Whether it is seen only.
+    const fn is_scenery(&self) -> bool {
+        matches!(self, Self::Mesh(_) | Self::Tree(_))
+    }
 }
 
 /// What all objects of a scene stand in.
@@ -161,7 +174,8 @@ pub(in crate::scene) fn read_objects(
         if let ModelFile::Rigid(file) = &entry.model {
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
-        let can_move = matches!(entry.model, ModelFile::Rigid(_) | ModelFile::Tube(_));
+        entry.fixed |= entry.model.is_scenery();
+        let can_move = entry.model.is_scenery() || matches!(entry.model, ModelFile::Rigid(_) | ModelFile::Tube(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
         entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
     }
@@ -169,7 +183,8 @@ pub(in crate::scene) fn read_objects(
     let (obstacles, obstacle_looks) = fixed_objects(c, &entries, around.source);
     let obstacles: Arc<[Obstacle]> = obstacles.into();
     let agents = agents(c, &entries, &names, &Stage { around, obstacles: &obstacles });
-    Objects { agents, obstacles, obstacle_looks, names }
+    let scenery = scenery::read(c, &entries, around.source);
+    Objects { agents, obstacles, obstacle_looks, scenery, names }
 }
 
 fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>) -> Option<Entry> {
@@ -192,6 +207,8 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
         "tube" => read(c, own, span).map(ModelFile::Tube),
         "rigid" => read(c, own, span).map(ModelFile::Rigid),
         "instrument" => read(c, own, span).map(ModelFile::Instrument),
+        "mesh" => read(c, own, span).map(ModelFile::Mesh),
+        "tree" => read(c, own, span).map(ModelFile::Tree),
         _ => read(c, own, span).map(ModelFile::Synthetic),
     };
     let common = common?;
@@ -233,6 +250,7 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     for entry in entries {
         let name = &entry.common.name;
         let named = |id: AgentId| match (&entry.model, entry.fixed) {
+            (ModelFile::Mesh(_) | ModelFile::Tree(_), _) => Named::Scenery,
             (_, true) => Named::Fixed,
             (ModelFile::Tube(_), _) => Named::Tube(id),
             (ModelFile::Rigid(_), _) => Named::Rigid(id),
@@ -280,7 +298,7 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
     found
 }
 
-fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
+pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
     let message = format!("the scene has {count} {what}");
     let span = c.document().locate(&format!("object.{}", most));
     c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
@@ -372,6 +390,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
             let (spec, range) = synthetic::build(c, file, &given);
             (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
         }
+        ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
     let (name, links) = (common.name.clone(), Vec::new());
     Some(Member { id, name, spec, pace, simulation, start, picture, links, look, faults })

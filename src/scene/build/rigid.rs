@@ -77,7 +77,13 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>
     })
 }
 
-fn point_or_zero(c: &mut Checker<'_, '_>, place: &Place, key: &str, value: Option<Point>, most: f64) -> DVec3 {
+pub(super) fn point_or_zero(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    key: &str,
+    value: Option<Point>,
+    most: f64,
+) -> DVec3 {
     value.map_or(DVec3::ZERO, |value| c.point(place, key, value, most))
 }
 
@@ -164,7 +170,7 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
 fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Mesh> {
     let name = file.file.as_deref()?;
     let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
-    let read = source.sibling(name).and_then(|bytes| mesh::read_obj(&bytes, scale));
+    let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read {
         Ok(mesh) => Some(mesh),
         Err(why) => {
@@ -172,7 +178,7 @@ fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &
                 place,
                 "file",
                 format_args!("cannot be used: {name}: {why}"),
-                "expected an OBJ file beside the scene",
+                "expected a .glb or OBJ file beside the scene",
             );
             None
         }

@@ -1,11 +1,11 @@
 //! The keys that objects of every model share.
 
-use super::{FaultsFile, OneOrRange, Point};
+use super::{FaultsFile, OneOrRange, Point, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 13] = [
+pub const COMMON_KEYS: [&str; 15] = [
     "name",
     "rate_hz",
     "dt_ms",
@@ -13,10 +13,12 @@ pub const COMMON_KEYS: [&str; 13] = [
     "importance",
     "colour",
     "material",
+    "shading",
     "sleep",
     "faults",
     "grid",
     "spacing_m",
+    "rise_m",
     "scatter_m",
     "scatter_seed",
 ];
@@ -45,16 +47,21 @@ pub struct CommonFile {
     pub colour: Option<String>,
     /// What its surface looks like. Default: tissue for a tube, metal for an instrument, plastic for the rest.
     pub material: Option<Material>,
+    /// How the light on it is worked out: `flat`, `gouraud`, `per-pixel` (default), or `any`, whichever the policy takes.
+    pub shading: Option<ShadingKind>,
     /// Whether it stops stepping when it is at rest and nothing touches it. Default true.
     pub sleep: Option<bool>,
     /// What goes wrong with its clock and its messages on purpose; what is left out is the world's.
     pub faults: Option<FaultsFile>,
-    /// Repeats a rigid object or a tube: how many along x, y and z, each 1 … 1000. The first stands where the object says, the
+    /// Repeats a rigid object, a tube, a mesh or a tree: how many along x, y and z, each 1 … 1000. The first stands where the object says, the
     /// others `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….
     #[schemars(length(min = 3, max = 3))]
     pub grid: Option<[u32; 3]>,
     /// Distance of neighbours in the grid along x, y and z, metres, up to 1e4 in magnitude.
     pub spacing_m: Option<Point>,
+    /// How much higher each next one of the grid stands, along x and along y, metres, up to 1e4 in magnitude. Default `[0, 0]`.
+    #[schemars(length(min = 2, max = 2))]
+    pub rise_m: Option<[f64; 2]>,
     /// Moves every object of the grid by a random distance along each axis, evenly up to this far either way, metres,
     /// 0 … 1e4. Default 0.
     pub scatter_m: Option<f64>,

@@ -9,6 +9,7 @@ mod instrument;
 mod joint;
 mod rigid;
 mod scene;
+mod scenery;
 mod synthetic;
 mod tube;
 mod value;
@@ -22,9 +23,10 @@ pub use scene::{
     CameraFile, CameraKeyFile, ExecutorKind, LawKind, MachineFile, ModelCostFile, PolicyKind, ProbeFile, SceneFile,
     StatesKind, TargetFile, ValueKind, WorldFile,
 };
+pub use scenery::{GeneratorKind, GroupFile, MeshFile, ShadingKind, TreeFile, TreeLod};
 pub use synthetic::SyntheticFile;
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
 pub use value::{OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.
-pub const MODELS: [&str; 4] = ["tube", "rigid", "instrument", "synthetic"];
+pub const MODELS: [&str; 6] = ["tube", "rigid", "instrument", "synthetic", "mesh", "tree"];

@@ -17,7 +17,7 @@ pub struct RigidFile {
     pub half_extents_m: Option<Point>,
     /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
     pub half_height_m: Option<f64>,
-    /// An OBJ file, its path relative to the scene's: the points of a hull, the triangles of a mesh.
+    /// A .glb file (+y up) or an OBJ file (+z up), its path relative to the scene's: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
     /// What the file's coordinates are multiplied by to be metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,

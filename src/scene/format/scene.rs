@@ -1,6 +1,6 @@
 //! The tables of a scene besides its objects.
 
-use super::{CouplingFile, FaultsFile, JointFile, Point};
+use super::{CouplingFile, FaultsFile, GroupFile, JointFile, Point};
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::IgnoredAny;
@@ -39,6 +39,10 @@ pub struct SceneFile {
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub coupling: Vec<CouplingFile>,
+    /// Meshes and trees that may be drawn as one; at most 1000.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub group: Vec<GroupFile>,
     /// Known here as a key only: each object is read by its model.
     #[serde(default)]
     #[schemars(skip)]

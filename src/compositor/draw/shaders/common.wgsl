@@ -9,7 +9,7 @@ struct Globals {
     eye: vec4f,                // w: shadow texel in metres
     texel: vec4f,              // x: one shadow texel in texture coordinates
     focus: vec4f,              // xyz: centre of what is lit, w: its radius
-    viewport: vec4f,           // width, height, whether stripes show intervals, free
+    viewport: vec4f,           // width, height, whether stripes show intervals, metres a pixel one metre away
     floor_point: vec4f,
     floor_normal: vec4f,
     floor_colour: vec4f,       // w: metres that the shadow's depth range spans

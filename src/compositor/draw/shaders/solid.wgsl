@@ -132,6 +132,29 @@ fn fs_slab(in: Slab) -> @location(0) vec4f {
     return vec4f(mix(in.dark, in.light, lit(in.at)), 1.0);
 }
 
+// A solid with one colour a triangle: that of its first corner.
+struct Flat {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) colour: vec3f,
+}
+
+@vertex
+fn vs_flat(in: Corner) -> Flat {
+    let s = solid(in);
+    let within = pool(s.p);
+    let v = normalize(g.eye.xyz - s.p);
+    let surface = Surface(s.n, v, mix(s.colour, s.tint.rgb, s.tint.a), s.m, s.k, 1.0, 1.0);
+    var out: Flat;
+    out.clip = s.clip;
+    out.colour = finish(shade(surface, within, lit(shadow_place(s.p, s.n)) * within)).rgb;
+    return out;
+}
+
+@fragment
+fn fs_flat(in: Flat) -> @location(0) vec4f {
+    return vec4f(in.colour, 1.0);
+}
+
 @fragment
 fn fs_solid_edge(in: Solid) -> @location(0) vec4f {
     return finish(mix(vec3f(0.55, 0.62, 0.68), in.tint.rgb * 2.2, in.tint.a * 0.7));

@@ -1,0 +1,185 @@
+//! Meshes and trees of the file as scenery.
+//!
+//! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
+
+use super::common::{levels, look, pace, parse_colour};
+use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
+use super::rigid::{point_or_zero, rotation};
+use super::{POSITION_MAX_M, mesh};
+use crate::scene::cast::{Look, Scenery};
+use crate::scene::check::{Checker, Place, allowed};
+use crate::scene::format::{GeneratorKind, Material, MeshFile, Point, TreeFile, TreeLod};
+use crate::scene::source::Source;
+use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, creased_mesh, generate, tree};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Triangles of a generated mesh where a scene does not say.
+const TRIANGLES_DEFAULT: u32 = 1000;
+/// Boughs and leaves of a tree where a scene does not say: the first of (RH05, §6).
+const TREE_DEFAULT: (u32, u32) = (62, 240);
+/// Most boughs, most leaves.
+const PIECES_MAX: f64 = 1e5;
+/// Leaves weigh less than the trunk (RH05, §6 gives no number).
+const LEAVES_IMPORTANCE: f64 = 0.5;
+/// Colours where a scene does not say.
+const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
+const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
+
+/// Meshes that were made, by what they were made from: equal ones are one.
+type Made = BTreeMap<(String, u32, Option<u32>), Arc<Tom>>;
+
+/// Reads every mesh and tree.
+pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
+    let (mut scenery, mut made) = (Vec::new(), Made::new());
+    for entry in entries {
+        let before = c.count();
+        let parts = match &entry.model {
+            ModelFile::Mesh(file) => mesh_parts(c, entry, file, (source, &mut made)),
+            ModelFile::Tree(file) => tree_parts(c, entry, file),
+            _ => continue,
+        };
+        if c.count() > before {
+            continue;
+        }
+        for (offset, name) in entry.copies.places(&entry.common.name) {
+            scenery.extend(parts.iter().map(|(suffix, part)| Scenery {
+                name: format!("{name}{suffix}"),
+                at: Placement { position: part.at.position + offset, ..part.at },
+                ..part.clone()
+            }));
+        }
+    }
+    if scenery.len() > OBSTACLES_MAX {
+        too_many(c, "meshes and trees", scenery.len(), OBSTACLES_MAX);
+    }
+    scenery
+}
+
+/// The mesh of a file or a formula, as a table of `place` asks for it.
+pub(super) fn mesh_model(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &MeshFile,
+    source: &Source,
+) -> Option<(Arc<Tom>, Placement)> {
+    mesh_of(c, place, file, (source, &mut Made::new()))
+}
+
+fn mesh_of(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &MeshFile,
+    (source, made): (&Source, &mut Made),
+) -> Option<(Arc<Tom>, Placement)> {
+    let count = |n: u32| f64::from(n);
+    let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
+    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
+    let at = Placement { scale, ..placement(c, place, (file.position_m, file.rotation_deg)) };
+    if file.seed.is_some() && file.generate.is_none() {
+        c.wrong(place, "seed", "has nothing to act on", "expected `generate` beside it");
+    }
+    let made_from = match (&file.file, file.generate) {
+        (Some(name), None) => name.clone(),
+        (None, Some(kind)) => format!("{kind:?}"),
+        (Some(_), Some(_)) => {
+            c.wrong(place, "generate", "contradicts `file`", "expected one of them");
+            return None;
+        }
+        (None, None) => {
+            c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table");
+            return None;
+        }
+    };
+    let key = (made_from, file.seed.unwrap_or(0), triangles);
+    if let Some(tom) = made.get(&key) {
+        return Some((Arc::clone(tom), at));
+    }
+    let made_now = match (&file.file, file.generate) {
+        (Some(name), _) => from_file(name, source),
+        (None, kind) => Tom::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
+            .map_err(|why| why.to_string()),
+    };
+    match made_now {
+        Ok(tom) => {
+            let wanted = triangles.or(file.generate.map(|_| TRIANGLES_DEFAULT));
+            let tom = Arc::new(wanted.map_or(tom.clone(), |n| tom.truncated(n)));
+            made.insert(key, Arc::clone(&tom));
+            Some((tom, at))
+        }
+        Err(why) => {
+            let what = format!("cannot be used: {}: {why}", key.0);
+            c.wrong(place, "file", what, "expected a .glb or OBJ file beside the scene");
+            None
+        }
+    }
+}
+
+fn from_file(name: &str, source: &Source) -> Result<Tom, String> {
+    let mesh = mesh::read(&source.sibling(name)?, 1.0)?;
+    Tom::new(&creased_mesh(&mesh.points_m, &mesh.triangles)).map_err(|why| why.to_string())
+}
+
+const fn generator(kind: GeneratorKind) -> Generator {
+    match kind {
+        GeneratorKind::Sphere => Generator::Sphere,
+        GeneratorKind::Torus => Generator::Torus,
+        GeneratorKind::Blob => Generator::Blob,
+        GeneratorKind::Terrain => Generator::Terrain,
+        GeneratorKind::Seat => Generator::Seat,
+        GeneratorKind::Strut => Generator::Strut,
+    }
+}
+
+fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<Point>, Option<Point>)) -> Placement {
+    let position = point_or_zero(c, place, "position_m", position, POSITION_MAX_M);
+    let rotation = rotation(point_or_zero(c, place, "rotation_deg", turn, 1e6)).normalize();
+    Placement { position, rotation, scale: 1.0 }
+}
+
+/// One copy's parts, each with what its name ends in.
+type Parts = Vec<(&'static str, Scenery)>;
+
+fn looks(c: &mut Checker<'_, '_>, entry: &Entry, material: Material) -> Look {
+    // read for their own sake: scenery has no steps, but a wrong rate is still wrong
+    pace(c, &entry.place, &entry.common);
+    levels(c, &entry.place, &entry.common);
+    look(c, &entry.place, &entry.common, material)
+}
+
+fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&Source, &mut Made)) -> Parts {
+    let look = looks(c, entry, Material::Plastic);
+    let found = mesh_of(c, &entry.place, file, from);
+    let part = |(tom, at)| ("", Scenery { name: String::new(), model: Model::Mesh(tom), at, look });
+    found.map(part).into_iter().collect()
+}
+
+fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
+    let place = &entry.place;
+    let bark = looks(c, entry, Material::Skin);
+    let pieces = allowed(1.0..=PIECES_MAX, "");
+    let mut count = |key: &str, given: Option<u32>, usual: u32| {
+        c.number_or(place, key, (given.map(f64::from), f64::from(usual)), &pieces) as u32
+    };
+    let (branches, leaves) =
+        (count("branches", file.branches, TREE_DEFAULT.0), count("leaves", file.leaves, TREE_DEFAULT.1));
+    let spec = TreeSpec {
+        seed: u64::from(file.seed.unwrap_or(0)),
+        height_m: c.number(place, "height_m", file.height_m, &allowed(0.01..=1e3, "m")),
+        branches,
+        leaves,
+        prefix: file.lod == Some(TreeLod::Prefix),
+    };
+    let share = (file.leaves_importance, LEAVES_IMPORTANCE);
+    let share = c.number_or(place, "leaves_importance", share, &allowed(1e-3..=1.0, ""));
+    let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
+        c.wrong(place, "leaves_colour", "is no colour", "expected `#rrggbb`, such as `#5a8a42`");
+        LEAF
+    });
+    let leaf = Look { colour, importance: bark.importance * share, ..bark };
+    let bark = Look { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
+    let at = placement(c, place, (file.position_m, file.rotation_deg));
+    let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
+    let part = |model, look| Scenery { name: String::new(), model, at, look };
+    vec![("", part(trunk, bark)), (".leaves", part(crown, leaf))]
+}

@@ -1,0 +1,117 @@
+//! `model = "mesh"` and `model = "tree"`: scenery that is seen and never moves; and `[[group]]`, scenery that is drawn as one from afar.
+
+use super::Point;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A triangle mesh that is drawn with as many triangles as its frame affords. It is a picture only: nothing touches it
+/// (a `rigid` object of shape `mesh` with `fixed = true` is touched).
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MeshFile {
+    /// A file of triangles, glTF's binary form (.glb, +y up) or OBJ (+z up), its path relative to the scene's; not with `generate`.
+    pub file: Option<String>,
+    /// A mesh from a formula, about a metre large; not with `file`.
+    pub generate: Option<GeneratorKind>,
+    /// Seed of a generated mesh. Default 0.
+    pub seed: Option<u32>,
+    /// Triangles of the full mesh, 4 … 1000000: of a generated one; a file with more is cut down to them. Default 1000 where it is
+    /// generated, all where it is a file.
+    #[schemars(range(min = 4, max = 1_000_000))]
+    pub triangles: Option<u32>,
+    /// What coordinates are multiplied by to be metres, 1e-6 … 1e6. Default 1.
+    pub scale: Option<f64>,
+    /// Where the mesh's axes start, metres. Default the origin.
+    pub position_m: Option<Point>,
+    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+}
+
+/// A tree of boughs and leaves: two things to draw, `NAME` and `NAME.leaves`, from points and lines up to triangles.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TreeFile {
+    /// Seed of its shape. Default 0.
+    pub seed: Option<u32>,
+    /// Height, metres, 0.01 … 1000.
+    pub height_m: f64,
+    /// Boughs, 1 … 100000, each of 10 triangles at its finest. Default 62.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub branches: Option<u32>,
+    /// Leaves, 1 … 100000, each of 2 triangles at its finest. Default 240.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub leaves: Option<u32>,
+    /// `levels` (default): lines and points from afar, meshes from near. `prefix`: always the mesh, as much of it as there is time for.
+    pub lod: Option<TreeLod>,
+    /// Colour of the leaves as `#rrggbb` (sRGB). Default a green. `colour` is that of the trunk.
+    #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
+    pub leaves_colour: Option<String>,
+    /// Weight of the leaves' picture, as a share of `importance`, 0.001 … 1. Default 0.5.
+    #[schemars(range(min = 0.001, max = 1.0))]
+    pub leaves_importance: Option<f64>,
+    /// Where it stands, metres. Default the origin.
+    pub position_m: Option<Point>,
+    /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+}
+
+/// Meshes and trees that may be drawn as one mesh instead of themselves.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GroupFile {
+    /// The group's name: unique among objects and groups.
+    #[schemars(length(min = 1, max = 64))]
+    pub name: String,
+    /// Names of its meshes and trees; one that ends in `*` stands for all that begin so. Nothing is in two groups.
+    #[schemars(length(min = 1, max = 10_000))]
+    pub members: Vec<String>,
+    /// The mesh that stands for all of them. Default: one made of their own coarsest meshes.
+    pub proxy: Option<MeshFile>,
+    /// Triangles of the proxy, 1 … 100000. Default: a twentieth of the members', 12 … 2000.
+    #[schemars(range(min = 1, max = 100_000))]
+    pub proxy_triangles: Option<u32>,
+}
+
+/// A mesh from a formula.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum GeneratorKind {
+    /// A ball of radius 1.
+    Sphere,
+    /// A ring about z of radius 1.
+    Torus,
+    /// A ball with smooth bumps.
+    Blob,
+    /// Hills on a square of side 2.
+    Terrain,
+    /// A theatre seat that faces +y, 1 high.
+    Seat,
+    /// A rod along z from −1 to 1, a twentieth thick.
+    Strut,
+}
+
+/// What a tree looks like from afar.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum TreeLod {
+    /// Lines and points.
+    #[default]
+    Levels,
+    /// The beginning of its mesh.
+    Prefix,
+}
+
+/// How the light on a surface is worked out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ShadingKind {
+    /// One colour a triangle.
+    Flat,
+    /// Colours at corners, interpolated between them.
+    Gouraud,
+    /// Light at every pixel.
+    #[default]
+    PerPixel,
+    /// Whichever of them the policy takes.
+    Any,
+}
