@@ -3,7 +3,7 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
-use crate::coupling::{Impulse, Ledger, PairState};
+use crate::coupling::{Impulse, Ledger, PairState, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
 use crate::{AgentId, Resolution, SimTime};
@@ -36,6 +36,8 @@ pub struct Snapshot {
     pub inertia: Inertia,
     /// How it stands on something fixed; `None` where it does not, or not on one level.
     pub stand: Option<Stand>,
+    /// How springs on led points hold it; `None` where none do, or where nobody would have to know.
+    pub sprung: Option<Sprung>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -355,7 +357,8 @@ impl Snapshot {
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
-        (self.at_rest, self.acceleration, self.bounds, self.stand) = (false, DVec3::ZERO, None, None);
+        (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
+        (self.stand, self.sprung) = (None, None);
         self.pairs.clear();
         self.bonds.clear();
     }
@@ -365,6 +368,7 @@ impl Snapshot {
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()
             && self.acceleration.is_finite()
+            && self.sprung.as_ref().is_none_or(Sprung::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

@@ -85,6 +85,15 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
         given += dj;
         carried += way;
     });
+    let h = at.secs_after(member.snapshot.time);
+    if let Some(sprung) = &member.snapshot.sprung {
+        let inertia = (*inverse_mass, *inverse_inertia);
+        let way = [given, carried].map(|impulse| [impulse.linear, impulse.angular]);
+        let [gone, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
+        (state.position, state.rotation) = (state.position + gone[0], turned(state.rotation, gone[1]));
+        [state.velocity, state.spin] = velocity;
+        return Some(state);
+    }
     if let Some(stand) = member.snapshot.stand.filter(|stand| stand.bears(state.position, given)) {
         (given, carried) = (stand.leaves(given), stand.leaves(carried));
     }
@@ -92,7 +101,6 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     state.position += carried.linear * *inverse_mass;
     state.spin += *inverse_inertia * given.angular;
     state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
-    let h = at.secs_after(member.snapshot.time);
     let a = member.snapshot.acceleration;
     state.position += state.velocity * h + a * (0.5 * h * h);
     state.velocity += a * h;

@@ -5,6 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 1–4.
 
 use super::laws::Wave;
+use super::taken::Taken;
 use super::{Impulse, Ledger, Site};
 use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
@@ -98,7 +99,7 @@ struct Owned {
 #[derive(Debug, Clone, Default)]
 pub struct Exchange {
     owned: Vec<Owned>,
-    taken: Vec<Ledger>,
+    taken: Vec<Taken>,
     /// Room for one reading.
     reading: Option<Ledger>,
     now: SimTime,
@@ -132,21 +133,38 @@ impl Exchange {
     ) {
         for neighbour in around.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|l| l.with == around.me) else { continue };
-            let at = self.taken.iter().position(|t| t.with == neighbour.id);
-            let known = at.map(|at| &self.taken[at]);
+            let at = self.taken.iter().position(|t| t.copy.with == neighbour.id);
+            let known = at.map(|at| &self.taken[at].copy);
             if known.is_some_and(|known| !ledger.is_beyond(known)) || !ledger.is_finite() {
                 continue;
             }
-            let reading = self.reading.get_or_insert_with(|| Ledger::new(neighbour.id));
+            let mut reading = self.reading.take().unwrap_or_else(|| Ledger::new(neighbour.id));
             reading.read(ledger, until);
             reading.since(known, around.time, |site, sum, carried| apply(neighbour.id, site, sum, carried));
-            let at = at.unwrap_or_else(|| {
-                self.taken.push(Ledger::new(neighbour.id));
-                self.taken.len() - 1
-            });
-            self.taken[at].copy_from(reading);
-            self.taken[at].with = neighbour.id;
+            self.taken_mut(neighbour.id).copy_from(&reading, neighbour);
+            self.reading = Some(reading);
         }
+    }
+
+    /// Takes what owners give to a body as a whole as forces that go on: what each gave in its last step goes on evenly, until
+    /// the next reading tells better. `apply` gets dJ and t dJ − dS at the step's start, and what acts over its `dt_s` seconds.
+    pub fn follow(&mut self, around: &Surroundings<'_>, dt_s: f64, mut apply: impl FnMut(Impulse, Impulse, Impulse)) {
+        for neighbour in around.neighbours {
+            let ledger = neighbour.snapshot.given.iter().find(|l| l.with == around.me && l.is_finite());
+            if ledger.is_some() || self.taken.iter().any(|t| t.copy.with == neighbour.id) {
+                let [sum, carried, lasting] =
+                    self.taken_mut(neighbour.id).follow(ledger, neighbour, (around.time, dt_s));
+                apply(sum, carried, lasting);
+            }
+        }
+    }
+
+    fn taken_mut(&mut self, from: AgentId) -> &mut Taken {
+        let at = self.taken.iter().position(|t| t.copy.with == from).unwrap_or_else(|| {
+            self.taken.push(Taken::new(from));
+            self.taken.len() - 1
+        });
+        &mut self.taken[at]
     }
 
     /// Gives `to` an impulse that acts `after_s` seconds into the step.
@@ -202,7 +220,7 @@ impl Exchange {
     pub fn write(&self, into: &mut Snapshot) {
         let lively = |owned: &&Owned| owned.state.in_flight_n_s > 0.0 || self.now.secs_after(owned.active) <= LINGER_S;
         copy(self.owned.iter().filter(lively).map(|o| &o.ledger), &mut into.given);
-        copy(self.taken.iter(), &mut into.taken);
+        copy(self.taken.iter().map(|t| &t.copy), &mut into.taken);
         into.pairs.clear();
         into.pairs.extend(self.owned.iter().filter(lively).map(|o| o.state));
     }

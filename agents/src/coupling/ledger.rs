@@ -65,6 +65,25 @@ pub struct Coming {
     pub entry: Entry,
 }
 
+/// What a body as a whole has taken before it was booked, or not yet taken of what was: it lets a force go on evenly.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ahead {
+    /// The impulse taken beyond the ledger.
+    pub sum: Impulse,
+    /// Over which time it acts: evenly around so many seconds after this.
+    pub from: SimTime,
+    /// See [`Self::from`]; below zero before it.
+    pub middle_s: f64,
+}
+
+impl Ahead {
+    /// How far it has carried by the time `at`: its impulse times the seconds since.
+    #[must_use]
+    pub fn carried(&self, at: SimTime) -> Impulse {
+        self.sum * (at.secs_after(self.from) - self.middle_s)
+    }
+}
+
 /// What the owner of a coupling has given to the other side; the other side keeps a copy of what it has taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ledger {
@@ -76,6 +95,8 @@ pub struct Ledger {
     pub pages: Vec<Page>,
     /// Of the owner: what of the page in use acts late in its newest step. Of a copy: what it has left out.
     pub coming: Vec<Coming>,
+    /// In a copy: what was taken beyond it.
+    pub ahead: Option<Ahead>,
 }
 
 /// How long a page is written on, seconds.
@@ -175,7 +196,7 @@ impl Ledger {
     /// An empty ledger with the agent `with`.
     #[must_use]
     pub const fn new(with: AgentId) -> Self {
-        Self { with, revision: 0, pages: Vec::new(), coming: Vec::new() }
+        Self { with, revision: 0, pages: Vec::new(), coming: Vec::new(), ahead: None }
     }
 
     /// Books an impulse that acted `after_s` seconds after `time`.
@@ -224,10 +245,19 @@ impl Ledger {
         }
     }
 
-    /// What this ledger holds beyond `earlier` (`None`: beyond nothing): dJ, and dJ t − dS at the time `at`.
+    /// What this ledger holds beyond `earlier` (`None`: beyond nothing): dJ, and dJ t − dS at the time `at`. What `earlier` took
+    /// ahead comes back with the opposite sign.
     ///
     /// A page that only `earlier` has was torn out because all of it was taken: it counts for nothing.
     pub fn since(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
+        if let Some(ahead) = earlier.and_then(|e| e.ahead) {
+            visit(Site::Whole, -ahead.sum, -ahead.carried(at));
+        }
+        self.beyond(earlier, at, visit);
+    }
+
+    /// The same without what was taken ahead.
+    pub(super) fn beyond(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
         for page in &self.pages {
             let known = earlier.and_then(|e| e.page(page.number));
             let t = at.secs_after(page.origin);
@@ -247,7 +277,8 @@ impl Ledger {
     /// Whether this ledger is a later one than the copy `taken`, or that one has left out what may be due by now.
     #[must_use]
     pub fn is_beyond(&self, taken: &Self) -> bool {
-        self.revision > taken.revision || (self.revision == taken.revision && !taken.coming.is_empty())
+        let open = !taken.coming.is_empty() || taken.ahead.is_some();
+        self.revision > taken.revision || (self.revision == taken.revision && open)
     }
 
     /// Whether `taken` holds all that this ledger does.
@@ -276,7 +307,7 @@ impl Ledger {
 
     /// Copies `other` into the storage of this one.
     pub(super) fn copy_from(&mut self, other: &Self) {
-        (self.with, self.revision) = (other.with, other.revision);
+        (self.with, self.revision, self.ahead) = (other.with, other.revision, other.ahead);
         self.pages.truncate(other.pages.len());
         let kept = self.pages.len();
         for (mine, theirs) in self.pages.iter_mut().zip(&other.pages) {

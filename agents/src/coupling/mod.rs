@@ -12,7 +12,10 @@ mod law;
 pub mod laws;
 mod ledger;
 mod other;
+mod six;
 mod solver;
+mod sprung;
+mod taken;
 pub mod touch;
 
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
@@ -20,9 +23,11 @@ pub use exchange::{Exchange, PairKind, PairState, acknowledged};
 pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View};
 pub(crate) use knock::Knock;
 pub use law::{Law, Link, Standing, owns};
-pub use ledger::{Coming, Entry, Impulse, Ledger, Page, Site};
+pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
 pub use other::{Other, WAKE_M_S};
+pub use six::{Six, Twist};
 pub use solver::{Problem, Response, Settings, Solver, SolverReport};
+pub use sprung::Sprung;
 
 #[cfg(test)]
 pub(crate) mod harness;

@@ -2,9 +2,12 @@
 //!
 //! In: the newest snapshot, however old, and the ledger of what it does not know yet. Out: positions, velocities in slots, and
 //! how it answers impulses; it goes on with its neighbour's substeps. Never here: which impulses it gets.
-//! Theory: docs/theory/coupling.md, eq. 5–7: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
+//! Theory: docs/theory/coupling.md, eq. 5–7d: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
-use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, View};
+mod deliver;
+
+use super::sprung::{Lean, Sprung};
+use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, Twist, View};
 use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
 use glam::{DMat3, DQuat, DVec3};
 use std::sync::Arc;
@@ -16,6 +19,8 @@ pub struct Other {
     pose: Pose,
     /// Velocities in slots: a rigid body's or tool's centre and spin; a tube's nodes and segments in turn; a soft body's vertices.
     velocities: Vec<DVec3>,
+    /// A rigid body's springs.
+    lean: Option<Lean>,
     /// A tube's nodes, a soft body's vertices.
     positions: Vec<DVec3>,
     /// Room for two answers.
@@ -49,6 +54,7 @@ impl Other {
         let known = self.see(neighbour);
         if known {
             self.age_s = at.secs_after(neighbour.snapshot.time);
+            self.foresee(self.age_s);
             self.go_on(self.age_s);
             self.deliver(neighbour, around.me, exchange, at);
         }
@@ -60,7 +66,7 @@ impl Other {
         let snapshot = &neighbour.snapshot;
         self.neighbour = Some(neighbour.clone());
         self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
-        self.age_s = 0.0;
+        (self.age_s, self.lean) = (0.0, None);
         self.positions.clear();
         self.velocities.clear();
         match &snapshot.body {
@@ -68,6 +74,7 @@ impl Other {
             Body::Rigid(body) => {
                 self.pose = Pose { centre: body.position, rotation: body.rotation };
                 self.velocities.extend([body.velocity, body.spin]);
+                self.lean = self.lean_of(snapshot.sprung, [body.velocity, body.spin]);
                 true
             }
             Body::Tool(ToolState { tip, rotation, velocity, .. }) => {
@@ -124,6 +131,12 @@ impl Other {
         self.age_s
     }
 
+    /// Over how long a depth is taken back from it, seconds: until what was pushed out can show. Springs show it a step later.
+    #[must_use]
+    pub fn answers_within_s(&self) -> f64 {
+        self.age_s.max(self.lean.as_ref().map_or(0.0, Lean::span_s))
+    }
+
     /// Whether impulses do not move it: it is led, held, or at rest.
     #[must_use]
     pub const fn is_held(&self) -> bool {
@@ -158,9 +171,42 @@ impl Other {
     /// Its smooth acceleration, m/s²: none where impulses do not move it.
     #[must_use]
     pub fn acceleration(&self) -> DVec3 {
-        match &self.neighbour {
-            Some(neighbour) if !self.held => neighbour.snapshot.acceleration,
+        match (&self.neighbour, &self.lean) {
+            (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
+            (Some(neighbour), None) if !self.held => neighbour.snapshot.acceleration,
             _ => DVec3::ZERO,
+        }
+    }
+
+    /// What the next `h` seconds add to the velocities of its first two slots, for who gives an impulse at their start: half of
+    /// it where it falls freely, all of it where springs hold it and the impulse lasts (docs/theory/coupling.md, eq. 7d).
+    #[must_use]
+    pub fn gain(&self, h: f64) -> Twist {
+        match &self.lean {
+            Some(lean) => lean.acceleration(h).map(|a| a * h),
+            None => [self.acceleration() * (0.5 * h), DVec3::ZERO],
+        }
+    }
+
+    /// Impulses will last for `h` seconds: what springs hold answers by that.
+    pub fn foresee(&mut self, h: f64) {
+        if let Some(lean) = &mut self.lean {
+            lean.foresee(h);
+        }
+    }
+
+    /// The mean inverse mass (1/kg) and inverse inertia of a body on springs.
+    #[must_use]
+    pub fn mobility(&self) -> Option<[f64; 2]> {
+        self.lean.as_ref().map(Lean::mobility)
+    }
+
+    fn lean_of(&self, sprung: Option<Sprung>, velocity: Twist) -> Option<Lean> {
+        match (sprung.filter(|_| !self.held), &self.neighbour.as_ref()?.snapshot.inertia) {
+            (Some(sprung), Inertia::Rigid { inverse_mass, inverse_inertia }) => {
+                Some(Lean::new(sprung, (*inverse_mass, *inverse_inertia), velocity))
+            }
+            _ => None,
         }
     }
 
@@ -247,6 +293,10 @@ impl Other {
     /// # Panics
     /// Where there are not as many as [`Self::velocities`].
     pub fn respond(&self, impulses: &mut [DVec3]) {
+        if let (Some(lean), [linear, angular]) = (&self.lean, &mut *impulses) {
+            [*linear, *angular] = lean.respond([*linear, *angular]);
+            return;
+        }
         let inertia = self.neighbour.as_ref().filter(|_| !self.held).map(|n| &n.snapshot.inertia);
         match inertia {
             Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
@@ -270,18 +320,27 @@ impl Other {
         stand.bears(self.pose.centre, Impulse { linear, angular }).then_some(stand.normal)
     }
 
-    /// Lets impulses, one a slot, act on it.
-    pub fn push(&mut self, impulses: &[DVec3]) {
+    /// Lets impulses, one a slot, act on it: for the next `h` seconds, or at once where that is zero.
+    pub fn push(&mut self, impulses: &[DVec3], h: f64) {
         let mut answer = std::mem::take(&mut self.answer);
         answer.clear();
         answer.extend_from_slice(impulses);
         self.respond(&mut answer);
         self.velocities.iter_mut().zip(&answer).for_each(|(v, dv)| *v += *dv);
+        if let (Some(lean), [linear, angular]) = (&mut self.lean, &answer[..]) {
+            lean.push([*linear, *angular], h > 0.0);
+        }
         self.answer = answer;
     }
 
     /// Lets `h` seconds pass: x + v h + a h²/2, v + a h.
     pub fn go_on(&mut self, h: f64) {
+        if let Some(lean) = &mut self.lean {
+            let way = lean.go_on(h);
+            self.velocities.copy_from_slice(&lean.velocity());
+            self.shift(&way);
+            return;
+        }
         let a = self.acceleration();
         if self.positions.is_empty() {
             let Pose { centre, rotation } = &mut self.pose;
@@ -297,8 +356,9 @@ impl Other {
         }
     }
 
-    /// Books impulses, one a slot, that act `after_s` seconds into the step.
-    pub fn book(&self, exchange: &mut Exchange, after_s: f64, impulses: &[DVec3]) {
+    /// Books impulses, one a slot, that act from `after_s` seconds into the step on; on a body on springs they last for `h`.
+    pub fn book(&self, exchange: &mut Exchange, (after_s, h): (f64, f64), impulses: &[DVec3]) {
+        let after_s = if self.lean.is_some() { after_s + 0.5 * h } else { after_s };
         let Some(neighbour) = &self.neighbour else { return };
         if self.held && !matches!(neighbour.snapshot.body, Body::Tool(_)) {
             return; // a body at rest stands on something else, which takes the impulse
@@ -343,32 +403,6 @@ impl Other {
         }
     }
 
-    /// Adds what is on its way: W (J − J_ack) to the velocities, W ((J − J_ack) t − (S − S_ack)) to the positions.
-    fn deliver(&mut self, neighbour: &Neighbour, me: AgentId, exchange: &Exchange, at: SimTime) {
-        let slots = self.velocities.len();
-        let (mut sums, mut carried) = (std::mem::take(&mut self.answer), std::mem::take(&mut self.carried));
-        sums.clear();
-        carried.clear();
-        exchange.in_flight(me, neighbour, at, |site, sum, moved| {
-            if sums.is_empty() {
-                sums.resize(slots, DVec3::ZERO);
-                carried.resize(slots, DVec3::ZERO);
-            }
-            spread(neighbour, site, |slot, share, angular| {
-                let of = |impulse: Impulse| if angular { impulse.angular } else { impulse.linear } * share;
-                sums[slot] += of(sum);
-                carried[slot] += of(moved);
-            });
-        });
-        if !sums.is_empty() {
-            self.respond(&mut sums);
-            self.respond(&mut carried);
-            self.velocities.iter_mut().zip(&sums).for_each(|(v, dv)| *v += *dv);
-            self.shift(&carried);
-        }
-        (self.answer, self.carried) = (sums, carried);
-    }
-
     /// Moves by what each slot is carried.
     fn shift(&mut self, by: &[DVec3]) {
         if self.positions.is_empty() {
@@ -377,26 +411,6 @@ impl Other {
         } else {
             let stride = self.stride();
             self.positions.iter_mut().zip(by.iter().step_by(stride)).for_each(|(x, dx)| *x += *dx);
-        }
-    }
-}
-
-/// Which slots of `neighbour` an impulse at `site` acts on: (slot, share, whether it is the angular part).
-fn spread(neighbour: &Neighbour, site: Site, mut visit: impl FnMut(usize, f64, bool)) {
-    match (&neighbour.snapshot.body, site) {
-        (Body::Curve(curve), Site::Arc(arc_m)) => {
-            let Some((segment, share)) = curve.locate(arc_m) else { return };
-            visit(2 * segment, 1.0 - share, false);
-            visit(2 * segment + 2, share, false);
-            visit(2 * segment + 1, 1.0, true);
-        }
-        (Body::Soft(soft), Site::Vertex(vertex)) if (vertex as usize) < soft.positions.len() => {
-            visit(vertex as usize, 1.0, false);
-        }
-        (Body::Curve(_) | Body::Soft(_), _) | (_, Site::Arc(_) | Site::Vertex(_)) => {}
-        (_, Site::Whole) => {
-            visit(0, 1.0, false);
-            visit(1, 1.0, true);
         }
     }
 }

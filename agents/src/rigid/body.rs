@@ -3,6 +3,7 @@
 //! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::company::Company;
+use super::hold::Hold;
 use super::island::{self, Island};
 use super::mass::Spread;
 use super::meeting::Meeting;
@@ -47,6 +48,8 @@ pub struct RigidBody {
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
+    /// How springs hold it in contact that others own.
+    pub(super) hold: Hold,
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
@@ -108,6 +111,7 @@ impl RigidBody {
             received: DVec3::ZERO,
             acceleration: spec.gravity,
             stand: None,
+            hold: Hold::default(),
             at_rest: false,
             calm_s: 0.0,
             steps: 0,
@@ -148,14 +152,15 @@ impl RigidBody {
     /// The springs' part of `h` seconds, gravity with it; whether there was one.
     pub(super) fn pull(&mut self, h: f64) -> Result<bool, &'static str> {
         self.ties.aim(&self.company);
-        let ties = (&mut self.ties.all[..], self.gravity);
-        let pulled = springs::pull(&mut self.motion, &self.spread, ties, h, &mut self.grips);
-        if pulled {
+        let under = self.hold.under(h, self.gravity);
+        let pulled = springs::pull(&mut self.motion, &self.spread, &mut self.ties.all, &under, &mut self.grips);
+        if let Some(added) = pulled {
+            self.hold.note(added, h);
             self.ties.give(&mut self.company, h);
             self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
         }
-        if self.motion.is_sane(&self.spread) { Ok(pulled) } else { Err("a spring threw it out of reach") }
+        if self.motion.is_sane(&self.spread) { Ok(pulled.is_some()) } else { Err("a spring threw it out of reach") }
     }
 
     /// Ends a step in which a shared world has moved it.
@@ -163,6 +168,7 @@ impl RigidBody {
         (self.touching, self.sunk_m, self.calm_s) = (touching, sunk_m, 0.0);
         self.steps += 1;
         self.world.flew();
+        self.hold.forget();
         self.settle(around, dt);
     }
 
@@ -205,9 +211,11 @@ impl Agent for RigidBody {
         (self.island, self.sunk_m) = (None, 0.0);
         let (before, touching) = (self.motion, self.touching);
         self.begin(around, &[], dt_s);
-        let parts = self.parts(dt_s);
+        let leans = self.hold.is_known() && !self.ties.is_empty();
+        let parts = if leans { 1 } else { self.parts(dt_s) };
         for _ in 0..parts {
-            if let Err(what) = self.part(dt_s / f64::from(parts)) {
+            let h = dt_s / f64::from(parts);
+            if let Err(what) = if leans { self.lean(h) } else { self.part(h) } {
                 (self.motion, self.touching) = (before, touching);
                 self.grips.clear();
                 self.world.flew();
@@ -216,6 +224,7 @@ impl Agent for RigidBody {
         }
         self.steps += 1;
         let at_rest = self.rest(dt_s);
+        self.tell(around, dt_s);
         self.settle(around, dt_s);
         Ok(StepReport { work: 1.0, substeps: parts, at_rest })
     }

@@ -248,7 +248,9 @@ impl Guest {
     /// Writes a scale of the inverse mass of each of its slots; a tube's are told by its contacts.
     pub(super) fn scale(&self, mobilities: &mut [f64]) {
         let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);
-        if let (Some(Inertia::Rigid { inverse_mass, inverse_inertia: turning }), [linear, angular]) =
+        if let Some(mobility) = self.other.mobility() {
+            mobilities.copy_from_slice(&mobility);
+        } else if let (Some(Inertia::Rigid { inverse_mass, inverse_inertia: turning }), [linear, angular]) =
             (inertia, mobilities)
         {
             *linear = *inverse_mass;

@@ -31,11 +31,23 @@ impl RigidBody {
     ///
     /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
     pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+        let before = self.motion.velocity;
+        self.company.exchange.open(around);
+        self.company.pairs.open();
+        if self.hold.is_known() {
+            self.follow(around, dt);
+        } else {
+            self.take(around, dt);
+        }
+        self.received = self.motion.velocity - before;
+        self.company.gather(around, &self.world.mover, fellows);
+        (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
+    }
+
+    /// Takes what owners gave, and what acts in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
+    fn take(&mut self, around: &Surroundings<'_>, dt: f64) {
         let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
-        let before = motion.velocity;
-        company.exchange.open(around);
-        company.pairs.open();
         let mut taken = None;
         company.exchange.take(around, until, |_, _, sum, way| {
             motion.velocity += sum.linear / spread.mass_kg;
@@ -49,9 +61,6 @@ impl RigidBody {
             self.shift(stand.map_or(carried, |stand| stand.leaves(carried)));
             self.world.moved();
         }
-        self.received = self.motion.velocity - before;
-        self.company.gather(around, &self.world.mover, fellows);
-        (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
     }
 
     /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
@@ -144,7 +153,7 @@ impl RigidBody {
     }
 
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
-    fn shift(&mut self, carried: Impulse) {
+    pub(super) fn shift(&mut self, carried: Impulse) {
         let Self { motion, spread, world, gravity, touching, .. } = self;
         let way = carried.linear / spread.mass_kg;
         let mut moved = Motion { velocity: way, angular: carried.angular, ..*motion };
@@ -169,6 +178,7 @@ impl RigidBody {
             speed_m_s: self.motion.velocity.length() + swing,
         });
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
+        into.sprung = self.hold.published();
         self.company.exchange.write(into);
         into.touches.clear();
         into.bonds.clear();

@@ -145,6 +145,7 @@ impl Meeting {
                 slots.iter_mut().step_by(2).for_each(|v| *v += gained);
             } else {
                 slots[0] += gained;
+                slots[1] += guest.other.gain(h)[1];
             }
         }
     }
@@ -234,8 +235,8 @@ impl Meeting {
                 let from = self.bases[i] as usize;
                 let given = &self.given[from..from + guest.other.velocities().len()];
                 if given.iter().any(|impulse| *impulse != DVec3::ZERO) {
-                    guest.other.book(exchange, after_s, given);
-                    guest.other.push(given);
+                    guest.other.book(exchange, (after_s, h), given);
+                    guest.other.push(given, h);
                 }
             }
         }

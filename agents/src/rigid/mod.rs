@@ -18,6 +18,7 @@ mod clearance;
 mod company;
 mod couple;
 mod flight;
+mod hold;
 mod island;
 mod joint;
 mod mass;

@@ -61,7 +61,7 @@ impl Meeting {
             self.take_up(me, Some((i, guest)), (guest.friction, 0.0, 0.0));
             self.keep_closing(from, h);
             let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
-            let age_s = guest.other.age_s().abs() + after_s;
+            let age_s = guest.other.age_s().abs().max(guest.other.answers_within_s()) + after_s;
             for found in &mut self.found[from..] {
                 found.contact.age_s = age_s;
                 let depth = found.contact.gap_m;

@@ -1,7 +1,7 @@
 //! Springs that pull a rigid body: linearly implicit, stable at any stiffness, whatever the other end weighs.
 //!
-//! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring.
-//! Never here: contacts; positions stay.
+//! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring; all springs together
+//! as others have to know them. Never here: contacts; positions stay.
 //!
 //! With the generalised velocity u = (v, ω), the point Jacobian G = (1, −r×) and the spring's force at the *end* of the step,
 //! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The turning of r under
@@ -10,6 +10,7 @@
 
 use super::mass::Spread;
 use super::motion::Motion;
+use crate::coupling::{Six, Sprung, Twist};
 use crate::{Anchor, Grip, Pull};
 use glam::{DMat3, DVec3};
 
@@ -32,6 +33,16 @@ impl Tie {
         Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO }
     }
 
+    /// By how much it is stretched where its ends are `away` from each other, metres, and the directions in which it pulls.
+    fn stretch(&self, away: DVec3) -> (DVec3, DMat3) {
+        if self.rest_m == 0.0 {
+            return (away, DMat3::IDENTITY);
+        }
+        let along = away.normalize_or(DVec3::Z);
+        let pass = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+        (along * (away.length() - self.rest_m), pass)
+    }
+
     /// Where on the body it pulls, from the centre of mass: only an anchor in the body's own axes is a point of it.
     pub(super) fn arm(&self, motion: &Motion) -> Option<DVec3> {
         match self.pull.anchor {
@@ -41,181 +52,155 @@ impl Tie {
     }
 }
 
-/// Changes the velocities by gravity and the springs over `h` seconds; writes each spring's impulse, and its force for those
-/// who hold the body.
+/// A part of a step under springs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Under {
+    /// Its length, seconds.
+    pub h: f64,
+    /// m/s².
+    pub gravity: DVec3,
+    /// The impulse of what else acts evenly over the part, N·s and N·m·s.
+    pub lasting: Twist,
+    /// What impulses received at its start did to the velocities while the springs gave way over so many seconds: theirs to
+    /// account for too.
+    pub bent: (Twist, f64),
+}
+
+/// Changes the velocities by gravity, the springs and what else lasts over a part; writes each spring's impulse, and its force
+/// for those who hold the body. Returns what it added to velocity and spin, and how much of that what lasts did.
 ///
-/// Nothing is written and `false` returned where no spring holds a point of this body.
+/// Nothing is written and `None` returned where no spring holds a point of this body.
 pub(super) fn pull(
     motion: &mut Motion,
     body: &Spread,
-    (ties, gravity): (&mut [Tie], DVec3),
-    h: f64,
+    ties: &mut [Tie],
+    under: &Under,
     grips: &mut Vec<Grip>,
-) -> bool {
+) -> Option<[Twist; 2]> {
     if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
-        return false;
+        return None;
     }
-    let spin = motion.spin(body);
-    let mut change = [0.0; 6];
+    let h = under.h;
+    let mut change = [DVec3::ZERO; 2];
+    let mut system = System::free(motion, body, under);
     for pass in 0..2 {
-        let mut system = System::mass(motion, body, gravity * h);
+        let forces = (pass > 0).then_some(change);
+        system = System::free(motion, body, under);
         for tie in ties.iter() {
-            let Some(r) = tie.arm(motion) else { continue };
-            let point_velocity = motion.velocity + spin.cross(r);
-            let spring = Spring::new(tie, motion.position + r, point_velocity, h);
-            system.add_spring(r, spring.resistance, spring.impulse);
-            if pass > 0 {
-                let force = spring.after(change, r) / h;
-                let stiffness = r.dot(force).max(0.0);
-                system.add_turning(r, h * h * stiffness, spin);
-            }
+            system.add(tie, (motion, body), h, forces);
         }
-        change = system.solve();
+        change = system.matrix.solve(system.right);
     }
     grips.clear();
     for tie in ties.iter_mut() {
-        let Some(r) = tie.arm(motion) else { continue };
-        let spring = Spring::new(tie, motion.position + r, motion.velocity + spin.cross(r), h);
-        tie.impulse = spring.after(change, r);
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
+        tie.impulse = spring.after(change, r) - spring.bent(tie, r, under.bent);
         grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
-    motion.velocity += DVec3::new(change[0], change[1], change[2]);
-    let spin_change = DVec3::new(change[3], change[4], change[5]);
-    motion.angular += motion.inertia_times(body, spin_change);
-    true
+    motion.velocity += change[0];
+    motion.angular += motion.inertia_times(body, change[1]);
+    Some([change, system.matrix.solve(under.lasting)])
+}
+
+/// What springs whose far ends are led do to the body in this state, and how that changes as it moves (docs/theory/coupling.md,
+/// eq. 7b).
+pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3) -> Sprung {
+    let mut all = Sprung {
+        force: [gravity * body.mass_kg, DVec3::ZERO],
+        rising: [DVec3::ZERO; 2],
+        stiffness: Six::ZERO,
+        damping: Six::ZERO,
+        past: [DVec3::ZERO; 2],
+        span_s: 0.0,
+    };
+    let spin = motion.spin(body);
+    for tie in ties {
+        let Some(r) = tie.arm(motion) else { continue };
+        let (away, slip) =
+            (tie.pull.target - motion.position - r, tie.pull.target_velocity - motion.velocity - spin.cross(r));
+        let (stretch, pass) = tie.stretch(away);
+        let force = stretch * tie.pull.stiffness_n_m + pass * slip * tie.pull.damping_n_s_m;
+        let rising = pass * tie.pull.target_velocity * tie.pull.stiffness_n_m;
+        for (sum, at_point) in [(&mut all.force, force), (&mut all.rising, rising)] {
+            sum[0] += at_point;
+            sum[1] += r.cross(at_point);
+        }
+        all.stiffness.add_point(r, pass * tie.pull.stiffness_n_m);
+        all.stiffness.add_turning(r, r.dot(force).max(0.0));
+        all.damping.add_point(r, pass * tie.pull.damping_n_s_m);
+    }
+    all
 }
 
 /// A spring over one step: impulse = `impulse` − `resistance` × change of the point's velocity.
 struct Spring {
     impulse: DVec3,
     resistance: DMat3,
+    /// The directions in which it pulls.
+    pass: DMat3,
 }
 
 impl Spring {
+    /// The spring of `tie` where it holds the body, and where that is from the centre of mass.
+    fn at(tie: &Tie, motion: &Motion, body: &Spread, h: f64) -> Option<(DVec3, Self)> {
+        let r = tie.arm(motion)?;
+        let velocity = motion.velocity + motion.spin(body).cross(r);
+        Some((r, Self::new(tie, motion.position + r, velocity, h)))
+    }
+
     /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W makes R to (1 + R W)⁻¹ R.
     fn new(tie: &Tie, point: DVec3, velocity: DVec3, h: f64) -> Self {
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         let slip = tie.pull.target_velocity - velocity;
-        let (impulse, resistance) = if tie.rest_m > 0.0 {
-            let along = (tie.pull.target - point).normalize_or(DVec3::Z);
-            let stretch = (tie.pull.target - point).length() - tie.rest_m;
-            let closing = slip.dot(along);
-            let size = h * (k * (stretch + h * closing) + c * closing);
-            (along * size, DMat3::from_cols(along * along.x, along * along.y, along * along.z))
-        } else {
-            (h * (k * (tie.pull.target + h * slip - point) + c * slip), DMat3::IDENTITY)
-        };
-        let resistance = resistance * (h * (h * k + c));
+        let (stretch, pass) = tie.stretch(tie.pull.target - point);
+        let impulse = (stretch * k + pass * slip * (h * k + c)) * h;
+        let resistance = pass * (h * (h * k + c));
         if tie.yields == DMat3::ZERO {
-            return Self { impulse, resistance };
+            return Self { impulse, resistance, pass };
         }
         let softer = (DMat3::IDENTITY + resistance * tie.yields).inverse();
-        Self { impulse: softer * impulse, resistance: softer * resistance }
+        Self { impulse: softer * impulse, resistance: softer * resistance, pass }
     }
 
     /// The impulse where the body's velocities change so, at a point `r` from its centre.
-    fn after(&self, change: [f64; 6], r: DVec3) -> DVec3 {
-        self.impulse - self.resistance * point(change, r)
+    fn after(&self, [linear, angular]: Twist, r: DVec3) -> DVec3 {
+        self.impulse - self.resistance * (linear + angular.cross(r))
     }
-}
 
-/// The change of a point's velocity.
-fn point(change: [f64; 6], r: DVec3) -> DVec3 {
-    DVec3::new(change[0], change[1], change[2]) + DVec3::new(change[3], change[4], change[5]).cross(r)
+    /// The impulse with which a spring gave way over `span_s` seconds to a change of the body's velocities.
+    fn bent(&self, tie: &Tie, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
+        let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
+        self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
+    }
 }
 
 /// A symmetric positive system for the change of (v, ω).
 struct System {
-    matrix: [[f64; 6]; 6],
-    right: [f64; 6],
+    matrix: Six,
+    right: Twist,
 }
 
 impl System {
-    fn mass(motion: &Motion, body: &Spread, fall: DVec3) -> Self {
-        let mut matrix = [[0.0; 6]; 6];
-        for i in 0..3 {
-            matrix[i][i] = body.mass_kg;
-            let column = motion.inertia_times(body, DVec3::AXES[i]);
-            (0..3).for_each(|j| matrix[3 + j][3 + i] = column[j]);
-        }
-        let p = fall * body.mass_kg;
-        Self { matrix, right: [p.x, p.y, p.z, 0.0, 0.0, 0.0] }
+    /// A body without springs.
+    fn free(motion: &Motion, body: &Spread, under: &Under) -> Self {
+        let columns = DVec3::AXES.map(|axis| motion.inertia_times(body, axis));
+        let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
+        let [linear, angular] = under.lasting;
+        let right = [under.gravity * (under.h * body.mass_kg) + linear, angular];
+        Self { matrix: Six::mass(body.mass_kg, inertia), right }
     }
 
-    fn add_spring(&mut self, r: DVec3, resistance: DMat3, impulse: DVec3) {
-        // the rows of Gᵀ: forces pass as they are, torques as r ×
-        let rows: [DVec3; 6] = std::array::from_fn(|i| match i {
-            0..3 => DVec3::AXES[i],
-            _ => DVec3::AXES[i - 3].cross(r),
-        });
-        for i in 0..6 {
-            for j in 0..6 {
-                self.matrix[i][j] += rows[i].dot(resistance * rows[j]);
-            }
-            self.right[i] += rows[i].dot(impulse);
-        }
-    }
-
-    /// Stiffness (times h²) against turning across r.
-    fn add_turning(&mut self, r: DVec3, stiffness: f64, spin: DVec3) {
-        let axis = r.normalize_or_zero();
-        let resist = stiffness * (spin - axis * axis.dot(spin));
-        for i in 0..3 {
-            for j in 0..3 {
-                let unit = if i == j { 1.0 } else { 0.0 };
-                self.matrix[3 + i][3 + j] += stiffness * (unit - axis[i] * axis[j]);
-            }
-            self.right[3 + i] -= resist[i];
-        }
-    }
-
-    /// Solves by LDLᵀ without pivots: the matrix is positive definite.
-    fn solve(mut self) -> [f64; 6] {
-        let a = &mut self.matrix;
-        for j in 0..6 {
-            let d = a[j][j] - (0..j).map(|k| a[j][k] * a[j][k] * a[k][k]).sum::<f64>();
-            a[j][j] = d;
-            for i in j + 1..6 {
-                let sum: f64 = (0..j).map(|k| a[i][k] * a[j][k] * a[k][k]).sum();
-                a[i][j] = (a[i][j] - sum) / d;
-            }
-        }
-        let mut x = self.right;
-        for i in 0..6 {
-            x[i] -= (0..i).map(|k| a[i][k] * x[k]).sum::<f64>();
-        }
-        for i in (0..6).rev() {
-            x[i] = x[i] / a[i][i] - (i + 1..6).map(|k| a[k][i] * x[k]).sum::<f64>();
-        }
-        x
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_factor_solves_its_system() {
-        let body =
-            Spread { mass_kg: 2.0, com: DVec3::ZERO, moments: DVec3::new(0.1, 0.2, 0.3), axes: glam::DQuat::IDENTITY };
-        let motion = Motion {
-            position: DVec3::ONE,
-            rotation: glam::DQuat::from_rotation_x(0.4),
-            velocity: DVec3::X,
-            angular: DVec3::Y,
-        };
-        let build = || {
-            let mut system = System::mass(&motion, &body, DVec3::Z);
-            system.add_spring(DVec3::new(0.1, -0.2, 0.3), DMat3::IDENTITY * 40.0, DVec3::new(1.0, 2.0, 3.0));
-            system.add_turning(DVec3::new(0.1, -0.2, 0.3), 0.5, DVec3::ONE);
-            system
-        };
-        let x = build().solve();
-        let System { matrix, right } = build();
-        for i in 0..6 {
-            let left: f64 = (0..6).map(|j| matrix[i][j] * x[j]).sum();
-            assert!((left - right[i]).abs() < 1e-12, "row {i}: {left} is not {}", right[i]); // rounding of numbers near 10
+    /// Adds a spring; with `forces` of a first pass, the stiffness that its force has against turning across its arm too.
+    fn add(&mut self, tie: &Tie, (motion, body): (&Motion, &Spread), h: f64, first: Option<Twist>) {
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
+        self.matrix.add_point(r, spring.resistance);
+        self.right[0] += spring.impulse;
+        self.right[1] += r.cross(spring.impulse);
+        if let Some(change) = first {
+            let stiffness = h * h * r.dot(spring.after(change, r) / h).max(0.0);
+            let (axis, spin) = (r.normalize_or_zero(), motion.spin(body));
+            self.matrix.add_turning(r, stiffness);
+            self.right[1] -= (spin - axis * axis.dot(spin)) * stiffness;
         }
     }
 }

@@ -93,8 +93,8 @@ impl Ties {
             room.clear();
             room.resize(other.velocities().len(), DVec3::ZERO);
             slots.scatter(-tie.impulse, room);
-            other.book(exchange, after_s, room);
-            other.push(room);
+            other.book(exchange, (after_s, h), room);
+            other.push(room, h);
             if let Some(id) = other.id() {
                 let state = exchange.pair_mut(id);
                 state.kind =

@@ -123,12 +123,16 @@ impl Mate {
 
     /// Appends its velocities on the mean of a substep `h`.
     pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
-        let fall = self.other.acceleration() * (0.5 * h);
+        self.other.foresee(h);
+        let [fall, turn] = self.other.gain(h);
         let list = self.other.velocities();
         self.slots = (velocities.len(), list.len());
         velocities.extend_from_slice(list);
         let fallen = if self.other.is_many() { list.len() } else { 1 };
         velocities[self.slots.0..][..fallen].iter_mut().step_by(self.other.stride()).for_each(|v| *v += fall);
+        if !self.other.is_many() {
+            velocities[self.slots.0 + 1..][..1].iter_mut().for_each(|spin| *spin += turn);
+        }
     }
 
     /// One past its last slot.
@@ -189,7 +193,7 @@ impl Mate {
             gap_m: if touch.gap_m < 0.0 { touch.gap_m * self.fade } else { touch.gap_m },
             friction: self.friction,
             rebound_m_s: 0.0,
-            age_s: self.other.age_s().max(0.0),
+            age_s: self.other.answers_within_s(),
         }
     }
 
@@ -222,6 +226,9 @@ impl Mate {
     pub fn scale(&self, mobilities: &mut Vec<f64>) {
         let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);
         match inertia {
+            Some(_) if self.other.mobility().is_some() => {
+                mobilities.extend(self.other.mobility().into_iter().flatten())
+            }
             Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
                 let trace = (0..3).map(|i| inverse_inertia.col(i)[i]).sum::<f64>();
                 mobilities.extend([*inverse_mass, trace / 3.0]);
@@ -239,7 +246,7 @@ impl Mate {
         let mut slots = Slots::default();
         self.other.hold(&mut slots, there);
         let inverse_mass = self.other.inverse_mass(&slots);
-        Some(Far { point, velocity: velocity + self.other.acceleration() * (0.5 * h), inverse_mass })
+        Some(Far { point, velocity: velocity + self.other.gain(h)[0], inverse_mass })
     }
 
     /// Adds what a link gives to one of its points.
@@ -285,8 +292,8 @@ impl Mate {
             let list = &mut impulses[first..end];
             let linear = if self.other.is_many() { list.len() } else { 1 };
             self.given += list[..linear].iter().step_by(self.other.stride()).sum::<DVec3>();
-            self.other.book(exchange, start, list);
-            self.other.push(list);
+            self.other.book(exchange, (start, h), list);
+            self.other.push(list, h);
         }
         self.other.go_on(h);
     }

@@ -13,7 +13,7 @@ use glam::DVec3;
 
 /// When a tube's contacts are good enough: 10 µm/s, a tenth of what counts as rest.
 /// A stiff tube (10⁸ Pa) that lands flat takes 30 answers, a soft one at rest takes one or two.
-const SETTINGS: Settings = Settings { iterations: 30, tolerance_m_s: 1e-5 };
+const SETTINGS: Settings = Settings { iterations: 300, tolerance_m_s: 1e-5 };
 
 /// A substep at the point where its system is solved and nothing has moved yet.
 #[derive(Clone, Copy)]
