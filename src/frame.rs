@@ -3,6 +3,7 @@
 //! In: a checked [`crate::scene::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that says how it went.
 //! A [`Session`] is a scene in play; [`play_headless`] and [`play_in_window`] drive it. Never here: a law of control, physics.
 
+mod calibrate;
 mod cast;
 mod couplings;
 mod error;

@@ -4,6 +4,7 @@
 //! [`Stage::survey`] says what is visible and how large, [`Stage::compose`] makes the [`Picture`] at the levels asked
 //! for, [`Renderer::render`] draws it. [`Stage`] needs no GPU; [`Offscreen`] needs no window.
 
+mod benchmark;
 mod compose;
 mod draw;
 mod gather;
@@ -16,6 +17,7 @@ mod survey;
 mod view;
 pub mod viewer;
 
+pub use benchmark::{Drawn, benchmark};
 pub use compose::Hand;
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use gather::{Actor, Form, Look, Material, Prop, Stage, States};

@@ -106,7 +106,7 @@ impl AdaptiveChoice {
     }
 
     /// κ as planned with: how much slower the machine is than its prices.
-    pub fn kappa(&self) -> f64 {
+    fn kappa(&self) -> f64 {
         self.law.planned_kappa(DRAWING)
     }
 

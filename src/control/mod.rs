@@ -31,7 +31,7 @@ pub use metachron_budget::cost::value::Value;
 pub use picture::PictureControl;
 pub use plan::{FrameWork, LevelDemand, Plan, detail};
 pub use policy::{Law, Policy};
-pub use price::{Backdrop, Prices};
+pub use price::{Backdrop, Measured, Prices};
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure};
 pub use status::Status;
 pub use view::{Kind, ObjectView, Shading};

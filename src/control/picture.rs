@@ -338,12 +338,6 @@ impl PictureControl {
         share / self.target_hz
     }
 
-    /// How much slower the machine is than its prices, as the default has learnt.
-    #[must_use]
-    pub fn kappa(&self) -> f64 {
-        self.adaptive.kappa()
-    }
-
     /// The policy in use.
     #[must_use]
     pub fn policy(&self) -> Policy {

@@ -36,9 +36,9 @@ pub enum Policy {
     /// The same, and then whatever still fits.
     MarginalFill,
     /// Feedback on (ε, n) from the measured work of frames (GDC04).
-    #[default]
     Feedback,
     /// Concave hulls, a cost table that learns, hysteresis on marginal value, a certificate every frame.
+    #[default]
     Adaptive,
 }
 
@@ -84,6 +84,12 @@ impl Policy {
             Self::Feedback => "feedback",
             Self::Adaptive => "adaptive",
         }
+    }
+
+    /// Whether it predicts what levels cost.
+    #[must_use]
+    pub const fn predicts(self) -> bool {
+        !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
     }
 
     /// The policy of this name.

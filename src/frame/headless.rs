@@ -53,6 +53,9 @@ pub fn play_headless(
     mut plan: Headless,
     go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
 ) -> Result<Outcome, SessionError> {
+    if let Drawing::Every(screen) = &plan.drawing {
+        session.calibrate(&screen.gpu().describe(), || Some(screen.gpu().clone()));
+    }
     let period = session.period();
     let mut due = Duration::ZERO;
     let mut interrupted = false;

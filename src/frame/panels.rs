@@ -80,9 +80,8 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     let control = session.control();
     status.target_hz = control.target_hz();
     let policy = control.policy();
-    let blind = [Policy::Full, Policy::Static, Policy::Threshold, Policy::Feedback];
     status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
-    status.sliders = (!blind.contains(&policy)).then(|| control.sliders());
+    status.sliders = policy.predicts().then(|| control.sliders());
     status.frozen = control.is_frozen();
     status.loop_value = Some(control.eps_hat());
     status.policy = session.policy_name().to_owned();

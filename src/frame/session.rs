@@ -3,12 +3,13 @@
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
 
+use super::calibrate;
 use super::cast;
 use super::couplings::{Coupling, Couplings};
 use super::error::SessionError;
 use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 use super::trace::Trace;
-use crate::compositor::{Camera, Hand, Level, Picture, Seen, Size, Stage, States, Style};
+use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Seen, Size, Stage, States, Style};
 use crate::control::{
     Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Shading, Status,
 };
@@ -170,6 +171,16 @@ impl Session {
     /// The controller of the picture.
     pub const fn control(&mut self) -> &mut PictureControl {
         &mut self.control
+    }
+
+    /// Takes the prices of the adapter that draws, where they are known or can be measured; declared costs stay as they are.
+    pub(super) fn calibrate(&mut self, adapter: &str, open: impl FnOnce() -> Option<Gpu>) {
+        if self.control.policy().predicts()
+            && !self.is_virtual()
+            && let Some(prices) = calibrate::prices(adapter, open)
+        {
+            self.control.set_prices(prices);
+        }
     }
 
     /// The name of the policy that chooses levels, as scenes write it.

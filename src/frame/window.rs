@@ -10,7 +10,7 @@ use crate::compositor::viewer::{
     Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
     run_window,
 };
-use crate::compositor::{Camera, Hand, Hit, Picture, Ray};
+use crate::compositor::{Camera, Gpu, Hand, Hit, Picture, Ray};
 use crate::runtime::Drive;
 use crate::scene::{self, Scene, SceneError, Source};
 use glam::DVec3;
@@ -134,6 +134,10 @@ impl<'a> WindowShow<'a> {
         session.drive(Drive::Speed(self.speed));
         if !self.running {
             session.drive(Drive::Pause);
+        }
+        let prices = *self.session.control().prices();
+        if !session.is_virtual() {
+            session.control().set_prices(prices);
         }
         let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
         drop(std::mem::replace(&mut self.session, session));
@@ -336,6 +340,8 @@ impl Show for WindowShow<'_> {
 
     fn drawn_by(&mut self, adapter: &str) {
         self.adapter = Some(adapter.to_owned());
+        // the same adapter without a window: the benchmark needs a device that nobody else draws with
+        self.session.calibrate(adapter, || Gpu::headless().ok());
     }
 
     fn scene_camera(&self) -> Camera {

@@ -1,5 +1,6 @@
 //! What the whole program promises, played from the command line: physics, control, rest, outputs and ends.
 
+mod budget;
 mod isolation;
 mod limits;
 mod outputs;

@@ -68,7 +68,7 @@ pub struct TargetFile {
     /// Wanted frames per second, 1 … 1000. Default 60.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub frame_hz: Option<f64>,
-    /// Who chooses the level of every visible object. Default `feedback`.
+    /// Who chooses the level of every visible object. Default `adaptive`.
     pub policy: Option<PolicyKind>,
     /// What an object is worth to `robin-hood`. Default `plain`.
     pub value: Option<ValueKind>,
@@ -128,9 +128,9 @@ pub enum PolicyKind {
     /// The same, and then whatever still fits.
     MarginalFill,
     /// Feedback on (ε, n) from the measured frame work (GDC04).
-    #[default]
     Feedback,
     /// Steps in falling gain per cost, by prices that learn, with hysteresis and a certificate.
+    #[default]
     Adaptive,
 }
 

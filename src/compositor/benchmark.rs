@@ -1,0 +1,119 @@
+//! A benchmark of an adapter: what pictures of many equal balls take, by triangles, pixels and shading (FS93, §4).
+//!
+//! In: an adapter. Out: measured pictures. Never here: a fit, a file. It takes about a second where a processor draws.
+
+use super::draw::RendererOptions;
+use super::gather::{Actor, Form, Look, Material, Stage, States};
+use super::level::{Level, Shading};
+use super::offscreen::{Gpu, GpuError, Offscreen};
+use super::picture::Style;
+use super::view::{Camera, Size};
+use glam::DVec3;
+use metachron_agents::shape::{Primitive, Solid};
+use metachron_agents::{AgentId, Body, Resolution, RigidState, SimTime, Snapshot};
+use std::sync::Arc;
+use std::time::Instant;
+
+/// One measured picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Pixels of the picture.
+    pub picture_px: f64,
+    /// Objects in it.
+    pub objects: u32,
+    /// Triangles of each.
+    pub polygons: f64,
+    /// Pixels that each covers.
+    pub pixels: f64,
+    /// How they are shaded.
+    pub shading: Shading,
+    /// The least of a few drawings of it, seconds.
+    pub seconds: f64,
+}
+
+/// Pictures without an object, for what a picture and its pixels cost.
+const EMPTY: [Size; 3] =
+    [Size { width: 320, height: 180 }, Size { width: 640, height: 360 }, Size { width: 960, height: 540 }];
+/// Pictures of balls.
+const SIZE: Size = Size { width: 640, height: 360 };
+/// Balls along each side of a square.
+const SIDE: u32 = 6;
+/// Radius of a ball, and from one to the next, metres.
+const RADIUS_M: f64 = 0.05;
+const APART_M: f64 = 0.12;
+/// Levels and distances: few and many triangles on few and many pixels.
+const LEVELS: [u8; 4] = [0, 2, 4, 5];
+const DISTANCES_M: [f64; 3] = [1.4, 2.8, 8.0];
+/// Drawings of each picture; the least is the work when nobody disturbs it.
+const DRAWINGS: usize = 3;
+
+/// Draws all pictures.
+///
+/// # Errors
+/// As [`Offscreen::new`] and [`Offscreen::render`].
+pub fn benchmark(gpu: &Gpu, options: RendererOptions) -> Result<Vec<Drawn>, GpuError> {
+    let mut drawn = Vec::new();
+    for size in EMPTY {
+        let mut screen = Offscreen::new(gpu.clone(), size, options)?;
+        let seconds = least(&mut screen, &mut Stage::new(Vec::new(), Vec::new()), DISTANCES_M[0], &[])?;
+        let (objects, polygons, pixels) = (0, 0.0, 0.0);
+        drawn.push(Drawn { picture_px: size.pixels(), objects, polygons, pixels, shading: Shading::PerPixel, seconds });
+    }
+    let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
+    let mut stage = balls();
+    for shading in [Shading::Flat, Shading::Gouraud, Shading::PerPixel] {
+        for n in LEVELS {
+            for distance_m in DISTANCES_M {
+                drawn.push(measure(&mut screen, &mut stage, (shading, n, distance_m))?);
+            }
+        }
+    }
+    Ok(drawn)
+}
+
+fn measure(
+    screen: &mut Offscreen,
+    stage: &mut Stage,
+    (shading, n, distance_m): (Shading, u8, f64),
+) -> Result<Drawn, GpuError> {
+    let level = Level { shading, ..Resolution { eps_m: 1.0, n }.into() };
+    let seconds = least(screen, stage, distance_m, &[level; (SIDE * SIDE) as usize])?;
+    let mut seen = Vec::new();
+    stage.survey(&camera(distance_m), SIZE, &mut seen);
+    let pixels = seen.iter().map(|seen| seen.pixels).sum::<f64>() / f64::from(SIDE * SIDE);
+    let polygons = f64::from(Primitive::Ball.triangles(n));
+    Ok(Drawn { picture_px: SIZE.pixels(), objects: SIDE * SIDE, polygons, pixels, shading, seconds })
+}
+
+fn least(screen: &mut Offscreen, stage: &mut Stage, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
+    let (camera, mut least, mut seen) = (camera(distance_m), f64::INFINITY, Vec::new());
+    // the first drawing makes meshes and buffers
+    for drawing in 0..=DRAWINGS {
+        let started = Instant::now();
+        stage.survey(&camera, screen.size(), &mut seen);
+        screen.render(stage.compose(&camera, levels, Style::default(), None), &camera)?;
+        let took = started.elapsed().as_secs_f64();
+        least = if drawing == 0 { least } else { least.min(took) };
+    }
+    Ok(least)
+}
+
+fn camera(distance_m: f64) -> Camera {
+    Camera::looking(DVec3::new(0.0, -distance_m, 0.0), DVec3::ZERO, 0.6)
+}
+
+/// A square of balls across the view.
+fn balls() -> Stage {
+    let look = Look { colour: [200, 120, 100], material: Material::Plastic };
+    let form = Form::Solid(Solid::Ball { radius_m: RADIUS_M });
+    let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
+    let mut stage = Stage::new((0..SIDE * SIDE).map(actor).collect(), Vec::new());
+    for id in 0..SIDE * SIDE {
+        let place = |i: u32| (f64::from(i) - 0.5 * f64::from(SIDE - 1)) * APART_M;
+        let position = DVec3::new(place(id % SIDE), 0.0, place(id / SIDE));
+        let body = Body::Rigid(RigidState { position, ..RigidState::default() });
+        stage.see(AgentId(id), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+    }
+    stage.pose(SimTime::ZERO, States::Latest);
+    stage
+}
