@@ -40,6 +40,8 @@ pub struct RigidBody {
     pub(super) touching: bool,
     /// Whether nothing but contact happened since the step began.
     pub(super) steady: bool,
+    /// Whether something fixed, or a world that it shares, has held it up since the step began.
+    pub(super) held_up: bool,
     /// The velocity after what was received at the step's start, and what couplings of its own have added since, m/s.
     pub(super) begun: DVec3,
     pub(super) coupled: DVec3,
@@ -106,6 +108,7 @@ impl RigidBody {
             sided: Sided::default(),
             touching: false,
             steady: false,
+            held_up: false,
             begun: spec.velocity,
             coupled: DVec3::ZERO,
             received: DVec3::ZERO,

@@ -57,6 +57,8 @@ pub(super) struct Guest {
     chain: bool,
 }
 
+/// Who accelerates otherwise than gravity would have it by more than this is held by something, m/s².
+const HELD_M_S2: f64 = 0.1;
 /// The gap at which two balls touch, as a share of the radius: their distance is known to rounding.
 const BALL_SKIN_SHARE: f64 = 1e-9;
 
@@ -120,12 +122,16 @@ impl Company {
         }
     }
 
-    /// Ends a step of `dt` seconds: how long pairs have touched, how everybody should move next, and the accounts.
-    pub(super) fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+    /// Ends a step of `dt` seconds: how long pairs have touched, how everybody should move next, and the accounts. `gravity` is
+    /// what pulls at everybody; `held` says whether something beside the pair held the body up.
+    pub(super) fn settle(&mut self, around: &Surroundings<'_>, dt: f64, (gravity, held): (DVec3, bool)) {
         for guest in &self.guests[..self.count] {
             let Some(neighbour) = guest.other.neighbour() else { continue };
             if let Some(pair) = self.pairs.get(neighbour.id) {
                 pair.expect(guest.other.velocities());
+                if held || neighbour.snapshot.acceleration.distance(gravity) > HELD_M_S2 {
+                    pair.bond();
+                }
             }
         }
         self.pairs.close(dt);

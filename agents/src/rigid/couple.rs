@@ -42,6 +42,7 @@ impl RigidBody {
         self.received = self.motion.velocity - before;
         self.company.gather(around, &self.world.mover, fellows);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
+        self.held_up = !fellows.is_empty();
     }
 
     /// Takes what owners gave, and what acts in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
@@ -99,7 +100,8 @@ impl RigidBody {
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && !n.owned);
         self.stand = if seen { self.feet() } else { None };
         self.company.knock(around, &self.world.mover, &self.motion, dt);
-        self.company.settle(around, dt);
+        let held = self.held_up || self.received != DVec3::ZERO;
+        self.company.settle(around, dt, (self.gravity, held));
     }
 
     /// Says what others may expect of a body that has not stepped yet: it stands where it was put down, and does not fall into

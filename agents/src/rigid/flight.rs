@@ -123,6 +123,7 @@ impl RigidBody {
         let mut me = Me { motion, spread, mover: &world.mover };
         let Some(pressed) = meeting.press(&mut me, company, (obstacles, scope), (h, gravity)) else { return false };
         self.coupled += self.motion.velocity - before - gravity * h - pressed.fixed / self.spread.mass_kg;
+        self.held_up |= pressed.fixed != DVec3::ZERO;
         self.motion.fly(&self.spread, DVec3::ZERO, h);
         // the velocity is that of the end; what it is pressed on goes along a parabola, so the body does too
         self.motion.position -= pressed.carried * (0.5 * h * h);

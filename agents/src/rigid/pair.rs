@@ -110,6 +110,13 @@ impl Pair {
         }
     }
 
+    /// The two press on each other and something else holds one of them up: that lasts, and their world is shared from now on.
+    pub(super) fn bond(&mut self) {
+        if self.pressed {
+            self.lasting_s = self.lasting_s.max(BOND_S);
+        }
+    }
+
     /// What a bounce has to pay back, joules: what has been spent beyond half the reserve.
     pub(super) fn owed_j(&self) -> f64 {
         (0.5 * self.reserve_j - self.tank_j).max(0.0)

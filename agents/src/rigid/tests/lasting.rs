@@ -285,3 +285,31 @@ fn a_body_of_a_millionth_of_the_mass_bonds_with_what_carries_it() {
         assert!(bonded, "light {light_hz} Hz, heavy {heavy_hz} Hz");
     }
 }
+
+#[test]
+fn boxes_that_start_on_each_other_are_bonded_at_once_and_colliding_ones_are_not() {
+    let mut stage = Stage::new(Faults::default());
+    let ids: Vec<_> = (0..5)
+        .map(|i| {
+            let at = UP * (0.05 + 0.1 * f64::from(i));
+            let part = RigidSpec { obstacles: [floor(0.5)].into(), ..cube(0.05, at) };
+            stage.add(RigidBody::new(part).unwrap(), 240.0)
+        })
+        .collect();
+    stage.run(2.5 / 240.0, |_| {});
+    for pair in ids.windows(2) {
+        assert_eq!(stage.newest(pair[0]).bonds, [pair[1]]);
+    }
+    for id in &ids {
+        let Body::Rigid(state) = stage.newest(*id).body else { panic!("rigid") };
+        assert!(state.position.truncate().length() < 1e-5, "{state:?}");
+    }
+
+    let mut stage = Stage::new(Faults::default());
+    let thrown = |x: f64, speed: f64| {
+        let still = RigidSpec { gravity: DVec3::ZERO, ..cube(0.05, DVec3::X * x) };
+        RigidBody::new(RigidSpec { velocity: DVec3::X * speed, ..still }).unwrap()
+    };
+    let ids = [(stage.add(thrown(-0.1, 1.0), 240.0)), stage.add(thrown(0.1, -1.0), 60.0)];
+    stage.run(0.5, |stage| assert!(ids.iter().all(|id| stage.newest(*id).bonds.is_empty())));
+}
