@@ -10,7 +10,7 @@ use super::company::placed;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use crate::coupling::touch::touches;
-use crate::coupling::{Impulse, Place};
+use crate::coupling::{Impulse, Law, Place};
 use crate::{AgentId, Bounds, Inertia, SimSpan, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
@@ -66,12 +66,12 @@ impl RigidBody {
 
     /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
     pub fn push_alone(&mut self, around: &Surroundings<'_>, dt: f64) {
-        let Self { motion, spread, company, sided, gravity, .. } = self;
+        let Self { motion, spread, company, sided, gravity, stand, .. } = self;
         if company.guests().is_empty() {
             return;
         }
         let before = motion.velocity;
-        sided.act((motion, spread), company, around, (dt, *gravity));
+        sided.act((motion, spread), company, around, (dt, *gravity, *stand));
         if self.motion.velocity != before {
             self.coupled += self.motion.velocity - before;
             self.world.moved();
@@ -97,7 +97,7 @@ impl RigidBody {
     pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
-        let seen = around.neighbours.iter().any(|n| n.form.is_some() && !n.owned);
+        let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
         self.stand = if seen { self.feet() } else { None };
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received != DVec3::ZERO;

@@ -7,10 +7,10 @@ use super::company::{Company, Guest, placed};
 use super::mass::Spread;
 use super::motion::Motion;
 use super::places::halfway;
-use crate::coupling::laws::{Line, push_off_n};
+use crate::coupling::laws::{Drawn, End, Line, push_off_n};
 use crate::coupling::touch::touches;
-use crate::coupling::{Law, PairKind, Slots, Touch};
-use crate::{AgentId, Anchor, SimTime, Surroundings};
+use crate::coupling::{Impulse, Law, Link, PairKind, Slots, Touch};
+use crate::{AgentId, Anchor, SimTime, Stand, Surroundings};
 use glam::{DMat3, DVec3};
 
 /// What a body keeps of the laws by which it acts on itself.
@@ -28,6 +28,8 @@ struct Span {
     at: SimTime,
     dt_s: f64,
     gravity: DVec3,
+    /// How the body stands on something fixed.
+    stand: Option<Stand>,
 }
 
 impl Sided {
@@ -37,9 +39,9 @@ impl Sided {
         (motion, spread): (&mut Motion, &Spread),
         company: &mut Company,
         around: &Surroundings<'_>,
-        (dt_s, gravity): (f64, DVec3),
+        (dt_s, gravity, stand): (f64, DVec3, Option<Stand>),
     ) {
-        let span = Span { at: around.time, dt_s, gravity };
+        let span = Span { at: around.time, dt_s, gravity, stand };
         for i in 0..company.guests().len() {
             let Some(law) = company.guests()[i].other.neighbour().map(|n| n.law) else { continue };
             match law {
@@ -53,10 +55,9 @@ impl Sided {
             }
         }
         for link in around.links {
-            let Law::Tlm { stiffness_n_m, .. } = link.law else { continue };
             let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
-            if let (Some(i), Anchor::Local(local)) = (guest, link.here) {
-                self.draw((motion, spread), (company, i), (stiffness_n_m, local), span);
+            if let (Law::Tlm { .. }, Some(i)) = (link.law, guest) {
+                self.draw((motion, spread), (company, i), link, span);
             }
         }
     }
@@ -106,9 +107,13 @@ impl Sided {
         let normal = touch.normal;
         let velocity = slots.velocity(&self.velocities);
         self.velocities[2..].fill(DVec3::ZERO);
-        let own = slots.velocity(&self.velocities).dot(normal) + span.gravity.dot(normal) * span.dt_s;
+        let mut own = (slots.velocity(&self.velocities) + span.gravity * span.dt_s).dot(normal);
         let (z, c) = (self.line(company.guests()[i].id(), stiffness).impedance(), arriving.dot(normal));
-        let yields = answer_of(motion, spread, &only_mine(&touch, motion), normal).dot(normal);
+        let mut yields = answer_of(motion, spread, &only_mine(&touch, motion), normal).dot(normal);
+        if span.bears(&only_mine(&touch, motion), normal, motion) {
+            // what it stands on takes its weight and the push
+            (own, yields) = (own.min(0.0), 0.0);
+        }
         let push = (-(z * own + c) / (1.0 + z * yields * span.dt_s)).max(0.0);
         let damped = (push - damping * velocity.dot(normal)).max(0.0);
         let slip = velocity - normal * velocity.dot(normal);
@@ -122,30 +127,39 @@ impl Sided {
         tell(company, i, PairKind::Tlm, (force, -touch.gap_m, 1, span.dt_s));
     }
 
-    /// A link to guest `i` by wave variables, at the point `local` of the body: it pulls nothing where it was made.
+    /// A link to guest `i` by wave variables.
     fn draw(
         &mut self,
         (motion, spread): (&mut Motion, &Spread),
         (company, i): (&mut Company, usize),
-        (stiffness, local): (f64, DVec3),
+        link: &Link,
         span: Span,
     ) {
-        let arriving = self.listen((company, i), stiffness, span);
+        let Law::Tlm { stiffness_n_m, damping_n_s_m } = link.law else { return };
+        let guest = &company.guests()[i];
+        let (Anchor::Local(local), Some((far_m, far))) = (link.here, guest.other.point(link.there)) else { return };
+        let (id, decides) = (guest.id(), guest.other.neighbour().is_some_and(|n| n.owned));
         let arm = motion.rotation * local;
+        let way = far_m - motion.position - arm;
+        if decides {
+            self.line(id, stiffness_n_m).begin(way, span.at);
+        }
+        let arriving = self.listen((company, i), stiffness_n_m, span);
         let mut slots = Slots::default();
         slots.add_linear(0, 1.0);
         slots.add_angular(1, arm);
         let own = slots.velocity(&[motion.velocity + span.gravity * span.dt_s, motion.spin(spread)]);
-        let columns = DVec3::AXES.map(|axis| answer_of(motion, spread, &slots, axis));
-        let yields = DMat3::from_cols(columns[0], columns[1], columns[2]);
-        let z = self.line(company.guests()[i].id(), stiffness).impedance();
-        let into_line = (DMat3::IDENTITY + yields * (z * span.dt_s)).inverse() * (own * z + arriving);
+        let [x, y, z] = DVec3::AXES.map(|axis| answer_of(motion, spread, &slots, axis) * span.dt_s);
+        let yields = DMat3::from_cols(x, y, z);
+        let step = (span.at, span.dt_s);
+        let end = End { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
+        let Drawn { force, arriving, into_line } = self.line(id, stiffness_n_m).draw(&end);
         let mut given = [DVec3::ZERO; 2];
-        slots.scatter(into_line * -span.dt_s, &mut given);
+        slots.scatter(force * span.dt_s, &mut given);
         motion.velocity += given[0] / spread.mass_kg;
         motion.angular += given[1];
         self.answer((company, i), Some((arriving, into_line)), span);
-        tell(company, i, PairKind::Tlm, (-into_line, 0.0, 1, span.dt_s));
+        tell(company, i, PairKind::Tlm, (force, 0.0, 1, span.dt_s));
     }
 
     /// Where guest `i` overlaps the body, and the velocities of both.
@@ -191,6 +205,16 @@ impl Sided {
             self.lines.len() - 1
         });
         &mut self.lines[at].1
+    }
+}
+
+impl Span {
+    /// Whether a push along `axis` on what gathers from `slots` only presses the body on what it stands on.
+    fn bears(&self, slots: &Slots, axis: DVec3, motion: &Motion) -> bool {
+        let mut push = [DVec3::ZERO; 2];
+        slots.scatter(axis, &mut push);
+        let push = Impulse { linear: push[0], angular: push[1] };
+        self.stand.is_some_and(|stand| stand.bears(motion.position, push))
     }
 }
 

@@ -6,9 +6,9 @@
 use super::company::Company;
 use super::division::Division;
 use super::mate::Mate;
-use crate::coupling::laws::{Line, push_off_n};
+use crate::coupling::laws::{Drawn, End, Line, push_off_n};
 use crate::coupling::touch::touches;
-use crate::coupling::{Law, PairKind, Placed, Slots, Touch, View};
+use crate::coupling::{Law, Link, PairKind, Placed, Slots, Touch, View};
 use crate::rod::band::Factor;
 use crate::{AgentId, Anchor, Neighbour, SimTime, Surroundings};
 use glam::{DMat3, DVec3};
@@ -69,9 +69,7 @@ impl Company {
                 Law::Ledger | Law::Off => {}
             }
             for link in around.links.iter().filter(|link| link.other == neighbour.id) {
-                if let (Law::Tlm { stiffness_n_m, .. }, Anchor::Arc(arc_m)) = (link.law, link.here) {
-                    sided.draw(self, (neighbour, now), (stiffness_n_m, arc_m), around);
-                }
+                sided.draw(self, (neighbour, now), link, around);
             }
         }
         sided.radii_m = std::mem::take(&mut self.sided().radii_m);
@@ -146,27 +144,34 @@ impl Sided {
         tell(company, neighbour.id, PairKind::Tlm, (force, -touch.gap_m, 1, now.dt));
     }
 
-    /// A link by wave variables: it pulls nothing where it was made.
+    /// A link by wave variables.
     fn draw(
         &mut self,
         company: &mut Company,
         (neighbour, now): (&Neighbour, &Now<'_>),
-        (stiffness, arc_m): (f64, f64),
+        link: &Link,
         around: &Surroundings<'_>,
     ) {
-        let arriving = self.listen(neighbour, stiffness, (around, now.dt));
+        let (Law::Tlm { stiffness_n_m, damping_n_s_m }, Anchor::Arc(arc_m)) = (link.law, link.here) else { return };
+        let Some((far_m, far)) = self.mate.other.point(link.there) else { return };
         let (segment, share) = now.division.locate(arc_m);
+        let way = far_m - now.positions[segment].lerp(now.positions[segment + 1], share);
+        if neighbour.owned {
+            self.line(neighbour.id, stiffness_n_m).begin(way, around.time);
+        }
+        let arriving = self.listen(neighbour, stiffness_n_m, (around, now.dt));
         let mut slots = Slots::default();
         slots.add_linear(2 * segment as u32, 1.0 - share);
         slots.add_linear(2 * segment as u32 + 2, share);
         let own = slots.velocity(now.slots) + now.gravity * now.dt;
-        let columns = DVec3::AXES.map(|axis| self.answer_of(now, &slots, axis));
-        let yields = DMat3::from_cols(columns[0], columns[1], columns[2]);
-        let z = self.line(neighbour.id, stiffness).impedance();
-        let into_line = (DMat3::IDENTITY + yields * z).inverse() * (own * z + arriving);
-        company.received().add_slots(&slots, into_line * -now.dt);
+        let [x, y, z] = DVec3::AXES.map(|axis| self.answer_of(now, &slots, axis));
+        let yields = DMat3::from_cols(x, y, z);
+        let step = (around.time, now.dt);
+        let end = End { step, own, far, way, arriving, yields, rest_m: link.rest_m, damping_n_s_m };
+        let Drawn { force, arriving, into_line } = self.line(neighbour.id, stiffness_n_m).draw(&end);
+        company.received().add_slots(&slots, force * now.dt);
         self.answer(company, neighbour.id, Some((arriving, into_line)), now.dt);
-        tell(company, neighbour.id, PairKind::Tlm, (-into_line, 0.0, 1, now.dt));
+        tell(company, neighbour.id, PairKind::Tlm, (force, 0.0, 1, now.dt));
     }
 
     /// What arrives during the step.

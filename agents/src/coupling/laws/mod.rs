@@ -7,4 +7,4 @@ mod penalty;
 mod tlm;
 
 pub use penalty::push_off_n;
-pub use tlm::{Line, Wave};
+pub use tlm::{Drawn, End, Line, Wave};

@@ -7,8 +7,8 @@
 //! has f = Z v + c. Z = k T, so the line has the mass k T² of its own. What was sent is published as its integral over time:
 //! readings that are lost or made twice take and repeat nothing, and means over a step only dissipate.
 
-use crate::SimTime;
-use glam::DVec3;
+use crate::{SimSpan, SimTime};
+use glam::{DMat3, DVec3};
 use std::collections::VecDeque;
 
 /// What one end publishes.
@@ -18,6 +18,42 @@ pub struct Wave {
     pub sent: DVec3,
     /// The delay of the line, seconds; zero as long as the owner of the pair has not chosen it.
     pub delay_s: f64,
+    /// From this end to the other one when the line was made, metres; zero for a line of a contact.
+    pub start: DVec3,
+    /// From when on both ends feel how far the link was stretched when it was made.
+    pub since: SimTime,
+}
+
+/// One end of a link during a step.
+#[derive(Debug, Clone, Copy)]
+pub struct End {
+    /// When the step begins, and how long it lasts, seconds.
+    pub step: (SimTime, f64),
+    /// Its own velocity at the end of the step without the link, m/s.
+    pub own: DVec3,
+    /// How the other end moves as far as is known, m/s.
+    pub far: DVec3,
+    /// From here to the other end, metres.
+    pub way: DVec3,
+    /// What arrives, N.
+    pub arriving: DVec3,
+    /// The velocity that a force on this end causes by the end of the step, m/s a newton.
+    pub yields: DMat3,
+    /// The distance at which the link pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// Damping beside the line, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// What a link does at one end.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawn {
+    /// The force on this end, N.
+    pub force: DVec3,
+    /// What of the wave that arrived the line answers, N: its part along the link where that has a length at rest.
+    pub arriving: DVec3,
+    /// The force into the line, N.
+    pub into_line: DVec3,
 }
 
 /// One end of a line.
@@ -30,6 +66,8 @@ pub struct Line {
     /// How much of the other's integral has arrived here.
     arrived: DVec3,
     sent: DVec3,
+    start: DVec3,
+    since: SimTime,
 }
 
 /// The most states of the other end that are kept: those of one delay, at a hundred times this end's rate.
@@ -48,7 +86,8 @@ impl Line {
     /// `dt_s` and the other's; the other end takes it over.
     pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
         let wave = wave.unwrap_or_default();
-        if self.heard.back().is_some_and(|&(last, _)| last >= at) || !wave.sent.is_finite() {
+        let sane = wave.sent.is_finite() && wave.start.is_finite();
+        if self.heard.back().is_some_and(|&(last, _)| last >= at) || !sane {
             return;
         }
         if self.delay_s == 0.0 {
@@ -58,6 +97,12 @@ impl Line {
                 _ if decides => 0.0,
                 _ => wave.delay_s,
             };
+            if decides {
+                // by then the other end has heard of it
+                self.since += SimSpan::from_secs_f64(2.0 * self.delay_s).unwrap_or(SimSpan::ZERO);
+            } else {
+                (self.start, self.since) = (-wave.start, wave.since);
+            }
             self.heard.clear();
             self.arrived = wave.sent;
         }
@@ -65,6 +110,37 @@ impl Line {
             self.heard.pop_front();
         }
         self.heard.push_back((at, wave.sent));
+    }
+
+    /// The end that decides notes where the other end is, `way` metres from it, when the line is made: in its step from `at` on.
+    pub fn begin(&mut self, way: DVec3, at: SimTime) {
+        if self.delay_s == 0.0 {
+            (self.start, self.since) = (way, at);
+        }
+    }
+
+    /// What a link on this line does at one end, implicit in its own motion.
+    ///
+    /// The line carries what has changed since it was made; what it was stretched by then pulls as it is. Without a length at
+    /// rest the link is the same in all directions, else it acts along itself.
+    #[must_use]
+    pub fn draw(&self, end: &End) -> Drawn {
+        let along = end.way.normalize_or_zero();
+        let here = if end.rest_m > 0.0 {
+            DMat3::from_cols(along * along.x, along * along.y, along * along.z)
+        } else {
+            DMat3::IDENTITY
+        };
+        let (at, h) = end.step;
+        let felt = (1.0 - self.since.secs_after(at) / h).clamp(0.0, 1.0);
+        let taut = if self.delay_s > 0.0 { felt * self.stiffness_n_m } else { 0.0 };
+        let start = if end.rest_m > 0.0 { along * (self.start.length() - end.rest_m) } else { self.start };
+        let (z, c) = (self.impedance(), end.damping_n_s_m);
+        let arriving = here * end.arriving;
+        let drive = start * taut - arriving + here * ((end.far - end.own) * c - end.own * z);
+        let force = (DMat3::IDENTITY + here * end.yields * (z + c)).inverse() * drive;
+        let into_line = here * (end.own + end.yields * force) * z + arriving;
+        Drawn { force, arriving, into_line }
     }
 
     /// What arrives on the average of the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
@@ -88,7 +164,7 @@ impl Line {
     /// What this end publishes.
     #[must_use]
     pub const fn wave(&self) -> Wave {
-        Wave { sent: self.sent, delay_s: self.delay_s }
+        Wave { sent: self.sent, delay_s: self.delay_s, start: self.start, since: self.since }
     }
 
     /// Z = k T, N·s/m.
@@ -119,7 +195,6 @@ impl Line {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::SimSpan;
 
     /// Two bodies of 1 kg on a line, stepped at the same clock or at different ones: the stretch over time.
     fn swing(stiffness: f64, steps: [f64; 2], seconds: f64) -> Vec<(f64, f64, f64)> {

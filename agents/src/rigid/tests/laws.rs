@@ -88,7 +88,7 @@ fn a_link_by_wave_variables_swings_and_stays_bounded() {
             there: centre,
             stiffness_n_m: 40.0,
             damping_n_s_m: 0.0,
-            rest_m: 0.0,
+            rest_m: 0.3,
             law,
         };
         stage.link(first, link);
@@ -102,5 +102,59 @@ fn a_link_by_wave_variables_swings_and_stays_bounded() {
         println!("{rates:?}: {most} J of 0.025, {nearest} … {farthest} m");
         assert!(most < 0.025 * 1.01, "{rates:?}: {most} J");
         assert!(farthest > 0.305 && farthest < 0.4 && nearest > 0.2, "{rates:?}: {nearest} … {farthest} m");
+    }
+}
+
+#[test]
+fn a_link_by_wave_variables_comes_to_rest_at_its_length_where_it_is_damped() {
+    for (rates, rest_m) in
+        [([1000.0, 1000.0], 0.1), ([1000.0, 240.0], 0.1), ([100.0, 1000.0], 0.1), ([1000.0, 240.0], 0.0)]
+    {
+        let mut stage = Stage::new(Faults::default());
+        let make = |x: f64| {
+            let solid = Solid::Ball { radius_m: 0.01 };
+            RigidBody::new(RigidSpec { mass_kg: 0.2, gravity: DVec3::ZERO, ..spec(solid, DVec3::X * x) }).unwrap()
+        };
+        let (first, second) = (stage.add(make(0.0), rates[0]), stage.add(make(0.3), rates[1]));
+        stage.law(first, second, Law::Off);
+        let centre = Anchor::Local(DVec3::ZERO);
+        let law = Law::Tlm { stiffness_n_m: 40.0, damping_n_s_m: 2.0 };
+        let (stiffness_n_m, damping_n_s_m) = (40.0, 2.0);
+        stage.link(
+            first,
+            Link { other: second, here: centre, there: centre, stiffness_n_m, damping_n_s_m, rest_m, law },
+        );
+        stage.run(4.0, |_| {});
+        let ends = [first, second].map(|id| stage.settled(id, 4.0).state);
+        let apart = ends[0].position.distance(ends[1].position);
+        println!("{rates:?}, rest {rest_m} m: {apart} m, {} {}", ends[0].velocity, ends[1].velocity);
+        // what moved before both ends had heard of the line
+        assert!((apart - rest_m).abs() < 2e-3, "{rates:?}: {apart} m for {rest_m} m");
+        let drift = (ends[0].velocity + ends[1].velocity).length() * 0.2;
+        // eight newtons pulled at first
+        assert!(drift < 2e-3, "{rates:?}: {drift} kg m/s out of nothing");
+    }
+}
+
+/// Weight over stiffness is how deep a ball lies in what stands, and it goes no deeper.
+#[test]
+fn wave_variables_bear_a_body_on_one_that_stands() {
+    for rates in [[1000.0, 240.0], [240.0, 1000.0], [240.0, 240.0]] {
+        let mut stage = Stage::new(Faults::default());
+        let table = RigidSpec { mass_kg: 2.0, obstacles: [floor(0.5)].into(), sleep: false, ..cube(0.1, UP * 0.1) };
+        let ball = RigidSpec { mass_kg: 0.1, sleep: false, ..spec(Solid::Ball { radius_m: RADIUS }, UP * 0.2501) };
+        let table = stage.add(RigidBody::new(table).unwrap(), rates[0]);
+        let ball = stage.add(RigidBody::new(ball).unwrap(), rates[1]);
+        stage.law(table, ball, Law::Tlm { stiffness_n_m: 500.0, damping_n_s_m: 2.0 });
+        let (mut early, mut late) = (0.0, 0.0);
+        stage.run(4.0, |stage| {
+            let now = stage.newest(table).time.as_secs_f64();
+            let [low, high] = [table, ball].map(|id| stage.settled(id, now).state.position.z);
+            (early, late) =
+                if now < 2.0 { (0.25 - (high - low) - 0.1, late) } else { (early, 0.25 - (high - low) - 0.1) };
+        });
+        println!("{rates:?}: {early} m deep after 2 s, {late} m after 4 s");
+        // its weight over the stiffness is 2 mm
+        assert!(early < 4e-3 && late < 4e-3 && late > -4e-3, "{rates:?}: {early} m, {late} m");
     }
 }
