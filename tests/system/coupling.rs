@@ -64,9 +64,12 @@ fn heavy_on_light_holds_wherever_another_engine_does() {
 
 #[test]
 fn a_closed_system_of_five_clocks_keeps_its_momentum_and_gains_no_energy() {
-    let closed = holds("stability", "closed", 3);
-    let row = &closed["table"][0];
-    assert!(number(row, "looks") >= 30.0 && number(row, "in flight") > 0.0, "{row}");
+    let closed = holds("stability", "closed", 4);
+    let rows = closed["table"].as_array().unwrap();
+    assert_eq!(rows.len(), 2, "plates and a ring");
+    for row in rows {
+        assert!(number(row, "blows") > 0.0 && number(row, "in flight") > 0.0, "{row}");
+    }
 }
 
 #[test]
@@ -93,11 +96,11 @@ fn a_tube_on_a_bar_between_two_clocks_lies_still() {
 
 #[test]
 fn the_error_that_clocks_apart_make_is_told_for_every_scene() {
-    let error = holds("coupling", "error", 1);
+    let error = holds("coupling", "error", 4);
     let rows = error["table"].as_array().unwrap();
-    assert_eq!(rows.len(), 8);
+    assert_eq!(rows.len(), 12, "four scenes, 1:1, 1:10 and 10:1");
     for row in rows.iter().filter(|r| r["scene"] == "oblique-blow") {
-        // exact but for where the slow ball is between its states: a blow known a step late, 1 m/s for 10 ms
-        assert!(number(row, "max_mm") < 10.0 && number(row, "momentum_n_s") < 1e-9, "{row}");
+        // everything delivered at a common time: what is left is where the blow was found, to a thousandth of a millimetre
+        assert!(number(row, "max_mm") < 1e-2 && number(row, "momentum_error") < 1e-9, "{row}");
     }
 }

@@ -32,6 +32,7 @@ pub(super) fn scene(name: &str, rates_hz: [f64; 2], faults: Faults) -> Option<Sc
         "tube-on-bar" => tube_on_bar(rates_hz, faults),
         "gripper" => gripper(rates_hz, faults),
         "crossing" => crossing(rates_hz, faults),
+        "ball-on-box" => ball_on_box(rates_hz, faults),
         "oblique-blow" => oblique_blow(rates_hz, faults),
         _ => None,
     }
@@ -123,6 +124,22 @@ fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     let points =
         [lower, upper].into_iter().flat_map(|id| [0.0, half, 2.0 * half].map(|s| (id, Anchor::Arc(s)))).collect();
     let zero_j = play.raw_j() - weight_n(2.0 * half) * 0.05;
+    Some(Scene { play, points, zero_j })
+}
+
+/// A ball falls a centimetre on a box that stands free on the floor, and stays there.
+fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
+    let mut play = Play::new(Law::Ledger, faults);
+    let (half, radius_m, fall_m) = (0.1, 0.05, 0.01);
+    let plain = |solid: Solid, height: f64, mass_kg: f64| {
+        let plain = plain_body(solid, DVec3::Z * height, mass_kg);
+        RigidSpec { gravity: gravity(), friction: 0.5, obstacles: [floor()].into(), ..plain }
+    };
+    let ball = plain(Solid::Ball { radius_m }, 2.0 * half + radius_m + fall_m, 0.1);
+    let ball = play.add_body(ball, ball_hz, vec![])?;
+    let below = play.add_body(plain(Solid::Box { half_extents_m: DVec3::splat(half) }, half, 1.0), box_hz, vec![])?;
+    let points = [ball, below].map(|id| (id, Anchor::Local(DVec3::ZERO))).to_vec();
+    let zero_j = play.raw_j() - 0.1 * GRAVITY * fall_m;
     Some(Scene { play, points, zero_j })
 }
 

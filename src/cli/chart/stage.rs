@@ -2,7 +2,7 @@
 //!
 //! In: agents, their rates, laws, springs and faults. Out: what each published last, and sums at a common time. Whoever's time
 //! is earliest steps next, of equals the lower number; what it publishes is seen at once, stamped with the end of its step, as
-//! in a run whose turns cost nothing. Never here: what is measured of it.
+//! in a run whose turns cost nothing, or when that time has come. Never here: what is measured of it.
 
 use metachron_agents::coupling::audit::Member;
 use metachron_agents::coupling::{Form, Law, Link, Standing, owns};
@@ -18,6 +18,8 @@ pub(super) struct Faults {
     pub(super) loss: f64,
     /// Equal seeds disturb equally.
     pub(super) seed: u64,
+    /// Whether a state is seen only when its time has come: as where a turn takes as long as the step that it makes.
+    pub(super) due: bool,
 }
 
 /// Agents that see each other.
@@ -35,8 +37,8 @@ struct Actor {
     rate_hz: f64,
     /// What it is, seen by others or not.
     own: Snapshot,
-    /// What others see.
-    shown: Arc<Snapshot>,
+    /// What others see, and what they saw before.
+    shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
     hands: Vec<Pull>,
     links: Vec<Link>,
@@ -56,7 +58,8 @@ impl Stage {
     pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: [f64; 2]) -> AgentId {
         let mut own = Snapshot::default();
         agent.write_snapshot(&mut own);
-        let (form, shown) = (agent.form(), Arc::new(own.clone()));
+        let (form, first) = (agent.form(), Arc::new(own.clone()));
+        let shown = [first.clone(), first];
         self.actors.push(Actor {
             agent,
             form,
@@ -134,7 +137,8 @@ impl Stage {
         actor.agent.write_snapshot(&mut actor.own);
         actor.own.time = time + dt;
         if !lost {
-            actor.shown = Arc::new(actor.own.clone());
+            actor.shown.swap(0, 1);
+            actor.shown[0] = Arc::new(actor.own.clone());
         }
         Ok(())
     }
@@ -145,10 +149,11 @@ impl Stage {
             let actor = &self.actors[i];
             Standing { id: AgentId(i as u32), model: actor.agent.model(), rate_hz: actor.rate_hz }
         };
-        let actor = &self.actors[other];
+        let (actor, now) = (&self.actors[other], self.actors[me].own.time);
+        let early = self.faults.due && actor.shown[0].time > now;
         Neighbour {
             id: AgentId(other as u32),
-            snapshot: Arc::clone(&actor.shown),
+            snapshot: Arc::clone(&actor.shown[usize::from(early)]),
             form: actor.form.clone(),
             law: self.law,
             owned: owns(standing(me), standing(other)),

@@ -1,59 +1,53 @@
-//! A closed system: three balls and two tubes in a ring of soft springs, five clocks, no gravity, a minute.
+//! A closed system of three rigid bodies and two tubes, five clocks, no gravity, a minute.
 //!
+//! `plates`: two heavy plates close in on a ball and two tubes. `ring`: three balls and two tubes, each on a spring to the next.
 //! Nothing pulls from outside, so momentum stays, and energy may only fall. Both are taken when all five clocks show the same
 //! time, every impulse that was given delivered; and as they are told, to see what was on its way.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::play::Play;
-use super::super::stage::Faults;
 use super::super::table::Table;
-use super::common::{plain_body, plain_tube};
+use super::five::{ROOM_M, SYSTEMS, system};
 use glam::DVec3;
 use metachron_agents::coupling::audit::{Audit, audit};
-use metachron_agents::coupling::{Law, Link};
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::Solid;
-use metachron_agents::{AgentId, Anchor, SimTime};
+use metachron_agents::{AgentId, SimTime};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 /// The experiment.
 pub(in super::super) struct Closed;
 
-/// Rates of ball, tube, ball, tube, ball: all show the same time every 50 ms.
-const RATES_HZ: [f64; 5] = [1000.0, 500.0, 240.0, 120.0, 60.0];
 /// Which way the five are set up, so that each clock drives each kind once.
 const TURNS: [usize; 5] = [0, 1, 2, 3, 4];
+/// Seeds of the starting velocities.
+const SEEDS: [u64; 2] = [1, 2];
 const SECONDS: f64 = 60.0;
 const QUICK_SECONDS: f64 = 2.0;
-const MASSES_KG: [f64; 3] = [1.0, 0.5, 0.2];
-const RADIUS_M: f64 = 0.05;
-const TUBE_M: f64 = 0.4;
-const TUBE_RADIUS_M: f64 = 0.015;
-const SEGMENTS: usize = 12;
-/// The ring: radius, and stiffness and length of its springs.
-const RING_M: f64 = 0.3;
-const SPRING_N_M: f64 = 4.0;
-const SPRING_REST_M: f64 = 0.05;
 /// Clocks agree to within this, seconds: sixtieths are not whole nanoseconds.
 const SAME_S: f64 = 1e-5;
 const ENERGY_MAX: f64 = 1.01;
-/// What momentum may change with everything delivered, as a share of the momenta at the start.
-const DRIFT_MAX: f64 = 0.005;
+/// Momentum with everything delivered may round by so much, as a share of the momenta exchanged.
+const ROUNDING: f64 = 1e-9;
+/// They go on meeting: no time without a blow between two of them is longer than this share of the run.
+const PAUSE_MAX: f64 = 0.25;
 
 /// Which way it is set up, and for how long it runs.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
+    system: String,
     turn: usize,
+    seed: u64,
     seconds: f64,
 }
 
 /// What it came to.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
+    system: String,
     /// The rates are handed on by so many places.
     turn: usize,
+    seed: u64,
     seconds: f64,
     /// Peak of the energy at a common time, in that of the start.
     energy_peak: f64,
@@ -62,12 +56,22 @@ pub(in super::super) struct Row {
     raw_peak: f64,
     /// The greatest change of momentum, everything delivered, as a share of the momenta at the start added.
     drift: f64,
-    /// The same without delivery, and the greatest impulse that was on its way meanwhile.
+    /// The same of the angular momentum, as a share of the angular momenta that the momenta would have at the plates.
+    angular_drift: f64,
+    /// The same of the momentum without delivery; the greatest impulse on its way; the most by which the one passed the other.
     raw_drift: f64,
     in_flight: f64,
-    /// How often all clocks agreed, and contacts there were then.
+    beyond: f64,
+    /// How often all clocks agreed, and since when they did two of them had struck each other.
     looks: u32,
-    contacts: u32,
+    blows: u32,
+    /// The longest time without a blow, seconds.
+    pause_s: f64,
+    /// Second by second, with spaces between: the highest energy, the greatest change of momentum as told, the greatest
+    /// impulse on its way; shares as above.
+    energy_of_second: String,
+    told_of_second: String,
+    in_flight_of_second: String,
 }
 
 impl Experiment for Closed {
@@ -75,62 +79,92 @@ impl Experiment for Closed {
     type Row = Row;
     const NAME: &'static str = "closed";
     const TITLE: &'static str =
-        "three balls and two tubes in a ring, five clocks: momentum and energy at a common time";
+        "three rigid bodies and two tubes, five clocks, nothing from outside: momentum and energy at a common time";
 
     fn cases(quick: bool) -> Vec<Case> {
-        let (turns, seconds) = if quick { (&TURNS[..1], QUICK_SECONDS) } else { (&TURNS[..], SECONDS) };
-        turns.iter().map(|&turn| Case { turn, seconds }).collect()
+        let (turns, seeds, seconds) =
+            if quick { (&TURNS[..1], &SEEDS[..1], QUICK_SECONDS) } else { (&TURNS[..], &SEEDS[..], SECONDS) };
+        let mut cases = Vec::new();
+        for system in SYSTEMS {
+            for &turn in turns {
+                cases.extend(seeds.iter().map(|&seed| Case { system: system.to_owned(), turn, seed, seconds }));
+            }
+        }
+        cases
     }
 
     fn measure(case: &Case) -> Row {
-        let Case { turn, seconds } = *case;
-        let broken = Row {
+        let (sums, whole) = play(case).unwrap_or_default();
+        let [energy_peak, energy_end, raw_peak, drift, angular_drift, raw_drift, in_flight, beyond] =
+            if whole { sums.numbers() } else { [f64::NAN; 8] };
+        let Case { system, turn, seed, seconds } = case.clone();
+        let [energy_of_second, told_of_second, in_flight_of_second] = [0, 1, 2].map(|k| sums.of_second(k));
+        Row {
+            system,
             turn,
+            seed,
             seconds,
-            energy_peak: f64::NAN,
-            energy_end: f64::NAN,
-            raw_peak: f64::NAN,
-            drift: f64::NAN,
-            raw_drift: f64::NAN,
-            in_flight: f64::NAN,
-            looks: 0,
-            contacts: 0,
-        };
-        play(case).unwrap_or(broken)
+            energy_peak,
+            energy_end,
+            raw_peak,
+            drift,
+            angular_drift,
+            raw_drift,
+            in_flight,
+            beyond,
+            looks: sums.looks,
+            blows: sums.blows,
+            pause_s: sums.pause_s.max(seconds - sums.last_blow_s),
+            energy_of_second,
+            told_of_second,
+            in_flight_of_second,
+        }
     }
 
     fn case_of(row: &Row) -> Case {
-        Case { turn: row.turn, seconds: row.seconds }
+        Case { system: row.system.clone(), turn: row.turn, seed: row.seed, seconds: row.seconds }
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let dots = |label: &str, colour, get: fn(&Row) -> f64| Layer {
-            label: label.to_owned(),
-            colour,
-            mark: Mark::Dots(rows.iter().map(|r| (r.turn as f64, get(r))).collect()),
-        };
-        let x = || Axis::linear("which way the clocks are handed out", -0.5, 4.5);
-        let limit = Mark::Dashed(vec![(-0.5, ENERGY_MAX), (4.5, ENERGY_MAX)]);
-        let energies = rows.iter().flat_map(|r| [r.energy_peak, r.energy_end]).chain([ENERGY_MAX]);
+        let seconds = rows.iter().map(|r| r.seconds).fold(1.0, f64::max);
+        let x = || Axis::linear("time, s", 0.0, seconds);
+        let energies = rows.iter().flat_map(|r| read(&r.energy_of_second)).map(|p| p.1).chain([1.0, ENERGY_MAX]);
         let (low, high) = span(energies, false);
+        let limit = Layer {
+            label: "start + 1 %".to_owned(),
+            colour: Colour::Grey,
+            mark: Mark::Dashed(vec![(0.0, ENERGY_MAX), (seconds, ENERGY_MAX)]),
+        };
+        let lines = rows.iter().map(|r| {
+            let colour = Colour::LINES[r.turn % Colour::LINES.len()];
+            let first = r.seed == SEEDS[0] && r.system == SYSTEMS[0];
+            let label = if first { format!("clocks handed on by {}", r.turn) } else { String::new() };
+            Layer { label, colour, mark: Mark::Line(read(&r.energy_of_second)) }
+        });
         let energy = Panel {
             title: "energy at a common time".to_owned(),
             x: x(),
             y: Axis::linear("share of the start's", low, high),
-            layers: vec![
-                Layer { label: "start + 1 %".to_owned(), colour: Colour::Grey, mark: limit },
-                dots("peak", Colour::Blue, |r| r.energy_peak),
-                dots("after a minute", Colour::Green, |r| r.energy_end),
-            ],
+            layers: [limit].into_iter().chain(lines).collect(),
         };
+        let dots = |label: &str, colour, get: fn(&Row) -> &str| Layer {
+            label: label.to_owned(),
+            colour,
+            mark: Mark::Dots(rows.iter().flat_map(|r| read(get(r))).map(|(t, v)| (t, v.max(FLOOR))).collect()),
+        };
+        let delivered = rows.iter().map(|r| r.drift).fold(FLOOR, f64::max);
         let momentum = Panel {
             title: "momentum".to_owned(),
             x: x(),
-            y: Axis::log("change / momenta at the start", 1e-16, 1.0),
+            y: Axis::log("change / momenta at the start", FLOOR, 10.0),
             layers: vec![
-                dots("as it is told", Colour::Red, |r| r.raw_drift.max(1e-16)),
-                dots("on its way", Colour::Orange, |r| r.in_flight.max(1e-16)),
-                dots("delivered", Colour::Blue, |r| r.drift.max(1e-16)),
+                dots("on its way", Colour::Orange, |r| &r.in_flight_of_second),
+                dots("change as told", Colour::Red, |r| &r.told_of_second),
+                Layer {
+                    label: "greatest change, delivered".to_owned(),
+                    colour: Colour::Blue,
+                    mark: Mark::Line(vec![(0.0, delivered), (seconds, delivered)]),
+                },
             ],
         };
         Figure { title: "A closed system of five clocks".to_owned(), panels: vec![energy, momentum], columns: 2 }
@@ -138,115 +172,123 @@ impl Experiment for Closed {
 
     fn table(rows: &[Row]) -> Table {
         let mut table = Table::new(&[
+            "system",
             "turn",
+            "seed",
             "seconds",
             "energy peak",
             "energy end",
             "raw peak",
             "drift",
+            "angular",
             "raw drift",
             "in flight",
-            "looks",
-            "contacts",
+            "blows",
+            "pause_s",
         ]);
         table.rows.extend(rows.iter().map(|r| {
             vec![
+                r.system.clone().into(),
                 (r.turn as f64, 0).into(),
+                (r.seed as f64, 0).into(),
                 (r.seconds, 0).into(),
                 (r.energy_peak, 4).into(),
                 (r.energy_end, 4).into(),
                 (r.raw_peak, 4).into(),
                 (r.drift, 4).into(),
+                (r.angular_drift, 4).into(),
                 (r.raw_drift, 4).into(),
                 (r.in_flight, 4).into(),
-                (f64::from(r.looks), 0).into(),
-                (f64::from(r.contacts), 0).into(),
+                (f64::from(r.blows), 0).into(),
+                (r.pause_s, 1).into(),
             ]
         }));
         table
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let beyond = |r: &Row| r.raw_drift - r.in_flight;
+        let most = |get: fn(&Row) -> f64| worst(rows.iter().map(get));
         vec![
-            Finding::at_most(
-                "energy at a common time, in that of the start",
-                worst(rows.iter().map(|r| r.energy_peak)),
-                ENERGY_MAX,
-            ),
-            Finding::at_most(
-                "momentum, everything delivered: change over the momenta",
-                worst(rows.iter().map(|r| r.drift)),
-                DRIFT_MAX,
-            ),
-            Finding::at_most(
-                "momentum as told: change beyond what was on its way",
-                worst(rows.iter().map(beyond)),
-                0.0,
-            ),
+            Finding::at_most("energy at a common time, in that of the start", most(|r| r.energy_peak), ENERGY_MAX),
+            Finding::at_most("momentum, everything delivered: change over the momenta", most(|r| r.drift), ROUNDING),
+            Finding::at_most("momentum as told: change beyond what was on its way", most(|r| r.beyond), ROUNDING),
+            Finding::at_most("longest pause between blows over the run", most(|r| r.pause_s / r.seconds), PAUSE_MAX),
         ]
     }
 }
 
-/// Five in a ring: ball, tube, ball, tube, ball.
-fn ring(turn: usize) -> Option<(Play, [AgentId; 5])> {
-    let mut play = Play::new(Law::Ledger, Faults::default());
-    let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
-    let angle = |i: usize| std::f64::consts::TAU * i as f64 / 5.0;
-    let at = |i: usize| DVec3::new(libm::cos(angle(i)), libm::sin(angle(i)), 0.1 * (i as f64 - 2.0)) * RING_M;
-    let along = |i: usize| DVec3::new(-libm::sin(angle(i)), libm::cos(angle(i)), 0.2);
-    let ball = |i: usize, k: usize| RigidSpec {
-        velocity: at(i) * -1.5 + DVec3::new(0.1, -0.05, 0.2) * (k as f64 - 1.0),
-        spin: DVec3::new(2.0, 1.0, -1.0) * k as f64,
-        restitution: 0.7,
-        friction: 0.3,
-        ..plain_body(Solid::Ball { radius_m: RADIUS_M }, at(i), MASSES_KG[k])
-    };
-    let tube = |i: usize| {
-        let half = along(i).normalize() * (0.5 * TUBE_M);
-        TubeSpec { friction: 0.3, ..plain_tube(vec![at(i) - half, at(i) + half], TUBE_RADIUS_M, SEGMENTS) }
-    };
-    let ids = [
-        play.add_body(ball(0, 0), rate(0), vec![])?,
-        play.add_tube(tube(1), rate(1))?,
-        play.add_body(ball(2, 1), rate(2), vec![])?,
-        play.add_tube(tube(3), rate(3))?,
-        play.add_body(ball(4, 2), rate(4), vec![])?,
-    ];
-    let (ball, start, end) = (Anchor::Local(DVec3::ZERO), Anchor::Arc(0.0), Anchor::Arc(TUBE_M));
-    let ties = [(0, ball, 1, start), (1, end, 2, ball), (2, ball, 3, start), (3, end, 4, ball), (4, ball, 0, ball)];
-    for (a, here, b, there) in ties {
-        let link = Link {
-            other: ids[b],
-            here,
-            there,
-            stiffness_n_m: SPRING_N_M,
-            damping_n_s_m: 0.0,
-            rest_m: SPRING_REST_M,
-            law: Law::Ledger,
-        };
-        play.link(ids[a], link);
-    }
-    Some((play, ids))
+/// The least that the figure of momentum shows.
+const FLOOR: f64 = 1e-16;
+
+/// Numbers of a row, second by second.
+fn read(numbers: &str) -> Vec<(f64, f64)> {
+    let values = numbers.split(' ').filter_map(|v| v.parse().ok());
+    values.enumerate().map(|(second, v)| (second as f64 + 0.5, v)).collect()
 }
 
-fn play(case: &Case) -> Option<Row> {
-    let (play, ids) = ring(case.turn)?;
+/// What is summed up over a run; momenta are shares of those at the start.
+#[derive(Debug, Clone, Default)]
+struct Sums {
+    energy: [f64; 3],
+    drift: [f64; 2],
+    told: [f64; 3],
+    looks: u32,
+    blows: u32,
+    last_blow_s: f64,
+    pause_s: f64,
+    /// Cumulative impulses of the pairs.
+    struck: BTreeMap<[AgentId; 2], f64>,
+    seconds: Vec<[f64; 3]>,
+}
+
+impl Sums {
+    fn numbers(&self) -> [f64; 8] {
+        let ([peak, end, raw], [drift, angular], [told, flying, beyond]) = (self.energy, self.drift, self.told);
+        [peak, end, raw, drift, angular, told, flying, beyond]
+    }
+
+    fn of_second(&self, which: usize) -> String {
+        let numbers: Vec<String> = self.seconds.iter().map(|s| format!("{:.6e}", s[which])).collect();
+        numbers.join(" ")
+    }
+
+    /// Takes in a look at `at_s`: energies, changes of momenta, what is on its way.
+    fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [told, flying]: [f64; 2]) {
+        self.energy = [worst([self.energy[0], energy]), energy, worst([self.energy[2], raw])];
+        self.drift = [0, 1].map(|k| worst([self.drift[k], drift[k]]));
+        let told = [told, flying, told - flying];
+        self.told = [0, 1, 2].map(|k| worst([self.told[k], told[k]]));
+        self.seconds.resize((at_s as usize + 1).max(self.seconds.len()), [0.0; 3]);
+        if let Some(second) = self.seconds.last_mut() {
+            let now = [energy, told[0], told[1]];
+            *second = [0, 1, 2].map(|k| worst([second[k], now[k]]));
+        }
+        self.looks += 1;
+    }
+
+    /// Looks for pairs whose impulse has changed since the last look.
+    fn strike(&mut self, at_s: f64, play: &Play, ids: [AgentId; 5]) {
+        let mut struck = false;
+        for id in ids {
+            for pair in &play.stage.own(id).pairs {
+                struck |= self.struck.insert([id, pair.with], pair.impulse_n_s).unwrap_or(0.0) != pair.impulse_n_s;
+            }
+        }
+        if struck {
+            self.blows += 1;
+            self.pause_s = self.pause_s.max(at_s - self.last_blow_s);
+            self.last_blow_s = at_s;
+        }
+    }
+}
+
+/// Plays the case; and whether it came to its end.
+fn play(case: &Case) -> Option<(Sums, bool)> {
+    let (play, ids) = system(&case.system, case.turn, case.seed)?;
     let start = play.common(SimTime::ZERO);
     let size: f64 = momenta(&play, ids);
     let (raw_start, told_start) = (play.raw_j(), told(&play));
-    let mut row = Row {
-        turn: case.turn,
-        seconds: case.seconds,
-        energy_peak: 1.0,
-        energy_end: 1.0,
-        raw_peak: 1.0,
-        drift: 0.0,
-        raw_drift: 0.0,
-        in_flight: 0.0,
-        looks: 0,
-        contacts: 0,
-    };
+    let mut sums = Sums::default();
     let ended = play.run(case.seconds, |play, _| {
         let times = ids.map(|id| play.stage.own(id).time);
         let (first, last) = (times.iter().min().copied(), times.iter().max().copied());
@@ -254,18 +296,18 @@ fn play(case: &Case) -> Option<Row> {
         if last.secs_after(first) > SAME_S {
             return true;
         }
-        let sum = play.common(first);
-        row.energy_peak = worst([row.energy_peak, sum.energy_j / start.energy_j]);
-        row.energy_end = sum.energy_j / start.energy_j;
-        row.raw_peak = worst([row.raw_peak, play.raw_j() / raw_start]);
-        row.drift = worst([row.drift, (sum.momentum - start.momentum).length() / size]);
-        row.raw_drift = worst([row.raw_drift, (told(play) - told_start).length() / size]);
-        row.in_flight = worst([row.in_flight, sum.in_flight_n_s / size]);
-        row.looks += 1;
-        row.contacts += ids.iter().flat_map(|id| &play.stage.own(*id).pairs).map(|pair| pair.contacts).sum::<u32>();
-        row.energy_peak < 1e3
+        let (now, at_s) = (play.common(first), first.as_secs_f64());
+        let energy = [now.energy_j / start.energy_j, play.raw_j() / raw_start];
+        let drift = [
+            (told(play) + on_its_way(play, ids) - told_start).length(),
+            (now.angular - start.angular).length() / ROOM_M,
+        ];
+        let told = [(told(play) - told_start).length(), now.in_flight_n_s];
+        sums.add(at_s, energy, drift.map(|d| d / size), told.map(|t| t / size));
+        sums.strike(at_s, play, ids);
+        energy[0] < 1e3
     });
-    (ended.time().as_secs_f64() >= case.seconds - 1e-3 || row.energy_peak >= 1e3).then_some(row)
+    Some((sums, ended.time().as_secs_f64() >= case.seconds - 1e-3))
 }
 
 /// Magnitudes of all momenta added, kg·m/s.
@@ -273,6 +315,11 @@ fn momenta(play: &Play, ids: [AgentId; 5]) -> f64 {
     let members = play.stage.members();
     let one = |id: AgentId| audit(&members[id.0 as usize..=id.0 as usize], SimTime::ZERO, &mut |_, _| 0.0);
     ids.map(one).iter().map(|sum: &Audit| sum.momentum.length()).sum()
+}
+
+/// The linear impulses that were given and not yet taken, kg·m/s.
+fn on_its_way(play: &Play, ids: [AgentId; 5]) -> DVec3 {
+    ids.iter().map(|id| play.in_flight(*id)).sum()
 }
 
 /// Momentum as the agents tell it, nothing delivered, kg·m/s.

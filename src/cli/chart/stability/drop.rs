@@ -279,7 +279,7 @@ pub(super) fn pair(space: &str, law: Law, rate_hz: f64, (faults, fall_m): (Fault
 }
 
 fn fall(case: &Case, seed: u64) -> Option<Fall> {
-    let faults = Faults { jitter: JITTER, loss: case.loss, seed };
+    let faults = Faults { jitter: JITTER, loss: case.loss, seed, due: false };
     let law = law(&case.law, case.stiffness_n_m, DAMPING_RATIO);
     let Pair { play, mounted, falling, zero_j } = pair(&case.space, law, case.rate_hz, (faults, FALL_M))?;
     let start_j = play.raw_j() - zero_j;

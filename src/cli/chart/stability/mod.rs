@@ -4,6 +4,7 @@ pub(super) mod capstan;
 pub(super) mod closed;
 pub(super) mod common;
 pub(super) mod drop;
+mod five;
 mod hanging;
 pub(super) mod heavy;
 pub(super) mod impact;

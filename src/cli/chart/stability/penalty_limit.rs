@@ -1,9 +1,13 @@
 //! How stiff a penalty contact from stale states may be, beside the formula k < 0.55 μ/τ².
 //!
 //! A ball is let fall a centimetre on a spring-mounted one. Contact damping is 0.64 of the critical, where the formula allows
-//! the most. The stiffness at which the motion no longer dies away is found by halving.
+//! the most. A state is seen when its time has come: so the slow body's is H/2 old on average when it is used, and the force
+//! that it finds from a fresh one lasts for H, which is as old. (Where turns cost nothing a state of the end of a step is seen
+//! at its beginning; that is early by as much, and at 240 Hz unstable from a ninth of the formula on.) The stiffness at which
+//! the motion no longer dies away is found by halving. A linear model of both clocks, sampled as they are, has 0.67 of the
+//! formula at 240 to 60 Hz; below, the springs that the lower body stands on take part.
 
-use super::super::experiment::{Experiment, Finding};
+use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::stage::Faults;
 use super::super::table::Table;
@@ -26,8 +30,8 @@ const LATE_S: f64 = 2.0;
 const LEFT: f64 = 0.5;
 const STIFFNESS_N_M: [f64; 2] = [1.0, 1e7];
 const HALVINGS: u32 = 18;
-/// Up to here the age of what the slow body sends decides; above, that of what it gets, and the springs it stands on.
-const CLAIMED_HZ: f64 = 60.0;
+/// The measured limit and the formula are apart by less than this factor.
+const APART_MAX: f64 = 2.0;
 
 /// A law and a rate.
 #[derive(Debug, Clone, PartialEq)]
@@ -45,10 +49,8 @@ pub(in super::super) struct Row {
     halvings: u32,
     /// The stiffest contact that dies away, N/m.
     measured_n_m: f64,
-    /// 0.55 μ/τ² with τ = H, a step of the slow body: what it acts on is so old at the end of its step.
-    step_old_n_m: f64,
-    /// The same with τ = H/2: so old it is on average.
-    half_step_old_n_m: f64,
+    /// 0.55 μ/τ² with τ = H/2, half a step of the slow body.
+    theory_n_m: f64,
 }
 
 impl Experiment for PenaltyLimit {
@@ -70,15 +72,14 @@ impl Experiment for PenaltyLimit {
             if dies_away(case, libm::exp(middle)) { low = middle } else { high = middle }
         }
         let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
-        let limit = |tau_s: f64| LIMIT * reduced_kg / (tau_s * tau_s);
+        let tau_s = 0.5 / case.rate_hz;
         let Case { law, rate_hz, halvings } = case.clone();
         Row {
             law,
             rate_hz,
             halvings,
             measured_n_m: libm::exp(0.5 * (low + high)),
-            step_old_n_m: limit(1.0 / rate_hz),
-            half_step_old_n_m: limit(0.5 / rate_hz),
+            theory_n_m: LIMIT * reduced_kg / (tau_s * tau_s),
         }
     }
 
@@ -87,18 +88,9 @@ impl Experiment for PenaltyLimit {
     }
 
     fn figure(rows: &[Row]) -> Figure {
-        let line = |get: fn(&Row) -> f64| {
-            let here = rows.iter().filter(|r| r.law == LAWS[0]).map(|r| (r.rate_hz, get(r)));
-            Mark::Dashed(here.collect())
-        };
-        let mut layers = vec![
-            Layer { label: "0.55 μ/τ², τ = H".to_owned(), colour: Colour::Grey, mark: line(|r| r.step_old_n_m) },
-            Layer {
-                label: "0.55 μ/τ², τ = H/2".to_owned(),
-                colour: Colour::Orange,
-                mark: line(|r| r.half_step_old_n_m),
-            },
-        ];
+        let theory = rows.iter().filter(|r| r.law == LAWS[0]).map(|r| (r.rate_hz, r.theory_n_m));
+        let mark = Mark::Dashed(theory.collect());
+        let mut layers = vec![Layer { label: "0.55 μ/τ², τ = H/2".to_owned(), colour: Colour::Grey, mark }];
         for (law, colour) in LAWS.into_iter().zip(Colour::LINES) {
             let points = rows.iter().filter(|r| r.law == law).map(|r| (r.rate_hz, r.measured_n_m)).collect();
             layers.push(Layer { label: format!("{law}, measured"), colour, mark: Mark::Line(points) });
@@ -109,30 +101,25 @@ impl Experiment for PenaltyLimit {
     }
 
     fn table(rows: &[Row]) -> Table {
-        let mut table = Table::new(&["law", "rate_hz", "measured_n_m", "0.55 μ/H²", "0.55 μ/(H/2)²"]);
+        let mut table = Table::new(&["law", "rate_hz", "measured_n_m", "0.55 μ/τ²", "measured / formula"]);
         table.rows.extend(rows.iter().map(|r| {
-            let numbers = [r.measured_n_m, r.step_old_n_m, r.half_step_old_n_m].map(|k| (k, 2).into());
+            let numbers = [r.measured_n_m, r.theory_n_m, r.measured_n_m / r.theory_n_m].map(|k| (k, 2).into());
             [vec![r.law.clone().into(), (r.rate_hz, 0).into()], numbers.to_vec()].concat()
         }));
         table
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let naive = || rows.iter().filter(|r| r.law == LAWS[0] && r.rate_hz <= CLAIMED_HZ);
-        let factor = |r: &Row| (r.measured_n_m / r.half_step_old_n_m).max(r.half_step_old_n_m / r.measured_n_m);
-        let apart = naive().map(factor).fold(0.0, f64::max);
-        vec![Finding::at_most(
-            "penalty at 60 Hz and less: measured limit and 0.55 μ/τ², τ = H/2, apart by a factor",
-            apart,
-            4.0,
-        )]
+        let factor = |r: &Row| (r.measured_n_m / r.theory_n_m).max(r.theory_n_m / r.measured_n_m);
+        let apart = worst(rows.iter().map(factor));
+        vec![Finding::at_most("measured limit and 0.55 μ/τ², τ = H/2, apart by a factor", apart, APART_MAX)]
     }
 }
 
 /// Whether the motion dies away at this stiffness.
 fn dies_away(case: &Case, stiffness_n_m: f64) -> bool {
     let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
-    let set = pair("1d", law, case.rate_hz, (Faults { seed: 1, ..Faults::default() }, FALL_M));
+    let set = pair("1d", law, case.rate_hz, (Faults { seed: 1, due: true, ..Faults::default() }, FALL_M));
     let Some(Pair { play, zero_j, .. }) = set else { return false };
     let start_j = play.raw_j() - zero_j;
     // where springs and contact have given under the weight there is less energy than none: what is left is kinetic
