@@ -7,6 +7,7 @@ use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
 use super::session::{Finished, Session};
 use crate::compositor::{Offscreen, RendererOptions, Size, Style};
+use crate::runtime::Drive;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -54,7 +55,10 @@ pub fn play_headless(
     go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
 ) -> Result<Outcome, SessionError> {
     if let Drawing::Every(screen) = &plan.drawing {
+        // nothing happens before it can be drawn
+        session.drive(Drive::Pause);
         session.calibrate(&screen.gpu().describe(), || Some(screen.gpu().clone()));
+        session.drive(Drive::Run);
     }
     let period = session.period();
     let mut due = Duration::ZERO;
