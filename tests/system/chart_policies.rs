@@ -35,8 +35,10 @@ fn every_limit_of_the_closed_loop_is_kept() {
 
 #[test]
 fn every_limit_of_groves_meshes_and_bounds_is_kept() {
-    let of = quick(&["grove", "walkthrough", "values", "bound"]);
+    let of = quick(&["grove", "domes", "library", "walkthrough", "values", "bound"]);
     holds(&of("grove"), 3);
+    holds(&of("domes"), 5);
+    holds(&of("library"), 4);
     holds(&of("walkthrough"), 3);
     holds(&of("values"), 2);
     holds(&of("bound"), 3);

@@ -57,6 +57,14 @@ pub(crate) struct Object {
     pub dwell: u8,
 }
 
+impl Object {
+    /// Has `taken` steps from now on; having fallen it may not rise for `dwell` frames.
+    pub(crate) fn settle(&mut self, taken: u16, dwell: u8) {
+        self.dwell = if taken < self.taken { dwell } else { self.dwell.saturating_sub(1) };
+        self.taken = taken;
+    }
+}
+
 /// Objects in the order of their ids, and the steps of their hulls.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Menu {
@@ -104,6 +112,14 @@ impl Menu {
             Some(at) => self.vertices[object.first as usize + usize::from(at)],
             None => object.base,
         }
+    }
+
+    /// What an object gives after `taken` steps, at weight 1.
+    pub(crate) fn gain(&self, object: &Object, taken: u16) -> f64 {
+        // both are read, and then one is chosen: which one cannot be foreseen
+        let last = (object.first as usize + usize::from(taken)).wrapping_sub(1);
+        let after = self.vertices.get(last).map_or(0.0, |v| v.gain);
+        if taken > 0 { after } else { object.base.gain }
     }
 
     pub(crate) fn find(&self, id: u64) -> Option<&Object> {

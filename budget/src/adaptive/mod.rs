@@ -283,12 +283,7 @@ impl Adaptive {
     }
 
     fn pick(&mut self, terms: Terms) {
-        let picked = self.picker.pick(&self.menu, terms);
-        for (object, &taken) in self.menu.objects_mut().iter_mut().zip(self.picker.taken()) {
-            let fell = taken < object.taken;
-            object.dwell = if fell { self.settings.dwell } else { object.dwell.saturating_sub(1) };
-            object.taken = taken;
-        }
+        let picked = self.picker.pick(&mut self.menu, terms, self.settings.dwell);
         self.table = picked.table;
         let (value, upper, lambda) = (picked.value, picked.upper, picked.lambda);
         self.plan = Plan { feasible: picked.feasible, held: false, value, upper, lambda, ..self.plan };

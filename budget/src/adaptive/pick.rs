@@ -43,7 +43,6 @@ impl Picked {
         let fits = terms.cost(&with) <= terms.budget;
         if fits {
             self.table = with;
-            self.value += step.slope * object.weight * f64::from(step.cost);
         }
         fits
     }
@@ -102,15 +101,6 @@ impl Terms {
     }
 }
 
-/// What the steps of a bucket come to.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-struct Bin {
-    /// By the table.
-    ticks: u64,
-    /// Gain over κ: gain per measured tick, times ticks of the table.
-    gain: f64,
-}
-
 /// A step on the edge of the budget.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Edge {
@@ -122,8 +112,8 @@ struct Edge {
 /// Buffers of the choice, kept from frame to frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Picker {
-    /// For every stage and bucket.
-    bins: Vec<[Bin; BUCKETS]>,
+    /// What the steps of every stage and bucket take by the table.
+    bins: Vec<[u64; BUCKETS]>,
     /// The bucket of every step on offer, where the menu has the step.
     buckets: Vec<u16>,
     /// Steps of the bucket in which the budget ends.
@@ -133,13 +123,8 @@ pub(crate) struct Picker {
 }
 
 impl Picker {
-    /// Steps taken of every object, in the order of the menu.
-    pub(crate) fn taken(&self) -> &[u16] {
-        &self.taken
-    }
-
-    /// Chooses.
-    pub(crate) fn pick(&mut self, menu: &Menu, mut terms: Terms) -> Picked {
+    /// Chooses; the menu remembers what was taken, and an object that fell dwells.
+    pub(crate) fn pick(&mut self, menu: &mut Menu, mut terms: Terms, dwell: u8) -> Picked {
         let mut picked = Picked { table: menu.least, ..Picked::default() };
         let spare = terms.budget - terms.cost(&menu.least);
         terms.reach = terms.kappa.map(|k| (spare / k) as u64);
@@ -147,56 +132,55 @@ impl Picker {
             self.taken.clear();
             self.taken.resize(menu.objects().len(), 0);
             picked.value = menu.objects().iter().map(|o| o.base.gain * o.weight).sum();
+            menu.objects_mut().iter_mut().for_each(|object| object.settle(0, dwell));
             return picked;
         }
         picked.feasible = true;
-        picked.value = self.sort_into_buckets(menu, &terms);
+        self.sort_into_buckets(menu, &terms);
         let edge = self.find_edge(&terms, &mut picked);
         self.take_above(menu, &terms, edge);
         picked.lambda = self.take_edge(menu, &terms, &mut picked);
         if picked.lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
             self.go_on(menu, &terms, &mut picked);
         }
-        picked.upper = self.bound(menu, &terms, &picked);
+        self.settle(menu, &terms, &mut picked, dwell);
         picked
     }
 
-    /// Fills the bins; what the least of everything is worth.
-    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) -> f64 {
-        let mut least = 0.0;
+    /// Fills the bins.
+    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) {
         self.bins.clear();
-        self.bins.resize(STAGES, [Bin::default(); BUCKETS]);
+        self.bins.resize(STAGES, [0; BUCKETS]);
         self.buckets.resize(menu.room(), 0);
         self.taken.clear();
         for object in menu.objects() {
             let steps = menu.steps_of(object);
             let offered = terms.on_offer(object, steps);
             let worth = terms.worth(object);
-            least += object.base.gain * object.weight;
             let bins = &mut self.bins[usize::from(object.stage)];
             let buckets = &mut self.buckets[menu.range_of(object)][..offered];
             for (at, (step, place)) in steps[..offered].iter().zip(buckets).enumerate() {
                 // an index, not a branch: what an object had cannot be foreseen
                 let bucket = bucket(step.slope * worth[usize::from(at < usize::from(object.taken))]);
-                bins[bucket].ticks += u64::from(step.cost);
-                bins[bucket].gain += step.slope * worth[0] * f64::from(step.cost);
+                bins[bucket] += u64::from(step.cost);
                 *place = bucket as u16;
             }
             self.taken.push(offered as u16);
         }
-        least
     }
 
     /// The bucket in which the budget ends, and in `picked` what all above it come to; 0 where everything fits.
     fn find_edge(&self, terms: &Terms, picked: &mut Picked) -> u16 {
         for at in (1..BUCKETS).rev() {
+            if self.bins.iter().all(|bins| bins[at] == 0) {
+                continue;
+            }
             let mut with = picked.table;
-            with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at].ticks);
+            with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at]);
             if terms.cost(&with) > terms.budget {
                 return at as u16;
             }
             picked.table = with;
-            picked.value += self.bins.iter().zip(&terms.kappa).map(|(bins, k)| bins[at].gain * k).sum::<f64>();
         }
         0
     }
@@ -206,14 +190,10 @@ impl Picker {
         self.edge.clear();
         for (i, (object, taken)) in menu.objects().iter().zip(&mut self.taken).enumerate() {
             let own = &self.buckets[menu.range_of(object)][..usize::from(*taken)];
-            // along a hull buckets never rise, so these are the first; counting them all has no branch to be foreseen
-            let (mut above, mut on) = (0, 0);
-            for &bucket in own {
-                above += usize::from(bucket > edge);
-                on += usize::from(bucket == edge);
-            }
+            // along a hull buckets never rise
+            let above = own.partition_point(|bucket| *bucket > edge);
             *taken = above as u16;
-            for at in above..above + on {
+            for (at, _) in own.iter().enumerate().skip(above).take_while(|(_, bucket)| **bucket == edge) {
                 let worth = terms.worth(object)[usize::from(at < usize::from(object.taken))];
                 let merit = menu.steps_of(object)[at].slope * worth;
                 self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
@@ -261,19 +241,22 @@ impl Picker {
         }
     }
 
-    /// The bound that the price λ gives for any choice, each object being best for itself (eq. 33): what was taken, the price of what
-    /// is left over, and what hysteresis kept from being best.
-    fn bound(&self, menu: &Menu, terms: &Terms, picked: &Picked) -> f64 {
-        let mut upper = picked.value + picked.lambda * (terms.budget - terms.cost(&picked.table));
-        for (object, &taken) in menu.objects().iter().zip(&self.taken) {
+    /// Writes down what was taken, what it is worth, and the bound that the price λ gives for any choice, each object being best for
+    /// itself (eq. 33): what was taken, the price of what is left over, and what hysteresis kept from being best.
+    fn settle(&self, menu: &mut Menu, terms: &Terms, picked: &mut Picked, dwell: u8) {
+        let mut astray = 0.0;
+        for (i, &taken) in self.taken.iter().enumerate() {
+            let object = &menu.objects()[i];
+            picked.value += object.weight * menu.gain(object, taken);
             let (steps, worth) = (menu.steps_of(object), terms.worth(object)[0]);
             let kappa = terms.kappa[usize::from(object.stage)];
             let net = |step: &Step| (step.slope * worth - picked.lambda) * (kappa * f64::from(step.cost));
             let (had, rest) = steps.split_at(usize::from(taken));
-            upper -= had.iter().rev().map(net).take_while(|n| *n < 0.0).sum::<f64>();
-            upper += rest.iter().map(net).take_while(|n| *n > 0.0).sum::<f64>();
+            astray -= had.iter().rev().map(net).take_while(|n| *n < 0.0).sum::<f64>();
+            astray += rest.iter().map(net).take_while(|n| *n > 0.0).sum::<f64>();
+            menu.objects_mut()[i].settle(taken, dwell);
         }
-        upper
+        picked.upper = picked.value + picked.lambda * (terms.budget - terms.cost(&picked.table)) + astray;
     }
 }
 

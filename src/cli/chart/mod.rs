@@ -77,6 +77,8 @@ const POLICIES: &[Entry] = &[
     entry::<policies::auditorium::Auditorium>(),
     entry::<policies::grove::Grove>(),
     entry::<policies::values::Values>(),
+    entry::<policies::domes::Domes>(),
+    entry::<policies::library::Library>(),
     entry::<policies::walkthrough::Walkthrough>(),
     entry::<policies::disturbed::Disturbed>(),
     entry::<policies::still::Still>(),

@@ -13,9 +13,10 @@ use metachron_budget::cost::value::Value;
 /// The experiment.
 pub(in super::super) struct Auditorium;
 
-const POLICIES: [Policy; 8] = [
+const POLICIES: [Policy; 9] = [
     Policy::Full,
     Policy::Static,
+    Policy::StaticFine,
     Policy::Threshold,
     Policy::RobinHood(Value::Steep),
     Policy::Convex,
@@ -49,7 +50,7 @@ impl Experiment for Auditorium {
         let show = show(Fault::NONE, LAP, 1);
         let panels = vec![
             curves("no choice (five times the scale, as in the paper)", &show, &[Policy::Full], 12.5),
-            curves("by size", &show, &[Policy::Static, Policy::Threshold], 2.5),
+            curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 2.5),
             curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 2.5),
         ];
         figure("The walk through the auditorium (FS93, fig. 7)", panels, 3)
@@ -63,11 +64,11 @@ impl Experiment for Auditorium {
         let of = |policy: &str, what: fn(&Row) -> f64| number(rows, SETTING, policy, what);
         let spread = |policy: &str| of(policy, |r| r.binding_stddev);
         let (greedy, ours) = (spread("greedy"), spread("adaptive"));
-        let by_size = spread("static").min(spread("threshold"));
+        let by_size = spread("static-64-px").min(spread("threshold"));
         vec![
             at_least(
                 "binding stddev, none over the greater by size: > 1",
-                spread("full") / spread("static").max(spread("threshold")),
+                spread("full") / spread("static-64-px").max(spread("threshold")),
                 1.0,
             ),
             Finding::at_most(

@@ -13,9 +13,13 @@ use super::scene::{Scene, Seen};
 use metachron_budget::cost::overlap::Overlap;
 use metachron_budget::cost::value::Value;
 use metachron_budget::select::Level;
+use metachron_budget::select::threshold::STATIC_PX;
 
 /// The margin that every policy with a prediction leaves, as a part of T: none is better for leaving less.
 pub(super) const MARGIN: f64 = 0.02;
+
+/// Pixels a polygon of [`Policy::StaticFine`].
+const FINE_PX: f64 = 64.0;
 
 /// The time of a frame, microseconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -63,6 +67,8 @@ pub(super) enum Policy {
     Full,
     /// 1024 pixels a polygon.
     Static,
+    /// So few pixels a polygon that the static rule spends about the time it has.
+    StaticFine,
     /// The threshold moved by the last frame's time.
     Threshold,
     /// Whole levels in falling benefit per cost.
@@ -82,6 +88,7 @@ impl Policy {
         match self {
             Self::Full => "full",
             Self::Static => "static",
+            Self::StaticFine => "static-64-px",
             Self::Threshold => "threshold",
             Self::Greedy => "greedy",
             Self::RobinHood(_) => "robin-hood",
@@ -95,7 +102,8 @@ impl Policy {
     pub(super) fn chooser(self) -> Box<dyn Chooser> {
         match self {
             Self::Full => Box::new(whole::Full),
-            Self::Static => Box::new(whole::Static),
+            Self::Static => Box::new(whole::Static(STATIC_PX)),
+            Self::StaticFine => Box::new(whole::Static(FINE_PX)),
             Self::Threshold => Box::<whole::Threshold>::default(),
             Self::Greedy => Box::new(whole::Greedy),
             Self::MarginalFill => Box::new(whole::Marginal),

@@ -4,7 +4,7 @@
 
 use super::{Choice, Chooser, MARGIN, Pick, Time};
 use crate::cli::chart::policies::scene::{Scene, Seen};
-use metachron_budget::select::threshold::{self, Feedback, STATIC_PX};
+use metachron_budget::select::threshold::{self, Feedback};
 use metachron_budget::select::{Entry, Mode, Problem, Selection, funkhouser, marginal};
 
 /// Units of benefit to a pixel: benefits are whole numbers.
@@ -42,12 +42,12 @@ impl Chooser for Full {
     }
 }
 
-/// The finest level whose polygons cover 1024 pixels each.
-pub(super) struct Static;
+/// The finest level whose polygons cover so many pixels each.
+pub(super) struct Static(pub(super) f64);
 
 impl Chooser for Static {
     fn choose(&mut self, _: u64, scene: &Scene, seen: &[Seen], _: Time) -> Choice {
-        by_size(scene, seen, STATIC_PX)
+        by_size(scene, seen, self.0)
     }
 }
 
