@@ -53,6 +53,7 @@ impl Other {
     pub fn meet(&mut self, neighbour: &Neighbour, around: &Surroundings<'_>, exchange: &Exchange, at: SimTime) -> bool {
         let known = self.see(neighbour);
         if known {
+            self.reckon();
             self.age_s = at.secs_after(neighbour.snapshot.time);
             self.foresee(self.age_s);
             self.go_on(self.age_s);
@@ -210,6 +211,27 @@ impl Other {
         }
     }
 
+    /// The same of a node or vertex: a tube tells how each of its nodes accelerates.
+    #[must_use]
+    pub fn acceleration_of(&self, node: usize) -> DVec3 {
+        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == self.positions.len() => {
+                curve.accelerations[node]
+            }
+            _ => self.acceleration(),
+        }
+    }
+
+    /// Makes the published velocities of a tube, which are means over its last substep, those at its end (eq. 6a).
+    fn reckon(&mut self) {
+        let Some(Inertia::Curve(curve)) = self.neighbour.as_ref().map(|n| &n.snapshot.inertia) else { return };
+        let half_s = 0.5 * curve.span_s;
+        for node in 0..self.positions.len() {
+            let gained = self.acceleration_of(node) * half_s;
+            self.velocities[2 * node] += gained;
+        }
+    }
+
     /// Where it is; `None` before the first [`Self::meet`] and for a body that has no shape.
     #[must_use]
     pub fn placed(&self) -> Option<Placed<'_>> {
@@ -341,8 +363,8 @@ impl Other {
             self.shift(&way);
             return;
         }
-        let a = self.acceleration();
         if self.positions.is_empty() {
+            let a = self.acceleration();
             let Pose { centre, rotation } = &mut self.pose;
             *centre += self.velocities[0] * h + a * (0.5 * h * h);
             *rotation = turned(*rotation, self.velocities[1] * h);
@@ -350,8 +372,10 @@ impl Other {
             return;
         }
         let stride = self.stride();
-        for (x, v) in self.positions.iter_mut().zip(self.velocities.iter_mut().step_by(stride)) {
-            *x += *v * h + a * (0.5 * h * h);
+        for node in 0..self.positions.len() {
+            let a = self.acceleration_of(node);
+            let v = &mut self.velocities[stride * node];
+            self.positions[node] += *v * h + a * (0.5 * h * h);
             *v += a * h;
         }
     }

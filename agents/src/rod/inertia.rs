@@ -12,11 +12,16 @@ pub struct CurveInertia {
     held: [bool; 2],
     /// How fast each segment turns, rad/s, world axes.
     pub spins: Vec<DVec3>,
+    /// How each node accelerated in the last step, without what others gave at its start, m/s²; empty before the first.
+    pub accelerations: Vec<DVec3>,
+    /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
+    pub span_s: f64,
 }
 
 impl CurveInertia {
-    /// Takes over a factor and the velocities of all slots, into the storage that is here.
-    pub(super) fn copy_from(&mut self, factor: &Factor, held: [bool; 2], velocities: &[DVec3]) {
+    /// Takes over the factor of a substep of `span_s` seconds and the velocities of all slots, into the storage that is here.
+    pub(super) fn copy_from(&mut self, (factor, span_s): (&Factor, f64), held: [bool; 2], velocities: &[DVec3]) {
+        self.span_s = span_s;
         self.factor.copy_from(factor);
         self.held = held;
         self.spins.clear();

@@ -128,9 +128,11 @@ impl Mate {
         let list = self.other.velocities();
         self.slots = (velocities.len(), list.len());
         velocities.extend_from_slice(list);
-        let fallen = if self.other.is_many() { list.len() } else { 1 };
-        velocities[self.slots.0..][..fallen].iter_mut().step_by(self.other.stride()).for_each(|v| *v += fall);
-        if !self.other.is_many() {
+        if self.other.is_many() {
+            let gaining = velocities[self.slots.0..].iter_mut().step_by(self.other.stride());
+            gaining.enumerate().for_each(|(node, v)| *v += self.other.acceleration_of(node) * (0.5 * h));
+        } else {
+            velocities[self.slots.0] += fall;
             velocities[self.slots.0 + 1..][..1].iter_mut().for_each(|spin| *spin += turn);
         }
     }

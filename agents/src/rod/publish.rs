@@ -57,7 +57,9 @@ impl Tube {
         let company = &self.stepper.company;
         if company.is_watched() || self.steps == 0 {
             into.acceleration = if self.steps == 0 { self.spec.gravity } else { self.acceleration };
-            into.inertia.curve_mut().copy_from(self.stepper.factor(), self.matter.held, &self.now.u);
+            let inertia = into.inertia.curve_mut();
+            inertia.copy_from(self.stepper.last(), self.matter.held, &self.now.u);
+            inertia.accelerations.clone_from(&self.accelerations);
         } else {
             into.inertia = Inertia::Immovable;
         }

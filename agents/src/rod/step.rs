@@ -61,6 +61,8 @@ pub struct Stepper {
     pub company: Company,
     /// Work that contact does in the substep tried, J.
     pushed_j: f64,
+    /// The length of the substep that ended last, seconds.
+    span_s: f64,
 }
 
 /// What became of a trial substep.
@@ -153,6 +155,11 @@ impl Stepper {
     /// The factor of the substep that ended last; without slots where the division has changed since.
     pub fn factor(&self) -> &Factor {
         &self.factor
+    }
+
+    /// The same, and how long that substep was, seconds; zero before the first.
+    pub fn last(&self) -> (&Factor, f64) {
+        (&self.factor, self.span_s)
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
@@ -269,6 +276,7 @@ impl Stepper {
     /// Makes `next` the state and books what pulls and contacts gave.
     fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
+        self.span_s = h;
         for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let point = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));

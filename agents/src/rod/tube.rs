@@ -42,6 +42,8 @@ pub struct Tube {
     pub(super) at_rest: bool,
     /// Of the centre of mass in the last step, without what others gave at its start, m/s².
     pub(super) acceleration: DVec3,
+    /// The same of each node; empty where nobody is near.
+    pub(super) accelerations: Vec<DVec3>,
     pub(super) resolution: Resolution,
     time: SimTime,
     pub(super) dt_s: f64,
@@ -88,6 +90,7 @@ impl Tube {
             rest: RestWatch::default(),
             at_rest: false,
             acceleration: DVec3::ZERO,
+            accelerations: vec![],
             time: SimTime::ZERO,
             dt_s: 0.0,
             steps: 0,
@@ -214,6 +217,23 @@ impl Tube {
         StepError::Diverged { model: self.model(), dt_s, what }
     }
 
+    /// Notes how the tube moves before its step, for [`Self::end_watch`]: its momentum, where anybody wants to know.
+    fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
+        self.accelerations.clear();
+        self.accelerations.extend(self.now.u.iter().step_by(2).filter(|_| watched));
+        watched.then(|| self.momentum().0)
+    }
+
+    /// Works out what others may expect after a step of `dt` seconds.
+    fn end_watch(&mut self, before: Option<DVec3>, dt: f64) {
+        let Some(before) = before else { return };
+        let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
+        self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
+        for (a, u) in self.accelerations.iter_mut().zip(self.now.u.iter().step_by(2)) {
+            *a = smooth((*u - *a) / dt, gravity);
+        }
+    }
+
     /// Whether the tube is at rest after a step of `dt` seconds; it then stands still exactly.
     fn watch_rest(&mut self, dt: f64) -> bool {
         let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
@@ -270,15 +290,12 @@ impl Agent for Tube {
         self.take_pulls(around);
         self.widen(around.time + dt);
         let watched = self.stepper.company.is_watched();
-        let before = if watched { self.momentum().0 } else { DVec3::ZERO };
+        let before = self.begin_watch(watched);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
-        if watched {
-            let gained = self.momentum().0 - before;
-            self.acceleration = smooth(gained / (self.mass_kg() * dt_s), self.spec.gravity);
-        }
+        self.end_watch(before, dt_s);
         self.time = around.time + dt;
         self.steps += 1;
         self.at_rest = self.watch_rest(dt_s);

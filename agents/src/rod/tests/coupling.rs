@@ -5,6 +5,7 @@
 mod bodies;
 mod capstan;
 mod closed;
+mod crossing;
 mod gripper;
 mod meetings;
 mod rates;
