@@ -3,6 +3,8 @@
 //! In: the first body that each body is joined to, and blocks of B rows. Out: the solution. Never here: where the matrix comes from.
 //! A chain's factor has a constant width, so it costs as much as the chain is long.
 
+use glam::DVec3;
+
 /// A matrix of B rows a body, its lower half.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct Envelope<const B: usize> {
@@ -118,6 +120,43 @@ impl<const B: usize> Envelope<B> {
     }
 }
 
+impl Envelope<3> {
+    /// Solves for `x`, one vector a body, with the factor.
+    pub(crate) fn solve_vectors(&self, x: &mut [DVec3]) {
+        for (body, row) in (0..x.len()).flat_map(|body| (0..3).map(move |axis| (body, 3 * body + axis))) {
+            let (first, values) = (self.first[row] / 3, self.row(row));
+            let (before, own) = values.split_at(3 * (body - first));
+            let left = x[body][row % 3] - dot_vectors(before, &x[first..body]);
+            let (axis, done) = (row % 3, x[body]);
+            let inner: f64 = (0..axis).map(|k| own[k] * done[k]).sum();
+            x[body][axis] = (left - inner) / own[axis];
+        }
+        for (body, row) in (0..x.len()).rev().flat_map(|body| (0..3).rev().map(move |axis| (body, 3 * body + axis))) {
+            let (first, values) = (self.first[row] / 3, self.row(row));
+            let (before, own) = values.split_at(3 * (body - first));
+            let axis = row % 3;
+            let value = x[body][axis] / own[axis];
+            x[body][axis] = value;
+            (0..axis).for_each(|k| x[body][k] -= own[k] * value);
+            let below = x[first..body].iter_mut().zip(before.chunks_exact(3));
+            below.for_each(|(below, l)| *below -= DVec3::from_slice(l) * value);
+        }
+    }
+
+    fn row(&self, row: usize) -> &[f64] {
+        &self.values[self.start[row]..=self.start[row] + row - self.first[row]]
+    }
+}
+
+/// A sum of products in six lanes: a fixed order, so the same bits everywhere.
+fn dot_vectors(a: &[f64], b: &[DVec3]) -> f64 {
+    let mut lanes = [DVec3::ZERO; 2];
+    for (k, (a, b)) in a.chunks_exact(3).zip(b).enumerate() {
+        lanes[k % 2] += DVec3::from_slice(a) * *b;
+    }
+    (lanes[0] + lanes[1]).element_sum()
+}
+
 /// A sum of products in four lanes: a fixed order, so the same bits everywhere.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     let mut lanes = [0.0; 4];
@@ -132,6 +171,30 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn vectors_are_solved_as_numbers_are() {
+        let first_body = [0, 0, 1, 0, 3];
+        let mut matrix = Envelope::<3>::default();
+        matrix.shape(&first_body);
+        for (row, &first) in first_body.iter().enumerate() {
+            for column in first as usize..=row {
+                let value = |k: usize| 0.1 * libm::sin((7 * row + 3 * column + k) as f64);
+                let own = if row == column { 3.0 } else { 0.0 };
+                let block: [[f64; 3]; 3] =
+                    std::array::from_fn(|i| std::array::from_fn(|j| value(3 * i + j) + if i == j { own } else { 0.0 }));
+                matrix.add_block((row, column), block);
+            }
+        }
+        assert!(matrix.factor());
+        let mut flat: Vec<f64> = (0..15).map(|i| libm::cos(f64::from(i))).collect();
+        let mut vectors: Vec<DVec3> = flat.chunks_exact(3).map(DVec3::from_slice).collect();
+        matrix.solve(&mut flat);
+        matrix.solve_vectors(&mut vectors);
+        for (vector, numbers) in vectors.iter().zip(flat.chunks_exact(3)) {
+            assert!(vector.distance(DVec3::from_slice(numbers)) < 1e-14); // rounding in another order
+        }
+    }
 
     #[test]
     fn the_factor_solves_its_system() {

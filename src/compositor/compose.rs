@@ -9,6 +9,7 @@ use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
     detail_colour, resolution_colour,
 };
+use super::skin::{ROPE_LEVEL, SkinRoom, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
 use metachron_agents::shape::{Model, Primitive, Rounding, Rung, SkinFrame, Solid, ToolShape};
@@ -51,6 +52,7 @@ type Solids = Vec<((Shading, MeshKey), SolidInstance)>;
 pub(super) struct Scratch {
     solids: Solids,
     tubes: Vec<(u8, usize)>,
+    skins: SkinRoom,
 }
 
 impl Stage {
@@ -82,6 +84,7 @@ impl Stage {
             add_spring(from, to, SPRING_SHARE * camera.distance_m, &mut picture);
         }
         sort_solids(&mut scratch.solids, &mut picture);
+        self.add_skins(levels, &mut picture, &mut scratch.skins);
         self.picture = picture;
         self.scratch = scratch;
         &self.picture
@@ -119,15 +122,29 @@ impl Stage {
     /// Cuts every tube into its intervals, tubes of one level side by side.
     fn add_tubes(&mut self, levels: &[Level], picture: &mut Picture, scratch: &mut Scratch) {
         scratch.tubes.clear();
-        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| matches!(t.actor.form, Form::Tube));
+        let long = |form: &Form| matches!(form, Form::Tube | Form::Rope { .. });
+        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| long(&t.actor.form));
         let drawn = tubes.map(|(number, _)| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
-        scratch.tubes.extend(drawn.map(|(at, number)| (at.resolution.n, number)));
+        let tracks = &self.tracks;
+        let level_of = |n: u8, number: usize| {
+            if matches!(tracks[number].actor.form, Form::Rope { .. }) { ROPE_LEVEL } else { n }
+        };
+        scratch.tubes.extend(drawn.map(|(at, number)| (level_of(at.resolution.n, number), number)));
         scratch.tubes.sort_unstable();
         for &(n, number) in &scratch.tubes {
             let track = &mut self.tracks[number];
-            let Body::Curve(curve) = &track.pose else { continue };
             let asked = level(levels, number);
-            let Level { resolution: at, shading, .. } = asked;
+            let Level { resolution: mut at, shading, .. } = asked;
+            let curve = match (&track.pose, &track.actor.form) {
+                (Body::Curve(curve), _) => curve,
+                (Body::Soft(soft), Form::Rope { radius_m }) => {
+                    curve_of_rope(soft, *radius_m, &mut track.rope);
+                    // drawn as it is divided
+                    at.eps_m = track.rope.arc_m.last().copied().unwrap_or(1.0) / track.rope.frames.len().max(1) as f64;
+                    &track.rope
+                }
+                _ => continue,
+            };
             let frames = track.skeleton.rebuild(curve, at.eps_m);
             let Some(last) = frames.len().checked_sub(1) else { continue };
             let paint = Paint::of(track.actor.look, tint(picture.style, asked, track.age_s));
@@ -142,6 +159,23 @@ impl Stage {
                 let ball = instance(end.position - origin, DQuat::IDENTITY, size, paint);
                 scratch.solids.push(((shading, MeshKey::Primitive(Primitive::Ball, n)), ball));
             }
+        }
+    }
+
+    /// The skins of soft bodies, each with an instance of its own for its colour.
+    fn add_skins(&self, levels: &[Level], picture: &mut Picture, room: &mut SkinRoom) {
+        for (number, track) in self.tracks.iter().enumerate() {
+            let (Form::Skin(form), Body::Soft(soft)) = (&track.actor.form, &track.pose) else { continue };
+            let at = level(levels, number);
+            if at.triangles == 0 {
+                continue;
+            }
+            let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
+            let size = Rounding { extents: Vec3::ONE, radius_m: drawn_radius_m(form) as f32 };
+            let number = picture.instances.len() as u32;
+            picture.instances.push(instance(DVec3::ZERO, DQuat::IDENTITY, size, paint));
+            let Picture { skins, origin, style, .. } = picture;
+            skins.add(form, soft, (*origin, number, style.wireframe), room);
         }
     }
 

@@ -6,6 +6,7 @@
 use super::picture::Picture;
 use super::pose;
 use glam::{DQuat, DVec3};
+use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::shape::{
     Cut, Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
 };
@@ -60,6 +61,13 @@ pub enum Form {
     Tool(ToolShape),
     /// What never moves and has no snapshots; it is drawn with as many triangles as its level says.
     Scenery(Model, Placement),
+    /// The skin of a sheet or soft solid.
+    Skin(SurfaceForm),
+    /// A rope.
+    Rope {
+        /// Its radius, metres.
+        radius_m: f64,
+    },
 }
 
 /// An agent as the picture knows it.
@@ -108,6 +116,8 @@ pub(super) struct Track {
     pub skeleton: Skeleton,
     /// The triangles last asked for of a mesh, and the cut that has them.
     pub cut: Option<(u32, Cut)>,
+    /// A rope as it is shown.
+    pub rope: CurveState,
 }
 
 /// A fixed solid with what drawing needs to know of it.
@@ -190,7 +200,7 @@ impl Track {
                 let side = 2.0 * tool.shaft_radius_m * tool.shaft_length_m;
                 BodyShape { radius_m, mean_area_m2: side, ..BodyShape::default() }
             }
-            Form::Tube | Form::Unseen => BodyShape::default(),
+            Form::Tube | Form::Skin(_) | Form::Rope { .. } | Form::Unseen => BodyShape::default(),
         };
         let pose = match &actor.form {
             Form::Scenery(_, at) => {
@@ -211,6 +221,7 @@ impl Track {
             seen: true,
             skeleton: Skeleton::default(),
             cut: None,
+            rope: CurveState::default(),
         };
         track.bounds = track.find_bounds();
         track

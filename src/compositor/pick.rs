@@ -5,8 +5,9 @@
 use super::gather::{Form, Stage, Track};
 use super::view::Ray;
 use glam::{DQuat, DVec3, Vec3};
+use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::shape::{Primitive, PrimitiveMesh, Rounding, Solid, ToolShape};
-use metachron_agents::{AgentId, Anchor, Body, CurveState, ToolState};
+use metachron_agents::{AgentId, Anchor, Body, CurveState, SoftState, ToolState};
 
 /// What a ray hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +44,8 @@ impl Stage {
         match (&track.actor.form, &track.pose) {
             _ if !near => None,
             (Form::Tube, Body::Curve(curve)) => hit_curve(curve, ray),
+            (Form::Skin(form), Body::Soft(soft)) => hit_skin(form, soft, ray),
+            (Form::Rope { radius_m }, Body::Soft(soft)) => hit_rope(soft, *radius_m, ray),
             (Form::Tool(shape), Body::Tool(tool)) => hit_tool(shape, tool, ray),
             (Form::Solid(solid), Body::Rigid(body)) => {
                 let local = Ray {
@@ -90,6 +93,33 @@ fn hit_curve(curve: &CurveState, ray: Ray) -> Option<(Anchor, f64)> {
     hits.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
+/// The nearest triangle of a skin along the ray, seen from either side, and its vertex nearest to the point.
+fn hit_skin(form: &SurfaceForm, soft: &SoftState, ray: Ray) -> Option<(Anchor, f64)> {
+    let hits = form.triangles.iter().filter_map(|triangle| {
+        let corners = triangle.map(|vertex| soft.positions[vertex as usize]);
+        let [a, b, c] = corners;
+        let distance = hit_triangle([a, b, c], ray).or_else(|| hit_triangle([a, c, b], ray))?;
+        let point = ray.origin + ray.direction * distance;
+        let nearest = triangle
+            .iter()
+            .zip(corners)
+            .min_by(|p, q| p.1.distance_squared(point).total_cmp(&q.1.distance_squared(point)));
+        nearest.map(|(vertex, _)| (Anchor::Vertex(*vertex), distance))
+    });
+    hits.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// A rope is thin: how much thicker than it is it feels to the pointer.
+const ROPE_GRIP: f64 = 2.0;
+
+fn hit_rope(soft: &SoftState, radius_m: f64, ray: Ray) -> Option<(Anchor, f64)> {
+    let hits = (0_u32..).zip(soft.positions.windows(2)).filter_map(|(i, ends)| {
+        let (distance, w) = hit_capsule(ends[0], ends[1], ROPE_GRIP * radius_m, ray)?;
+        Some((Anchor::Vertex(i + u32::from(w > 0.5)), distance))
+    });
+    hits.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
 fn hit_tool(shape: &ToolShape, tool: &ToolState, ray: Ray) -> Option<(Anchor, f64)> {
     let end = tool.tip - tool.rotation * DVec3::Z * shape.shaft_length_m;
     let (distance, _) = hit_capsule(tool.tip, end, TOOL_GRIP * shape.shaft_radius_m, ray)?;
@@ -97,26 +127,28 @@ fn hit_tool(shape: &ToolShape, tool: &ToolState, ray: Ray) -> Option<(Anchor, f6
     Some((Anchor::Local(DQuat::inverse(tool.rotation) * (point - tool.tip)), distance))
 }
 
-/// Distance along the ray to the nearest triangle that faces it (Möller and Trumbore's test).
+/// Distance along the ray to a triangle that faces it (Möller and Trumbore's test).
+fn hit_triangle([a, b, c]: [DVec3; 3], ray: Ray) -> Option<f64> {
+    let (u, v) = (b - a, c - a);
+    let p = ray.direction.cross(v);
+    let facing = u.dot(p);
+    if facing <= 0.0 {
+        return None;
+    }
+    let s = ray.origin - a;
+    let q = s.cross(u);
+    let (wu, wv) = (s.dot(p) / facing, ray.direction.dot(q) / facing);
+    let distance = v.dot(q) / facing;
+    (wu >= 0.0 && wv >= 0.0 && wu + wv <= 1.0 && distance > 0.0).then_some(distance)
+}
+
+/// Distance along the ray to the nearest triangle that faces it.
 fn hit_mesh(mesh: &PrimitiveMesh, size: Rounding, ray: Ray) -> Option<f64> {
     let corner = |i: u32| {
         let v = mesh.vertices[i as usize];
         (v.core * size.extents + v.normal * size.radius_m).as_dvec3()
     };
-    let hits = mesh.triangles.iter().filter_map(|t| {
-        let [a, b, c] = t.map(corner);
-        let (u, v) = (b - a, c - a);
-        let p = ray.direction.cross(v);
-        let facing = u.dot(p);
-        if facing <= 0.0 {
-            return None;
-        }
-        let s = ray.origin - a;
-        let q = s.cross(u);
-        let (wu, wv) = (s.dot(p) / facing, ray.direction.dot(q) / facing);
-        let distance = v.dot(q) / facing;
-        (wu >= 0.0 && wv >= 0.0 && wu + wv <= 1.0 && distance > 0.0).then_some(distance)
-    });
+    let hits = mesh.triangles.iter().filter_map(|t| hit_triangle(t.map(corner), ray));
     hits.min_by(f64::total_cmp)
 }
 

@@ -4,6 +4,7 @@
 //! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its bits.
 
 use super::level::Shading;
+use super::skin::Skins;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use metachron_agents::Resolution;
@@ -156,6 +157,8 @@ pub struct Picture {
     pub instances: Vec<SolidInstance>,
     /// The solids by mesh.
     pub solids: Vec<SolidRun>,
+    /// The skins of soft bodies: one mesh of the frame.
+    pub skins: Skins,
     /// The floor, if there is one.
     pub floor: Option<FloorDraw>,
     /// Meshes that are no primitives.
@@ -176,6 +179,7 @@ impl Default for Picture {
             tubes: Vec::new(),
             instances: Vec::new(),
             solids: Vec::new(),
+            skins: Skins::default(),
             floor: None,
             meshes: Arc::default(),
             models: Arc::default(),
@@ -190,6 +194,7 @@ impl Picture {
         self.tubes.clear();
         self.instances.clear();
         self.solids.clear();
+        self.skins.clear();
         self.floor = None;
     }
 
@@ -199,7 +204,8 @@ impl Picture {
         let tubes =
             self.tubes.iter().filter(|t| t.shown).map(|t| u64::from(t.intervals) * u64::from(patch::triangles(t.n)));
         let solids = self.solids.iter().map(|s| u64::from(s.count) * self.mesh_triangles(s.mesh));
-        tubes.sum::<u64>() + solids.sum::<u64>() + if self.floor.is_some() { 2 } else { 0 }
+        let skins = self.skins.triangles.len() as u64;
+        tubes.sum::<u64>() + solids.sum::<u64>() + skins + if self.floor.is_some() { 2 } else { 0 }
     }
 
     pub(super) fn mesh_triangles(&self, key: MeshKey) -> u64 {

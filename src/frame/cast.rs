@@ -6,7 +6,7 @@
 use super::error::SessionError;
 use super::governor::RateGovernor;
 use super::ties::{Ties, faults};
-use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, Seen, Stage};
+use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
 use crate::control::{
     self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
     RateLimits, Stages, Value,
@@ -15,10 +15,12 @@ use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, Step
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ShadingKind, ValueKind};
 use crate::scene::{self, Member, Scene, Scenery, Spec};
 use glam::DVec3;
+use metachron_agents::coupling::FormKind;
 use metachron_agents::instrument::Instrument;
 use metachron_agents::rigid::RigidBody;
 use metachron_agents::rod::Tube;
-use metachron_agents::shape::{Primitive, Solid, ToolShape};
+use metachron_agents::shape::{Primitive, Solid, ToolShape, patch};
+use metachron_agents::soft::{SoftBody, SoftShape, SoftSpec};
 use metachron_agents::synthetic::Synthetic;
 use metachron_agents::{Agent, AgentId, N_MAX, ResolutionRange};
 use std::borrow::Cow;
@@ -69,6 +71,7 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
     Ok(match member.spec.clone() {
         Spec::Tube(tube) => Box::new(Tube::new(tube)?),
         Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
+        Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
         Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
         Spec::Synthetic(synthetic) => {
             let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
@@ -145,8 +148,21 @@ fn form(spec: &Spec) -> Form {
     match spec {
         Spec::Tube(_) => Form::Tube,
         Spec::Rigid(body) => Form::Solid(body.solid.clone()),
+        Spec::Soft(soft) => soft_form(soft),
         Spec::Instrument(_) => Form::Tool(ToolShape::default()),
         Spec::Synthetic(_) => Form::Unseen,
+    }
+}
+
+/// A rope is drawn as a tube, all else as its skin; nothing where it cannot be built, which is told elsewhere.
+fn soft_form(spec: &SoftSpec) -> Form {
+    if let SoftShape::Rope { radius_m, .. } = spec.shape {
+        return Form::Rope { radius_m };
+    }
+    let form = SoftBody::new(spec.clone()).ok().and_then(|body| body.form());
+    match form.as_deref().map(|form| &form.kind) {
+        Some(FormKind::Surface(skin)) => Form::Skin(skin.clone()),
+        _ => Form::Unseen,
     }
 }
 
@@ -295,9 +311,20 @@ fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
         match spec {
             Spec::Rigid(body) => solid_triangles(&body.solid, n),
             Spec::Instrument(_) => of_tool(n),
+            Spec::Soft(body) => soft_triangles(&body.shape),
             Spec::Tube(_) | Spec::Synthetic(_) => 0,
         }
     })
+}
+
+/// Triangles of a soft body's picture: a sheet has two faces and a rim, a rope is drawn as a tube.
+fn soft_triangles(shape: &SoftShape) -> u32 {
+    match *shape {
+        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
+        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
+        SoftShape::Ball { segments: n, .. } => 12 * n * n,
+        SoftShape::Rope { segments, .. } => segments * patch::triangles(ROPE_LEVEL),
+    }
 }
 
 fn solid_triangles(solid: &Solid, n: u8) -> u32 {

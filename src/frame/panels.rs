@@ -168,6 +168,7 @@ pub(super) fn mass_kg(spec: &Spec) -> f64 {
             (tube.mass_per_length_kg_m * length).min(STRETCH_MASS_KG)
         }
         Spec::Rigid(body) => body.mass_kg,
+        Spec::Soft(_) => STRETCH_MASS_KG,
         Spec::Instrument(_) | Spec::Synthetic(_) => HAND_MASS_KG,
     }
 }

@@ -85,6 +85,9 @@ impl Machine {
             steps: vec![
                 price("tube", 2.0, 0.25),
                 price("rigid", 0.0, 25.0),
+                price("sheet", 5.0, 0.6),
+                price("solid", 5.0, 0.6),
+                price("rope", 5.0, 0.6),
                 price("instrument", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],

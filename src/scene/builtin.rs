@@ -12,7 +12,7 @@ pub struct BuiltIn {
 }
 
 /// Every built-in scene; the first is the default.
-pub const ALL: [BuiltIn; 9] = [
+pub const ALL: [BuiltIn; 12] = [
     BuiltIn { name: "tube", text: include_str!("../../scenes/tube.toml") },
     BuiltIn { name: "pendulum", text: include_str!("../../scenes/pendulum.toml") },
     BuiltIn { name: "yard", text: include_str!("../../scenes/yard.toml") },
@@ -22,6 +22,9 @@ pub const ALL: [BuiltIn; 9] = [
     BuiltIn { name: "pile", text: include_str!("../../scenes/pile.toml") },
     BuiltIn { name: "crossing", text: include_str!("../../scenes/crossing.toml") },
     BuiltIn { name: "gripper", text: include_str!("../../scenes/gripper.toml") },
+    BuiltIn { name: "mesentery", text: include_str!("../../scenes/mesentery.toml") },
+    BuiltIn { name: "organ", text: include_str!("../../scenes/organ.toml") },
+    BuiltIn { name: "suture", text: include_str!("../../scenes/suture.toml") },
 ];
 
 /// Files that built-in scenes name.

@@ -10,6 +10,7 @@ use metachron_agents::instrument::ToolSpec;
 use metachron_agents::rigid::{Joint, RigidSpec};
 use metachron_agents::rod::TubeSpec;
 use metachron_agents::shape::{Model, Obstacle, Placement};
+use metachron_agents::soft::SoftSpec;
 use metachron_agents::synthetic::SyntheticSpec;
 use metachron_agents::{AgentId, Resolution, ResolutionRange, SimSpan};
 use std::ops::Range;
@@ -221,6 +222,8 @@ pub enum Spec {
     Tube(TubeSpec),
     /// A rigid body.
     Rigid(RigidSpec),
+    /// A sheet, solid or rope.
+    Soft(SoftSpec),
     /// A driven tool.
     Instrument(ToolSpec),
     /// Declared cost and error.
@@ -234,6 +237,7 @@ impl Spec {
         match self {
             Self::Tube(_) => "tube",
             Self::Rigid(_) => "rigid",
+            Self::Soft(spec) => spec.shape.model(),
             Self::Instrument(_) => "instrument",
             Self::Synthetic(_) => "synthetic",
         }
@@ -260,7 +264,8 @@ pub struct Probe {
     pub agent: AgentId,
     /// That agent's name.
     pub object: String,
-    /// 0 start … 1 end of a tube's rest length; no meaning for other models.
+    /// 0 start … 1 end of a tube's or rope's rest length, the first corner … the opposite one of a sheet or solid; no meaning
+    /// for other models.
     pub at: f64,
     /// Time between samples, where samples are wanted.
     pub every: Option<SimSpan>,

@@ -10,7 +10,8 @@ use metachron_agents::coupling::touch::{TouchRoom, touches};
 use metachron_agents::coupling::{Form, FormKind, Law, Placed, SolidForm, Touch, View};
 use metachron_agents::rod::Tube;
 use metachron_agents::shape::ToolShape;
-use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot};
+use metachron_agents::soft::SoftBody;
+use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
 use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
@@ -41,6 +42,7 @@ struct Figure {
 enum Pose {
     Solid(DVec3, DQuat),
     Chain(CurveState),
+    Soft(SoftState),
     Tool(DVec3, DQuat, f64),
 }
 
@@ -123,6 +125,7 @@ impl Figure {
         let view = match &self.place {
             Pose::Solid(position, rotation) => View::Solid { position: *position, rotation: *rotation },
             Pose::Chain(curve) => View::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
+            Pose::Soft(soft) => View::Surface(&soft.positions),
             Pose::Tool(tip, rotation, jaw) => View::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
         };
         Placed { form: &self.form, view }
@@ -146,6 +149,14 @@ fn figure(member: &Member) -> Option<Figure> {
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
             (FormKind::Chain, Pose::Chain(curve), low, high)
+        }
+        Spec::Soft(spec) => {
+            let body = SoftBody::new(spec.clone()).ok()?;
+            let Body::Soft(soft) = body.start() else { return None };
+            let low = soft.positions.iter().copied().reduce(DVec3::min)?;
+            let high = soft.positions.iter().copied().reduce(DVec3::max)?;
+            let kind = body.form()?.kind.clone();
+            (kind, Pose::Soft(soft), low, high)
         }
         Spec::Instrument(spec) => {
             let (key, shape) = (spec.keyframes.first()?, ToolShape::default());

@@ -3,7 +3,8 @@
 //! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys; a schema cannot say them all.
 
 use super::format::{
-    CommonFile, InstrumentFile, MODELS, MeshFile, RigidFile, SceneFile, SyntheticFile, TreeFile, TubeFile,
+    CommonFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SceneFile, SheetFile, SolidFile, SyntheticFile,
+    TreeFile, TubeFile,
 };
 use schemars::{JsonSchema, SchemaGenerator};
 use serde_json::{Map, Value, json};
@@ -15,6 +16,9 @@ pub fn json_schema() -> Value {
     let objects = [
         object::<TubeFile>(&mut generator),
         object::<RigidFile>(&mut generator),
+        object::<SheetFile>(&mut generator),
+        object::<SolidFile>(&mut generator),
+        object::<RopeFile>(&mut generator),
         object::<InstrumentFile>(&mut generator),
         object::<SyntheticFile>(&mut generator),
         object::<MeshFile>(&mut generator),

@@ -70,9 +70,22 @@ fn completions_and_manual_pages_are_printed() {
 
 #[test]
 fn check_accepts_the_built_in_scenes() {
-    let check =
-        metachron(&["check", "tube", "pendulum", "yard", "overload", "stack", "chain", "pile", "crossing", "gripper"]);
-    assert_eq!((code(&check), out(&check).lines().count()), (0, 9), "{}", err(&check));
+    let check = metachron(&[
+        "check",
+        "tube",
+        "pendulum",
+        "yard",
+        "overload",
+        "stack",
+        "chain",
+        "pile",
+        "crossing",
+        "gripper",
+        "mesentery",
+        "organ",
+        "suture",
+    ]);
+    assert_eq!((code(&check), out(&check).lines().count()), (0, 12), "{}", err(&check));
     assert!(metachron(&["check", "-q", "tube"]).stdout.is_empty());
 }
 

@@ -11,4 +11,5 @@ mod scene_ties;
 mod scenery;
 mod scenes;
 mod scenes_coupled;
+mod scenes_soft;
 mod viewer;

@@ -6,6 +6,7 @@ use metachron::scene::{Scene, Spec, builtin, load};
 use metachron_agents::instrument::Instrument;
 use metachron_agents::rigid::RigidBody;
 use metachron_agents::rod::Tube;
+use metachron_agents::soft::SoftBody;
 use metachron_agents::synthetic::Synthetic;
 use metachron_agents::{Agent, AgentId, Body, Neighbour, SimSpan, SimTime, Snapshot, Surroundings};
 use std::sync::Arc;
@@ -29,6 +30,7 @@ impl Play {
                 let built: Result<Box<dyn Agent>, String> = match member.spec.clone() {
                     Spec::Tube(spec) => Tube::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
                     Spec::Rigid(spec) => RigidBody::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
+                    Spec::Soft(spec) => SoftBody::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string()),
                     Spec::Instrument(spec) => {
                         Instrument::new(spec).map(|a| Box::new(a) as _).map_err(|e| e.to_string())
                     }
@@ -77,7 +79,7 @@ fn millis(ms: f64) -> SimSpan {
 #[test]
 fn every_agent_of_every_built_in_scene_can_be_built_and_stays_finite() {
     for built_in in &builtin::ALL {
-        let mut play = Play::of(&scene(built_in.name), &["tube", "rigid", "instrument", "synthetic"]);
+        let mut play = Play::of(&scene(built_in.name), &metachron::scene::format::MODELS);
         for _ in 0..20 {
             play.step(millis(5.0));
         }

@@ -1,9 +1,9 @@
-//! What the jaws catch: the nearest point of a tube within reach, held by a spring that comes on smoothly.
+//! What the jaws catch: the nearest point of a tube or soft body within reach, held by a spring that comes on smoothly.
 //!
 //! In: an opening, a tip, the snapshots around. Out: a [`Grasp`]. Never here: where the tip goes.
 
 use super::ToolSpec;
-use crate::{AgentId, Anchor, Body, CurveState, Grasp, Surroundings};
+use crate::{AgentId, Anchor, Body, CurveState, Grasp, SoftState, Surroundings};
 use glam::DVec3;
 
 /// Jaws that pass below this opening grasp.
@@ -26,7 +26,7 @@ pub(super) struct Jaws {
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Held {
     target: AgentId,
-    arc_m: f64,
+    anchor: Anchor,
     for_s: f64,
 }
 
@@ -56,7 +56,7 @@ impl Jaws {
         if let Some(held) = &mut self.held {
             held.for_s += dt;
         } else if now < GRASP_BELOW && self.armed {
-            self.held = nearest(spec, tip, around).map(|(target, arc_m, _)| Held { target, arc_m, for_s: 0.0 });
+            self.held = nearest(spec, tip, around).map(|(target, anchor, _)| Held { target, anchor, for_s: 0.0 });
             // jaws that have come to a stop catch nothing any more
             self.armed = self.held.is_none() && now < was;
         }
@@ -69,21 +69,30 @@ impl Jaws {
         let share = (u * u * (3.0 - 2.0 * u)).max(RAMP_START);
         Some(Grasp {
             target: held.target,
-            anchor: Anchor::Arc(held.arc_m),
+            anchor: held.anchor,
             stiffness_n_m: share * spec.stiffness_n_m,
             damping_n_s_m: share * spec.damping_n_s_m,
         })
     }
 }
 
-/// The nearest point within reach of a tube that may be grasped: whose, at which rest arc length, and the gap to its skin.
-pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<(AgentId, f64, f64)> {
-    let curves = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id)).filter_map(|other| {
-        let Body::Curve(curve) = &other.snapshot.body else { return None };
-        let (arc_m, gap_m) = nearest_on(curve, tip)?;
-        Some((other.id, arc_m, gap_m))
+/// The nearest point within reach of what may be grasped: whose, which, and the gap to its skin.
+pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<(AgentId, Anchor, f64)> {
+    let soft = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id)).filter_map(|other| {
+        let (anchor, gap_m) = match &other.snapshot.body {
+            Body::Curve(curve) => nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?,
+            Body::Soft(soft) => nearest_vertex(soft, tip)?,
+            _ => return None,
+        };
+        Some((other.id, anchor, gap_m))
     });
-    curves.filter(|(_, _, gap_m)| *gap_m <= spec.reach_m).min_by(|a, b| a.2.total_cmp(&b.2))
+    soft.filter(|(_, _, gap_m)| *gap_m <= spec.reach_m).min_by(|a, b| a.2.total_cmp(&b.2))
+}
+
+/// The nearest vertex of a soft body, and how far it is.
+fn nearest_vertex(soft: &SoftState, tip: DVec3) -> Option<(Anchor, f64)> {
+    let apart = (0..).zip(&soft.positions).map(|(vertex, at)| (Anchor::Vertex(vertex), at.distance(tip)));
+    apart.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
 /// The point of a curve whose skin is nearest: rest arc length, and the gap (negative inside).

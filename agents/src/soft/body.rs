@@ -10,7 +10,10 @@ use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use crate::coupling::{Form, FormKind, Law, Link};
-use crate::{Agent, Bounds, Grip, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings, check_span};
+use crate::{
+    Agent, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, Surroundings,
+    check_span,
+};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -77,6 +80,12 @@ impl SoftBody {
             steps: 0,
             spec,
         })
+    }
+
+    /// Its vertices as a snapshot shows them.
+    #[must_use]
+    pub fn start(&self) -> Body {
+        Body::Soft(SoftState { positions: self.positions.clone(), velocities: self.velocities.clone() })
     }
 
     /// What it was built from.

@@ -40,7 +40,6 @@ impl SoftInertia {
     /// Where there are not as many as [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3]) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        let mut flat = vec![0.0; 3 * impulses.len()];
-        respond(&self.factor, &self.held, &mut flat, impulses);
+        respond(&self.factor, &self.held, impulses);
     }
 }

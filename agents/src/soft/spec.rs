@@ -127,8 +127,8 @@ pub enum SoftError {
     },
 }
 
-/// The most vertices of a soft body: the factor of a cube of as many takes 0.3 s (measured), past any frame.
-pub const VERTICES_MAX: u64 = 4096;
+/// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.
+pub const VERTICES_MAX: u64 = 2048;
 
 impl SoftShape {
     /// The model's name as scenes write it.
@@ -155,7 +155,7 @@ impl SoftShape {
 
     fn check(&self) -> Result<(), SoftError> {
         let length = |what, value| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m");
-        let count = |what, value: u32| number(what, f64::from(value), (1.0, 4095.0), "between 1 and 4095");
+        let count = |what, value: u32| number(what, f64::from(value), (1.0, 2047.0), "between 1 and 2047");
         match self {
             Self::Sheet { size_m, thickness_m, segments } => {
                 size_m.iter().try_for_each(|size| length("the size", *size))?;
@@ -168,7 +168,7 @@ impl SoftShape {
             }
             Self::Ball { radius_m, segments } => {
                 length("the radius", *radius_m)?;
-                number("the number of segments", f64::from(*segments), (2.0, 4095.0), "between 2 and 4095")?;
+                number("the number of segments", f64::from(*segments), (2.0, 2047.0), "between 2 and 2047")?;
             }
             Self::Rope { path_m, radius_m, segments } => {
                 length("the radius", *radius_m)?;

@@ -8,6 +8,8 @@ use glam::{DMat3, DVec3};
 
 /// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
 const HASTE_MAX: f64 = 0.3;
+/// Past this no coordinate or speed is taken, metres or m/s: its square would soon be no number.
+const REACH_MAX: f64 = 1e9;
 /// A step is divided into no more substeps than this.
 pub(super) const SUBSTEPS_MAX: u32 = 16;
 
@@ -28,8 +30,8 @@ impl SoftBody {
                 continue;
             }
             self.act(f64::from(parts - left) * h, h);
-            if !self.velocities.iter().chain(&self.positions).all(|v| v.is_finite()) {
-                return Err(self.lost("a vertex", dt));
+            if !self.velocities.iter().chain(&self.positions).all(|v| v.abs().max_element() <= REACH_MAX) {
+                return Err(self.lost("a vertex was thrown out of reach", dt));
             }
             (left, done) = (left - 1, done + 1);
         }
@@ -51,7 +53,7 @@ impl SoftBody {
         contacts.mobilities.clear();
         contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
         if !system.factor() {
-            return Err("its stiffness");
+            return Err("its stiffness has no inverse");
         }
         free.clear();
         let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);

@@ -12,7 +12,6 @@ pub(super) struct System {
     /// Lowest vertex that each vertex is joined to.
     first: Vec<u32>,
     held: Vec<bool>,
-    flat: Vec<f64>,
     /// Force on each vertex at the start of the substep, N.
     pub forces: Vec<DVec3>,
     /// h², s²: what a stiffness counts.
@@ -25,7 +24,7 @@ impl System {
         let mut matrix = Envelope::default();
         matrix.shape(&first);
         let forces = vec![DVec3::ZERO; held.len()];
-        Self { matrix, flat: vec![0.0; 3 * held.len()], first, held, forces, square: 0.0 }
+        Self { matrix, first, held, forces, square: 0.0 }
     }
 
     /// Begins a substep of `h` seconds: no force, no stiffness.
@@ -69,8 +68,8 @@ impl System {
     }
 
     /// Turns impulses, one a vertex (N·s), into the velocities they cause (m/s) by the factor (eq. 2).
-    pub fn respond(&mut self, impulses: &mut [DVec3]) {
-        respond(&self.matrix, &self.held, &mut self.flat, impulses);
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        respond(&self.matrix, &self.held, impulses);
     }
 
     /// The size of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
@@ -92,12 +91,7 @@ impl System {
 }
 
 /// A⁻¹ on impulses, one a vertex; those that are held stay still.
-pub(super) fn respond(factor: &Envelope<3>, held: &[bool], flat: &mut [f64], impulses: &mut [DVec3]) {
-    for ((row, impulse), &held) in flat.chunks_exact_mut(3).zip(impulses.iter()).zip(held) {
-        row.copy_from_slice(&if held { DVec3::ZERO } else { *impulse }.to_array());
-    }
-    factor.solve(flat);
-    for (row, impulse) in flat.chunks_exact(3).zip(impulses) {
-        *impulse = DVec3::from_slice(row);
-    }
+pub(super) fn respond(factor: &Envelope<3>, held: &[bool], impulses: &mut [DVec3]) {
+    impulses.iter_mut().zip(held).filter(|(_, held)| **held).for_each(|(impulse, _)| *impulse = DVec3::ZERO);
+    factor.solve_vectors(impulses);
 }

@@ -4,7 +4,7 @@
 
 use super::super::view::Size;
 
-/// A vertex buffer that is written anew every frame and only ever grows.
+/// A buffer of vertices or indices that is written anew every frame and only ever grows.
 #[derive(Debug)]
 pub struct Growing {
     label: &'static str,
@@ -28,7 +28,7 @@ impl Growing {
             self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
                 label: Some(self.label),
                 size: wanted.next_power_of_two().max(64 * self.stride as u64),
-                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::COPY_DST,
+                usage: wgpu::BufferUsages::VERTEX | wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }));
         }

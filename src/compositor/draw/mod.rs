@@ -8,6 +8,7 @@ mod cuts;
 mod globals;
 mod meshes;
 mod pipelines;
+mod skins;
 mod timing;
 mod tissue;
 
@@ -20,6 +21,7 @@ use cuts::Cuts;
 use globals::Globals;
 use meshes::{Mesh, Meshes};
 use pipelines::{Bindings, Pipelines};
+use skins::SkinBuffers;
 use std::time::{Duration, Instant};
 use timing::Timing;
 
@@ -115,6 +117,7 @@ pub struct Renderer {
     cuts: Cuts,
     samples: Growing,
     instances: Growing,
+    skins: SkinBuffers,
     targets: Option<Targets>,
     timing: Option<Timing>,
 }
@@ -153,6 +156,7 @@ impl Renderer {
             cuts: Cuts::default(),
             samples: Growing::new("tube samples", size_of::<SkinSample>()),
             instances: Growing::new("solid instances", size_of::<SolidInstance>()),
+            skins: SkinBuffers::default(),
             targets: None,
             timing: Timing::new(device, queue),
         };
@@ -231,6 +235,7 @@ impl Renderer {
         self.queue.write_buffer(&self.bindings.globals, 0, bytemuck::bytes_of(&globals));
         self.samples.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.samples));
         self.instances.write(&self.device, &self.queue, bytemuck::cast_slice(&picture.instances));
+        self.skins.write(&self.device, &self.queue, &picture.skins);
         self.meshes.prepare(&self.device, picture);
         self.cuts.prepare(&self.device, &self.queue, picture);
         if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
@@ -262,7 +267,8 @@ impl Renderer {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
-        draws
+        pass.set_pipeline(&self.pipelines.solid_shadow);
+        draws + self.draw_skins(&mut pass, picture, false)
     }
 
     /// The picture itself, nearest kinds first so that hidden pixels are not lit; the number of draws.
@@ -295,6 +301,8 @@ impl Renderer {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
+        pass.set_pipeline(&self.pipelines.solid);
+        draws += self.draw_skins(&mut pass, picture, false);
         if picture.style.wireframe {
             draws += self.draw_edges(&mut pass, picture);
         }
@@ -322,7 +330,19 @@ impl Renderer {
         for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.mesh)) {
             draws += self.draw_solids(pass, run, true);
         }
-        draws
+        draws + self.draw_skins(pass, picture, true)
+    }
+
+    /// The skins of soft bodies, by the pipeline of solids: each is a mesh that is drawn once.
+    fn draw_skins(&self, pass: &mut wgpu::RenderPass<'_>, picture: &Picture, edges: bool) -> u32 {
+        let Some(instances) = self.instances.buffer() else { return 0 };
+        let stride = size_of::<SolidInstance>() as u64;
+        let drawn = picture.skins.runs.iter().map(|run| {
+            let from = u64::from(run.instance) * stride;
+            pass.set_vertex_buffer(1, instances.slice(from..from + stride));
+            self.skins.draw(pass, run, edges)
+        });
+        drawn.sum()
     }
 
     /// What a run of solids is drawn with: points, lines and slabs are lit at their corners.

@@ -5,6 +5,7 @@
 
 use super::POSITION_MAX_M;
 use super::object::{Named, Objects};
+use super::soft;
 use crate::scene::cast::Spec;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
@@ -12,6 +13,7 @@ use crate::scene::ties::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_agents::coupling::Law;
 use metachron_agents::rigid::RigidBody;
+use metachron_agents::soft::SoftShape;
 use metachron_agents::{AgentId, Anchor};
 use std::collections::BTreeMap;
 
@@ -56,6 +58,11 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
         return None;
     }
     let before = c.count();
+    let stays = matches!(file.law.unwrap_or_default(), CouplingLaw::Ledger | CouplingLaw::Off);
+    if [a, b].into_iter().any(|end| matches!(end, Named::Soft(_))) && !stays {
+        let what = format!("is `{}`, which sheets, solids and ropes do not know", file.law.unwrap_or_default().name());
+        c.wrong(place, "law", what, "expected `ledger` or `off`");
+    }
     check_keys(c, place, file);
     let law = law(c, place, file);
     let kind = match file.kind.unwrap_or_default() {
@@ -158,6 +165,22 @@ fn anchor(
     objects: &Objects,
 ) -> Option<Anchor> {
     let id = named.agent()?;
+    if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
+        let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
+        return match spot {
+            Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, ""))),
+            Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
+            Spot::Share(_) => {
+                let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
+                c.wrong(place, key, "is a share of a length", expected);
+                None
+            }
+            Spot::Point(_) => {
+                c.wrong(place, key, "is a point, but the object is a rope", "expected a share of its length, 0 … 1");
+                None
+            }
+        };
+    }
     match (spot, matches!(named, Named::Tube(_))) {
         (Spot::Share(share), true) => {
             let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
@@ -178,17 +201,19 @@ fn anchor(
     }
 }
 
+fn spec_of(objects: &Objects, id: AgentId) -> Option<&Spec> {
+    objects.agents.iter().find(|member| member.id == id).map(|member| &member.spec)
+}
+
 /// Rest length of a tube's skeleton; none where the tube cannot be built, which is told elsewhere.
 fn tube_length_m(objects: &Objects, id: AgentId) -> Option<f64> {
-    let member = objects.agents.iter().find(|member| member.id == id)?;
-    let Spec::Tube(spec) = &member.spec else { return None };
+    let Spec::Tube(spec) = spec_of(objects, id)? else { return None };
     metachron_agents::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
 }
 
 /// The centre of mass of a rigid object in its shape's axes; zero where there is none, as at an instrument's tip.
 fn centre_of_mass(objects: &Objects, id: AgentId) -> DVec3 {
-    let member = objects.agents.iter().find(|member| member.id == id);
-    match member.map(|member| &member.spec) {
+    match spec_of(objects, id) {
         Some(Spec::Rigid(spec)) => RigidBody::new(spec.clone()).map_or(DVec3::ZERO, |body| body.com_local()),
         _ => DVec3::ZERO,
     }

@@ -61,6 +61,10 @@ fn moved(spec: Spec, by: DVec3) -> Spec {
             tube.path_m.iter_mut().for_each(|point| *point += by);
             Spec::Tube(tube)
         }
+        Spec::Soft(mut soft) => {
+            soft.position += by;
+            Spec::Soft(soft)
+        }
         other => other,
     }
 }
@@ -86,12 +90,7 @@ pub(super) fn copies(
         return Copies::single();
     };
     if !can_move {
-        c.wrong(
-            place,
-            "grid",
-            "repeats an object without a place",
-            "expected a rigid object, a tube, a mesh or a tree",
-        );
+        c.wrong(place, "grid", "repeats an object without a place", "expected an object that has one: no instrument");
         return Copies::single();
     }
     let count = grid.iter().map(|n| u64::from(*n)).product::<u64>();

@@ -1,7 +1,7 @@
 //! An instrument of the file as a [`ToolSpec`].
 
 use super::POSITION_MAX_M;
-use super::object::{Given, Names};
+use super::object::{Given, Named, Names};
 use super::rigid::rotation;
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{InstrumentFile, KeyframeFile};
@@ -32,10 +32,12 @@ fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &InstrumentFile, name
     let mut found = Vec::with_capacity(wanted.len().min(names.len()));
     for (i, name) in wanted.iter().enumerate() {
         let key = format!("grasps.{i}");
-        if names.is_known(name) && names.tube(name).is_none() {
-            c.wrong(place, &key, format_args!("names `{name}`, which is no tube"), "expected the name of a tube");
-        } else if c.reference(place, &key, name, names.tubes().map(|(name, _)| name)) {
-            found.extend(names.tube(name).filter(|id| !found.contains(id)));
+        let soft = |named| matches!(named, Named::Tube(_) | Named::Soft(_));
+        if names.is_known(name) && names.soft(name).is_none() {
+            let expected = "expected the name of a tube, sheet, solid or rope";
+            c.wrong(place, &key, format_args!("names `{name}`, which is not soft"), expected);
+        } else if c.reference(place, &key, name, names.only(soft)) {
+            found.extend(names.soft(name).filter(|id| !found.contains(id)));
         }
     }
     found

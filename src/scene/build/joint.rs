@@ -102,6 +102,11 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
             "which is a tube",
             "expected a rigid object; a tube is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `clamp` and `pin`",
         ),
+        Some(Named::Soft(_)) => wrong(
+            c,
+            "which is soft",
+            "expected a rigid object; a sheet, solid or rope is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `hold`",
+        ),
         Some(Named::Tool(_)) => wrong(
             c,
             "which is an instrument",

@@ -16,6 +16,7 @@ mod mesh;
 mod object;
 mod rigid;
 mod scenery;
+mod soft;
 mod stage;
 mod synthetic;
 mod tube;

@@ -2,12 +2,12 @@
 
 use super::common::{faults, levels, look, pace};
 use super::grid::{Copies, copies};
-use super::{instrument, rigid, scenery, synthetic, tube};
+use super::{instrument, rigid, scenery, soft, synthetic, tube};
 use crate::scene::cast::{Look, Member, Scenery, Spec};
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{
-    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, MeshFile, RigidFile, SyntheticFile,
-    TreeFile, TubeFile,
+    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, MeshFile, RigidFile, RopeFile, SheetFile,
+    SolidFile, SyntheticFile, TreeFile, TubeFile,
 };
 use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
@@ -16,6 +16,7 @@ use metachron_agents::instrument::Instrument;
 use metachron_agents::rigid::{Joint, RigidBody};
 use metachron_agents::rod::{Tube, TubeError};
 use metachron_agents::shape::Obstacle;
+use metachron_agents::soft::SoftBody;
 use metachron_agents::synthetic::Synthetic;
 use metachron_agents::{AgentId, Resolution, ResolutionRange};
 use serde::de::DeserializeOwned;
@@ -82,6 +83,8 @@ pub(in crate::scene) enum Named {
     Synthetic(AgentId),
     /// A tube.
     Tube(AgentId),
+    /// A sheet, solid or rope.
+    Soft(AgentId),
 }
 
 impl Named {
@@ -89,7 +92,7 @@ impl Named {
     pub(in crate::scene) const fn agent(self) -> Option<AgentId> {
         match self {
             Self::Fixed | Self::Scenery => None,
-            Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) => Some(id),
+            Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
         }
     }
 }
@@ -112,8 +115,9 @@ impl Names {
         self.0.iter().filter_map(|(name, n)| if let Named::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
     }
 
-    pub(super) fn tube(&self, name: &str) -> Option<AgentId> {
-        if let Some(Named::Tube(id)) = self.get(name) { Some(id) } else { None }
+    /// What jaws can hold if a scene says so: tubes and soft bodies.
+    pub(super) fn soft(&self, name: &str) -> Option<AgentId> {
+        self.get(name).filter(|named| matches!(named, Named::Tube(_) | Named::Soft(_))).and_then(Named::agent)
     }
 
     pub(super) fn is_known(&self, name: &str) -> bool {
@@ -137,6 +141,9 @@ pub(super) struct Entry {
 pub(super) enum ModelFile {
     Tube(TubeFile),
     Rigid(RigidFile),
+    Sheet(SheetFile),
+    Solid(SolidFile),
+    Rope(RopeFile),
     Instrument(InstrumentFile),
     Synthetic(SyntheticFile),
     Mesh(MeshFile),
@@ -175,7 +182,7 @@ pub(in crate::scene) fn read_objects(
             entry.fixed = rigid::is_fixed(c, &entry.place, file);
         }
         entry.fixed |= entry.model.is_scenery();
-        let can_move = entry.model.is_scenery() || matches!(entry.model, ModelFile::Rigid(_) | ModelFile::Tube(_));
+        let can_move = !matches!(entry.model, ModelFile::Instrument(_) | ModelFile::Synthetic(_));
         let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
         entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
     }
@@ -206,6 +213,9 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
     let own = match model {
         "tube" => read(c, own, span).map(ModelFile::Tube),
         "rigid" => read(c, own, span).map(ModelFile::Rigid),
+        "sheet" => read(c, own, span).map(ModelFile::Sheet),
+        "solid" => read(c, own, span).map(ModelFile::Solid),
+        "rope" => read(c, own, span).map(ModelFile::Rope),
         "instrument" => read(c, own, span).map(ModelFile::Instrument),
         "mesh" => read(c, own, span).map(ModelFile::Mesh),
         "tree" => read(c, own, span).map(ModelFile::Tree),
@@ -254,6 +264,7 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             (_, true) => Named::Fixed,
             (ModelFile::Tube(_), _) => Named::Tube(id),
             (ModelFile::Rigid(_), _) => Named::Rigid(id),
+            (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => Named::Soft(id),
             (ModelFile::Instrument(_), _) => Named::Tool(id),
             (ModelFile::Synthetic(_), _) => Named::Synthetic(id),
         };
@@ -344,6 +355,7 @@ fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
             other => other.map(drop).map_err(|e| e.to_string()),
         },
         Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Soft(spec) => SoftBody::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Instrument(spec) => Instrument::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Synthetic(spec) => {
             Synthetic::new(spec, member.simulation, member.start).map(drop).map_err(|e| e.to_string())
@@ -369,7 +381,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     let pace = pace(c, place, common);
     let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
     let material = match model {
-        ModelFile::Tube(_) => Material::Tissue,
+        ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
         ModelFile::Instrument(_) => Material::Metal,
         _ => Material::Plastic,
     };
@@ -385,6 +397,9 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
             (Spec::Tube(built.spec), start, range, built.picture)
         }
         ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &given)?), unit, flat, flat),
+        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &given)), unit, flat, flat),
+        ModelFile::Solid(file) => (Spec::Soft(soft::solid(c, file, &given)?), unit, flat, flat),
+        ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &given)), unit, flat, flat),
         ModelFile::Instrument(file) => (Spec::Instrument(instrument::build(c, file, &given, names)), unit, flat, flat),
         ModelFile::Synthetic(file) => {
             let (spec, range) = synthetic::build(c, file, &given);

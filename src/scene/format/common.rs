@@ -45,7 +45,7 @@ pub struct CommonFile {
     /// Colour as `#rrggbb` (sRGB). Default: by material.
     #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
     pub colour: Option<String>,
-    /// What its surface looks like. Default: tissue for a tube, metal for an instrument, plastic for the rest.
+    /// What its surface looks like. Default: tissue for a tube, sheet or solid, metal for an instrument, plastic for the rest.
     pub material: Option<Material>,
     /// How the light on it is worked out: `flat`, `gouraud`, `per-pixel` (default), or `any`, whichever the policy takes.
     pub shading: Option<ShadingKind>,
@@ -53,7 +53,7 @@ pub struct CommonFile {
     pub sleep: Option<bool>,
     /// What goes wrong with its clock and its messages on purpose; what is left out is the world's.
     pub faults: Option<FaultsFile>,
-    /// Repeats a rigid object, a tube, a mesh or a tree: how many along x, y and z, each 1 … 1000. The first stands where the object says, the
+    /// Repeats an object: how many along x, y and z, each 1 … 1000. The first stands where the object says, the
     /// others `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….
     #[schemars(length(min = 3, max = 3))]
     pub grid: Option<[u32; 3]>,

@@ -16,8 +16,8 @@ pub struct CouplingFile {
     pub kind: Option<CouplingKind>,
     /// By which law. Default `ledger`.
     pub law: Option<CouplingLaw>,
-    /// Where an `attach` holds `a`: 0 start … 1 end of a tube's rest length, or `[x, y, z]` in the axes of a rigid object's
-    /// shape or of an instrument's tip, metres.
+    /// Where an `attach` holds `a`: 0 start … 1 end of a tube's or rope's rest length, or `[x, y, z]` in the axes of a rigid
+    /// object's shape, of an instrument's tip, or of a sheet or solid from its middle (the nearest vertex), metres.
     pub at_a: Option<Spot>,
     /// Where an `attach` holds `b`, as `at_a`.
     pub at_b: Option<Spot>,

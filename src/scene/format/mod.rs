@@ -10,6 +10,7 @@ mod joint;
 mod rigid;
 mod scene;
 mod scenery;
+mod soft;
 mod synthetic;
 mod tube;
 mod value;
@@ -24,9 +25,10 @@ pub use scene::{
     StatesKind, TargetFile, ValueKind, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, ShadingKind, TreeFile, TreeLod};
+pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
 pub use value::{OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.
-pub const MODELS: [&str; 6] = ["tube", "rigid", "instrument", "synthetic", "mesh", "tree"];
+pub const MODELS: [&str; 9] = ["tube", "rigid", "sheet", "solid", "rope", "instrument", "synthetic", "mesh", "tree"];

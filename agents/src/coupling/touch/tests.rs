@@ -3,6 +3,7 @@
 mod blocks;
 mod promises;
 mod rounds;
+mod surfaces;
 mod tubes;
 
 use super::*;

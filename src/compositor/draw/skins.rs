@@ -1,0 +1,46 @@
+//! The skins of soft bodies on the GPU: one mesh, written anew every frame.
+//!
+//! In: corners and triangles. Out: draws. Never here: pipelines, instances.
+
+use super::super::skin::{SkinRun, Skins};
+use super::buffers::Growing;
+
+/// Corners, triangles and sides of all skins.
+#[derive(Debug)]
+pub struct SkinBuffers {
+    corners: Growing,
+    triangles: Growing,
+    sides: Growing,
+}
+
+impl Default for SkinBuffers {
+    fn default() -> Self {
+        Self {
+            corners: Growing::new("skin corners", size_of::<[[f32; 3]; 2]>()),
+            triangles: Growing::new("skin triangles", size_of::<[u32; 3]>()),
+            sides: Growing::new("skin sides", size_of::<[u32; 2]>()),
+        }
+    }
+}
+
+impl SkinBuffers {
+    /// Uploads the skins of a picture.
+    pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, skins: &Skins) {
+        self.corners.write(device, queue, bytemuck::cast_slice(&skins.corners));
+        self.triangles.write(device, queue, bytemuck::cast_slice(&skins.triangles));
+        self.sides.write(device, queue, bytemuck::cast_slice(&skins.sides));
+    }
+
+    /// Draws one skin, as triangles or as their sides; the number of draws.
+    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, run: &SkinRun, edges: bool) -> u32 {
+        let indices = if edges { &self.sides } else { &self.triangles };
+        let (Some(corners), Some(indices)) = (self.corners.buffer(), indices.buffer()) else { return 0 };
+        // three corners a triangle, and as many sides of two ends
+        let each = if edges { 6 } else { 3 };
+        let (from, count) = run.triangles;
+        pass.set_vertex_buffer(0, corners.slice(..));
+        pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
+        pass.draw_indexed(each * from..each * (from + count), 0, 0..1);
+        1
+    }
+}

@@ -1,0 +1,189 @@
+//! Soft bodies in the picture: skins of triangles that move, and ropes as tubes.
+//!
+//! In: vertices as a snapshot shows them, and what joins them. Out: corners with smooth normals for one mesh of the frame; a framed
+//! curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
+
+use glam::{DQuat, DVec3};
+use metachron_agents::coupling::SurfaceForm;
+use metachron_agents::{CurveState, SoftState};
+
+/// Level of the patches that a rope is drawn with.
+pub const ROPE_LEVEL: u8 = 2;
+/// A sheet is drawn at least this thick, as a share of its edges: thinner, its two faces would fight for the same depths.
+const THIN_SHARE: f64 = 0.01;
+
+/// The corners and triangles of all skins of a frame.
+#[derive(Debug, Clone, Default)]
+pub struct Skins {
+    /// Position relative to the picture's origin, metres, and unit normal of each corner.
+    pub corners: Vec<[[f32; 3]; 2]>,
+    /// Corners of each triangle, counter-clockwise seen from outside.
+    pub triangles: Vec<[u32; 3]>,
+    /// Their sides, three a triangle, where edges are drawn.
+    pub sides: Vec<[u32; 2]>,
+    /// Which triangles belong to which instance of the picture.
+    pub runs: Vec<SkinRun>,
+}
+
+/// One skin.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SkinRun {
+    /// Its first triangle, and how many it has.
+    pub triangles: (u32, u32),
+    /// The instance of [`super::Picture::instances`] that tells its colour and how thick it is.
+    pub instance: u32,
+}
+
+/// Room to work in.
+#[derive(Debug, Default)]
+pub(super) struct SkinRoom {
+    normals: Vec<DVec3>,
+    /// How many triangles each edge of a sheet has: those with one are its rim.
+    rim: Vec<[u32; 2]>,
+}
+
+impl Skins {
+    /// Empties the list, keeping its storage.
+    pub(super) fn clear(&mut self) {
+        self.corners.clear();
+        self.triangles.clear();
+        self.sides.clear();
+        self.runs.clear();
+    }
+
+    /// Adds the skin of a body that is drawn by an instance, with its sides where edges are drawn.
+    pub(super) fn add(
+        &mut self,
+        form: &SurfaceForm,
+        soft: &SoftState,
+        (origin, instance, edges): (DVec3, u32, bool),
+        room: &mut SkinRoom,
+    ) {
+        room.find_normals(form, soft);
+        let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
+        let corner = |x: &DVec3, n: DVec3| [(*x - origin).as_vec3().to_array(), n.as_vec3().to_array()];
+        let both = || soft.positions.iter().zip(&room.normals);
+        self.corners.extend(both().map(|(x, n)| corner(x, *n)));
+        self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
+        if !form.closed {
+            let back = first + soft.positions.len() as u32;
+            self.corners.extend(both().map(|(x, n)| corner(x, -*n)));
+            self.triangles.extend(form.triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
+            room.find_rim(form);
+            for &[a, b] in &room.rim {
+                self.triangles.extend([[first + b, first + a, back + a], [first + b, back + a, back + b]]);
+            }
+        }
+        if edges {
+            let all = self.triangles[from as usize..].iter();
+            self.sides.extend(all.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
+        }
+        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance });
+    }
+}
+
+impl SkinRoom {
+    fn find_normals(&mut self, form: &SurfaceForm, soft: &SoftState) {
+        self.normals.clear();
+        self.normals.resize(soft.positions.len(), DVec3::ZERO);
+        for triangle in form.triangles.iter() {
+            let [a, b, c] = triangle.map(|vertex| soft.positions[vertex as usize]);
+            let normal = (b - a).cross(c - a);
+            triangle.iter().for_each(|vertex| self.normals[*vertex as usize] += normal);
+        }
+        self.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(DVec3::Z));
+    }
+
+    /// Finds the sides of triangles that have no neighbour, each in the direction of its triangle.
+    fn find_rim(&mut self, form: &SurfaceForm) {
+        self.rim.clear();
+        self.rim.extend(form.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
+        self.rim.sort_unstable_by_key(|[a, b]| [*a.min(b), *a.max(b)]);
+        let same = |one: &[u32; 2], two: &[u32; 2]| one[0] == two[1] && one[1] == two[0];
+        let mut kept = 0;
+        let mut at = 0;
+        while at < self.rim.len() {
+            if at + 1 < self.rim.len() && same(&self.rim[at], &self.rim[at + 1]) {
+                at += 2;
+            } else {
+                self.rim[kept] = self.rim[at];
+                (kept, at) = (kept + 1, at + 1);
+            }
+        }
+        self.rim.truncate(kept);
+    }
+}
+
+/// How thick a skin is drawn about its vertices, metres.
+pub(super) fn drawn_radius_m(form: &SurfaceForm) -> f64 {
+    if form.closed { 0.0 } else { form.radius_m.max(THIN_SHARE * form.edge_m) }
+}
+
+/// A rope as a framed curve, its frames turned no more than it bends; into storage that is used again.
+pub(super) fn curve_of_rope(soft: &SoftState, radius_m: f64, curve: &mut CurveState) {
+    curve.positions.clone_from(&soft.positions);
+    curve.velocities.clone_from(&soft.velocities);
+    curve.radii_m.clear();
+    curve.radii_m.resize(soft.positions.len(), radius_m);
+    curve.arc_m.clear();
+    curve.frames.clear();
+    let (mut arc_m, mut frame) = (0.0, DQuat::IDENTITY);
+    curve.arc_m.push(arc_m);
+    for pair in soft.positions.windows(2) {
+        let way = pair[1] - pair[0];
+        arc_m += way.length().max(f64::MIN_POSITIVE);
+        curve.arc_m.push(arc_m);
+        let along = way.normalize_or(frame * DVec3::Z);
+        frame = (DQuat::from_rotation_arc(frame * DVec3::Z, along) * frame).normalize();
+        curve.frames.push(frame);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn square() -> (SurfaceForm, SoftState) {
+        let form = SurfaceForm {
+            vertices: [0, 1, 2, 3].into(),
+            edges: [[0, 1], [1, 2], [2, 3], [0, 3], [0, 2]].into(),
+            triangles: [[0, 1, 2], [0, 2, 3]].into(),
+            radius_m: 0.01,
+            edge_m: 1.0,
+            closed: false,
+        };
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
+        (form, SoftState { velocities: vec![DVec3::ZERO; 4], positions })
+    }
+
+    #[test]
+    fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
+        let (form, soft) = square();
+        let (mut skins, mut room) = (Skins::default(), SkinRoom::default());
+        skins.add(&form, &soft, (DVec3::ZERO, 7, false), &mut room);
+        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7 }]);
+        let thick = |i: u32| {
+            let [x, n] = skins.corners[i as usize].map(glam::Vec3::from_array);
+            (x + n * 0.01).as_dvec3()
+        };
+        let volumes = skins.triangles.iter().map(|t| {
+            let [a, b, c] = t.map(thick);
+            a.dot(b.cross(c)) / 6.0
+        });
+        let volume: f64 = volumes.sum();
+        assert!((volume - 0.02).abs() < 1e-8, "{volume}"); // 1 m² by 2 cm, in single precision
+    }
+
+    #[test]
+    fn a_rope_s_frames_follow_it_and_do_not_spin() {
+        let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(2.0, 1.0, 0.0), DVec3::new(2.0, 2.0, 0.5)];
+        let soft = SoftState { velocities: vec![DVec3::ZERO; 4], positions };
+        let mut curve = CurveState::default();
+        curve_of_rope(&soft, 0.1, &mut curve);
+        for (frame, pair) in curve.frames.iter().zip(soft.positions.windows(2)) {
+            let along = (pair[1] - pair[0]).normalize();
+            assert!((*frame * DVec3::Z).distance(along) < 1e-12);
+        }
+        assert_eq!(curve.arc_m.len(), 4);
+    }
+}

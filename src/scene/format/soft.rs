@@ -1,0 +1,148 @@
+//! `model = "sheet"`, `"solid"` and `"rope"`: soft bodies of finite elements.
+
+use super::Point;
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// A soft sheet, flat at rest, that stretches and bends.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SheetFile {
+    /// Length along its x and y, metres, each 1e-6 … 1e4.
+    pub size_m: [f64; 2],
+    /// Cells along x and y; at most 2048 vertices in all.
+    pub segments: [u32; 2],
+    /// Thickness, metres, 1e-6 … 1e4.
+    pub thickness_m: f64,
+    /// Young's modulus, Pa, 1 … 1e11.
+    pub young_pa: f64,
+    /// Poisson's ratio, 0 … 0.49. Default 0.4.
+    #[schemars(range(min = 0.0, max = 0.49))]
+    pub poisson: Option<f64>,
+    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    pub density_kg_m3: Option<f64>,
+    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    pub damping_per_s: Option<f64>,
+    /// Where its middle is, metres. Default the origin.
+    pub position_m: Option<Point>,
+    /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    pub velocity_m_s: Option<Point>,
+    /// Sides whose vertices never move. Default none.
+    pub hold: Option<Vec<SheetSide>>,
+    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub friction: Option<f64>,
+}
+
+/// A soft solid: a box or a ball.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolidFile {
+    /// Its shape. `box`: `size_m`. `ball`: `radius_m`.
+    pub shape: SoftShapeKind,
+    /// Length of a box along its x, y and z, metres, each 1e-6 … 1e4.
+    pub size_m: Option<Point>,
+    /// Radius of a ball, metres, 1e-6 … 1e4.
+    pub radius_m: Option<f64>,
+    /// Cells along x, y and z, of a ball the same three times; at most 2048 vertices in all.
+    pub segments: [u32; 3],
+    /// Young's modulus, Pa, 1 … 1e11.
+    pub young_pa: f64,
+    /// Poisson's ratio, 0 … 0.49. Default 0.4.
+    #[schemars(range(min = 0.0, max = 0.49))]
+    pub poisson: Option<f64>,
+    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    pub density_kg_m3: Option<f64>,
+    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    pub damping_per_s: Option<f64>,
+    /// Where its middle is, metres. Default the origin.
+    pub position_m: Option<Point>,
+    /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
+    pub rotation_deg: Option<Point>,
+    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    pub velocity_m_s: Option<Point>,
+    /// Faces of a box whose vertices never move. Default none.
+    pub hold: Option<Vec<SolidSide>>,
+    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub friction: Option<f64>,
+}
+
+/// A rope: it stretches, and neither bends stiffly nor twists.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RopeFile {
+    /// Points of its course at rest, metres: at least two.
+    pub path_m: Vec<Point>,
+    /// Radius, metres, 1e-6 … 1e4.
+    pub radius_m: f64,
+    /// Pieces, 1 … 2047.
+    pub segments: u32,
+    /// Young's modulus, Pa, 1 … 1e11.
+    pub young_pa: f64,
+    /// Density, kg/m³, 1 … 1e5. Default 1050.
+    pub density_kg_m3: Option<f64>,
+    /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
+    pub damping_per_s: Option<f64>,
+    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    pub velocity_m_s: Option<Point>,
+    /// Ends that never move. Default none.
+    pub hold: Option<Vec<RopeEnd>>,
+    /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.3.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub friction: Option<f64>,
+}
+
+/// The shape of a soft solid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SoftShapeKind {
+    /// A box.
+    Box,
+    /// A ball.
+    Ball,
+}
+
+/// An edge of a sheet, in its own axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SheetSide {
+    /// Where x is least.
+    Left,
+    /// Where x is largest.
+    Right,
+    /// Where y is least.
+    Near,
+    /// Where y is largest.
+    Far,
+}
+
+/// A face of a box, in its own axes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolidSide {
+    /// Where x is least.
+    Left,
+    /// Where x is largest.
+    Right,
+    /// Where y is least.
+    Near,
+    /// Where y is largest.
+    Far,
+    /// Where z is least.
+    Bottom,
+    /// Where z is largest.
+    Top,
+}
+
+/// An end of a rope.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum RopeEnd {
+    /// The first point.
+    Start,
+    /// The last point.
+    End,
+}

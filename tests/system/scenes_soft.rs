@@ -1,0 +1,96 @@
+//! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
+
+use crate::play::{agent, lockstep, number, point};
+use metachron::scene::{Scene, SceneError, Source, Spec, load};
+use metachron_agents::soft::{Side, SoftShape};
+
+fn read(text: &str) -> Result<Scene, SceneError> {
+    load(&Source::memory("test.toml", format!("format = 1\n{text}").as_bytes())?, &[])
+}
+
+const SHEET: &str = "name = \"s\"\nmodel = \"sheet\"\nsize_m = [0.2, 0.1]\nsegments = [4, 2]\nthickness_m = 0.001\n";
+const SOLID: &str = "name = \"s\"\nmodel = \"solid\"\nyoung_pa = 1e4\nsegments = [2, 2, 2]\n";
+const ROPE: &str = "name = \"s\"\nmodel = \"rope\"\nyoung_pa = 1e6\nradius_m = 0.002\nsegments = 10\n";
+
+/// The line counted from the object's first, and what is said of the only problem.
+fn refusal(object: &str) -> (usize, String) {
+    let error = read(&format!("[[object]]\n{object}\n")).expect_err(object);
+    assert_eq!(error.problems.len(), 1, "{object}: {:#?}", error.problems);
+    let p = &error.problems[0];
+    (p.line - 2, format!("{}; {}", p.message, p.expected))
+}
+
+#[test]
+fn a_sheet_stands_about_its_middle_and_is_held_by_its_sides() {
+    let text = "young_pa = 1e5\nposition_m = [1, 0, 0]\nrotation_deg = [90, 0, 0]\nhold = [\"far\", \"left\"]";
+    let scene = read(&format!("[[object]]\n{SHEET}{text}\n")).unwrap();
+    let Spec::Soft(spec) = &scene.agents[0].spec else { panic!("a soft body") };
+    assert_eq!(spec.held, [Side::Far, Side::Left]);
+    assert!((spec.position - glam::DVec3::new(0.9, 0.0, -0.05)).length() < 1e-12, "{}", spec.position);
+    assert!(matches!(spec.shape, SoftShape::Sheet { segments: [4, 2], .. }));
+}
+
+#[test]
+fn what_a_soft_body_cannot_be_is_told_with_its_line_and_limit() {
+    for (object, line, words) in [
+        (format!("{SHEET}young_pa = 0"), 6, "`young_pa` of `s` is 0; expected a number from 1 to 100000000000 Pa"),
+        (
+            format!("{SHEET}young_pa = 1e5\npoisson = 0.5"),
+            7,
+            "`poisson` of `s` is 0.5; expected a number from 0 to 0.49",
+        ),
+        (format!("{SOLID}shape = \"box\""), 1, "`size_m` of `s` is missing; a box needs it"),
+        (format!("{SOLID}shape = \"ball\"\nradius_m = 0.1\nhold = [\"top\"]"), 7, "a ball does not have"),
+        (format!("{ROPE}path_m = [[0, 0, 0]]"), 6, "`path_m` of `s` has 1 points; expected at least 2"),
+        (format!("{ROPE}path_m = [[0, 0, 0], [0, 0, 0]]"), 1, "cannot be built: the path of a rope needs two points"),
+    ] {
+        let (at, said) = refusal(&object);
+        assert!(said.contains(words), "{words:?} is not said: {said}");
+        assert!(at == line || line == 1, "line {at} of {object}");
+    }
+}
+
+#[test]
+fn a_coupling_by_a_law_that_soft_bodies_do_not_know_is_refused() {
+    let ball =
+        "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n";
+    let couple = "[[coupling]]\na = \"s\"\nb = \"b\"\nlaw = \"penalty\"\nstiffness_n_m = 10\n";
+    let error = read(&format!("[[object]]\n{SHEET}young_pa = 1e5\n{ball}{couple}")).expect_err("no such law");
+    assert!(error.problems[0].message.contains("sheets, solids and ropes do not know"), "{:?}", error.problems);
+}
+
+#[test]
+fn the_gut_hangs_from_its_mesentery_and_the_grasper_feels_it() {
+    let report = lockstep("mesentery", &["--seconds", "2.5"]);
+    for name in ["gut", "mesentery"] {
+        assert_eq!(agent(&report, name)["parked"], false, "{name}");
+    }
+    // it hangs 11 to 15 cm under the wall at 22 cm, and is pulled 5 cm towards the grasper
+    let gut = point(&report, "/probes/0/position_m");
+    assert!(gut[2] > 0.04 && gut[2] < 0.11 && gut[1] < -0.01, "{gut:?}");
+    let couplings = report["couplings"].as_array().unwrap();
+    let attached = couplings.iter().find(|c| c["kind"] == "attach").unwrap_or_else(|| panic!("{couplings:?}"));
+    assert!(number(attached, "/force_n") > 0.05, "{attached}");
+}
+
+#[test]
+fn the_organ_gives_way_under_the_instrument_and_carries_the_marble() {
+    let report = lockstep("organ", &["--seconds", "2.5"]);
+    assert_eq!(agent(&report, "organ")["parked"], false);
+    let marble = point(&report, "/probes/1/position_m");
+    // its radius over the organ's top, less what it sinks in
+    assert!(marble[2] > 0.064 && marble[2] < 0.076, "{marble:?}");
+    let couplings = report["couplings"].as_array().unwrap();
+    let pressed = couplings.iter().find(|c| c["a"] == "probe" || c["b"] == "probe").expect("the organ is pressed");
+    assert!(number(pressed, "/force_n") > 0.2 && number(pressed, "/penetration_m") < 2e-3, "{pressed}");
+}
+
+#[test]
+fn the_rope_hangs_in_a_catenary_and_the_rod_keeps_some_of_its_bend() {
+    let report = lockstep("suture", &["--seconds", "1.2"]);
+    let (rope, rod) = (point(&report, "/probes/0/position_m"), point(&report, "/probes/1/position_m"));
+    // span 0.2 m of 0.2973 m: sinh u/u = 1.4865, sag (cosh u - 1) 0.2/2u = 98.85 mm; it stretches by half a millimetre
+    assert!((rope[2] - (0.2 - 0.09885)).abs() < 1.5e-3, "{rope:?}");
+    // the rod was made as a V, 11 cm deep, and would be one again
+    assert!(rod[2] > 0.088 && rod[2] < rope[2] - 3e-3, "{rod:?}");
+}
