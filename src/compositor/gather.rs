@@ -165,7 +165,11 @@ impl Stage {
     /// Takes the newest snapshot of an agent; `awake` tells whether it goes on stepping.
     /// One that was seen already changes nothing, one of an earlier time starts its history anew (a reset).
     pub fn see(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
-        if let Some(track) = self.tracks.iter_mut().find(|track| track.actor.id == id) {
+        // actors mostly stand in the order of their numbers
+        let here = |track: &Track| track.actor.id == id;
+        let at = id.0 as usize;
+        let at = if self.tracks.get(at).is_some_and(here) { Some(at) } else { self.tracks.iter().position(here) };
+        if let Some(track) = at.and_then(|at| self.tracks.get_mut(at)) {
             track.see(newest, awake);
         }
     }

@@ -11,7 +11,7 @@ use crate::control::{
     self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
     RateLimits, Stages, Value,
 };
-use crate::runtime::{AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, StepPrice, Watch};
+use crate::runtime::{AUTO_THREADS_MAX, AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, StepPrice, Watch};
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ShadingKind, ValueKind};
 use crate::scene::{self, Member, Scene, Scenery, Spec};
 use glam::DVec3;
@@ -33,6 +33,15 @@ pub(super) fn spawns(scene: &Scene) -> Result<Vec<AgentSpawn>, SessionError> {
     let share = fair_share(machine(scene).cores, scene.agents.len());
     let mut ties = Ties::of(scene);
     scene.agents.iter().map(|member| spawn(scene, member, share, &mut ties)).collect()
+}
+
+/// Who runs the agents of `scene`: where it leaves that open, by their number.
+pub(super) fn executor(scene: &Scene) -> ExecutorKind {
+    match scene.executor {
+        ExecutorKind::Auto if scene.agents.len() <= AUTO_THREADS_MAX => ExecutorKind::Threads,
+        ExecutorKind::Auto => ExecutorKind::Pool,
+        asked => asked,
+    }
 }
 
 /// The share of its period that one agent's work may take, so that all find room on `cores` beside the frame loop.

@@ -13,10 +13,10 @@ use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Seen, Size, Stage, St
 use crate::control::{
     Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Shading, Status,
 };
-use crate::runtime::{self, AgentHandle, AgentState, Command, Drive, Lockstep, Machine, Run, Threads};
+use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
 use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
 use crate::scene::{Probe, Scene};
-use metachron_agents::{AgentId, Body, Pull, SimTime, Snapshot};
+use metachron_agents::{AgentId, Body, Pull, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,7 +29,7 @@ pub struct Session {
     run: Box<dyn Run>,
     stage: Stage,
     control: PictureControl,
-    newest: Vec<Arc<Snapshot>>,
+    reader: Reader,
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
     levels: Vec<Level>,
@@ -81,16 +81,19 @@ impl Session {
     ///
     /// # Errors
     /// [`SessionError::Build`] and [`SessionError::Run`]; nothing runs then.
-    pub fn open(scene: Scene) -> Result<Self, SessionError> {
+    pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
+        scene.executor = cast::executor(&scene);
         let machine = cast::machine(&scene);
         let spawns = cast::spawns(&scene)?;
+        let clock = || Arc::new(runtime::SystemClock::new());
         let run: Box<dyn Run> = match scene.executor {
-            ExecutorKind::Threads => Box::new(Threads::start(spawns, Arc::new(runtime::SystemClock::new()))?),
+            ExecutorKind::Threads => Box::new(Threads::start(spawns, clock())?),
+            ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock())?),
             ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, machine.clone())?),
         };
         Ok(Self {
             control: cast::picture_control(&scene),
-            newest: run.agents().iter().map(AgentHandle::latest).collect(),
+            reader: Reader::new(run.agents()),
             stage: cast::stage(&scene),
             declared: cast::prices(&machine.draw),
             machine,
@@ -215,7 +218,7 @@ impl Session {
     /// The force that the user's hand feels of an agent, newtons.
     #[must_use]
     pub fn hand_force_n(&self, on: AgentId) -> f64 {
-        let Some(state) = self.newest.get(on.0 as usize) else { return 0.0 };
+        let Some(state) = self.reader.newest().get(on.0 as usize) else { return 0.0 };
         // nothing resists the leading of a tool; what the hand feels is what the tool holds
         if let Body::Tool(tool) = &state.body {
             return tool.force_n;
@@ -324,6 +327,7 @@ impl Session {
     #[must_use]
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
+        self.reader.finish(self.run.agents());
         let handles = self.run.agents().to_vec();
         let clamp = self.clamp();
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
@@ -375,18 +379,15 @@ impl Session {
 
     fn gather(&mut self) {
         let now = self.run.sim_now();
-        for (agent, newest) in self.run.agents().iter().zip(&mut self.newest) {
-            *newest = agent.latest();
-            agent.record_age(agent.age_s(newest, now));
-            self.stage.see(agent.id(), newest, agent.state() == AgentState::Running);
-        }
+        let stage = &mut self.stage;
+        self.reader.read(self.run.agents(), now, |agent, newest, awake| stage.see(agent.id(), newest, awake));
         self.stage.pose(now, states(self.scene.states));
         self.chosen.sim = now;
         let agents = self.run.agents();
         let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
-        self.couplings.note(&self.scene, &self.newest, leader);
+        self.couplings.note(&self.scene, self.reader.newest(), leader);
         if let Some(trace) = &mut self.trace {
-            trace.note(&self.scene, &self.newest);
+            trace.note(&self.scene, self.reader.newest());
         }
     }
 

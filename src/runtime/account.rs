@@ -4,7 +4,7 @@
 //! the last turn. Never here: locks on the side of the agent, printing.
 
 use super::pace::Pace;
-use hdrhistogram::Histogram;
+use super::times::Times;
 use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
@@ -28,7 +28,7 @@ pub struct Spread {
     pub p50_s: f64,
     /// 99 in 100 are at most this, to 1 %.
     pub p99_s: f64,
-    /// None is above this, to 1 %.
+    /// None is above this; 16.8 s stands for all that is longer.
     pub max_s: f64,
 }
 
@@ -75,32 +75,6 @@ pub struct AgentStats {
     pub residual_m: f64,
     /// Who makes its turns, on his own thread and clock, because the two share a world; `None` where it makes them itself.
     pub led_by: Option<AgentId>,
-}
-
-/// Times of up to [`LONGEST_US`], counted to 1 %.
-#[derive(Debug)]
-pub(super) struct Times(Histogram<u32>);
-
-/// The longest time told apart from longer ones, microseconds: ten seconds.
-const LONGEST_US: u64 = 10_000_000;
-
-impl Times {
-    pub fn new() -> Self {
-        Self(Histogram::new_with_bounds(1, LONGEST_US, 2).expect("the bounds are sound: 1 < 10⁷, two digits"))
-    }
-
-    pub fn record(&mut self, time: Duration) {
-        self.0.saturating_record(u64::try_from(time.as_micros()).unwrap_or(u64::MAX));
-    }
-
-    pub fn spread(&self) -> Spread {
-        let seconds = |us: u64| us as f64 * 1e-6;
-        Spread {
-            p50_s: seconds(self.0.value_at_quantile(0.5)),
-            p99_s: seconds(self.0.value_at_quantile(0.99)),
-            max_s: seconds(self.0.max()),
-        }
-    }
 }
 
 /// A number that one thread writes and any thread reads.
@@ -210,7 +184,7 @@ pub(super) struct Entry {
 impl Diary {
     pub fn new() -> Self {
         let window = (SimTime::ZERO, 0);
-        Self { steps: 0, misses: 0, late: Times::new(), work_s: None, window, first_window: true }
+        Self { steps: 0, misses: 0, late: Times::default(), work_s: None, window, first_window: true }
     }
 
     /// Steps written down so far.
@@ -270,23 +244,6 @@ impl Diary {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[test]
-    fn percentiles_are_right_to_a_hundredth() {
-        let mut times = Times::new();
-        (1..=1000).for_each(|us| times.record(Duration::from_micros(us * 10)));
-        let spread = times.spread();
-        assert!((spread.p50_s - 5e-3).abs() < 5e-5, "{spread:?}");
-        assert!((spread.p99_s - 9.9e-3).abs() < 9.9e-5, "{spread:?}");
-        assert!((spread.max_s - 10e-3).abs() < 1e-4, "{spread:?}");
-    }
-
-    #[test]
-    fn a_time_beyond_the_scale_counts_as_the_longest() {
-        let mut times = Times::new();
-        times.record(Duration::from_secs(1000));
-        assert!(times.spread().max_s >= 10.0);
-    }
 
     #[test]
     fn the_first_reason_to_park_stands() {

@@ -1,6 +1,6 @@
 //! Wall time: how long the run has lasted.
 //!
-//! Out: a [`Duration`] since the run's start that never falls. Never here: simulated time, sleeping, dates.
+//! Out: a [`Duration`] since the run's start that never falls. Never here: simulated time, dates.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -59,6 +59,17 @@ impl ManualClock {
 impl Clock for ManualClock {
     fn now(&self) -> Duration {
         Duration::from_nanos(self.nanos.load(Ordering::SeqCst))
+    }
+}
+
+/// Sleeps until it is `until` by `clock`.
+pub(super) fn wait_until(clock: &dyn Clock, until: Duration) {
+    loop {
+        let left = until.saturating_sub(clock.now());
+        if left.is_zero() {
+            return;
+        }
+        std::thread::sleep(left);
     }
 }
 

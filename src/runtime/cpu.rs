@@ -39,10 +39,17 @@ impl CpuBatch {
 
     /// Counts a turn that took `wall`; whether the batch should be closed.
     pub fn add(&mut self, wall: Duration) -> bool {
+        self.count(wall);
+        self.is_full() || self.opened.is_some_and(|o| o.wall.elapsed() >= AGE_MAX)
+    }
+
+    fn count(&mut self, wall: Duration) {
         self.wall += wall;
         self.turns += 1;
-        let old = self.opened.is_some_and(|o| o.wall.elapsed() >= AGE_MAX);
-        self.turns >= TURNS_MAX || self.wall >= WORK_MAX || old
+    }
+
+    fn is_full(&self) -> bool {
+        self.turns >= TURNS_MAX || self.wall >= WORK_MAX
     }
 
     /// Whether no turn has been counted since the last was closed.
@@ -57,6 +64,40 @@ impl CpuBatch {
         let Some(to) = thread_time() else { return 1.0 };
         let cpu = to.saturating_sub(from);
         if wall.is_zero() { 1.0 } else { (cpu.as_secs_f64() / wall.as_secs_f64()).min(1.0) }
+    }
+}
+
+/// The share of wall time that is CPU time, for turns that must be accounted for at once, because others make the next ones.
+#[derive(Debug)]
+pub(super) struct CpuShare {
+    batch: CpuBatch,
+    share: f64,
+    /// CPU time that was used and not accounted for, seconds; negative where too much was.
+    owed_s: f64,
+}
+
+impl CpuShare {
+    pub fn new() -> Self {
+        Self { batch: CpuBatch::default(), share: 1.0, owed_s: 0.0 }
+    }
+
+    /// Counts a turn that took `wall` and begins after [`Self::open`]: the share of it to be accounted for. What the newest
+    /// batch had too little or too much, the next one makes up.
+    pub fn count(&mut self, wall: Duration) -> f64 {
+        let share = self.share;
+        self.batch.count(wall);
+        if self.batch.is_full() {
+            let wall_s = self.batch.wall.as_secs_f64();
+            let measured = self.batch.close();
+            self.owed_s += (measured - share) * wall_s;
+            self.share = if wall_s > 0.0 { (measured + self.owed_s / wall_s).clamp(0.0, 1.0) } else { measured };
+        }
+        share
+    }
+
+    /// The worker's thread begins to make turns.
+    pub fn open(&mut self) {
+        self.batch.open();
     }
 }
 
@@ -76,6 +117,19 @@ mod tests {
         batch.add(Duration::from_secs(3600));
         // the test itself computes far less than 36 s
         assert!(batch.close() < 0.01);
+    }
+
+    #[test]
+    fn what_one_batch_counts_too_much_the_next_ones_make_up() {
+        let mut share = CpuShare::new();
+        let mut counted_s = 0.0;
+        // turns of an hour that the test does not really compute
+        for _ in 0..10 {
+            share.open();
+            counted_s += 3600.0 * share.count(Duration::from_secs(3600));
+        }
+        assert!(share.owed_s < 0.0 && counted_s <= 3600.0, "{counted_s}");
+        assert!(share.share == 0.0);
     }
 
     #[test]

@@ -13,6 +13,7 @@ pub(super) use sight::Sight;
 
 use berth::{Berth, Reach};
 use metachron_agents::{AgentId, Bounds, SimTime};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
 
 /// What the agents of a run share to find each other.
@@ -26,12 +27,19 @@ pub(super) struct Crowd {
     calls: Vec<Calls>,
 }
 
-/// Who has booked something for one agent since it last asked: a bit each.
+/// Who has booked something for one agent since it last asked: a bit each, on pages that are made when first needed, since most
+/// agents never hear of most others.
 #[derive(Debug, Default)]
 struct Calls {
     any: AtomicBool,
-    bits: Vec<AtomicU64>,
+    pages: OnceLock<Box<[OnceLock<Page>]>>,
 }
+
+/// The bits of some callers.
+type Page = Box<[AtomicU64; PAGE_WORDS]>;
+
+/// Words of a page: it tells of 1024 agents.
+const PAGE_WORDS: usize = 16;
 
 /// Notes that are kept: who is further behind looks at everybody again.
 const LOG_LENGTH: u64 = 1024;
@@ -45,13 +53,11 @@ const SPEED_ROOM: f64 = 1.25;
 impl Crowd {
     /// A crowd of that many agents, none of which is anywhere yet.
     pub fn new(agents: usize) -> Self {
-        let words = agents.div_ceil(64);
-        let calls = || Calls { any: AtomicBool::new(false), bits: zeros(words) };
         Self {
             berths: std::iter::repeat_with(Berth::default).take(agents).collect(),
             log: zeros(LOG_LENGTH as usize),
             noted: AtomicU64::new(0),
-            calls: std::iter::repeat_with(calls).take(agents).collect(),
+            calls: std::iter::repeat_with(Calls::default).take(agents).collect(),
         }
     }
 
@@ -79,8 +85,11 @@ impl Crowd {
     /// Tells `to` that `from` has booked something for it: it lists it at its next turn.
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
-        if let Some(word) = calls.bits.get(from.0 as usize / 64) {
-            word.fetch_or(1 << (from.0 % 64), SeqCst);
+        let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
+        let pages = self.calls.len().div_ceil(64 * PAGE_WORDS);
+        let pages = calls.pages.get_or_init(|| std::iter::repeat_with(OnceLock::new).take(pages).collect());
+        if let Some(page) = pages.get(word / PAGE_WORDS) {
+            page.get_or_init(Box::default)[word % PAGE_WORDS].fetch_or(bit, SeqCst);
             calls.any.store(true, SeqCst);
         }
     }
@@ -91,11 +100,14 @@ impl Crowd {
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
             return;
         }
-        for (word, bits) in calls.bits.iter().enumerate() {
-            let mut bits = bits.swap(0, SeqCst);
-            while bits != 0 {
-                visit(AgentId(word as u32 * 64 + bits.trailing_zeros()));
-                bits &= bits - 1;
+        let pages = calls.pages.get().into_iter().flat_map(|pages| pages.iter().enumerate());
+        for (page, words) in pages.filter_map(|(at, page)| Some((at, page.get()?))) {
+            for (word, bits) in words.iter().enumerate() {
+                let mut bits = bits.swap(0, SeqCst);
+                while bits != 0 {
+                    visit(AgentId((page * PAGE_WORDS + word) as u32 * 64 + bits.trailing_zeros()));
+                    bits &= bits - 1;
+                }
             }
         }
     }

@@ -2,11 +2,12 @@
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
-use super::account::{AgentState, AgentStats, Gauges, Times};
+use super::account::{AgentState, AgentStats, Gauges};
 use super::island::Seating;
 use super::mailbox::{Command, Mailbox, SendError};
 use super::slot::LatestSlot;
 use super::switchboard::Switchboard;
+use super::times::Times;
 use super::watch::{Sample, Trace};
 use metachron_agents::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::Ordering::Relaxed;
@@ -73,9 +74,13 @@ impl AgentHandle {
 
     /// Counts the age of a state that was used, seconds ([`Self::age_s`]); what is no age is not counted.
     pub fn record_age(&self, age_s: f64) {
-        if let Ok(age) = Duration::try_from_secs_f64(age_s) {
-            self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner).record(age);
-        }
+        self.record_ages(std::iter::once(age_s));
+    }
+
+    /// As [`Self::record_age`], for several.
+    pub(super) fn record_ages(&self, ages_s: impl Iterator<Item = f64>) {
+        let mut ages = self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner);
+        ages_s.filter_map(|age_s| Duration::try_from_secs_f64(age_s).ok()).for_each(|age| ages.record(age));
     }
 
     /// In whose world it steps now; `None` where it keeps its own.
@@ -112,6 +117,12 @@ impl AgentHandle {
     pub fn samples(&self, watch: usize) -> Vec<Sample> {
         let traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
         traces.get(watch).map_or_else(Vec::new, |trace| trace.samples().to_vec())
+    }
+
+    /// Steps it has taken.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.shared.gauges.steps.load(Relaxed)
     }
 
     /// How it has fared so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.

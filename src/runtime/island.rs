@@ -13,7 +13,7 @@
 
 mod seats;
 
-pub(super) use seats::{Company, Seating, assign, empty_rooms, move_in};
+pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_in};
 
 use super::account::Entry;
 use super::pace::{Start, Timeline};

@@ -3,8 +3,12 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded by construction: a kind has one
 //! place, a newer command takes it. Never here: what an agent does with them ([`super::turn`] does).
 
-use crossbeam::queue::ArrayQueue;
 use metachron_agents::{AgentId, Anchor, Pull, Resolution, SimSpan};
+use std::sync::atomic::{
+    AtomicBool,
+    Ordering::{Acquire, Release},
+};
+use std::sync::{Mutex, PoisonError};
 
 /// What an agent can be told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -32,18 +36,25 @@ pub enum SendError {
 }
 
 /// The newest command of each kind, waiting for one agent.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub(super) struct Mailbox {
-    retune: ArrayQueue<Resolution>,
-    dt: ArrayQueue<SimSpan>,
-    hand: ArrayQueue<Option<Pull>>,
+    /// Whether there is anything: an agent to whom nobody writes looks at this alone.
+    full: AtomicBool,
+    letters: Mutex<Letters>,
+}
+
+/// What lies in a mailbox.
+#[derive(Debug, Default)]
+pub(super) struct Letters {
+    /// The newest resolution asked for.
+    pub retune: Option<Resolution>,
+    /// The newest step length asked for.
+    pub dt: Option<SimSpan>,
+    /// What the hand did last.
+    pub hand: Option<Option<Pull>>,
 }
 
 impl Mailbox {
-    pub fn new() -> Self {
-        Self { retune: ArrayQueue::new(1), dt: ArrayQueue::new(1), hand: ArrayQueue::new(1) }
-    }
-
     /// Puts `command` in the place of its kind.
     ///
     /// # Errors
@@ -52,28 +63,25 @@ impl Mailbox {
         if !is_sound(&command) {
             return Err(SendError::BadNumber(command));
         }
+        let mut letters = self.letters.lock().unwrap_or_else(PoisonError::into_inner);
         match command {
-            Command::Retune(resolution) => drop(self.retune.force_push(resolution)),
-            Command::SetDt(dt) => drop(self.dt.force_push(dt)),
-            Command::Hand(pull) => drop(self.hand.force_push(pull)),
-            Command::Wake => {}
+            Command::Retune(resolution) => letters.retune = Some(resolution),
+            Command::SetDt(dt) => letters.dt = Some(dt),
+            Command::Hand(pull) => letters.hand = Some(pull),
+            Command::Wake => return Ok(()),
         }
+        self.full.store(true, Release);
         Ok(())
     }
 
-    /// The newest resolution asked for since the last call.
-    pub fn take_retune(&self) -> Option<Resolution> {
-        self.retune.pop()
-    }
-
-    /// The newest step length asked for since the last call.
-    pub fn take_dt(&self) -> Option<SimSpan> {
-        self.dt.pop()
-    }
-
-    /// What the hand did last since the last call.
-    pub fn take_hand(&self) -> Option<Option<Pull>> {
-        self.hand.pop()
+    /// All that has come since the last call. It waits for nobody: where somebody is just writing it finds nothing yet.
+    pub fn take(&self) -> Letters {
+        if !self.full.load(Acquire) {
+            return Letters::default();
+        }
+        let Ok(mut letters) = self.letters.try_lock() else { return Letters::default() };
+        self.full.store(false, Release);
+        std::mem::take(&mut *letters)
     }
 }
 
@@ -108,33 +116,44 @@ mod tests {
 
     #[test]
     fn the_newest_command_of_a_kind_takes_the_place_of_the_older() {
-        let mail = Mailbox::new();
+        let mail = Mailbox::default();
         for eps_m in [0.1, 0.2, 0.3] {
             mail.post(Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
         }
         mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
-        assert_eq!(mail.take_retune().unwrap().eps_m, 0.3);
-        assert_eq!(mail.take_retune(), None);
-        assert_eq!(mail.take_dt(), Some(SimSpan::from_nanos(5)));
+        let taken = mail.take();
+        assert_eq!((taken.retune.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
+        let taken = mail.take();
+        assert_eq!((taken.retune, taken.dt, taken.hand), (None, None, None), "once");
     }
 
     #[test]
     fn letting_go_is_a_command_too() {
-        let mail = Mailbox::new();
+        let mail = Mailbox::default();
         mail.post(Command::Hand(Some(pull(DVec3::X)))).unwrap();
         mail.post(Command::Hand(None)).unwrap();
-        assert_eq!(mail.take_hand(), Some(None));
-        assert_eq!(mail.take_hand(), None);
+        assert_eq!(mail.take().hand, Some(None));
+        assert_eq!(mail.take().hand, None);
+    }
+
+    #[test]
+    fn who_finds_somebody_writing_finds_it_the_next_time() {
+        let mail = Mailbox::default();
+        mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
+        let writing = mail.letters.lock().unwrap();
+        assert_eq!(mail.take().dt, None);
+        drop(writing);
+        assert_eq!(mail.take().dt, Some(SimSpan::from_nanos(5)));
     }
 
     #[test]
     fn a_pull_that_is_not_finite_is_refused_at_the_door() {
-        let mail = Mailbox::new();
+        let mail = Mailbox::default();
         let bad = Command::Hand(Some(pull(DVec3::NAN)));
         assert!(matches!(mail.post(bad), Err(SendError::BadNumber(_))));
         let negative = Pull { stiffness_n_m: -1.0, ..pull(DVec3::X) };
         assert!(mail.post(Command::Hand(Some(negative))).is_err());
         assert!(mail.post(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
-        assert_eq!(mail.take_hand(), None);
+        assert_eq!(mail.take().hand, None);
     }
 }

@@ -2,11 +2,12 @@
 //!
 //! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and how they fare.
 //! Every executor makes the same turns of an agent and shows the same surface, [`Run`], so that there is one frame loop:
-//! [`Threads`] gives each agent a thread of its own and real time; [`Lockstep`] runs all in virtual time on a declared
+//! [`Threads`] gives each agent a thread of its own and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time on a declared
 //! [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
 //! those that hang together share the turns of one of them (`island`). Never here: a model of physics, a picture, a law of control, a file.
 
 mod account;
+mod bell;
 mod clock;
 mod cpu;
 mod crowd;
@@ -15,10 +16,15 @@ mod faults;
 mod governor;
 mod handle;
 mod island;
+#[cfg(test)]
+mod live_tests;
 mod lockstep;
 mod machine;
 mod mailbox;
+mod news;
 mod pace;
+mod pool;
+mod reader;
 mod show;
 mod slot;
 mod spawn;
@@ -26,6 +32,7 @@ mod switchboard;
 #[cfg(test)]
 mod testing;
 mod threads;
+mod times;
 mod turn;
 mod watch;
 
@@ -38,9 +45,11 @@ pub use lockstep::Lockstep;
 pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
 pub use mailbox::{Command, SendError};
 pub use pace::{Drive, LAG_CAP, Pace, SPEED_RANGE, SharedTimeline, Start, Timeline};
+pub use pool::Pool;
+pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
-pub use threads::{THREADS_MAX, Threads};
+pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use watch::{SAMPLES_MAX, Sample, Watch};
 
 use metachron_agents::{AgentId, SimTime};

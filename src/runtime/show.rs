@@ -18,6 +18,7 @@ impl Actor {
         self.withheld = self.faults.loses(self.id(), self.diary.steps());
         let published = !self.withheld && self.writer.publish();
         if published {
+            self.tell();
             self.announce(now);
         }
         published
@@ -46,9 +47,14 @@ impl Actor {
 
     /// Shows a state that was kept from being seen: the last of a life never is.
     pub fn show_withheld(&mut self) {
-        if std::mem::take(&mut self.withheld) {
-            self.writer.publish();
+        if std::mem::take(&mut self.withheld) && self.writer.publish() {
+            self.tell();
         }
+    }
+
+    /// Lets the reader of the run know that there is something new of this agent.
+    pub fn tell(&self) {
+        self.shared.board.news.tell(self.shared.id);
     }
 
     /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.

@@ -3,7 +3,7 @@
 //! In: [`AgentSpawn`]s; an agent's number is its place in their list. Out: actors and handles, or a [`RunError`].
 //! Never here: threads, time passing.
 
-use super::account::{Diary, Gauges, Times};
+use super::account::{Diary, Gauges};
 use super::crowd::Crowd;
 use super::eyes::{Peer, Peers};
 use super::faults::Faults;
@@ -14,6 +14,7 @@ use super::mailbox::Mailbox;
 use super::pace::Pace;
 use super::slot::SlotWriter;
 use super::switchboard::Switchboard;
+use super::times::Times;
 use super::turn::{Actor, Rhythm};
 use super::watch::{Trace, Watch};
 use metachron_agents::coupling::{Law, Link};
@@ -60,7 +61,9 @@ pub const RATE_MAX_HZ: f64 = 1e6;
 #[non_exhaustive]
 pub enum RunError {
     /// More agents than this executor takes.
-    #[error("{agents} agents are too many: one thread each, and at most {most}")]
+    #[error(
+        "{agents} agents are too many for a thread each, at most {most}: run them with executor = \"pool\" or \"auto\""
+    )]
     TooMany {
         /// How many agents were asked for.
         agents: usize,
@@ -106,9 +109,9 @@ pub enum RunError {
         loss: f64,
     },
     /// The system gave no thread.
-    #[error("no thread for agent \"{name}\": {source}")]
+    #[error("the system gives no thread for {name}: {source}")]
     NoThread {
-        /// The agent's name.
+        /// What it was for.
         name: String,
         /// What the system said.
         source: std::io::Error,
@@ -228,11 +231,11 @@ fn shared(
         model: spawn.agent.model(),
         wanted_hz: spawn.rate_hz,
         gauges: Gauges::default(),
-        mail: Mailbox::new(),
+        mail: Mailbox::default(),
         slot: writer.slot(),
         board: Arc::clone(board),
-        seating: seated.then(Seating::new),
-        ages: Mutex::new(Times::new()),
+        seating: seated.then(Seating::default),
+        ages: Mutex::new(Times::default()),
         traces: Mutex::new(spawn.watches.drain(..).map(Trace::new).collect()),
     }
 }
@@ -266,5 +269,7 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         withheld: false,
         announced: Vec::new(),
         unsettled: Duration::ZERO,
+        served: SimTime::ZERO,
+        owed: SimSpan::ZERO,
     }
 }

@@ -1,12 +1,14 @@
 //! Who sleeps and who wakes whom.
 //!
-//! In: wakes and touches from any thread. Out: a flag each agent looks at, and its thread unparked.
+//! In: wakes and touches from any thread. Out: a flag each agent looks at, and its thread unparked, or the bell of its pool rung.
 //! An agent that another leads has no turns of its own: who wakes it wakes its leader, and the leader rests for all it leads.
 //! Never here: when an agent is due ([`super::pace`]), what it is told ([`super::mailbox`]).
 //!
 //! Leaders have lower numbers than those they lead, so that the way up always ends. No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
 //! first and looks at `resting` after. In one total order (SeqCst) at least one of the two sees the other.
 
+use super::bell::Bell;
+use super::news::News;
 use metachron_agents::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::SeqCst};
@@ -53,12 +55,32 @@ pub(super) struct Switchboard {
     /// Somebody was summoned: the lockstep loop looks for them.
     rung: AtomicBool,
     stop: AtomicBool,
+    /// Calls the workers, where agents have no threads of their own.
+    bell: OnceLock<Bell>,
+    /// Whose state has changed, for the reader of the run.
+    pub news: News,
 }
 
 impl Switchboard {
     pub fn new(agents: usize) -> Self {
         let signals = std::iter::repeat_with(Signal::default).take(agents).collect();
-        Self { signals, rung: AtomicBool::new(false), stop: AtomicBool::new(false) }
+        Self {
+            signals,
+            rung: AtomicBool::new(false),
+            stop: AtomicBool::new(false),
+            bell: OnceLock::new(),
+            news: News::new(agents),
+        }
+    }
+
+    /// That many workers look after those that are summoned from now on.
+    pub fn hire(&self, workers: usize) {
+        self.bell.get_or_init(|| Bell::new(self.signals.len(), workers));
+    }
+
+    /// What calls the workers; `None` where every agent has a thread of its own.
+    pub fn bell(&self) -> Option<&Bell> {
+        self.bell.get()
     }
 
     fn signal(&self, id: AgentId) -> Option<&Signal> {
@@ -121,6 +143,10 @@ impl Switchboard {
     /// Makes the one who waits for `id` look at what has come for it.
     pub fn summon(&self, id: AgentId) {
         let Some(signal) = self.signal(id) else { return };
+        if let Some(bell) = self.bell.get() {
+            bell.ring(id);
+            return;
+        }
         self.rung.store(true, SeqCst);
         signal.thread.get().inspect(|t| t.unpark());
     }
@@ -160,9 +186,17 @@ impl Switchboard {
 
     /// A turn of `id` begins: what it was woken for is looked after in this turn. To be said before looking.
     pub fn heed(&self, id: AgentId) {
-        if let Some(signal) = self.signal(id) {
+        // a flag that is down is not written: its line of the cache stays with all who read there
+        if let Some(signal) = self.signal(id)
+            && signal.woken.load(SeqCst)
+        {
             signal.woken.store(false, SeqCst);
         }
+    }
+
+    /// Whether somebody woke `id` and it has not looked yet.
+    pub fn is_woken(&self, id: AgentId) -> bool {
+        self.signal(id).is_some_and(|signal| signal.woken.load(SeqCst))
     }
 
     /// Ends the rest of `id` if somebody woke it; whether somebody did.
@@ -182,6 +216,9 @@ impl Switchboard {
 
     /// Unparks every thread, so that it looks at the timeline again.
     pub fn unpark_all(&self) {
+        if let Some(bell) = self.bell.get() {
+            bell.rouse_all();
+        }
         self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
     }
 

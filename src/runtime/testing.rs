@@ -1,7 +1,9 @@
 //! An agent without physics for the tests of this room: it counts, drifts towards its neighbours and fails on demand.
 
 use super::faults::Faults;
+use super::pool::Pool;
 use super::spawn::AgentSpawn;
+use super::{Clock, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site};
 use metachron_agents::{
@@ -9,6 +11,46 @@ use metachron_agents::{
     Snapshot, StepError, StepReport, Surroundings,
 };
 use std::sync::{Arc, Mutex};
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// A way to start a run in real time.
+pub(super) type Start = fn(Vec<AgentSpawn>, Arc<dyn Clock>) -> Box<dyn Run>;
+
+/// Every executor that keeps real time; pools with fewer and with more workers than a small machine has cores.
+const LIVE: [(&str, Start); 4] = [
+    ("threads", |spawns, clock| Box::new(Threads::start(spawns, clock).unwrap())),
+    ("pool of one", |spawns, clock| pool(spawns, clock, 1)),
+    ("pool of two", |spawns, clock| pool(spawns, clock, 2)),
+    ("pool of five", |spawns, clock| pool(spawns, clock, 5)),
+];
+
+fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
+    Box::new(Pool::with_workers(spawns, clock, workers, Duration::from_secs(60)).unwrap())
+}
+
+/// Holds a claim against every executor that keeps real time.
+pub(super) fn on_every_executor(claim: impl Fn(Start)) {
+    for (name, start) in LIVE {
+        // shown where the claim fails
+        println!("{name}");
+        claim(start);
+    }
+}
+
+/// The machine's own clock.
+pub(super) fn system() -> Arc<dyn Clock> {
+    Arc::new(SystemClock::new())
+}
+
+/// Waits for progress; the deadline only ends a test that hangs.
+pub(super) fn eventually(what: &str, done: impl Fn() -> bool) {
+    let deadline = Instant::now() + Duration::from_secs(60);
+    while !done() {
+        assert!(Instant::now() < deadline, "never happened: {what}");
+        thread::yield_now();
+    }
+}
 
 /// What goes wrong at a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -19,6 +61,8 @@ pub(super) enum Fault {
     Diverged,
     /// The model has a bug.
     Panic,
+    /// The step does not return.
+    Hang,
 }
 
 /// Whether two agents, by rising numbers, hang together at a time.
@@ -121,7 +165,7 @@ impl Dummy {
 
     fn write_down(&self, to: SimTime, around: &Surroundings<'_>) {
         let Some(log) = &self.log else { return };
-        let thread = std::thread::current().name().unwrap_or_default().to_owned();
+        let thread = thread::current().name().unwrap_or_default().to_owned();
         let saw = around.neighbours.iter().map(|n| (n.id, n.owned && n.form.is_some())).collect();
         log.lock().unwrap().push(Made { id: around.me, from: around.time, to, thread, saw });
     }
@@ -169,6 +213,12 @@ impl Agent for Dummy {
                 return Err(StepError::Diverged { model: "synthetic", dt_s, what: "on demand".into() });
             }
             Some((_, Fault::Panic)) => panic!("on demand"),
+            Some((_, Fault::Hang)) => {
+                self.write_down(around.time, around);
+                loop {
+                    thread::park();
+                }
+            }
             None => {}
         }
         self.steps += 1;

@@ -50,6 +50,10 @@ pub(super) struct Actor {
     pub announced: Vec<(AgentId, u64)>,
     /// Wall time of turns whose CPU time is not known yet.
     pub unsettled: Duration,
+    /// Up to which time it has had its share of a pool's workers.
+    pub served: SimTime,
+    /// How far it was served worse with the worker it was taken from: it makes that up.
+    pub owed: SimSpan,
 }
 
 /// A turn between its begin and its finish.
@@ -123,6 +127,7 @@ impl Actor {
             Ok(()) => drop(self.writer.publish()),
             Err(reason) => self.park(reason),
         }
+        self.tell();
         self.diary.pace(&self.shared.gauges, &self.pace);
     }
 
@@ -202,6 +207,7 @@ impl Actor {
         self.show_withheld();
         self.diary.flush(&self.shared.gauges);
         self.shared.gauges.park(reason);
+        self.tell();
         if let Some(crowd) = &self.peers.crowd {
             crowd.stay(self.id());
         }
@@ -234,13 +240,14 @@ impl Actor {
     }
 
     pub fn take_commands(&mut self) {
-        if let Some(wanted) = self.shared.mail.take_retune() {
+        let letters = self.shared.mail.take();
+        if let Some(wanted) = letters.retune {
             self.retune(wanted);
         }
-        if let Some(dt) = self.shared.mail.take_dt() {
+        if let Some(dt) = letters.dt {
             self.set_dt(dt);
         }
-        if let Some(hand) = self.shared.mail.take_hand() {
+        if let Some(hand) = letters.hand {
             self.hands.clear();
             self.hands.extend(hand);
         }
@@ -293,6 +300,7 @@ impl Actor {
     fn rest_now(&mut self) {
         self.diary.flush(&self.shared.gauges);
         self.shared.gauges.set_resting(true);
+        self.tell();
         if let Some(crowd) = &self.peers.crowd {
             crowd.stay(self.id());
         }
@@ -307,6 +315,7 @@ impl Actor {
         self.diary.restart(timeline.sim_at(wall));
         self.diary.pace(&self.shared.gauges, &self.pace);
         self.shared.gauges.set_resting(false);
+        self.tell();
         self.company.each(|seat| seat.get_up(timeline, wall));
     }
 }

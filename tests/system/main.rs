@@ -12,4 +12,5 @@ mod scenery;
 mod scenes;
 mod scenes_coupled;
 mod scenes_soft;
+mod throughput;
 mod viewer;

@@ -248,11 +248,12 @@ fn deep_nesting_and_many_problems_stay_readable() {
 }
 
 #[test]
-fn more_agents_than_threads_can_carry_are_refused() {
-    let ball = |i| format!("[[object]]\nname = \"b{i}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\n");
-    let many = |n| format!("format = 1\n{}", (0..n).map(ball).collect::<String>());
-    assert!(read(&many(1000)).is_ok());
-    assert!(problem(&many(1001)).3.contains("at most 1000"));
+fn more_agents_than_a_scene_can_carry_are_refused() {
+    let balls =
+        "[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nspacing_m = [1, 1, 1]\n";
+    let many = |n| format!("format = 1\n{balls}grid = [100, {n}, 1]\n");
+    assert!(read(&many(100)).is_ok());
+    assert!(problem(&many(101)).3.contains("at most 10000"));
 }
 
 #[test]

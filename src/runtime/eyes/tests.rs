@@ -3,13 +3,12 @@
 use super::super::faults::Faults;
 use super::super::lockstep::Lockstep;
 use super::super::spawn::{AgentSpawn, assemble};
-use super::super::testing::{Dummy, Log, Made};
-use super::super::{AgentState, Clock, Machine, Run, SystemClock, Threads};
+use super::super::testing::{Dummy, Log, Made, eventually, on_every_executor, system};
+use super::super::{AgentState, Machine, Run};
 use super::*;
 use metachron_agents::Anchor;
 use metachron_agents::coupling::Link;
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
@@ -137,7 +136,7 @@ fn spans(log: &Log) -> Vec<u64> {
 fn jitter_spreads_the_steps_of_every_executor_alike() {
     let faults = Faults { jitter: 0.2, loss: 0.3, seed: 11 };
     let disturbed = |log: &Log| AgentSpawn { faults, ..ball(0.0, 0.0, log).at(250.0) };
-    let (virtually, really) = (Log::default(), Log::default());
+    let virtually = Log::default();
     let mut run = lockstep(vec![disturbed(&virtually)]);
     run.wait_until(ms(1000));
     let end = run.shutdown().remove(0);
@@ -145,14 +144,13 @@ fn jitter_spreads_the_steps_of_every_executor_alike() {
     assert!(steps.windows(2).all(|w| w[0].to == w[1].from), "each begins where the last one ended");
     assert!((240..=260).contains(&end.steps), "250 on the mean: {}", end.steps);
     assert!(spans(&virtually).iter().all(|ns| (3_200_000..=4_800_000).contains(ns)));
-    let run = Threads::start(vec![disturbed(&really)], Arc::new(SystemClock::new()) as Arc<dyn Clock>).unwrap();
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while run.agents()[0].stats().steps < 50 {
-        assert!(Instant::now() < deadline, "no fifty steps");
-        thread::yield_now();
-    }
-    drop(run);
-    assert_eq!(spans(&virtually)[..50], spans(&really)[..50]);
+    on_every_executor(|start| {
+        let really = Log::default();
+        let run = start(vec![disturbed(&really)], system());
+        eventually("fifty steps", || run.agents()[0].stats().steps >= 50);
+        drop(run);
+        assert_eq!(spans(&virtually)[..50], spans(&really)[..50]);
+    });
 }
 
 #[test]

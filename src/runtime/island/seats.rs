@@ -5,23 +5,30 @@
 //! that is not looked at. A door that is shut sends everybody home again.
 //! Never here: steps.
 
-use super::super::handle::AgentHandle;
+use super::super::handle::{AgentHandle, Shared};
 use super::super::pace::Timeline;
 use super::super::turn::Actor;
-use crossbeam::queue::ArrayQueue;
+use crossbeam::atomic::AtomicCell;
 use metachron_agents::{AgentId, Companion, SimTime};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Where agents come and go.
-#[derive(Debug)]
+#[derive(Default)]
 pub(in super::super) struct Seating {
-    door: ArrayQueue<Box<Actor>>,
-    home: ArrayQueue<Box<Actor>>,
+    /// Nobody waits for this lock but at the end of a run: who finds it taken tries again after the next turn.
+    door: Mutex<Vec<Guest>>,
+    home: AtomicCell<Option<Box<Actor>>>,
 }
 
-/// So many can wait at one door; others try again after their next turn.
-const DOOR_PLACES: usize = 16;
+impl std::fmt::Debug for Seating {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Seating").finish_non_exhaustive()
+    }
+}
+
+/// Who waits at a door: an agent is far larger than the word that moves it.
+type Guest = Box<Actor>;
 
 /// Those an agent leads.
 #[derive(Default)]
@@ -44,13 +51,28 @@ pub(super) struct Seat {
 }
 
 impl Seating {
-    pub fn new() -> Self {
-        Self { door: ArrayQueue::new(DOOR_PLACES), home: ArrayQueue::new(1) }
-    }
-
     /// The agent, if it has come home.
     pub fn come_home(&self) -> Option<Box<Actor>> {
-        self.home.pop()
+        self.home.take()
+    }
+
+    /// Somebody who waits at the door.
+    fn knock(&self) -> Option<Box<Actor>> {
+        self.door.try_lock().ok()?.pop()
+    }
+
+    /// Waits at the door; gives `actor` back if somebody stands in it.
+    fn wait(&self, actor: Box<Actor>) -> Result<(), Box<Actor>> {
+        match self.door.try_lock() {
+            Ok(mut door) => door.push(actor),
+            Err(_) => return Err(actor),
+        }
+        Ok(())
+    }
+
+    /// Everybody who waits at the door.
+    fn clear(&self) -> Vec<Guest> {
+        std::mem::take(&mut *self.door.lock().unwrap_or_else(PoisonError::into_inner))
     }
 }
 
@@ -125,7 +147,7 @@ impl Actor {
 
     /// Somebody who waits at its door.
     fn knock(&self) -> Option<Box<Actor>> {
-        self.shared.seating.as_ref()?.door.pop()
+        self.shared.seating.as_ref()?.knock()
     }
 
     fn admit(&mut self, actor: Box<Actor>) {
@@ -156,9 +178,7 @@ impl Actor {
     /// Takes nobody in any more.
     pub fn shut_door(&self) {
         self.shared.board.close(self.id());
-        while let Some(actor) = self.knock() {
-            actor.go_home();
-        }
+        empty_door(&self.shared);
     }
 
     /// Makes its own turns again, and those of all it leads.
@@ -169,7 +189,7 @@ impl Actor {
         self.settle(1.0);
         if let Some(seating) = &shared.seating {
             // its place is free: there is only one of it
-            drop(seating.home.push(self));
+            drop(seating.home.swap(Some(self)));
         }
         shared.board.summon(id);
     }
@@ -210,15 +230,13 @@ pub(in super::super) fn move_in(actor: Box<Actor>, leader: AgentId) -> Result<()
     let (id, board, peers) = (actor.id(), Arc::clone(&actor.shared.board), Arc::clone(&actor.peers));
     let Some(seating) = peers.get(leader).and_then(|peer| peer.shared.seating.as_ref()) else { return Err(actor) };
     board.follow(id, Some(leader));
-    if let Err(actor) = seating.door.push(actor) {
+    if let Err(actor) = seating.wait(actor) {
         board.follow(id, None);
         return Err(actor);
     }
     // the door may have been shut just before: one of the two sides sees who is left outside
     if board.is_closed(leader) {
-        while let Some(actor) = seating.door.pop() {
-            actor.go_home();
-        }
+        seating.clear().into_iter().for_each(Actor::go_home);
     }
     board.wake(leader);
     Ok(())
@@ -258,12 +276,16 @@ fn leaders(together: &[Option<AgentId>]) -> Vec<usize> {
     (0..together.len()).map(|at| top(&up, at)).collect()
 }
 
+/// Sends home those who wait at the door of one whose turns nobody makes any more.
+pub(in super::super) fn empty_door(shared: &Shared) {
+    shared.seating.iter().flat_map(Seating::clear).for_each(Actor::go_home);
+}
+
 /// Ends the lives of those who wait at doors or have come home when nobody looks any more.
 pub(in super::super) fn empty_rooms(handles: &[AgentHandle], timeline: &Timeline, now: Duration) {
     let seatings = handles.iter().filter_map(|handle| handle.shared.seating.as_ref());
     for seating in seatings {
-        while let Some(mut actor) = seating.door.pop().or_else(|| seating.home.pop()) {
-            actor.close_account(timeline, now);
-        }
+        let left = seating.clear().into_iter().chain(seating.come_home());
+        left.for_each(|mut actor| actor.close_account(timeline, now));
     }
 }

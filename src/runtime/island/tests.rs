@@ -1,15 +1,12 @@
 //! Agents that are led lose no step and make none twice, wherever they are.
 
 use super::super::lockstep::Lockstep;
-use super::super::testing::{Bond, Dummy, Fault, Log, Made};
-use super::super::{
-    AgentHandle, AgentSpawn, AgentState, AgentStats, Clock, Command, Machine, Run, SystemClock, Threads, Watch,
-    state_hash,
-};
+use super::super::testing::{Bond, Dummy, Fault, Log, Made, eventually, on_every_executor, system};
+use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, Watch, state_hash};
 use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};
-use std::thread;
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 const fn ms(n: u64) -> Duration {
     Duration::from_millis(n)
@@ -219,76 +216,89 @@ fn a_broken_member_is_parked_alone_and_the_others_go_on() {
     }
 }
 
-fn eventually(what: &str, done: impl Fn() -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while !done() {
-        assert!(Instant::now() < deadline, "never happened: {what}");
-        thread::yield_now();
-    }
-}
-
-fn threads(spawns: Vec<AgentSpawn>) -> Box<Threads> {
-    Box::new(Threads::start(spawns, Arc::new(SystemClock::new()) as Arc<dyn Clock>).unwrap())
-}
-
 #[test]
-fn on_threads_agents_come_and_go_and_no_step_is_lost() {
-    let log = Log::default();
-    let run = threads(mates(now_and_then, &log));
-    let moves = |log: &Log| {
-        let log = log.lock().unwrap();
-        (0..6)
-            .map(|id| {
-                let threads: Vec<_> = log.iter().filter(|m| m.id == AgentId(id)).map(|m| &m.thread).collect();
-                threads.windows(2).filter(|w| w[0] != w[1]).count()
-            })
-            .sum::<usize>()
-    };
-    eventually("a hundred moves between threads", || moves(&log) >= 100);
-    let handles = run.agents().to_vec();
-    let stats = run.shutdown();
-    assert_whole(&log, &stats, &handles);
-    assert!(handles.iter().all(|a| Arc::strong_count(&a.shared) == 1), "every thread has let go of every agent");
-    let number = |name: &str| RATES.iter().position(|hz| name == format!("agent:mate at {hz}")).unwrap();
-    for made in log.lock().unwrap().iter() {
-        // 0 and 3 have one name
-        assert!(number(&made.thread) <= made.id.0 as usize, "{made:?}: a leader has a lower number");
-    }
+fn in_real_time_agents_come_and_go_and_no_step_is_lost() {
+    on_every_executor(|start| {
+        let log = Log::default();
+        let run = start(mates(now_and_then, &log), system());
+        let leaders = || run.agents().iter().map(AgentHandle::led_by).collect::<Vec<_>>();
+        let (moves, before) = (Cell::new(0), RefCell::new(leaders()));
+        eventually("a hundred moves", || {
+            let old = before.replace(leaders());
+            moves.set(moves.get() + before.borrow().iter().zip(&old).filter(|(new, old)| new != old).count());
+            moves.get() >= 100
+        });
+        let handles = run.agents().to_vec();
+        let stats = run.shutdown();
+        assert_whole(&log, &stats, &handles);
+        assert!(handles.iter().all(|a| Arc::strong_count(&a.shared) == 1), "every thread has let go of every agent");
+        let number = |name: &str| RATES.iter().position(|hz| name == format!("agent:mate at {hz}"));
+        for made in log.lock().unwrap().iter() {
+            // 0 and 3 have one name; workers of a pool have none of an agent
+            assert!(number(&made.thread).is_none_or(|at| at <= made.id.0 as usize), "{made:?}: a leader is lower");
+        }
+    });
 }
 
 #[test]
 fn a_run_that_ends_while_agents_are_led_ends_all_of_them() {
-    for drop_it in [true, false] {
-        let log = Log::default();
-        let run = threads(mates(always, &log));
-        let kept = run.agents().to_vec();
-        eventually("all are led by the first", || kept[1..].iter().all(|a| a.stats().led_by == Some(AgentId(0))));
-        let steps = kept[5].stats().steps;
-        kept[5].send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
-        eventually("a command reaches who is led", || kept[5].latest().resolution.is_some_and(|r| r.eps_m == 0.07));
-        assert!(kept[5].stats().steps >= steps);
-        if drop_it {
-            drop(run);
-        } else {
-            let stats = run.shutdown();
-            assert_whole(&log, &stats, &kept);
+    on_every_executor(|start| {
+        for drop_it in [true, false] {
+            let log = Log::default();
+            let run = start(mates(always, &log), system());
+            let kept = run.agents().to_vec();
+            eventually("all are led by the first", || kept[1..].iter().all(|a| a.led_by() == Some(AgentId(0))));
+            let steps = kept[5].stats().steps;
+            kept[5].send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
+            eventually("a command reaches who is led", || kept[5].latest().resolution.is_some_and(|r| r.eps_m == 0.07));
+            assert!(kept[5].stats().steps >= steps);
+            if drop_it {
+                drop(run);
+            } else {
+                let stats = run.shutdown();
+                assert_whole(&log, &stats, &kept);
+            }
+            assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
         }
-        assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
-    }
+    });
 }
 
 #[test]
-fn a_panic_in_a_led_turn_on_threads_stops_nobody_else() {
-    let log = Log::default();
-    let mate = |id| Dummy { fault: (id == 1).then_some((50, Fault::Panic)), ..Dummy::mate(20.0, always, &log) };
-    let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
-    spawns.push(Dummy::mate(20.0, never, &log).at(500.0));
-    let run = threads(spawns);
-    eventually("the panic", || matches!(run.agents()[1].state(), AgentState::Parked(_)));
-    let before = run.agents()[2].stats().steps;
-    let stopped = || matches!(run.agents()[2].state(), AgentState::Parked(_));
-    eventually("the others go on", || run.agents()[2].stats().steps > before + 20 || stopped());
-    let before = run.agents()[3].stats().steps;
-    eventually("and strangers", || run.agents()[3].stats().steps > before + 20);
-    drop(run);
+fn a_panic_in_a_led_turn_stops_nobody_else() {
+    on_every_executor(|start| {
+        let log = Log::default();
+        let mate = |id| Dummy { fault: (id == 1).then_some((50, Fault::Panic)), ..Dummy::mate(20.0, always, &log) };
+        let mut spawns: Vec<_> = (0..3).map(|id| mate(id).at(500.0)).collect();
+        spawns.push(Dummy::mate(20.0, never, &log).at(500.0));
+        let run = start(spawns, system());
+        eventually("the panic", || matches!(run.agents()[1].state(), AgentState::Parked(_)));
+        let before = run.agents()[2].stats().steps;
+        let stopped = || matches!(run.agents()[2].state(), AgentState::Parked(_));
+        eventually("the others go on", || run.agents()[2].stats().steps > before + 20 || stopped());
+        let before = run.agents()[3].stats().steps;
+        eventually("and strangers", || run.agents()[3].stats().steps > before + 20);
+    });
+}
+
+#[test]
+fn an_island_rests_and_wakes_as_one_in_real_time() {
+    on_every_executor(|start| {
+        let log = Log::default();
+        let sleepy = |hz| Dummy { rest_from: Some(20), ..Dummy::mate(20.0, always, &log) }.at(hz);
+        let run = start([500.0, 250.0, 125.0].map(sleepy).into(), system());
+        let all_rest = || run.agents().iter().all(|a| a.state() == AgentState::Resting && a.latest().at_rest);
+        for round in 1..=20_u8 {
+            eventually("all rest", all_rest);
+            let steps = run.agents()[0].stats().steps;
+            let eps_m = f64::from(round) * 1e-3;
+            run.send(AgentId(2), Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
+            eventually("the one led last obeys", || {
+                run.agents()[2].latest().resolution.is_some_and(|r| r.eps_m == eps_m)
+            });
+            assert!(run.agents()[0].stats().steps > steps, "its leader woke for it");
+        }
+        let handles = run.agents().to_vec();
+        let stats = run.shutdown();
+        assert_whole(&log, &stats, &handles);
+    });
 }

@@ -1,103 +1,8 @@
-//! Claims about agents on threads. Waiting is for progress; the deadline only ends a test that hangs.
+//! What only threads do; `live_tests.rs` holds what every executor does.
 
-use super::super::testing::{Dummy, Fault};
-use super::super::{AgentState, Command, ManualClock, SystemClock};
+use super::super::SystemClock;
+use super::super::testing::Dummy;
 use super::*;
-use metachron_agents::{Resolution, SimSpan, SimTime};
-
-fn eventually(what: &str, done: impl Fn() -> bool) {
-    let deadline = Instant::now() + Duration::from_secs(60);
-    while !done() {
-        assert!(Instant::now() < deadline, "never happened: {what}");
-        thread::yield_now();
-    }
-}
-
-fn threads(spawns: Vec<AgentSpawn>) -> Box<Threads> {
-    Box::new(Threads::start(spawns, Arc::new(SystemClock::new())).unwrap())
-}
-
-#[test]
-fn every_agent_steps_on_its_own_and_the_end_joins_them() {
-    let run = threads([30.0, 240.0, 1000.0].map(|hz| Dummy::new(1.0).at(hz)).into());
-    eventually("50 steps of each", || run.agents().iter().all(|a| a.stats().steps >= 50));
-    let kept = run.agents()[0].clone();
-    let stats = run.shutdown();
-    assert!(stats.iter().all(|s| s.steps >= 50 && s.state == AgentState::Running && s.cpu_s > 0.0));
-    assert_eq!(kept.latest().steps, stats[0].steps, "the last state outlives the run");
-    assert_eq!(Arc::strong_count(&kept.shared), 1, "every thread has let go of its agent");
-}
-
-#[test]
-fn a_broken_agent_is_parked_and_the_others_go_on() {
-    for fault in [Fault::Panic, Fault::NotFinite, Fault::Diverged] {
-        let broken = Dummy { fault: Some((3, fault)), ..Dummy::new(1.0) };
-        let run = threads(vec![broken.at(500.0), Dummy::new(1.0).at(500.0)]);
-        eventually("the fault", || matches!(run.agents()[0].state(), AgentState::Parked(_)));
-        let before = run.agents()[1].stats().steps;
-        eventually("20 steps after it", || run.agents()[1].stats().steps >= before + 20);
-        let stats = run.shutdown();
-        assert_eq!((stats[0].steps, &stats[1].state), (2, &AgentState::Running));
-    }
-}
-
-#[test]
-fn an_agent_at_rest_wakes_for_a_command_and_for_a_touch() {
-    let sleepy = Dummy { rest_from: Some(5), ..Dummy::new(1.0) };
-    let late = Dummy { touches: Some((1, AgentId(0))), rest_from: Some(1), ..Dummy::new(1.0) };
-    let run = threads(vec![sleepy.at(500.0), late.at(500.0)]);
-    let agent = run.agents()[0].clone();
-    eventually("both at rest", || run.agents().iter().all(|a| a.state() == AgentState::Resting));
-    let steps = agent.stats().steps;
-    agent.send(Command::Retune(Resolution { eps_m: 0.07, n: 3 })).unwrap();
-    eventually("the command", || agent.latest().resolution.is_some_and(|r| r.eps_m == 0.07));
-    assert!(agent.stats().steps > steps);
-    eventually("rest again", || agent.state() == AgentState::Resting);
-    let steps = agent.stats().steps;
-    run.agents()[1].send(Command::Wake).unwrap();
-    eventually("the touch", || agent.stats().steps > steps);
-    run.shutdown();
-}
-
-#[test]
-fn on_a_clock_that_stands_still_nobody_runs_ahead() {
-    let clock = Arc::new(ManualClock::new());
-    let spawns = vec![Dummy::new(1.0).at(250.0), Dummy::new(1.0).at(100.0)];
-    let mut run = Box::new(Threads::start(spawns, Arc::clone(&clock) as Arc<dyn Clock>).unwrap());
-    let covered = |run: &Threads, ms: u64| {
-        let end = SimTime::from_nanos(ms * 1_000_000);
-        eventually("the present is covered", || run.agents().iter().all(|a| a.latest().time >= end));
-    };
-    for step in 1..=20 {
-        clock.advance(Duration::from_millis(20));
-        covered(&run, step * 20);
-    }
-    run.drive(Drive::Pause);
-    clock.advance(Duration::from_secs(5));
-    assert_eq!(run.sim_now(), SimTime::from_nanos(400_000_000));
-    run.drive(Drive::Step(SimSpan::from_nanos(20_000_000)));
-    clock.advance(Duration::from_secs(5));
-    covered(&run, 420);
-    assert_eq!(run.sim_now(), SimTime::from_nanos(420_000_000));
-    let agents: Vec<_> = run.agents().to_vec();
-    run.shutdown();
-    for agent in agents {
-        assert!(agent.latest().time <= SimTime::from_nanos(420_000_000), "a step after the timeline stopped");
-    }
-}
-
-#[test]
-fn a_lag_past_the_cap_is_dropped_once_and_the_agent_is_on_time_again() {
-    let clock = Arc::new(ManualClock::new());
-    let run = Box::new(Threads::start(vec![Dummy::new(1.0).at(250.0)], Arc::clone(&clock) as Arc<dyn Clock>).unwrap());
-    let agent = run.agents()[0].clone();
-    eventually("the first step", || agent.stats().steps >= 1);
-    clock.advance(Duration::from_secs(3));
-    eventually("the present is covered", || agent.latest().time >= SimTime::from_nanos(3_000_000_000));
-    let stats = run.shutdown().remove(0);
-    assert_eq!(stats.dropped, SimSpan::from_nanos(2_996_000_000), "3 s less the step that was made");
-    assert_eq!(stats.steps, 2);
-}
 
 #[test]
 fn too_many_agents_for_threads_are_refused() {
@@ -107,16 +12,8 @@ fn too_many_agents_for_threads_are_refused() {
 }
 
 #[test]
-fn a_run_that_is_dropped_ends_its_threads() {
-    let run = threads(vec![Dummy::new(1.0).at(500.0), Dummy { rest_from: Some(1), ..Dummy::new(1.0) }.at(500.0)]);
-    let kept: Vec<_> = run.agents().to_vec();
-    drop(run);
-    assert!(kept.iter().all(|a| Arc::strong_count(&a.shared) == 1));
-}
-
-#[test]
 fn threads_carry_the_names_of_their_agents() {
-    let run = threads(vec![Dummy::new(1.0).at(60.0)]);
+    let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new())).unwrap();
     let names: Vec<_> = run.threads.iter().flatten().filter_map(|t| t.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
 }

@@ -26,8 +26,8 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
-/// Most agents of a scene: each has a thread of its own.
-const AGENTS_MAX: usize = 1000;
+/// Most agents of a scene: each that can be touched remembers something of every other one.
+const AGENTS_MAX: usize = 10_000;
 /// Most fixed objects of a scene.
 pub(super) const OBSTACLES_MAX: usize = 10_000;
 /// Longest name, in characters.

@@ -15,7 +15,8 @@ pub struct SceneFile {
     pub format: i64,
     /// One line that says what the scene shows.
     pub description: Option<String>,
-    /// How agents are run: `threads` (an OS thread each, default) or `lockstep` (one thread, virtual time, declared costs).
+    /// How agents are run. Default `auto`: `threads` for a few, `pool` for many.
+    /// `lockstep` runs them on one thread in virtual time, with declared costs.
     pub executor: Option<ExecutorKind>,
     /// At which time states are drawn. Default `interpolate`.
     pub states: Option<StatesKind>,
@@ -88,9 +89,13 @@ pub struct TargetFile {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ExecutorKind {
-    /// One named OS thread an agent.
+    /// Threads for a few agents, the pool for many.
     #[default]
+    Auto,
+    /// One named OS thread an agent; at most 1000 agents.
     Threads,
+    /// A worker a core for any number of agents; each keeps its own clock as on a thread of its own.
+    Pool,
     /// One thread, virtual time, declared costs: bit-identical on every run.
     Lockstep,
 }
@@ -298,7 +303,9 @@ impl ExecutorKind {
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Auto => "auto",
             Self::Threads => "threads",
+            Self::Pool => "pool",
             Self::Lockstep => "lockstep",
         }
     }

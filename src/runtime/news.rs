@@ -1,0 +1,81 @@
+//! Whose state has changed since the one reader of a run looked last.
+//!
+//! In: numbers of agents, from whoever makes their turns. Out: each of them once. A reader finds a hundred thousand agents of
+//! which none has news in as little time as one that has. Never here: the states themselves.
+
+use crossbeam::utils::CachePadded;
+use metachron_agents::AgentId;
+use std::sync::atomic::{AtomicU64, Ordering::AcqRel};
+
+/// A bit an agent. Words lie far apart: agents of one word mostly share a worker, and workers must not disturb each other.
+#[derive(Debug)]
+pub(super) struct News(Vec<CachePadded<AtomicU64>>);
+
+impl News {
+    pub fn new(agents: usize) -> Self {
+        Self(std::iter::repeat_with(CachePadded::default).take(agents.div_ceil(64)).collect())
+    }
+
+    /// There is something new of `id`; to be said after it can be seen.
+    pub fn tell(&self, id: AgentId) {
+        if let Some(word) = self.0.get(id.0 as usize / 64) {
+            // always written, even where the bit is set: else the reader might take the bit and miss what this one has published
+            word.fetch_or(1 << (id.0 % 64), AcqRel);
+        }
+    }
+
+    /// Visits those of whom there is something new, by rising numbers.
+    pub fn take(&self, mut visit: impl FnMut(AgentId)) {
+        for (at, word) in self.0.iter().enumerate() {
+            // an idle word is only read; a bit that comes now is found the next time
+            if word.load(std::sync::atomic::Ordering::Relaxed) == 0 {
+                continue;
+            }
+            let mut bits = word.swap(0, AcqRel);
+            while bits != 0 {
+                visit(AgentId(at as u32 * 64 + bits.trailing_zeros()));
+                bits &= bits - 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn news_are_heard_once() {
+        let news = News::new(130);
+        let heard = || {
+            let mut heard = Vec::new();
+            news.take(|id| heard.push(id.0));
+            heard
+        };
+        [129, 0, 64, 0, 63].iter().for_each(|id| news.tell(AgentId(*id)));
+        assert_eq!(heard(), [0, 63, 64, 129]);
+        assert!(heard().is_empty());
+        news.tell(AgentId(5000));
+        assert!(heard().is_empty(), "strangers are nobody");
+    }
+
+    #[test]
+    fn what_is_published_before_the_telling_is_seen_with_it() {
+        let (news, value) = (News::new(1), AtomicU64::new(0));
+        let last = 100_000;
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for k in 1..=last {
+                    value.store(k, std::sync::atomic::Ordering::Release);
+                    news.tell(AgentId(0));
+                }
+            });
+            // a reader that looks only when told comes to the last value
+            let mut seen = 0;
+            while seen < last {
+                news.take(|_| seen = value.load(std::sync::atomic::Ordering::Acquire));
+                std::thread::yield_now();
+            }
+        });
+    }
+}

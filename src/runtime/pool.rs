@@ -1,0 +1,117 @@
+//! A few workers for thousands of agents, real time.
+//!
+//! In: agents and a [`Clock`]. Out: [`Run`]. Each worker makes the turns that are due, earliest deadline first, and sleeps when
+//! none is; agents keep their own clocks as they do on threads, and none knows who makes its turns.
+//! A thread for each agent costs a switch of threads for each turn; here a worker goes from one agent to the next.
+//! Under overload every agent falls to the same share of its rate (`pool/queue.rs`). Never here: virtual time, declared costs.
+
+mod desk;
+mod hall;
+mod queue;
+mod staff;
+mod worker;
+
+use super::Run;
+use super::account::AgentStats;
+use super::clock::Clock;
+use super::handle::AgentHandle;
+use super::pace::{Drive, Timeline};
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use hall::Hall;
+use staff::{Note, Staff};
+use std::num::NonZero;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// A step that takes longer is given up: its agent is parked, its worker replaced.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Agents that share workers.
+pub struct Pool {
+    hall: Arc<Hall>,
+    notes: Sender<Note>,
+    watch: Option<JoinHandle<()>>,
+}
+
+impl Pool {
+    /// Starts a worker for each core the system gives; simulated time begins when all are there.
+    ///
+    /// # Errors
+    /// [`RunError`] for agents that cannot run as asked, and where the system gives no thread.
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>) -> Result<Self, RunError> {
+        let workers = thread::available_parallelism().map_or(1, NonZero::get);
+        Self::with_workers(spawns, clock, workers, PATIENCE)
+    }
+
+    /// Starts `workers` workers, at least one, who are given up after `patience` in one step.
+    pub(super) fn with_workers(
+        spawns: Vec<AgentSpawn>,
+        clock: Arc<dyn Clock>,
+        workers: usize,
+        patience: Duration,
+    ) -> Result<Self, RunError> {
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let workers = workers.clamp(1, handles.len().max(1));
+        board.hire(workers);
+        let hall = Arc::new(Hall::new(clock, board, handles, actors, workers));
+        hall.timeline.drive(Duration::ZERO, Drive::Pause);
+        let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
+        let staff = Staff::hire(Arc::clone(&hall), workers, patience).map_err(no_thread)?;
+        let notes = staff.notes();
+        let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
+            hall.board.stop();
+            no_thread(source)
+        })?;
+        let mut run = Self { hall, notes, watch: Some(watch) };
+        run.drive(Drive::Run);
+        Ok(run)
+    }
+
+    fn end(&mut self) {
+        self.hall.board.stop();
+        // where the watch has ended there is nobody left to be told
+        let _ = self.notes.send(Note::Stop);
+        drop(self.watch.take().map(JoinHandle::join));
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl Run for Pool {
+    fn now(&self) -> Duration {
+        self.hall.clock.now()
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        super::clock::wait_until(&*self.hall.clock, until);
+    }
+
+    fn spend(&mut self, _work: Duration) {}
+
+    fn timeline(&self) -> Timeline {
+        self.hall.timeline.read()
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.hall.timeline.drive(self.hall.clock.now(), drive);
+        self.hall.board.unpark_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.hall.handles
+    }
+
+    fn shutdown(mut self: Box<Self>) -> Vec<AgentStats> {
+        self.end();
+        self.hall.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

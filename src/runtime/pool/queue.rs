@@ -1,0 +1,265 @@
+//! The agents of one worker between their turns, in the order of those.
+//!
+//! In: agents. Out: the most urgent one whose step has been released ([`super::super::pace`]), earliest deadline first.
+//! Under overload deadlines alone would be unjust: an agent past its lag cap gives up time, and with it its place. So deadlines
+//! are counted in *served* time: how much simulated time the workers have given the agent, whatever it dropped. While all keep
+//! up, that is the agent's own time; when they cannot, all fall behind alike, each at the same share of its rate, and none
+//! starves. Who comes back from a rest, or falls behind by its own fault, goes on from what is served now: it saves nothing up
+//! (start-time fair queueing, (GVC97)). Never here: threads, sleeping, turns.
+
+use super::super::pace::Timeline;
+use super::super::turn::Actor;
+use metachron_agents::{SimSpan, SimTime};
+use std::cmp::Ordering;
+use std::collections::BinaryHeap;
+use std::time::Duration;
+
+/// A moment that never comes, in nanoseconds.
+pub(super) const NEVER: u64 = u64::MAX;
+
+/// Agents that wait for their turns.
+#[derive(Default)]
+pub(super) struct Queue {
+    timeline: Timeline,
+    /// By the wall time at which their steps are released.
+    waiting: BinaryHeap<Place>,
+    /// Released, by deadline.
+    ready: BinaryHeap<Place>,
+    /// The latest served time of those taken so far.
+    served: SimTime,
+    /// Since when somebody has been ready, wall nanoseconds.
+    ready_since: u64,
+}
+
+/// An agent and its rank: the least comes first.
+struct Place {
+    rank: u64,
+    actor: Box<Actor>,
+}
+
+impl Queue {
+    /// Works by `timeline` from now on, if that is newer than the one known.
+    pub fn keep_time(&mut self, timeline: &Timeline, now: Duration) {
+        if timeline.piece() <= self.timeline.piece() {
+            return;
+        }
+        self.timeline = *timeline;
+        let all: Vec<Place> = self.waiting.drain().chain(self.ready.drain()).collect();
+        all.into_iter().for_each(|place| self.put_back(place.actor, now));
+    }
+
+    /// Lets `actor`, who comes from elsewhere, wait for its next turn.
+    pub fn put(&mut self, mut actor: Box<Actor>, now: Duration) {
+        actor.owed = SimSpan::ZERO;
+        self.put_back(actor, now);
+    }
+
+    /// Lets `actor`, whose turn was just made, wait for its next one.
+    pub fn put_back(&mut self, mut actor: Box<Actor>, now: Duration) {
+        actor.served = actor.served.max(self.served - actor.owed);
+        actor.owed = actor.owed.min(self.served.since(actor.served));
+        match actor.pace.due(&self.timeline) {
+            Some(due) if due <= now => self.make_ready(actor, now),
+            due => self.waiting.push(Place { rank: due.map_or(NEVER, nanos), actor }),
+        }
+    }
+
+    /// The most urgent of those whose steps are released at `now`: it has had its share of one step more.
+    pub fn take(&mut self, now: Duration) -> Option<Box<Actor>> {
+        self.release(now);
+        let mut actor = self.ready.pop()?.actor;
+        self.served = self.served.max(actor.served);
+        actor.served += actor.pace.dt();
+        Some(actor)
+    }
+
+    /// Hands over an agent that is ready to another worker's queue, `thief`, where its rights stay what they are.
+    pub fn give(&mut self, thief: &mut Self, now: Duration) -> bool {
+        let Some(Place { mut actor, .. }) = self.ready.pop() else { return false };
+        // what it was given too little here it is owed there
+        actor.owed = thief.served.since(actor.served);
+        thief.make_ready(actor, now);
+        true
+    }
+
+    /// The wall time, in nanoseconds, at which a turn is due, or since when one has been; [`NEVER`] where none is.
+    pub fn due(&self) -> u64 {
+        if self.ready.is_empty() { self.waiting.peek().map_or(NEVER, |place| place.rank) } else { self.ready_since }
+    }
+
+    /// How far the most urgent of those that are ready has been served, nanoseconds; [`NEVER`] where none is ready.
+    pub fn frontier(&self) -> u64 {
+        self.ready.peek().map_or(NEVER, |place| place.actor.served.as_nanos())
+    }
+
+    /// All that are left, at the end of a run.
+    pub fn drain(&mut self) -> impl Iterator<Item = Box<Actor>> {
+        self.waiting.drain().chain(self.ready.drain()).map(|place| place.actor)
+    }
+
+    fn release(&mut self, now: Duration) {
+        let now_nanos = nanos(now);
+        while self.waiting.peek().is_some_and(|place| place.rank <= now_nanos && place.rank != NEVER) {
+            if let Some(Place { actor, .. }) = self.waiting.pop() {
+                self.make_ready(actor, now);
+            }
+        }
+    }
+
+    fn make_ready(&mut self, actor: Box<Actor>, now: Duration) {
+        if self.ready.is_empty() {
+            self.ready_since = nanos(now);
+        }
+        let deadline = actor.served + actor.pace.dt();
+        self.ready.push(Place { rank: deadline.as_nanos(), actor });
+    }
+}
+
+/// `span` as a rank.
+fn nanos(span: Duration) -> u64 {
+    u64::try_from(span.as_nanos()).unwrap_or(NEVER)
+}
+
+impl PartialEq for Place {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other) == Ordering::Equal
+    }
+}
+
+impl Eq for Place {}
+
+impl PartialOrd for Place {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl Ord for Place {
+    /// The standard library's heap gives the greatest first.
+    fn cmp(&self, other: &Self) -> Ordering {
+        other.rank.cmp(&self.rank)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::pace::Drive;
+    use super::super::super::spawn::{AgentSpawn, assemble};
+    use super::super::super::testing::Dummy;
+    use super::*;
+
+    const COST: Duration = Duration::from_micros(1000);
+
+    fn queue(spawns: Vec<AgentSpawn>) -> Queue {
+        let mut queue = Queue::default();
+        let actors = assemble(spawns).unwrap().actors.into_iter().flatten();
+        actors.for_each(|actor| queue.put(actor, Duration::ZERO));
+        queue
+    }
+
+    /// Makes turns of [`COST`] each on one worker until `end`, as often as `made` is told of one.
+    fn work(queue: &mut Queue, mut now: Duration, end: Duration, mut made: impl FnMut(usize)) {
+        let line = Timeline::new();
+        while now < end {
+            let Some(mut actor) = queue.take(now) else {
+                now = Duration::from_nanos(queue.due());
+                continue;
+            };
+            made(actor.id().0 as usize);
+            actor.pace.begin(&line, now);
+            now += COST;
+            actor.pace.advance();
+            queue.put(actor, now);
+        }
+    }
+
+    fn turns<const N: usize>(queue: &mut Queue, seconds: u64) -> [u32; N] {
+        let mut counts = [0; N];
+        work(queue, Duration::ZERO, Duration::from_secs(seconds), |id| counts[id] += 1);
+        counts
+    }
+
+    #[test]
+    fn with_room_for_all_everybody_keeps_its_rate_and_short_deadlines_go_first() {
+        // 100 + 50 + 4 · 10 turns of 1 ms a second: a load of 0.19
+        let rates = [100.0, 50.0, 10.0, 10.0, 10.0, 10.0];
+        let mut queue = queue(rates.map(|hz| Dummy::new(1.0).at(hz)).into());
+        let counts: [u32; 6] = turns(&mut queue, 10);
+        for (count, hz) in counts.iter().zip(rates) {
+            assert!((f64::from(*count) - 10.0 * hz).abs() <= 1.0, "{count} at {hz} Hz");
+        }
+    }
+
+    #[test]
+    fn under_overload_each_falls_to_the_same_share_of_its_rate() {
+        for (rates, share) in [([400.0, 800.0, 200.0, 600.0], 0.5), ([100_000.0, 1000.0, 5000.0, 94_000.0], 0.005)] {
+            let mut queue = queue(rates.map(|hz| Dummy::new(1.0).at(hz)).into());
+            let counts: [u32; 4] = turns(&mut queue, 20);
+            for (count, hz) in counts.iter().zip(rates) {
+                let wanted = 20.0 * hz * share;
+                // one turn at either end, and what is lost between whole turns
+                assert!((f64::from(*count) - wanted).abs() <= 2.0 + 0.01 * wanted, "{count} of {wanted} at {hz} Hz");
+            }
+        }
+    }
+
+    #[test]
+    fn who_was_away_saves_nothing_up() {
+        let mut queue = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
+        let away = queue.take(Duration::ZERO).unwrap();
+        let (came_back, end) = (Duration::from_secs(4), Duration::from_secs(6));
+        work(&mut queue, Duration::ZERO, came_back, |_| ());
+        queue.put(away, came_back);
+        let mut counts = [0; 3];
+        work(&mut queue, came_back, end, |id| counts[id] += 1);
+        // 2000 turns for three
+        assert!(counts.iter().all(|count| (660..=673).contains(count)), "{counts:?}");
+    }
+
+    #[test]
+    fn a_stopped_timeline_releases_nobody_and_a_running_one_all() {
+        let mut queue = queue(vec![Dummy::new(1.0).at(100.0), Dummy::new(1.0).at(10.0)]);
+        let paused = Timeline::new().after(Duration::ZERO, Drive::Pause);
+        queue.keep_time(&paused, Duration::ZERO);
+        assert!(queue.take(Duration::from_secs(9)).is_none());
+        assert_eq!((queue.due(), queue.frontier()), (NEVER, NEVER));
+        let running = paused.after(Duration::from_secs(9), Drive::Run);
+        queue.keep_time(&running, Duration::from_secs(9));
+        assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 0, "the earlier deadline");
+        assert_eq!(queue.take(Duration::from_secs(9)).unwrap().id().0, 1);
+    }
+
+    #[test]
+    fn rights_move_with_the_agent_that_another_worker_takes() {
+        let mut mine = queue([1000.0; 4].map(|hz| Dummy::new(1.0).at(hz)).into());
+        let mut theirs = Queue::default();
+        let taken = mine.take(Duration::ZERO).unwrap();
+        assert!(mine.give(&mut theirs, COST));
+        assert_eq!(theirs.due(), 1_000_000);
+        assert_eq!((theirs.frontier(), mine.frontier()), (0, 0));
+        assert_eq!(taken.served, SimTime::from_nanos(1_000_000));
+        assert_eq!((mine.drain().count(), theirs.drain().count()), (2, 1));
+    }
+
+    #[test]
+    fn who_was_served_worse_makes_it_up_where_it_is_taken_to() {
+        // two of 1 ms in a queue that has come to 100 ms, and one more from a queue that has come to 70
+        let mut theirs = queue([1000.0; 2].map(|hz| Dummy::new(1.0).at(hz)).into());
+        let mut mine = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
+        let late = Duration::from_secs(1);
+        work(&mut theirs, Duration::ZERO, Duration::from_millis(200), |_| ());
+        work(&mut mine, Duration::ZERO, Duration::from_millis(210), |_| ());
+        assert!(mine.give(&mut theirs, late));
+        let mut turns = 0;
+        loop {
+            let actor = theirs.take(late).unwrap();
+            let is_owed = actor.owed > SimSpan::ZERO;
+            theirs.put_back(actor, late);
+            if !is_owed {
+                break;
+            }
+            turns += 1;
+        }
+        assert!((27..=31).contains(&turns), "{turns} turns before the others'");
+    }
+}

@@ -1,0 +1,179 @@
+//! The workers of a pool as those who must be there: hired, watched, replaced, dismissed.
+//!
+//! In: a hall. Out: a thread for each place in it, until the end. A step that does not return costs one agent and one thread:
+//! the agent is parked with the reason, and another worker takes the place. Never here: turns.
+
+use super::super::island::{empty_door, empty_rooms};
+use super::desk::{Desk, Sitting};
+use super::hall::Hall;
+use super::worker::Worker;
+use metachron_agents::AgentId;
+use std::io;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+/// How long the end of a run waits after the last worker that ended. A step that takes longer hangs; its thread is left behind.
+const PARTING: Duration = Duration::from_millis(400);
+
+/// A worker is given up when this often in a row it was found in the same turn: a machine that stood still is found so once.
+const LOOKS: u32 = 4;
+
+/// All workers and what is known of them.
+pub(super) struct Staff {
+    hall: Arc<Hall>,
+    posts: Vec<Post>,
+    hired: u32,
+    patience: Duration,
+    sender: Sender<Note>,
+    notes: Receiver<Note>,
+}
+
+/// What the staff is told.
+pub(super) enum Note {
+    /// The run is to end.
+    Stop,
+    /// The worker hired under this number has ended.
+    Ended(u32),
+}
+
+/// One worker.
+struct Post {
+    number: u32,
+    desk: Arc<Desk>,
+    thread: Option<JoinHandle<()>>,
+    seen: Option<Sitting>,
+    looks: u32,
+}
+
+/// Says that a worker has ended, however it did.
+struct Farewell {
+    number: u32,
+    sender: Sender<Note>,
+}
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        // nobody listens any more after the end: then nobody needs to know
+        let _ = self.sender.send(Note::Ended(self.number));
+    }
+}
+
+impl Staff {
+    /// Hires a worker for each of `places`; a step that takes longer than `patience` is given up.
+    pub fn hire(hall: Arc<Hall>, places: usize, patience: Duration) -> io::Result<Self> {
+        let (sender, notes) = channel();
+        let mut staff = Self { hall, posts: Vec::new(), hired: 0, patience, sender, notes };
+        for at in 0..places {
+            match staff.post(at) {
+                Ok(post) => staff.posts.push(post),
+                Err(error) => {
+                    staff.hall.board.stop();
+                    staff.dismiss();
+                    return Err(error);
+                }
+            }
+        }
+        Ok(staff)
+    }
+
+    /// Where notes are sent to.
+    pub fn notes(&self) -> Sender<Note> {
+        self.sender.clone()
+    }
+
+    /// Watches until the run is to end, and ends it.
+    pub fn watch(mut self) {
+        loop {
+            match self.notes.recv_timeout(self.patience / LOOKS) {
+                Ok(Note::Stop) => break,
+                Ok(Note::Ended(number)) => self.bury(number),
+                Err(_) => self.look(),
+            }
+        }
+        self.dismiss();
+    }
+
+    fn post(&mut self, at: usize) -> io::Result<Post> {
+        let (number, desk) = (self.hired, Arc::new(Desk::default()));
+        self.hired += 1;
+        let (hall, farewell) = (Arc::clone(&self.hall), Farewell { number, sender: self.sender.clone() });
+        let body = {
+            let desk = Arc::clone(&desk);
+            move || {
+                let _farewell = farewell;
+                Worker::new(hall, at, desk).work();
+            }
+        };
+        let thread = thread::Builder::new().name(format!("pool:{at}")).spawn(body)?;
+        Ok(Post { number, desk, thread: Some(thread), seen: None, looks: 0 })
+    }
+
+    fn look(&mut self) {
+        for at in 0..self.posts.len() {
+            let post = &mut self.posts[at];
+            let sitting = post.desk.sitting();
+            post.looks = if sitting.is_some() && sitting == post.seen { post.looks + 1 } else { 0 };
+            post.seen = sitting;
+            if let Some(sitting) = sitting.filter(|sitting| post.looks >= LOOKS && post.desk.give_up(*sitting)) {
+                self.lose(sitting.whose(), self.patience);
+                self.replace(at);
+            }
+        }
+    }
+
+    /// A worker ended before its time: that is a bug of ours, and the others must not suffer from it.
+    fn bury(&mut self, number: u32) {
+        let Some(at) = self.posts.iter().position(|post| post.number == number) else { return };
+        if let Some(sitting) = self.posts[at].desk.sitting() {
+            self.park(sitting.whose(), "its worker broke down, which is a bug in metachron");
+        }
+        self.replace(at);
+    }
+
+    /// Where the system gives no thread any more, the other workers do without.
+    fn replace(&mut self, at: usize) {
+        if let Ok(post) = self.post(at) {
+            self.posts[at] = post;
+        }
+    }
+
+    fn lose(&self, id: AgentId, patience: Duration) {
+        self.park(id, &format!("a step has not ended within {} s", patience.as_secs_f64()));
+    }
+
+    /// Parks an agent that is stuck in a turn, and all it leads, from outside.
+    fn park(&self, id: AgentId, reason: &str) {
+        let Hall { board, handles, .. } = &*self.hall;
+        board.close(id);
+        let led = || handles.iter().filter(|agent| board.leader(agent.id()) == id);
+        led().for_each(|agent| empty_door(&agent.shared));
+        led().for_each(|agent| {
+            board.close(agent.id());
+            agent.shared.gauges.park(reason.to_owned());
+            board.news.tell(agent.id());
+        });
+    }
+
+    /// Waits for the workers, as long as it has patience, and ends the lives of all agents.
+    fn dismiss(&mut self) {
+        let mut missing = self.posts.len();
+        while missing > 0 {
+            let Ok(note) = self.notes.recv_timeout(PARTING) else { break };
+            let Note::Ended(number) = note else { continue };
+            let Some(post) = self.posts.iter_mut().find(|post| post.number == number) else { continue };
+            missing -= 1;
+            // a panic outside a turn has been printed, and the others must still be joined
+            drop(post.thread.take().map(JoinHandle::join));
+        }
+        for post in self.posts.iter().filter(|post| post.thread.is_some()) {
+            if let Some(sitting) = post.desk.sitting().filter(|sitting| post.desk.give_up(*sitting)) {
+                self.lose(sitting.whose(), PARTING);
+            }
+        }
+        let (timeline, now) = (self.hall.timeline.read(), self.hall.clock.now());
+        self.hall.clear(|mut actor| actor.close_account(&timeline, now));
+        empty_rooms(&self.hall.handles, &timeline, now);
+    }
+}

@@ -1,0 +1,180 @@
+//! One worker of a pool: turn after turn of whoever is due.
+//!
+//! In: the hall, a place in it. Out: turns. Between two turns it answers the bell, and sleeps where nothing is due: it waits for
+//! no lock but its own queue's, and asks the system for nothing but sleep. Never here: which turn is next.
+
+use super::super::cpu::CpuShare;
+use super::super::island::move_in;
+use super::super::pace::Timeline;
+use super::super::turn::{Actor, Next};
+use super::desk::Desk;
+use super::hall::Hall;
+use metachron_agents::AgentId;
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+/// After so long without sleep a worker lets others have its core for a moment: the frame loop above all.
+const SHIFT: Duration = Duration::from_millis(1);
+
+/// Every so many turns a worker looks whether agents elsewhere are served worse than its own.
+const BALANCE_TURNS: u32 = 64;
+
+/// A worker and where it stands.
+pub(super) struct Worker {
+    hall: Arc<Hall>,
+    at: usize,
+    desk: Arc<Desk>,
+    cpu: CpuShare,
+    turns: u32,
+    /// The clock as it was read last.
+    now: Duration,
+    awake_since: Duration,
+    given_up: bool,
+    /// The agent of the last turn, if it waits for another one.
+    last: Option<Box<Actor>>,
+}
+
+impl Worker {
+    pub fn new(hall: Arc<Hall>, at: usize, desk: Arc<Desk>) -> Self {
+        let now = hall.clock.now();
+        Self { hall, at, desk, cpu: CpuShare::new(), turns: 0, now, awake_since: now, given_up: false, last: None }
+    }
+
+    /// Works until the run is to end, or until the worker has been given up.
+    pub fn work(mut self) {
+        self.hall.board.bell().inspect(|bell| bell.enter(self.at));
+        while !self.hall.board.stopping() && !self.given_up {
+            self.round();
+        }
+        self.last.take().into_iter().for_each(|actor| self.hall.put(self.at, actor, self.now));
+    }
+
+    /// Makes the next turn, or sleeps until one is due.
+    fn round(&mut self) {
+        let timeline = self.hall.timeline.read();
+        self.answer(&timeline);
+        match self.hall.exchange(self.at, self.last.take(), &timeline, self.now) {
+            Some(actor) => self.last = self.turn(actor, &timeline),
+            None => self.sleep(),
+        }
+        self.pause(&timeline);
+    }
+
+    /// Makes a turn of `actor`; gives it back if it waits for another one.
+    fn turn(&mut self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+        self.cpu.open();
+        self.turns = self.turns.wrapping_add(1);
+        let began = self.now;
+        let sitting = self.desk.sit(self.turns, actor.id());
+        let begun = actor.begin(timeline, began);
+        if !self.desk.rise(sitting) {
+            self.given_up = true;
+            return None;
+        }
+        let ended = self.hall.clock.now();
+        let next = match begun {
+            None => Next::Parked,
+            Some(_) => actor.finish(timeline, ended, ended.saturating_sub(began).as_secs_f64()),
+        };
+        self.now = self.hall.clock.now();
+        let wall = self.now.saturating_sub(began);
+        actor.count(wall);
+        actor.settle(self.cpu.count(wall));
+        match next {
+            Next::Due => Some(actor),
+            Next::Rest => self.lay(actor, timeline),
+            Next::Join(leader) => move_in(actor, leader).err(),
+            Next::Parked => None,
+        }
+    }
+
+    /// Looks after those who were summoned.
+    fn answer(&mut self, timeline: &Timeline) {
+        let Some(bell) = self.hall.board.bell().filter(|bell| bell.has_rung()) else { return };
+        self.now = self.hall.clock.now();
+        if bell.answer(|id| self.attend(id, timeline)) > 1 {
+            // that may be too much for one: another looks how this one gets on
+            bell.rouse();
+        }
+    }
+
+    fn attend(&self, id: AgentId, timeline: &Timeline) {
+        let woken = self.hall.lift(id).and_then(|actor| self.wake(actor, timeline));
+        let home = self.hall.come_home(id).filter(|actor| !actor.is_parked());
+        woken.into_iter().chain(home).for_each(|actor| self.hall.put(self.at, actor, self.now));
+    }
+
+    /// Lays `actor` to rest, unless it was woken: then it waits for a turn.
+    fn lay(&self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+        self.hall.lay(actor).and_then(|actor| self.wake(actor, timeline))
+    }
+
+    /// Wakes `actor`, if somebody said so; else it lies down again.
+    fn wake(&self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+        loop {
+            if actor.wakes(timeline, self.now) {
+                return Some(actor);
+            }
+            actor = self.hall.lay(actor)?;
+        }
+    }
+
+    fn sleep(&mut self) {
+        let span = self.hall.pause(self.at, self.now);
+        self.hall.board.bell().inspect(|bell| bell.sleep(self.at, span));
+        self.now = self.hall.clock.now();
+        self.awake_since = self.now;
+    }
+
+    /// What a worker does now and then while it has work.
+    fn pause(&mut self, timeline: &Timeline) {
+        if self.turns.is_multiple_of(BALANCE_TURNS) {
+            self.hall.balance(self.at, timeline, self.now);
+        }
+        if self.now.saturating_sub(self.awake_since) >= SHIFT {
+            thread::yield_now();
+            self.now = self.hall.clock.now();
+            self.awake_since = self.now;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::super::pace::Drive;
+    use super::super::super::spawn::{Company, assemble};
+    use super::super::super::testing::Dummy;
+    use super::super::super::{Clock, ManualClock};
+    use super::*;
+
+    fn worker(spawns: Vec<super::super::super::AgentSpawn>, clock: &Arc<ManualClock>) -> Worker {
+        let Company { actors, handles, board } = assemble(spawns).unwrap();
+        board.hire(1);
+        let clock = Arc::clone(clock) as Arc<dyn Clock>;
+        let hall = Arc::new(Hall::new(clock, board, handles, actors, 1));
+        hall.timeline.drive(Duration::ZERO, Drive::Run);
+        Worker::new(hall, 0, Arc::default())
+    }
+
+    #[test]
+    fn a_steady_turn_allocates_nothing() {
+        let clock = Arc::new(ManualClock::new());
+        let mut worker = worker((0..50).map(|k| Dummy::new(1.0).at(200.0 + f64::from(k))).collect(), &clock);
+        let mut rounds = |count: u32| {
+            for _ in 0..count {
+                // 50 agents of 225 Hz: a turn every 89 µs, and sometimes none
+                clock.advance(Duration::from_micros(80));
+                worker.now = clock.now();
+                worker.round();
+            }
+        };
+        let warm_up = allocation_counter::measure(|| rounds(20_000));
+        assert!(warm_up.count_total > 0, "the counter counts");
+        let steady = allocation_counter::measure(|| rounds(50_000));
+        assert_eq!(steady.count_total, 0, "{steady:?}");
+        let steps: u64 = worker.hall.handles.iter().map(|agent| agent.steps()).sum();
+        // 5.6 s of simulated time
+        assert!((62_000..64_000).contains(&steps), "{steps}");
+    }
+}
