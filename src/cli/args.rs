@@ -35,6 +35,14 @@ Examples:
   metachron check my.toml other.toml
   metachron check --json my.toml | jq '.[].problems'";
 
+const BENCH_EXAMPLES: &str = "\
+Examples:
+  metachron bench agents --quick                       a minute, into the folder bench/
+  metachron bench agents --executor pool --agents 1000
+  metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
+
+CPU times are the measure: on a machine that does other things too, wall times tell of those.";
+
 const CHART_EXAMPLES: &str = "\
 Examples:
   metachron chart stability                            every experiment, into the folder charts/
@@ -68,6 +76,9 @@ pub enum Command {
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
+    /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
+    #[command(after_help = BENCH_EXAMPLES)]
+    Bench(BenchArgs),
     /// Print the JSON Schema of scene files
     Schema,
     /// List the built-in scenes
@@ -121,8 +132,9 @@ pub struct RunArgs {
     /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
     pub law: Option<String>,
-    /// How agents run: a thread each, or one thread in virtual time with declared costs (the same bits on every run)
-    #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["threads", "lockstep"]))]
+    /// How agents run: a thread each, a pool of workers, the cheaper of the two by their number (auto), or one thread in
+    /// virtual time with declared costs (lockstep: the same bits on every run)
+    #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["auto", "threads", "pool", "lockstep"]))]
     pub executor: Option<String>,
     /// Size of the picture in pixels, or of the window, each 1 to 8192; a picture nobody sized has 1280x720
     #[arg(long, value_name = "WxH", env = "METACHRON_SIZE", value_parser = size)]
@@ -196,6 +208,44 @@ pub struct ChartArgs {
     /// No progress and no tables
     #[arg(short, long)]
     pub quiet: bool,
+}
+
+/// `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure
+    pub subject: BenchSubject,
+    /// Write the files here; the folder is made where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "bench", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Fewer cases, each for a second
+    #[arg(long)]
+    pub quick: bool,
+    /// Only this executor; may be repeated
+    #[arg(long, value_parser = PossibleValuesParser::new(["threads", "pool", "lockstep"]))]
+    pub executor: Vec<String>,
+    /// Only this model; may be repeated
+    #[arg(long, value_parser = PossibleValuesParser::new(["synthetic", "rod", "rigid"]))]
+    pub model: Vec<String>,
+    /// Only cases of up to so many agents
+    #[arg(long, value_name = "N")]
+    pub agents: Option<usize>,
+    /// How long each case runs
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Print the rows as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no table
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A subject of `bench`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum BenchSubject {
+    /// Agents on threads, in a pool and in lockstep: CPU a step against the bare loop, lateness, ages, memory
+    Agents,
 }
 
 /// A subject of `chart`.

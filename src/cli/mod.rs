@@ -4,6 +4,7 @@
 //! Never here: physics, drawing, the format of scenes.
 
 mod args;
+mod bench;
 mod chart;
 mod check;
 mod describe;
@@ -65,6 +66,7 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
         Command::Check(args) => check::command(&args),
         Command::Chart(args) => chart::command(&args),
+        Command::Bench(args) => bench::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),
         Command::Completions { shell } => describe::completions(shell),

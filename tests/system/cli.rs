@@ -143,7 +143,7 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
     for (arguments, word) in [
         (&["fly"][..], "fly"),
         (&["run", "--policy", "best"], "feedback"),
-        (&["run", "--executor", "pool"], "lockstep"),
+        (&["run", "--executor", "poll"], "lockstep"),
         (&["run", "--size", "big"], "1280x720"),
         (&["run", "--frames", "0"], "0"),
         (&["run", "--seconds", "-1"], "seconds"),

@@ -5,7 +5,7 @@
 mod company;
 mod coupling;
 mod experiment;
-mod figure;
+pub(super) mod figure;
 mod play;
 mod policies;
 mod rows;
@@ -13,7 +13,7 @@ mod scenes;
 mod stability;
 mod stage;
 mod sweep;
-mod table;
+pub(super) mod table;
 
 use super::Exit;
 use super::args::{ChartArgs, Subject};
@@ -135,10 +135,10 @@ fn unknown(all: &[Entry], name: &str) -> anyhow::Error {
 }
 
 /// The folder, made and tried: better known before an hour's work than after.
-fn prepared(folder: &Path) -> anyhow::Result<&Path> {
+pub(super) fn prepared(folder: &Path) -> anyhow::Result<&Path> {
     let refused = |why: std::io::Error| BadInput(format!("the folder {} cannot be written: {why}", folder.display()));
     std::fs::create_dir_all(folder).map_err(refused)?;
-    let trial = folder.join(".metachron-chart");
+    let trial = folder.join(".metachron-trial");
     std::fs::write(&trial, b"").and_then(|()| std::fs::remove_file(&trial)).map_err(refused)?;
     Ok(folder)
 }

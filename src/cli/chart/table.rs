@@ -6,7 +6,7 @@ use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
 /// What stands in a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Cell {
+pub(in crate::cli) enum Cell {
     /// Words.
     Text(String),
     /// A number, and how many digits after the point people see.
@@ -15,21 +15,21 @@ pub(super) enum Cell {
 
 /// Rows of cells under names.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Table {
+pub(in crate::cli) struct Table {
     /// The names of the columns; keys in JSON.
-    pub(super) columns: Vec<String>,
+    pub(in crate::cli) columns: Vec<String>,
     /// As many cells a row as there are columns.
-    pub(super) rows: Vec<Vec<Cell>>,
+    pub(in crate::cli) rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
     /// An empty table.
-    pub(super) fn new(columns: &[&str]) -> Self {
+    pub(in crate::cli) fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
     /// The table as lines, columns two spaces apart.
-    pub(super) fn text(&self) -> String {
+    pub(in crate::cli) fn text(&self) -> String {
         let cells = |row: &Vec<Cell>| row.iter().map(Cell::text).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> =
             std::iter::once(self.columns.clone()).chain(self.rows.iter().map(cells)).collect();

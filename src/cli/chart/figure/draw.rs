@@ -31,7 +31,7 @@ const SHARP: u32 = 2;
 ///
 /// # Errors
 /// What cannot be drawn: an axis that ends where it begins.
-pub(in crate::cli::chart) fn svg(figure: &Figure) -> anyhow::Result<String> {
+pub(in crate::cli) fn svg(figure: &Figure) -> anyhow::Result<String> {
     let mut text = String::new();
     let [width, height] = size(figure);
     draw(SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(), figure, Pen(1))?;
@@ -42,7 +42,7 @@ pub(in crate::cli::chart) fn svg(figure: &Figure) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// What cannot be drawn.
-pub(in crate::cli::chart) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
+pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
     let [width, height] = size(figure);
     let fine = (width * FINE, height * FINE);
     let mut pixels = vec![0; fine.0 as usize * fine.1 as usize * 3];

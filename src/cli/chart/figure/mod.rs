@@ -6,11 +6,11 @@ mod draw;
 mod font;
 mod scale;
 
-pub(super) use draw::{png, svg};
+pub(in crate::cli) use draw::{png, svg};
 
 /// Some panels under one title.
 #[derive(Debug, Clone, Default)]
-pub(in crate::cli::chart) struct Figure {
+pub(in crate::cli) struct Figure {
     /// What it shows.
     pub title: String,
     /// The panels, row by row.
@@ -21,7 +21,7 @@ pub(in crate::cli::chart) struct Figure {
 
 /// A pair of axes with what lies between them.
 #[derive(Debug, Clone)]
-pub(in crate::cli::chart) struct Panel {
+pub(in crate::cli) struct Panel {
     /// What it shows.
     pub title: String,
     /// To the right.
@@ -34,7 +34,7 @@ pub(in crate::cli::chart) struct Panel {
 
 /// An axis.
 #[derive(Debug, Clone)]
-pub(in crate::cli::chart) struct Axis {
+pub(in crate::cli) struct Axis {
     /// The quantity, with its unit.
     pub label: &'static str,
     /// Its least value; above 0 where `log`.
@@ -59,7 +59,7 @@ impl Axis {
 
 /// Something of one colour, with a label of its own in the legend (none where it is empty).
 #[derive(Debug, Clone)]
-pub(in crate::cli::chart) struct Layer {
+pub(in crate::cli) struct Layer {
     /// Its name.
     pub label: String,
     /// Its colour.
@@ -70,7 +70,7 @@ pub(in crate::cli::chart) struct Layer {
 
 /// What a layer is made of. Values outside the axes are drawn at their edge; those that are not finite are left out.
 #[derive(Debug, Clone)]
-pub(in crate::cli::chart) enum Mark {
+pub(in crate::cli) enum Mark {
     /// A line through points: measured.
     Line(Vec<(f64, f64)>),
     /// A broken line through points: theory, or a limit.
@@ -83,7 +83,7 @@ pub(in crate::cli::chart) enum Mark {
 
 /// Colours that people with any sight tell apart, also printed grey (Okabe and Ito's, the first two those of the other figures).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::cli::chart) enum Colour {
+pub(in crate::cli) enum Colour {
     /// Blue: ours.
     Blue,
     /// Red: what it is compared with.
@@ -106,7 +106,7 @@ impl Colour {
 }
 
 /// The range that holds all numbers, with a little room; (0, 1) where there are none.
-pub(in crate::cli::chart) fn span(numbers: impl IntoIterator<Item = f64>, log: bool) -> (f64, f64) {
+pub(in crate::cli) fn span(numbers: impl IntoIterator<Item = f64>, log: bool) -> (f64, f64) {
     let good = |v: &f64| v.is_finite() && (!log || *v > 0.0);
     let (low, high) = numbers
         .into_iter()

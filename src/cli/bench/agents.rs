@@ -1,0 +1,214 @@
+//! `bench agents`: what being an agent costs over the bare physics, and how late anyone gets.
+//!
+//! In: executor, model, number and rate. Out: a row: CPU a step beside the bare loops of the same run, ages as a reader at 60 Hz
+//! finds them, lateness, dropped time, memory, switches of threads. Never here: files, tables.
+
+use super::bare;
+use super::cast::{Model, agent, spawn};
+use super::machine::{others_cpu, own_cpu, resident_bytes, switches};
+use crate::runtime::{AgentStats, Lockstep, Machine, Pool, Reader, Run, SystemClock, Threads};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Who runs the agents.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Executor {
+    Threads,
+    Pool,
+    Lockstep,
+}
+
+/// One question.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Case {
+    pub executor: Executor,
+    pub model: Model,
+    pub agents: usize,
+    /// Mean rate of an agent; far above what the machine can do where no pace is meant to be kept.
+    pub rate_hz: f64,
+}
+
+/// One answer. Times are those of the agent at which half, or 99 in 100, are better.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Row {
+    pub executor: Executor,
+    pub model: Model,
+    pub agents: usize,
+    pub rate_hz: f64,
+    /// CPU time of all threads but the reader's, a step.
+    pub cpu_us_per_step: f64,
+    /// The ceiling: the same steps in a loop.
+    pub bare_us_per_step: f64,
+    /// The same steps in a loop that sleeps to the same due times.
+    pub sleeping_us_per_step: f64,
+    pub steps_per_s: f64,
+    pub wanted_steps_per_s: f64,
+    pub age_ms_p50: f64,
+    pub age_ms_p99: f64,
+    pub late_ms_p50: f64,
+    pub late_ms_p99: f64,
+    /// Mean over the agents.
+    pub dropped_ms: f64,
+    /// Memory that appeared with the run, without the models' own.
+    pub bytes_per_agent: Option<f64>,
+    pub switches_per_step: Option<f64>,
+    /// How late the reader's frames began, 99 in 100.
+    pub frame_late_ms_p99: f64,
+    /// What the reader needs to take all newest states, an agent.
+    pub read_ns_per_agent: f64,
+    /// Until all agents were running.
+    pub start_ms: f64,
+    pub shutdown_ms: f64,
+}
+
+/// A rate that no machine keeps.
+pub(super) const UNPACED_HZ: f64 = 1e5;
+
+const FRAME: Duration = Duration::from_micros(16_667);
+
+/// The cases of the benchmark.
+pub(super) fn cases(quick: bool) -> Vec<Case> {
+    use Executor::{Lockstep, Pool, Threads};
+    use Model::{Rigid, Rod, Synthetic};
+    let counts: &[(usize, f64)] = if quick {
+        &[(10, 198.0), (100, 198.0), (1000, 198.0), (10_000, 9.9), (100_000, 1.98)]
+    } else {
+        &[(1, 198.0), (10, 198.0), (30, 198.0), (100, 198.0), (300, 198.0), (1000, 198.0), (3000, 33.0), (10_000, 9.9)]
+    };
+    let more: &[(usize, f64)] = if quick { &[] } else { &[(30_000, 3.3), (100_000, 1.98)] };
+    let case = |executor, model, (agents, rate_hz)| Case { executor, model, agents, rate_hz };
+    let mut cases = Vec::new();
+    for &of in counts.iter().chain(more) {
+        let executors: &[Executor] = if of.0 <= 1000 { &[Threads, Pool, Lockstep] } else { &[Pool, Lockstep] };
+        cases.extend(executors.iter().map(|executor| case(*executor, Synthetic, of)));
+    }
+    cases.push(case(Pool, Synthetic, (10_000, UNPACED_HZ)));
+    cases.extend([Threads, Pool].map(|executor| case(executor, Synthetic, (64, 1000.0))));
+    for model in [Rod, Rigid] {
+        cases.extend([Threads, Pool, Lockstep].map(|executor| case(executor, model, (100, 60.0))));
+        cases.push(case(Pool, model, (1000, 6.0)));
+    }
+    cases
+}
+
+/// Measures one case for about `span` each for the loops and the run.
+pub(super) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
+    let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
+    let spawns = (0..case.agents).map(|k| anyhow::Ok(spawn(agent(case.model, k)?, k, case.rate_hz)));
+    let spawns = spawns.collect::<Result<Vec<_>, _>>()?;
+    let before = resident_bytes();
+    let started = Instant::now();
+    let mut run: Box<dyn Run> = match case.executor {
+        Executor::Threads => Box::new(Threads::start(spawns, Arc::new(SystemClock::new()))?),
+        Executor::Pool => Box::new(Pool::start(spawns, Arc::new(SystemClock::new()))?),
+        Executor::Lockstep => Box::new(Lockstep::start(spawns, Machine::default())?),
+    };
+    let start_ms = millis(started.elapsed());
+    let watched = watch(&mut *run, case.executor == Executor::Lockstep, span);
+    let after = resident_bytes();
+    let started = Instant::now();
+    let stats = run.shutdown();
+    let shutdown_ms = millis(started.elapsed());
+    let steps = watched.steps.max(1.0);
+    Ok(Row {
+        executor: case.executor,
+        model: case.model,
+        agents: case.agents,
+        rate_hz: case.rate_hz,
+        cpu_us_per_step: watched.cpu.as_secs_f64() * 1e6 / steps,
+        bare_us_per_step: bare.free_us,
+        sleeping_us_per_step: bare.paced_us,
+        steps_per_s: watched.steps / watched.wall.as_secs_f64(),
+        wanted_steps_per_s: stats.iter().map(|s| s.wanted_hz).sum(),
+        age_ms_p50: 1e3 * among(&stats, 0.5, |s| s.age.p50_s),
+        age_ms_p99: 1e3 * among(&stats, 0.99, |s| s.age.p99_s),
+        late_ms_p50: 1e3 * among(&stats, 0.5, |s| s.late.p50_s),
+        late_ms_p99: 1e3 * among(&stats, 0.99, |s| s.late.p99_s),
+        dropped_ms: 1e3 * stats.iter().map(|s| s.dropped.as_secs_f64()).sum::<f64>() / stats.len().max(1) as f64,
+        bytes_per_agent: before.zip(after).map(|(from, to)| (to - from).max(0.0) / case.agents as f64),
+        switches_per_step: watched.switches.map(|count| count / steps),
+        frame_late_ms_p99: 1e3 * share(watched.late_s, 0.99),
+        read_ns_per_agent: 1e9 * share(watched.read_s, 0.5) / case.agents as f64,
+        start_ms,
+        shutdown_ms,
+    })
+}
+
+/// What was seen of a run from outside.
+struct Watched {
+    wall: Duration,
+    cpu: Duration,
+    steps: f64,
+    switches: Option<f64>,
+    late_s: Vec<f64>,
+    read_s: Vec<f64>,
+}
+
+/// Lets `run` go on for `span` and reads all states at 60 Hz; a run in virtual time is made by this thread itself.
+fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
+    let cpu = || if is_virtual { own_cpu() } else { others_cpu() };
+    // a warm-up: the first turns of everybody
+    let mut reader = Reader::new(run.agents());
+    read(run, &mut reader, is_virtual, span / 4);
+    let (from_cpu, from_steps, from_switches, from) = (cpu(), steps(run), switches(), Instant::now());
+    let (late_s, read_s) = read(run, &mut reader, is_virtual, span);
+    let reading = if is_virtual { Duration::from_secs_f64(read_s.iter().sum()) } else { Duration::ZERO };
+    reader.finish(run.agents());
+    Watched {
+        wall: from.elapsed(),
+        cpu: (cpu() - from_cpu).saturating_sub(reading),
+        steps: steps(run) - from_steps,
+        switches: switches().zip(from_switches).map(|(to, from)| (to - from).max(0.0)),
+        late_s,
+        read_s,
+    }
+}
+
+/// Reads frame by frame: how late each frame began, and how long the reading took, seconds.
+fn read(run: &mut dyn Run, reader: &mut Reader, is_virtual: bool, span: Duration) -> (Vec<f64>, Vec<f64>) {
+    let (began, start) = (Instant::now(), run.now());
+    let (mut late_s, mut read_s) = (Vec::new(), Vec::new());
+    let mut frame = start;
+    // virtual time is as fast as it is: it must not make the benchmark longer
+    while began.elapsed() < span && (is_virtual || run.now() < start + span) {
+        frame += FRAME;
+        run.wait_until(frame);
+        late_s.push(run.now().saturating_sub(frame).as_secs_f64());
+        let from = Instant::now();
+        reader.read(run.agents(), run.sim_now(), |_, _, _| ());
+        read_s.push(from.elapsed().as_secs_f64());
+        frame = frame.max(run.now().saturating_sub(FRAME));
+    }
+    (late_s, read_s)
+}
+
+fn steps(run: &dyn Run) -> f64 {
+    run.agents().iter().map(|agent| agent.steps() as f64).sum()
+}
+
+/// The number that a share of the agents do not pass.
+fn among(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
+    share(stats.iter().map(of).collect(), part)
+}
+
+fn share(mut numbers: Vec<f64>, part: f64) -> f64 {
+    numbers.sort_unstable_by(f64::total_cmp);
+    let at = (part * numbers.len() as f64).ceil() as usize;
+    numbers.get(at.saturating_sub(1)).copied().unwrap_or(0.0)
+}
+
+fn millis(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e3
+}
+
+impl Executor {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Threads => "threads",
+            Self::Pool => "pool",
+            Self::Lockstep => "lockstep",
+        }
+    }
+}

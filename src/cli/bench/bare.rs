@@ -1,0 +1,74 @@
+//! The same steps without agents around them: what nothing can be faster than.
+//!
+//! In: a model, a number, a rate. Out: CPU time a step, of a loop that never sleeps and of one that sleeps to the same due times
+//! as the agents do. Never here: the runtime.
+
+use super::cast::{Model, agent, rate_hz};
+use super::machine::own_cpu;
+use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Surroundings};
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::thread;
+use std::time::{Duration, Instant};
+
+/// CPU time of bare steps, microseconds.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bare {
+    /// Step after step.
+    pub free_us: f64,
+    /// With a sleep wherever nothing is due.
+    pub paced_us: f64,
+}
+
+/// Measures both loops over `count` agents, each for `span`.
+pub(super) fn measure(model: Model, count: usize, mean_hz: f64, span: Duration) -> anyhow::Result<Bare> {
+    let mut agents = (0..count).map(|k| agent(model, k)).collect::<Result<Vec<_>, _>>()?;
+    let spans: Vec<_> = (0..count).map(|k| period(k, mean_hz)).collect();
+    // one round that fills caches and sizes
+    for (agent, dt) in agents.iter_mut().zip(&spans) {
+        step(&mut **agent, *dt)?;
+    }
+    Ok(Bare { free_us: free(&mut agents, &spans, span)?, paced_us: paced(&mut agents, &spans, span)? })
+}
+
+fn free(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
+    let (cpu, mut steps) = (own_cpu(), 0_u64);
+    while own_cpu() - cpu < span {
+        for (agent, dt) in agents.iter_mut().zip(spans) {
+            step(&mut **agent, *dt)?;
+        }
+        steps += agents.len() as u64;
+    }
+    Ok(micros(own_cpu() - cpu) / steps as f64)
+}
+
+fn paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> anyhow::Result<f64> {
+    let mut due: BinaryHeap<_> = (0..agents.len()).map(|k| Reverse((Duration::ZERO, k))).collect();
+    let (cpu, start, mut steps) = (own_cpu(), Instant::now(), 0_u64);
+    let mut now = start.elapsed();
+    while now < span {
+        let Some(Reverse((at, k))) = due.pop() else { break };
+        if at > now {
+            thread::sleep(at - now);
+        }
+        step(&mut *agents[k], spans[k])?;
+        steps += 1;
+        due.push(Reverse((at + Duration::from_nanos(spans[k].as_nanos()), k)));
+        now = start.elapsed();
+    }
+    Ok(micros(own_cpu() - cpu) / steps.max(1) as f64)
+}
+
+fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
+    let around = Surroundings { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
+    agent.step(dt, &around)?;
+    Ok(())
+}
+
+fn period(k: usize, mean_hz: f64) -> SimSpan {
+    SimSpan::from_secs_f64(1.0 / rate_hz(k, mean_hz)).unwrap_or(SimSpan::ZERO)
+}
+
+fn micros(span: Duration) -> f64 {
+    span.as_secs_f64() * 1e6
+}

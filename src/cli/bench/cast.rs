@@ -1,0 +1,165 @@
+//! The agents of a benchmark.
+//!
+//! In: a model and a number. Out: agents that step and meet nobody. Never here: time passing.
+
+use crate::runtime::{AgentSpawn, Faults};
+use anyhow::Context;
+use glam::{DQuat, DVec3};
+use metachron_agents::rigid::{RigidBody, RigidSpec};
+use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
+use metachron_agents::shape::Solid;
+use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
+use metachron_agents::{
+    Agent, N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, Surroundings,
+};
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// What an agent is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub(super) enum Model {
+    /// Nominal half microseconds of arithmetic a step: as cheap as agents get.
+    Synthetic,
+    /// A tube of 64 segments, clamped at one end.
+    Rod,
+    /// A ball in free flight.
+    Rigid,
+}
+
+impl Model {
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Synthetic => "synthetic",
+            Self::Rod => "rod",
+            Self::Rigid => "rigid",
+        }
+    }
+}
+
+/// Nominal cost of a synthetic step, microseconds: what a plain rod of 64 particles takes.
+const SYNTHETIC_US: f64 = 0.5;
+
+/// An agent that nobody can touch: what is measured is agents, not contacts.
+struct Aloof(Box<dyn Agent>);
+
+/// Agent number `k`.
+pub(super) fn agent(model: Model, k: usize) -> anyhow::Result<Box<dyn Agent>> {
+    // far apart, and none where another one is
+    let place = DVec3::new((k % 320) as f64, (k / 320) as f64, 0.0) * 2.0;
+    Ok(Box::new(Aloof(match model {
+        Model::Synthetic => Box::new(synthetic()?),
+        Model::Rod => Box::new(rod(place)?),
+        Model::Rigid => Box::new(ball(place)?),
+    })))
+}
+
+fn synthetic() -> anyhow::Result<Synthetic> {
+    let spec = SyntheticSpec { cost_us: SYNTHETIC_US, cost_order: 1.0, error_m: 1e-3, error_order: 1.0 };
+    let range = ResolutionRange { eps_m: (0.01, 0.01), n: (0, N_MAX) };
+    Synthetic::new(spec, range, Resolution { eps_m: 0.01, n: 1 }).context("the synthetic agent")
+}
+
+fn rod(place: DVec3) -> anyhow::Result<Tube> {
+    const LENGTH_M: f64 = 1.0;
+    const SEGMENTS: usize = 64;
+    let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 0.5 };
+    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    let resolution = Resolution { eps_m: LENGTH_M / SEGMENTS as f64, n: 1 };
+    let spec = TubeSpec {
+        path_m: vec![place, place + DVec3::X * LENGTH_M],
+        section,
+        mass_per_length_kg_m,
+        resolution,
+        range: ResolutionRange { eps_m: (resolution.eps_m, resolution.eps_m), n: (0, N_MAX) },
+        segments: Some(SEGMENTS),
+        substeps: 1,
+        damping_per_s: 6.0,
+        clamp: [true, false],
+        pin: [false; 2],
+        attachments: Vec::new(),
+        peristalsis: None,
+        pressure_pa: 0.0,
+        self_contact: false,
+        friction: 0.0,
+        gravity: DVec3::NEG_Z * 9.81,
+        obstacles: Arc::new([]),
+        sleep: false,
+    };
+    Tube::new(spec).context("the rod")
+}
+
+fn ball(place: DVec3) -> anyhow::Result<RigidBody> {
+    let spec = RigidSpec {
+        solid: Solid::Ball { radius_m: 0.1 },
+        position: place,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::Z,
+        spin: DVec3::new(1.0, 2.0, 3.0),
+        mass_kg: 1.0,
+        restitution: 0.5,
+        friction: 0.5,
+        gravity: DVec3::ZERO,
+        obstacles: Arc::new([]),
+        joints: Arc::new([]),
+        sleep: false,
+    };
+    RigidBody::new(spec).context("the ball")
+}
+
+/// The rate of agent `k` where `rate_hz` is meant: spread by ± 5 %, so that not all are due at once.
+pub(super) fn rate_hz(k: usize, rate_hz: f64) -> f64 {
+    const GOLDEN: f64 = 0.618_033_988_749_894_9;
+    rate_hz * (0.95 + 0.1 * (k as f64 * GOLDEN).fract())
+}
+
+/// On its way into a run.
+pub(super) fn spawn(agent: Box<dyn Agent>, k: usize, mean_hz: f64) -> AgentSpawn {
+    let rate_hz = rate_hz(k, mean_hz);
+    let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
+    AgentSpawn {
+        name: format!("agent {k}"),
+        agent,
+        rate_hz,
+        dt,
+        dt_range: (dt, dt),
+        range: None,
+        links: Vec::new(),
+        laws: Vec::new(),
+        attached: Vec::new(),
+        together: None,
+        faults: Faults::default(),
+        watches: Vec::new(),
+        governor: None,
+    }
+}
+
+impl Agent for Aloof {
+    fn model(&self) -> &'static str {
+        self.0.model()
+    }
+
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        self.0.step(dt, around)
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        self.0.resolution()
+    }
+
+    fn retune(&mut self, wanted: Resolution) {
+        self.0.retune(wanted);
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        self.0.write_snapshot(into);
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        self.0.momentum()
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.0.mass_kg()
+    }
+}
