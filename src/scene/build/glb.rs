@@ -1,14 +1,14 @@
 //! glTF's binary form (.glb) as points and triangles.
 //!
 //! In: any bytes. Out: the triangles of every mesh that a node of the scene shows, placed as the nodes say, z up; or what is wrong
-//! with the file. Never here: materials, skins, files beside the file. Every number in it is doubted: it may be hostile.
+//! with the file. Never here: materials, skins, files beside the file. Every number in it is doubted: it may be hostile
+//! (the crate `gltf` panics on a number of an accessor that is not there, so the few tables needed are read here).
 
 use super::mesh::TRIANGLES_MAX;
-use glam::{DMat4, DVec3, DVec4};
-use gltf::accessor::{DataType, Dimensions};
-use gltf::buffer::Source;
-use gltf::mesh::Mode;
-use gltf::{Accessor, Node, Primitive, Semantic};
+use glam::{DMat4, DQuat, DVec3, DVec4};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use std::collections::BTreeMap;
 
 /// What such a file begins with.
 pub(super) const MAGIC: &[u8] = b"glTF";
@@ -19,8 +19,80 @@ const DEPTH_MAX: usize = 64;
 /// glTF has y up: it becomes z.
 const UPRIGHT: DMat4 = DMat4::from_cols(DVec4::X, DVec4::Z, DVec4::NEG_Y, DVec4::W);
 
-#[derive(Default)]
-struct Found {
+/// The tables of the file's text, as far as triangles need them.
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Tables {
+    scene: usize,
+    scenes: Vec<Root>,
+    nodes: Vec<Node>,
+    meshes: Vec<Mesh>,
+    accessors: Vec<Accessor>,
+    buffer_views: Vec<View>,
+    buffers: Vec<Buffer>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Root {
+    nodes: Vec<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(default)]
+struct Node {
+    mesh: Option<usize>,
+    children: Vec<usize>,
+    matrix: Option<[f64; 16]>,
+    translation: [f64; 3],
+    rotation: Option<[f64; 4]>,
+    scale: Option<[f64; 3]>,
+}
+
+#[derive(Deserialize)]
+struct Mesh {
+    primitives: Vec<Primitive>,
+}
+
+#[derive(Deserialize)]
+struct Primitive {
+    attributes: BTreeMap<String, usize>,
+    indices: Option<usize>,
+    mode: Option<u32>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct Accessor {
+    buffer_view: Option<usize>,
+    #[serde(default)]
+    byte_offset: usize,
+    component_type: u32,
+    count: usize,
+    #[serde(rename = "type")]
+    kind: String,
+    sparse: Option<IgnoredAny>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct View {
+    buffer: usize,
+    #[serde(default)]
+    byte_offset: usize,
+    byte_length: usize,
+    byte_stride: Option<usize>,
+}
+
+#[derive(Deserialize)]
+struct Buffer {
+    uri: Option<IgnoredAny>,
+}
+
+/// A file in its two parts, and what was found in it.
+struct Reader<'d> {
+    tables: Tables,
+    data: &'d [u8],
     points: Vec<DVec3>,
     triangles: Vec<[u32; 3]>,
     nodes: usize,
@@ -28,112 +100,156 @@ struct Found {
 
 /// Points and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
-    let file = gltf::Gltf::from_slice(bytes).map_err(|error| error.to_string())?;
-    let data = file.blob.as_deref().unwrap_or_default();
-    let scene = file.default_scene().or_else(|| file.scenes().next()).ok_or("it has no scene")?;
-    let mut found = Found::default();
-    for node in scene.nodes() {
-        found.node(&node, UPRIGHT, (data, 0))?;
+    let (text, data) = parts(bytes)?;
+    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
+    let roots = tables.scenes.get(tables.scene).ok_or("it has no scene")?.nodes.clone();
+    let mut reader = Reader { tables, data, points: Vec::new(), triangles: Vec::new(), nodes: 0 };
+    for node in roots {
+        reader.node(node, UPRIGHT, 0)?;
     }
-    Ok((found.points, found.triangles))
+    Ok((reader.points, reader.triangles))
 }
 
-impl Found {
-    fn node(&mut self, node: &Node<'_>, above: DMat4, (data, depth): (&[u8], usize)) -> Result<(), String> {
+/// The text and the data of a file; the data is empty where there is none.
+fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
+    let word = |at: usize| bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
+    let short = || "it is cut short".to_owned();
+    let (version, length) = (word(4).ok_or_else(short)?, word(8).ok_or_else(short)? as usize);
+    if version != 2 {
+        return Err(format!("it is of version {version}; expected 2"));
+    }
+    let whole = bytes.get(..length).ok_or_else(short)?;
+    let (mut text, mut data, mut at): (Option<&[u8]>, &[u8], usize) = (None, &[], 12);
+    while at + 8 <= whole.len() {
+        let size = word(at).ok_or_else(short)? as usize;
+        let body = whole.get(at + 8..).and_then(|rest| rest.get(..size)).ok_or_else(short)?;
+        match &whole[at + 4..at + 8] {
+            b"JSON" if text.is_none() => text = Some(body),
+            b"BIN\0" if data.is_empty() => data = body,
+            _ => {}
+        }
+        at += 8 + size;
+    }
+    Ok((text.ok_or("it has no text")?, data))
+}
+
+impl Reader<'_> {
+    fn node(&mut self, number: usize, above: DMat4, depth: usize) -> Result<(), String> {
         self.nodes += 1;
         if self.nodes > NODES_MAX || depth > DEPTH_MAX {
             return Err("its nodes are too many or too deep".to_owned());
         }
-        let place = above * matrix(node);
-        for primitive in node.mesh().iter().flat_map(|mesh| mesh.primitives().collect::<Vec<_>>()) {
-            self.primitive(&primitive, place, data)?;
+        let node =
+            self.tables.nodes.get(number).ok_or_else(|| format!("it names node {number}, which is not there"))?;
+        let place = above * node.matrix();
+        let (mesh, children) = (node.mesh, node.children.clone());
+        if let Some(mesh) = mesh {
+            self.mesh(mesh, place)?;
         }
-        node.children().try_for_each(|child| self.node(&child, place, (data, depth + 1)))
+        children.into_iter().try_for_each(|child| self.node(child, place, depth + 1))
     }
 
-    fn primitive(&mut self, primitive: &Primitive<'_>, place: DMat4, data: &[u8]) -> Result<(), String> {
-        if !matches!(primitive.mode(), Mode::Triangles | Mode::TriangleStrip | Mode::TriangleFan) {
-            return Ok(());
-        }
-        let positions = primitive.get(&Semantic::Positions).ok_or("a primitive has no positions")?;
-        let first = u32::try_from(self.points.len()).map_err(|_| "too many points")?;
-        let points = points(&positions, data)?;
-        let count = points.len() as u32;
-        let corners = match primitive.indices() {
-            Some(accessor) => indices(&accessor, data)?,
-            None => (0..count).collect(),
-        };
-        if let Some(bad) = corners.iter().find(|&&i| i >= count) {
-            return Err(format!("a face uses point {bad} of {count}"));
-        }
-        self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
-        let turned = place.determinant() < 0.0;
-        let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
-        self.triangles.extend(triangles(&corners, primitive.mode()).into_iter().map(|t| side(t).map(|i| i + first)));
-        if self.triangles.len() > TRIANGLES_MAX {
-            return Err(format!("it has more than {TRIANGLES_MAX} triangles"));
+    fn mesh(&mut self, number: usize, place: DMat4) -> Result<(), String> {
+        let mesh =
+            self.tables.meshes.get(number).ok_or_else(|| format!("it names mesh {number}, which is not there"))?;
+        for primitive in &mesh.primitives {
+            // triangles, strips and fans; points and lines are left out
+            let Some(mode @ 4..=6) = Some(primitive.mode.unwrap_or(4)) else { continue };
+            let positions = primitive.attributes.get("POSITION").ok_or("a primitive has no positions")?;
+            let first = u32::try_from(self.points.len()).map_err(|_| "too many points")?;
+            let points = points(&self.tables, *positions, self.data)?;
+            let count = points.len() as u32;
+            let corners = match primitive.indices {
+                Some(accessor) => indices(&self.tables, accessor, self.data)?,
+                None => (0..count).collect(),
+            };
+            if let Some(bad) = corners.iter().find(|&&i| i >= count) {
+                return Err(format!("a face uses point {bad} of {count}"));
+            }
+            self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
+            let turned = place.determinant() < 0.0;
+            let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
+            self.triangles.extend(triangles(&corners, mode).into_iter().map(|t| side(t).map(|i| i + first)));
+            if self.triangles.len() > TRIANGLES_MAX {
+                return Err(format!("it has more than {TRIANGLES_MAX} triangles"));
+            }
         }
         Ok(())
     }
 }
 
-fn matrix(node: &Node<'_>) -> DMat4 {
-    DMat4::from_cols_array_2d(&node.transform().matrix().map(|column| column.map(f64::from)))
+impl Node {
+    fn matrix(&self) -> DMat4 {
+        if let Some(matrix) = &self.matrix {
+            return DMat4::from_cols_array(matrix);
+        }
+        let rotation = self.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
+        let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
+        // glam asks for a unit quaternion where its assertions are on
+        let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
+        DMat4::from_scale_rotation_translation(scale, rotation, self.translation.into())
+    }
 }
 
-fn triangles(corners: &[u32], mode: Mode) -> Vec<[u32; 3]> {
+fn triangles(corners: &[u32], mode: u32) -> Vec<[u32; 3]> {
     match mode {
-        Mode::TriangleStrip => {
+        5 => {
             let turned = |(i, w): (usize, &[u32])| if i % 2 == 0 { [w[0], w[1], w[2]] } else { [w[1], w[0], w[2]] };
             corners.windows(3).enumerate().map(turned).collect()
         }
-        Mode::TriangleFan => corners[1.min(corners.len())..].windows(2).map(|w| [corners[0], w[0], w[1]]).collect(),
+        6 => corners[1.min(corners.len())..].windows(2).map(|w| [corners[0], w[0], w[1]]).collect(),
         _ => corners.as_chunks::<3>().0.to_vec(),
     }
 }
 
-fn points(accessor: &Accessor<'_>, data: &[u8]) -> Result<Vec<DVec3>, String> {
-    if (accessor.data_type(), accessor.dimensions()) != (DataType::F32, Dimensions::Vec3) {
+fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<DVec3>, String> {
+    let accessor = accessor(tables, number)?;
+    if (accessor.component_type, accessor.kind.as_str()) != (5126, "VEC3") {
         return Err("its positions are not three 32-bit floats".to_owned());
     }
-    let number = |bytes: &[u8], at: usize| {
-        f64::from(f32::from_le_bytes([bytes[4 * at], bytes[4 * at + 1], bytes[4 * at + 2], bytes[4 * at + 3]]))
-    };
-    let items = items(accessor, data)?;
-    Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 1), number(bytes, 2))).collect())
+    let number = |b: &[u8], at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
+    let items = items(tables, accessor, (data, 12))?;
+    Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
 }
 
-fn indices(accessor: &Accessor<'_>, data: &[u8]) -> Result<Vec<u32>, String> {
-    if accessor.dimensions() != Dimensions::Scalar {
-        return Err("its indices are not single numbers".to_owned());
-    }
-    let number: fn(&[u8]) -> u32 = match accessor.data_type() {
-        DataType::U8 => |bytes| u32::from(bytes[0]),
-        DataType::U16 => |bytes| u32::from(u16::from_le_bytes([bytes[0], bytes[1]])),
-        DataType::U32 => |bytes| u32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]),
-        _ => return Err("its indices are not whole numbers".to_owned()),
+fn indices(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<u32>, String> {
+    let accessor = accessor(tables, number)?;
+    let (size, number): (usize, fn(&[u8]) -> u32) = match (accessor.component_type, accessor.kind.as_str()) {
+        (5121, "SCALAR") => (1, |b| u32::from(b[0])),
+        (5123, "SCALAR") => (2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
+        (5125, "SCALAR") => (4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        _ => return Err("its indices are not single whole numbers".to_owned()),
     };
-    Ok(items(accessor, data)?.map(number).collect())
+    Ok(items(tables, accessor, (data, size))?.map(number).collect())
+}
+
+fn accessor(tables: &Tables, number: usize) -> Result<&Accessor, String> {
+    tables.accessors.get(number).ok_or_else(|| format!("it names accessor {number}, which is not there"))
 }
 
 /// The bytes of every item of an accessor, checked to lie inside the file.
-fn items<'d>(accessor: &Accessor<'_>, data: &'d [u8]) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
+fn items<'d>(
+    tables: &Tables,
+    accessor: &Accessor,
+    (data, size): (&'d [u8], usize),
+) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
     let outside = || "its data lies outside the file: it is cut short, or kept in another".to_owned();
-    let view = accessor.view().filter(|_| accessor.sparse().is_none());
+    let view = accessor.buffer_view.filter(|_| accessor.sparse.is_none());
     let view = view.ok_or("its data is sparse, which is not understood")?;
-    if !matches!(view.buffer().source(), Source::Bin) {
+    let view = tables.buffer_views.get(view).ok_or_else(outside)?;
+    // only the first buffer can be in the file
+    if view.buffer != 0 || tables.buffers.first().is_none_or(|buffer| buffer.uri.is_some()) {
         return Err(outside());
     }
-    let end = view.offset().checked_add(view.length()).ok_or_else(outside)?;
-    let bytes = data.get(view.offset()..end).ok_or_else(outside)?;
-    let (size, count) = (accessor.size(), accessor.count());
-    let stride = view.stride().unwrap_or(size).max(size);
+    let end = view.byte_offset.checked_add(view.byte_length).ok_or_else(outside)?;
+    let bytes = data.get(view.byte_offset..end).ok_or_else(outside)?;
+    let (start, count) = (accessor.byte_offset, accessor.count);
+    let stride = view.byte_stride.unwrap_or(size).max(size);
     let last = count.checked_sub(1).ok_or("it has an empty list")?;
-    let reach = last.checked_mul(stride).and_then(|n| n.checked_add(accessor.offset())?.checked_add(size));
+    let reach = last.checked_mul(stride).and_then(|n| n.checked_add(start)?.checked_add(size));
     if reach.is_none_or(|reach| reach > bytes.len()) {
         return Err(outside());
     }
-    let start = accessor.offset();
     Ok((0..count).map(move |i| &bytes[start + i * stride..start + i * stride + size]))
 }
 

@@ -1,7 +1,7 @@
 //! A mesh that can be drawn with any number of triangles: the totally ordered mesh of (GB99).
 //!
 //! In: a triangle mesh. Out: a [`Tom`], whose first n triangles are a coarser mesh for every n, with its error.
-//! Never here: which count is right, the GPU.
+//! Never here: which count is right, the GPU. Theory: `docs/theory/multiresolution.md`.
 //!
 //! Vertices are taken away one position after the other, each put in the place of a neighbour, the cheapest by the quadric error
 //! (GH97) first. Vertices and triangles are then sorted so that what goes first stands last: the mesh of a count is a prefix of
