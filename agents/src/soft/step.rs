@@ -29,10 +29,10 @@ impl SoftBody {
                 (parts, left) = (2 * parts, 2 * left);
                 continue;
             }
-            self.act(f64::from(parts - left) * h, h);
-            if !self.velocities.iter().chain(&self.positions).all(|v| v.abs().max_element() <= REACH_MAX) {
+            if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
                 return Err(self.lost("a vertex was thrown out of reach", dt));
             }
+            self.act(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
         }
         Ok(done)
