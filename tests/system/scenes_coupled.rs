@@ -155,3 +155,13 @@ fn faults_on_purpose_shake_the_steps_and_are_the_same_on_every_run() {
     let speeds = [0, 1].map(|k| point(&one, &format!("/probes/{k}/velocity_m_s"))[0]);
     assert!((speeds[0] + speeds[1] - 1.0).abs() < 1e-9, "{speeds:?}");
 }
+
+#[test]
+fn the_fingers_of_the_gripper_lift_the_tube_by_friction_and_set_it_down() {
+    let middle = |seconds: &str| point(&lockstep("gripper", &["--seconds", seconds]), "/probes/0/position_m");
+    // by the script the hands are 12.2 cm up from 3.2 s to 4.2 s, and down again at 6 s
+    let (lifted, down) = (middle("4"), middle("7"));
+    assert!((lifted[2] - 0.1375).abs() < 5e-3 && lifted[0].abs() < 5e-3, "{lifted:?}");
+    // a tube of 15 mm radius lies on the floor
+    assert!((down[2] - 0.015).abs() < 2e-3, "{down:?}");
+}
