@@ -30,7 +30,7 @@ const FURNITURE: [(usize, f64, f64, bool); 5] = [
     (8, 240.0, 0.9, false),
     (24, 120.0, 1.1, true),
     (10, 60.0, 1.2, true),
-    (96, 79.0, 0.35, true),
+    (96, 88.0, 0.35, true),
 ];
 /// The part of all polygons in each level.
 const PARTS: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
