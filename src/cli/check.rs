@@ -20,6 +20,7 @@ struct Content {
     agents: usize,
     fixed: usize,
     probes: usize,
+    scenery: usize,
     joints: usize,
     couplings: usize,
     overlaps: Vec<OverlapRow>,
@@ -65,9 +66,11 @@ fn tell(name: &str, result: &Result<Scene, SceneError>, quiet: bool) -> anyhow::
         Err(error) => message(&pictured(error)),
         Ok(_) if quiet => {}
         Ok(scene) => {
-            let Content { agents, fixed, probes, joints, couplings, .. } = content(scene);
+            let Content { agents, fixed, probes, scenery, joints, couplings, .. } = content(scene);
             let always = [(agents, "agent"), (fixed, "fixed object"), (probes, "probe")].into_iter();
-            let some = [(joints, "joint"), (couplings, "coupling")].into_iter().filter(|(count, _)| *count > 0);
+            let some = [(scenery, "scenic object"), (joints, "joint"), (couplings, "coupling")]
+                .into_iter()
+                .filter(|(count, _)| *count > 0);
             let list = always.chain(some).map(counted).collect::<Vec<_>>().join(", ");
             data(&format!("{name}: ok ({list})\n"))?;
             tell_overlaps(scene);
@@ -91,6 +94,7 @@ fn content(scene: &Scene) -> Content {
         agents: scene.agents.len(),
         fixed: scene.obstacles.len(),
         probes: scene.probes.len(),
+        scenery: scene.scenery.len(),
         joints: scene.joints.len(),
         couplings: scene.couplings.len(),
         overlaps: scene.overlaps().iter().map(row).collect(),
