@@ -299,9 +299,17 @@ fn a_grid_that_cannot_be_says_why() {
         assert_eq!((error.problems.len(), p.text.as_str()), (1, text), "{said}");
         assert!(said.contains(word), "{word} is not in {said}");
     };
-    refused("spacing_m = [1, 1, 1]\ngrid = [11, 10, 10]", "[11, 10, 10]", "makes 1100 objects; expected at most 1000");
+    refused(
+        "spacing_m = [1, 1, 1]\ngrid = [110, 10, 10]",
+        "[110, 10, 10]",
+        "makes 11000 objects; expected at most 10000",
+    );
     refused("spacing_m = [1, 1, 1]\ngrid = [0, 10, 10]", "[0, 10, 10]", "1 … 1000");
-    refused("spacing_m = [1, 1, 1]\ngrid = [4294967295, 4294967295, 1]", "[4294967295, 4294967295, 1]", "at most 1000");
+    refused(
+        "spacing_m = [1, 1, 1]\ngrid = [4294967295, 4294967295, 1]",
+        "[4294967295, 4294967295, 1]",
+        "at most 10000",
+    );
     refused("scatter_m = 0.1", "0.1", "has no grid");
     refused("spacing_m = [1, 1, 1]\ngrid = [2, 1, 1]\nscatter_m = -1", "-1", "`scatter_m`");
     refused(
