@@ -321,7 +321,7 @@ fn a_grid_that_cannot_be_says_why() {
     let taken = "format = 1\nobject = [\n{ name = \"b-1\", model = \"synthetic\", cost_us = 1 },\n{ name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, grid = [2, 1, 1], spacing_m = [3, 3, 3] },\n]\n";
     assert!(read(taken).unwrap_err().problems[0].message.contains("`b-1` is taken"));
     let ghost = "format = 1\nobject = [{ name = \"g\", model = \"synthetic\", cost_us = 1, grid = [2, 1, 1], spacing_m = [1, 1, 1] }]\n";
-    assert!(read(ghost).unwrap_err().problems[0].expected.contains("a rigid object or a tube"));
+    assert!(read(ghost).unwrap_err().problems[0].expected.contains("an object that has one: no instrument"));
 }
 
 #[test]
