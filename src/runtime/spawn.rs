@@ -53,6 +53,30 @@ pub struct AgentSpawn {
     pub governor: Option<Box<dyn Governor>>,
 }
 
+impl AgentSpawn {
+    /// An agent that steps `rate_hz` times a second with a step that is fixed, knows nobody and is steered by nobody.
+    #[must_use]
+    pub fn alone(name: impl Into<String>, agent: Box<dyn Agent>, rate_hz: f64) -> Self {
+        // a rate that is none is told of when the run begins
+        let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
+        Self {
+            name: name.into(),
+            agent,
+            rate_hz,
+            dt,
+            dt_range: (dt, dt),
+            range: None,
+            links: Vec::new(),
+            laws: Vec::new(),
+            attached: Vec::new(),
+            together: None,
+            faults: Faults::default(),
+            watches: Vec::new(),
+            governor: None,
+        }
+    }
+}
+
 /// The highest rate that may be wanted: a step of a microsecond is less than a thread needs to wake.
 pub const RATE_MAX_HZ: f64 = 1e6;
 

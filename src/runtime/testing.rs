@@ -1,6 +1,5 @@
 //! An agent without physics for the tests of this room: it counts, drifts towards its neighbours and fails on demand.
 
-use super::faults::Faults;
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
 use super::{Clock, Run, SystemClock, Threads};
@@ -145,22 +144,8 @@ impl Dummy {
 
     /// On its way into a run at this rate, its step fixed.
     pub fn at(self, rate_hz: f64) -> AgentSpawn {
-        let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap();
-        AgentSpawn {
-            name: format!("dummy at {rate_hz}"),
-            agent: Box::new(self),
-            rate_hz,
-            dt,
-            dt_range: (dt, dt),
-            range: Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) }),
-            links: Vec::new(),
-            laws: Vec::new(),
-            attached: Vec::new(),
-            together: None,
-            faults: Faults::default(),
-            watches: Vec::new(),
-            governor: None,
-        }
+        let range = Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) });
+        AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
     }
 
     fn write_down(&self, to: SimTime, around: &Surroundings<'_>) {

@@ -1,6 +1,6 @@
 //! What a pool of workers promises of thousands of agents: counts and ratios, whatever the machine does meanwhile.
 
-use metachron::runtime::{AgentSpawn, AgentState, Command, Drive, Faults, Pool, Run, SystemClock};
+use metachron::runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Run, SystemClock};
 use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
 use metachron_agents::{N_MAX, Resolution, ResolutionRange, SimSpan};
 use std::sync::Arc;
@@ -10,22 +10,8 @@ use std::time::Duration;
 fn agent(cost_us: f64, rate_hz: f64) -> AgentSpawn {
     let spec = SyntheticSpec { cost_us, cost_order: 1.0, error_m: 1e-3, error_order: 1.0 };
     let range = ResolutionRange { eps_m: (0.01, 0.01), n: (0, N_MAX) };
-    let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap();
-    AgentSpawn {
-        name: format!("{rate_hz} Hz"),
-        agent: Box::new(Synthetic::new(spec, range, Resolution { eps_m: 0.01, n: 1 }).unwrap()),
-        rate_hz,
-        dt,
-        dt_range: (dt, dt),
-        range: Some(range),
-        links: Vec::new(),
-        laws: Vec::new(),
-        attached: Vec::new(),
-        together: None,
-        faults: Faults::default(),
-        watches: Vec::new(),
-        governor: None,
-    }
+    let agent = Synthetic::new(spec, range, Resolution { eps_m: 0.01, n: 1 }).unwrap();
+    AgentSpawn { range: Some(range), ..AgentSpawn::alone(format!("{rate_hz} Hz"), Box::new(agent), rate_hz) }
 }
 
 fn pool(spawns: Vec<AgentSpawn>) -> Box<Pool> {

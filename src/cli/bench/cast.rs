@@ -2,7 +2,7 @@
 //!
 //! In: a model and a number. Out: agents that step and meet nobody. Never here: time passing.
 
-use crate::runtime::{AgentSpawn, Faults};
+use crate::runtime::AgentSpawn;
 use anyhow::Context;
 use glam::{DQuat, DVec3};
 use metachron_agents::rigid::{RigidBody, RigidSpec};
@@ -115,23 +115,7 @@ pub(super) fn rate_hz(k: usize, rate_hz: f64) -> f64 {
 
 /// On its way into a run.
 pub(super) fn spawn(agent: Box<dyn Agent>, k: usize, mean_hz: f64) -> AgentSpawn {
-    let rate_hz = rate_hz(k, mean_hz);
-    let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
-    AgentSpawn {
-        name: format!("agent {k}"),
-        agent,
-        rate_hz,
-        dt,
-        dt_range: (dt, dt),
-        range: None,
-        links: Vec::new(),
-        laws: Vec::new(),
-        attached: Vec::new(),
-        together: None,
-        faults: Faults::default(),
-        watches: Vec::new(),
-        governor: None,
-    }
+    AgentSpawn::alone(format!("agent {k}"), agent, rate_hz(k, mean_hz))
 }
 
 impl Agent for Aloof {

@@ -2,34 +2,14 @@
 //!
 //! In: agents with rates. Out: a run whose turns cost nothing, and its agents' newest states. Never here: what is measured.
 
-use crate::runtime::{AgentSpawn, DrawPrice, Faults, Lockstep, Machine, Run, RunError, StepPrice};
+use crate::runtime::{AgentSpawn, DrawPrice, Lockstep, Machine, Run, RunError, StepPrice};
 use metachron_agents::coupling::audit::Member;
-use metachron_agents::{Agent, AgentId, SimSpan, Snapshot};
+use metachron_agents::{AgentId, Snapshot};
 use std::sync::Arc;
 use std::time::Duration;
 
 /// A run.
 pub(super) struct Company(Lockstep);
-
-/// An agent that steps `rate_hz` times a second and is called `name`.
-pub(super) fn spawn(name: &str, agent: Box<dyn Agent>, rate_hz: f64) -> AgentSpawn {
-    let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
-    AgentSpawn {
-        name: name.to_owned(),
-        agent,
-        rate_hz,
-        dt,
-        dt_range: (dt, dt),
-        range: None,
-        links: Vec::new(),
-        laws: Vec::new(),
-        attached: Vec::new(),
-        together: None,
-        faults: Faults::default(),
-        watches: Vec::new(),
-        governor: None,
-    }
-}
 
 /// A machine on which everything is done at once.
 fn tireless() -> Machine {

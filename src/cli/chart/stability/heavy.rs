@@ -3,11 +3,12 @@
 //! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. What was measured of the others, once, is in
 //! `docs/reference/peers_w4.json`: of every engine the best of its variants at this mass ratio and step.
 
-use super::super::company::{Company, spawn};
+use super::super::company::Company;
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
+use crate::runtime::AgentSpawn;
 use glam::{DQuat, DVec3};
 use metachron_agents::rigid::{Joint, JointKind, RigidBody, RigidSpec};
 use metachron_agents::shape::{Obstacle, Solid};
@@ -208,7 +209,7 @@ fn stacked(case: &Case) -> Option<Went> {
         let plain = plain_body(Solid::Box { half_extents_m }, DVec3::Z * (0.5 + 1.001 * f64::from(i)), mass);
         let gravity = DVec3::NEG_Z * GRAVITY;
         let spec = RigidSpec { friction: 0.5, gravity, obstacles: [ground.clone()].into(), ..plain };
-        spawns.push(spawn(&format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
+        spawns.push(AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
     }
     let mut company = Company::start(spawns).ok()?;
     company.run_to(SECONDS);
@@ -239,7 +240,7 @@ fn hung(case: &Case) -> Option<Went> {
         let rotation = DQuat::from_rotation_arc(DVec3::NEG_Z, along);
         let spec = RigidSpec { rotation, gravity: DVec3::NEG_Z * GRAVITY, joints: Arc::clone(&joints), ..plain };
         let body = Box::new(RigidBody::new(spec).ok()?);
-        let mut one = spawn(&format!("link-{i}"), body, case.rate_hz);
+        let mut one = AgentSpawn::alone(format!("link-{i}"), body, case.rate_hz);
         one.together = (i > 0).then_some(AgentId(0));
         spawns.push(one);
     }

@@ -1,10 +1,11 @@
 //! Two balls of different clocks meet once: against the closed form, by the ledger and not by one world.
 
-use super::super::company::{Company, members, spawn};
+use super::super::company::{Company, members};
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;
 use super::common::plain_body;
+use crate::runtime::AgentSpawn;
 use glam::DVec3;
 use metachron_agents::coupling::PairKind;
 use metachron_agents::coupling::audit::settled;
@@ -179,7 +180,10 @@ fn meet(case: &Case) -> Option<Met> {
     let far = GAP_M + 2.0 * RADIUS_M;
     let (hitting, hit) = (ball(0.0, CLOSING_M_S, masses[0])?, ball(far, 0.0, masses[1])?);
     let [rate_hitting, rate_hit] = case.rates_hz;
-    let spawns = vec![spawn("hitting", Box::new(hitting), rate_hitting), spawn("hit", Box::new(hit), rate_hit)];
+    let spawns = vec![
+        AgentSpawn::alone("hitting", Box::new(hitting), rate_hitting),
+        AgentSpawn::alone("hit", Box::new(hit), rate_hit),
+    ];
     let mut company = Company::start(spawns).ok()?;
     company.run_to(SECONDS);
     let snapshots = company.snapshots();
