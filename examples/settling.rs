@@ -106,7 +106,8 @@ fn watch(control: &mut PictureControl, stage: &[ObjectView], machine: Machine, s
 fn push(name: &'static str, law: Law, machine: Machine, target_hz: f64, factor: f64) -> Run {
     let stage = stage();
     let margin = 1.0 - law.set_share();
-    let mut control = PictureControl::new(Policy::Feedback, Law::Corrected { kappa: 0.5, margin }, target_hz);
+    let mut control =
+        PictureControl::new(Policy::Feedback, Law::Corrected { kappa: 0.5, lead: 0.0, margin }, target_hz);
     for _ in 0..REST_FRAMES {
         draw(&mut control, &stage, machine, 0.0);
     }

@@ -7,6 +7,7 @@ mod calibrate;
 mod cast;
 mod couplings;
 mod error;
+mod experiment;
 mod governor;
 mod headless;
 mod oracle;
@@ -19,6 +20,7 @@ mod window;
 
 pub use couplings::Coupling;
 pub use error::SessionError;
+pub use experiment::{Experiment, Experimented, experiment};
 pub use headless::{Drawing, End, Headless, play_headless};
 pub use oracle::{Oracle, PairError, consult_oracle};
 pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};

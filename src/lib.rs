@@ -8,3 +8,4 @@ pub mod control;
 pub mod frame;
 pub mod runtime;
 pub mod scene;
+pub mod tune;

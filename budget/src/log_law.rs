@@ -22,6 +22,8 @@ pub struct Gains {
     /// κ, 0.01 … 0.99: the share of an error (of logarithms) that one lesson removes where all time is work that ε scales.
     /// From 1 on, the loop rings when a measurement comes one frame late (control.md, eq. 8).
     pub kappa: f64,
+    /// λ, 0 … 0.99: the share of an error's change that a lesson adds: a PI law, with κ as its integral part. 0 is the law of eq. 7.
+    pub lead: f64,
     /// ln(T/t) above which a frame was early enough to refine; ≥ 0.
     pub early: f64,
     /// ln(t/T) above which a frame was late enough to coarsen; ≥ 0.
@@ -32,7 +34,7 @@ impl Default for Gains {
     /// κ = ½, dead within 2 % to either side: settles from ε four times wrong within 20 frames
     /// wherever a third of the wanted time is work that ε scales (control.md, table 1).
     fn default() -> Self {
-        Self { kappa: 0.5, early: 0.02, late: 0.02 }
+        Self { kappa: 0.5, lead: 0.0, early: 0.02, late: 0.02 }
     }
 }
 
@@ -40,7 +42,7 @@ impl Gains {
     fn sound(self) -> Self {
         let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 0.99)) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, early: width(self.early), late: width(self.late) }
+        Self { kappa, lead: within(width(self.lead), (0.0, 0.99)), early: width(self.early), late: width(self.late) }
     }
 }
 
@@ -63,8 +65,10 @@ pub struct LogLaw {
     gains: Gains,
     range: (f64, f64),
     value: f64,
-    /// The error before this one; 0 before the first, which is no surprise.
+    /// The error before this one; `None` before the first, which is no surprise.
     before: Option<f64>,
+    /// As much of it as was believed.
+    believed: Option<f64>,
     rest: Rest,
 }
 
@@ -72,7 +76,14 @@ impl LogLaw {
     /// A law for ln ε inside `range` (finest, coarsest; finite), starting at `start` or the end nearest to it.
     #[must_use]
     pub fn new(gains: Gains, range: (f64, f64), start: f64) -> Self {
-        Self { gains: gains.sound(), range, value: within(start, range), before: None, rest: Rest::Moving }
+        Self {
+            gains: gains.sound(),
+            range,
+            value: within(start, range),
+            before: None,
+            believed: None,
+            rest: Rest::Moving,
+        }
     }
 
     /// Learns that work took `ratio` = t/T of the time it should (control.md, eq. 7), and says what came of it.
@@ -84,11 +95,13 @@ impl LogLaw {
             return self.rest;
         }
         let error = self.believed(libm::log(ratio));
+        let change = self.believed.map_or(0.0, |before| self.gains.lead * (error - before));
+        self.believed = Some(error);
         let granted = granted.filter(|g| g.is_finite());
         self.rest = if error > self.gains.late {
-            self.coarsen_by(self.gains.kappa * (error - self.gains.late), granted)
+            self.coarsen_by(self.gains.kappa * (error - self.gains.late) + change, granted)
         } else if error < -self.gains.early {
-            self.refine(error, granted)
+            self.refine(error, change, granted)
         } else {
             Rest::Settled
         };
@@ -109,8 +122,8 @@ impl LogLaw {
         if from + step > self.range.1 { Rest::Clamped(Bound::Coarsest) } else { Rest::Moving }
     }
 
-    fn refine(&mut self, error: f64, granted: Option<f64>) -> Rest {
-        let wish = self.value + self.gains.kappa * (error + self.gains.early);
+    fn refine(&mut self, error: f64, change: f64, granted: Option<f64>) -> Rest {
+        let wish = self.value + self.gains.kappa * (error + self.gains.early) + change;
         // were all of the time work that ε scales, finer than this would be late
         let soonest = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
         self.value = within(wish.max(soonest), self.range);

@@ -43,6 +43,16 @@ Examples:
 
 CPU times are the measure: on a machine that does other things too, wall times tell of those.";
 
+const TUNE_EXAMPLES: &str = "\
+Examples:
+  metachron tune tube                                  finds gains on the declared machine; writes tube.gains.toml and charts/
+  metachron run tube --gains tube.gains.toml           and with them
+  metachron tune yard --target-fps 120 --quick
+  metachron tune tube --analyse α=1e-4,β=5             why given gains are slow, swing, or are fine
+  metachron tune tube --live --size 640x360            on the machine and the adapter present
+
+Ctrl-C keeps the best gains so far.";
+
 const CHART_EXAMPLES: &str = "\
 Examples:
   metachron chart stability                            every experiment, into the folder charts/
@@ -73,6 +83,9 @@ pub enum Command {
     /// Validate scenes; every problem is shown where it stands
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
+    /// Find feedback gains for a scene, or explain given ones
+    #[command(after_help = TUNE_EXAMPLES)]
+    Tune(TuneArgs),
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
@@ -132,6 +145,9 @@ pub struct RunArgs {
     /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
     pub law: Option<String>,
+    /// Take the gains of the feedback law from here: what `metachron tune` wrote (TOML); --set and flags go before it
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub gains: Option<PathBuf>,
     /// How agents run: a thread each, a pool of workers, the cheaper of the two by their number (auto), or one thread in
     /// virtual time with declared costs (lockstep: the same bits on every run)
     #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["auto", "threads", "pool", "lockstep"]))]
@@ -184,6 +200,50 @@ pub struct CheckArgs {
     #[arg(long)]
     pub json: bool,
     /// Say nothing of scenes that are sound
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `tune`.
+#[derive(Debug, Args)]
+pub struct TuneArgs {
+    /// A built-in scene or the path of a scene file
+    #[arg(default_value = "tube", value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// Explain these gains instead of looking for better ones, such as α=1e-4,β=5 or kappa=0.5,margin=0.1
+    #[arg(long, value_name = "GAINS")]
+    pub analyse: Option<String>,
+    /// Write the gains here (TOML); SCENE.gains.toml where not given
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub gains: Option<PathBuf>,
+    /// Overwrite the gains that are there
+    #[arg(long)]
+    pub force: bool,
+    /// Write the figure here; the folder is made where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Draw the experiment on the machine and the adapter present, instead of the declared machine
+    #[arg(long)]
+    pub live: bool,
+    /// Frames a second to hold, 1 to 1000
+    #[arg(long, value_name = "F", value_parser = target_fps)]
+    pub target_fps: Option<f64>,
+    /// Size of the picture in pixels, each 1 to 8192; 1280x720 where not given
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Seed of the declared machine's noise
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u32>,
+    /// Change a key of the scene; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Fewer frames and fewer seeds: seconds instead of a minute
+    #[arg(long)]
+    pub quick: bool,
+    /// Print the result as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress
     #[arg(short, long)]
     pub quiet: bool,
 }

@@ -13,6 +13,7 @@ mod play;
 mod progress;
 pub mod report;
 pub mod run;
+mod tune;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
@@ -67,6 +68,7 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         Command::Check(args) => check::command(&args),
         Command::Chart(args) => chart::command(&args),
         Command::Bench(args) => bench::command(&args),
+        Command::Tune(args) => tune::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),
         Command::Completions { shell } => describe::completions(shell),

@@ -207,6 +207,14 @@ impl Feedback {
         self.pushed += if self.started { 0.0 } else { libm::log(factor) };
     }
 
+    /// Puts the corrected law at `share` of the way from its finest to its coarsest ln ε̂; without effect before it has a range.
+    pub fn seek(&mut self, share: f64) {
+        let (finest, coarsest) = self.corrected.range();
+        if share.is_finite() && self.started {
+            self.corrected.set_value(finest + share.clamp(0.0, 1.0) * (coarsest - finest));
+        }
+    }
+
     pub fn status(&self) -> Status {
         self.status
     }

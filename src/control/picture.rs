@@ -306,6 +306,12 @@ impl PictureControl {
         }
     }
 
+    /// Goes to a place in the range of what is in view: `share` 0 is its finest, 1 its coarsest, by ln ε̂ of the corrected law. For
+    /// experiments; before anything was in view it is the middle whatever was asked.
+    pub fn seek(&mut self, share: f64) {
+        self.feedback.seek(share);
+    }
+
     /// What the controller is doing; its text is for the viewer and the report.
     #[must_use]
     pub fn status(&self) -> Status {

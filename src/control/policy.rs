@@ -113,6 +113,8 @@ pub enum Law {
     Corrected {
         /// κ, 0.01 … 0.99: the share of an error that one frame removes.
         kappa: f64,
+        /// λ, 0 … 0.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
+        lead: f64,
         /// The share of the frame that is left free, 0 … 0.9: T_set = (1 − margin) T.
         margin: f64,
     },
@@ -124,7 +126,7 @@ impl Law {
 
     /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses
     /// (is past 1.05 T in) fewer than 1 frame in 100.
-    pub const CORRECTED: Self = Self::Corrected { kappa: 0.5, margin: 0.1 };
+    pub const CORRECTED: Self = Self::Corrected { kappa: 0.5, lead: 0.0, margin: 0.1 };
 
     /// The share of the frame's time that the work is to take: T_set/T.
     #[must_use]
@@ -139,7 +141,7 @@ impl Law {
     pub(super) fn log_gains(self) -> log_law::Gains {
         let default = log_law::Gains::default();
         match self {
-            Self::Corrected { kappa, .. } => log_law::Gains { kappa, ..default },
+            Self::Corrected { kappa, lead, .. } => log_law::Gains { kappa, lead, ..default },
             Self::Printed { .. } => default,
         }
     }

@@ -64,7 +64,7 @@ const PATIENCE: (u32, u32) = (4, 128);
 const REFINE_MAX: f64 = 0.223;
 
 /// Dead between 80 % and 105 % of the share: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
-const GAINS: Gains = Gains { kappa: 0.5, early: 0.223, late: 0.049 };
+const GAINS: Gains = Gains { kappa: 0.5, lead: 0.0, early: 0.223, late: 0.049 };
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Window {

@@ -236,8 +236,12 @@ pub(super) fn law(target: &scene::Target) -> Law {
             Law::Printed { alpha: gains.alpha.unwrap_or(alpha), beta: gains.beta.unwrap_or(beta) }
         }
         LawKind::Corrected => {
-            let Law::Corrected { kappa, margin } = Law::CORRECTED else { return Law::CORRECTED };
-            Law::Corrected { kappa: gains.kappa.unwrap_or(kappa), margin: gains.margin.unwrap_or(margin) }
+            let Law::Corrected { kappa, lead, margin } = Law::CORRECTED else { return Law::CORRECTED };
+            Law::Corrected {
+                kappa: gains.kappa.unwrap_or(kappa),
+                lead: gains.lead.unwrap_or(lead),
+                margin: gains.margin.unwrap_or(margin),
+            }
         }
     }
 }

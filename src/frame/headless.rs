@@ -69,7 +69,7 @@ pub fn play_headless(
         if done >= 1.0 || interrupted {
             break;
         }
-        let record = one_frame(&mut session, &mut plan)?;
+        let record = one_frame(&mut session, (plan.size, plan.style), &mut plan.drawing, false)?;
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
     }
@@ -88,22 +88,27 @@ fn share_done(session: &Session, end: End) -> f64 {
     }
 }
 
-/// Gathers, chooses, draws and learns.
-fn one_frame(session: &mut Session, plan: &mut Headless) -> Result<FrameRecord, SessionError> {
+/// Gathers, chooses, draws and learns, unless the frame must not teach (`skip`).
+pub(super) fn one_frame(
+    session: &mut Session,
+    (size, style): (Size, Style),
+    drawing: &mut Drawing,
+    skip: bool,
+) -> Result<FrameRecord, SessionError> {
     let started = session.now();
     let camera = session.scene_camera();
-    session.compose(&camera, plan.size, plan.style, None);
+    session.compose(&camera, size, style, None);
     let composed = session.now();
-    let gpu = match &mut plan.drawing {
+    let gpu = match drawing {
         Drawing::Every(screen) => screen.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu,
         Drawing::Last(_) | Drawing::Nothing => {
-            session.spend_declared(plan.size);
+            session.spend_declared(size);
             None
         }
     };
     let done = session.now();
     let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
-    Ok(session.finish(started, Finished { work, draw, gpu, skip: false }))
+    Ok(session.finish(started, Finished { work, draw, gpu, skip }))
 }
 
 /// The last frame once more, with all the time it takes.

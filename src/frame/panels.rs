@@ -177,7 +177,7 @@ pub(super) fn mass_kg(spec: &Spec) -> f64 {
 const fn viewer_law(law: control::Law) -> Law {
     match law {
         control::Law::Printed { alpha, beta } => Law::Printed { alpha, beta },
-        control::Law::Corrected { kappa, margin } => Law::Corrected { kappa, margin },
+        control::Law::Corrected { kappa, lead, margin } => Law::Corrected { kappa, lead, margin },
     }
 }
 
@@ -185,6 +185,6 @@ const fn viewer_law(law: control::Law) -> Law {
 pub(super) const fn control_law(law: Law) -> control::Law {
     match law {
         Law::Printed { alpha, beta } => control::Law::Printed { alpha, beta },
-        Law::Corrected { kappa, margin } => control::Law::Corrected { kappa, margin },
+        Law::Corrected { kappa, lead, margin } => control::Law::Corrected { kappa, lead, margin },
     }
 }

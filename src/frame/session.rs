@@ -238,6 +238,12 @@ impl Session {
         self.stage.picture()
     }
 
+    /// What control was last told to be in view.
+    #[must_use]
+    pub(super) fn views(&self) -> &[ObjectView] {
+        &self.views
+    }
+
     /// The level each agent was last drawn at, in their order.
     #[must_use]
     pub fn levels(&self) -> &[Level] {

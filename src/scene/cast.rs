@@ -79,6 +79,8 @@ pub struct Gains {
     pub beta: Option<f64>,
     /// κ of the corrected law, 0 < κ < 1.
     pub kappa: Option<f64>,
+    /// λ of the corrected law, 0 … 0.99.
+    pub lead: Option<f64>,
     /// Share of the frame that is left free, 0 … 0.9.
     pub margin: Option<f64>,
 }

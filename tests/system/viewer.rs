@@ -41,8 +41,8 @@ impl Fake {
             target_hz: 30.0,
             policy: "feedback".to_owned(),
             policies: vec!["full".to_owned(), "feedback".to_owned()],
-            law: Some(Law::Corrected { kappa: 0.3, margin: 0.1 }),
-            laws: vec![Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, margin: 0.1 }],
+            law: Some(Law::Corrected { kappa: 0.3, lead: 0.0, margin: 0.1 }),
+            laws: vec![Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, lead: 0.0, margin: 0.1 }],
             agents: vec![tube, ball, tool],
             ..Status::default()
         };
@@ -228,9 +228,9 @@ fn sliders_move_the_target_and_the_gains() {
     harness.get_by_role_and_label(egui::Role::Slider, "Target rate").set_value_accesskit(60.0);
     assert_eq!(asked(&mut harness), [Action::TargetFps(60.0)]);
     harness.get_by_role_and_label(egui::Role::Slider, "Gain κ").set_value_accesskit(0.8);
-    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.8, margin: 0.1 })]);
+    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.8, lead: 0.0, margin: 0.1 })]);
     harness.get_by_label("Reset to default").click();
-    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.5, margin: 0.1 })]);
+    assert_eq!(asked(&mut harness), [Action::Law(Law::Corrected { kappa: 0.5, lead: 0.0, margin: 0.1 })]);
     harness.get_by_label("As printed").click();
     assert_eq!(asked(&mut harness), [Action::Law(Law::Printed { alpha: 1e-4, beta: 5.0 })]);
     assert!(harness.query_by_role_and_label(egui::Role::Slider, "Gain β").is_some());
@@ -238,7 +238,10 @@ fn sliders_move_the_target_and_the_gains() {
 
 #[test]
 fn a_window_left_alone_asks_for_nothing_whatever_the_numbers() {
-    let laws = [Law::Printed { alpha: 0.333_333, beta: 99.9 }, Law::Corrected { kappa: 0.123_456_7, margin: 0.777 }];
+    let laws = [
+        Law::Printed { alpha: 0.333_333, beta: 99.9 },
+        Law::Corrected { kappa: 0.123_456_7, lead: 0.0, margin: 0.777 },
+    ];
     for law in laws {
         let mut show = Fake::new();
         (show.status.law, show.status.target_hz) = (Some(law), 239.76);

@@ -95,6 +95,8 @@ pub enum Law {
     Corrected {
         /// κ, 0.01 … 0.99: the share of an error that one frame removes.
         kappa: f64,
+        /// λ, 0 … 0.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
+        lead: f64,
         /// Share of the frame's time that is left free, 0 … 0.9.
         margin: f64,
     },

@@ -148,8 +148,9 @@ fn gains(ui: &mut Ui, law: &mut Law) {
             });
             slider(ui, "Gain β", beta, (0.1, 50.0), |s| s.logarithmic(true).max_decimals(2));
         }
-        Law::Corrected { kappa, margin } => {
+        Law::Corrected { kappa, lead, margin } => {
             slider(ui, "Gain κ", kappa, (0.01, 0.99), |s| s.max_decimals(2));
+            slider(ui, "Lead λ", lead, (0.0, 0.99), |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
             slider(ui, "Margin", &mut percent, (0.0, 50.0), |s| s.max_decimals(0).suffix(" %"));
             // moving through percent must not count as a change by itself
@@ -163,7 +164,9 @@ fn gains(ui: &mut Ui, law: &mut Law) {
 fn as_toml(status: &Status, law: &Law) -> String {
     let gains = match law {
         Law::Printed { alpha, beta } => format!("law = \"printed\"\nalpha = {alpha:e}\nbeta = {beta}\n"),
-        Law::Corrected { kappa, margin } => format!("law = \"corrected\"\nkappa = {kappa}\nmargin = {margin}\n"),
+        Law::Corrected { kappa, lead, margin } => {
+            format!("law = \"corrected\"\nkappa = {kappa}\nlead = {lead}\nmargin = {margin}\n")
+        }
     };
     format!("[target]\nframe_hz = {:?}\npolicy = \"{}\"\n{gains}", status.target_hz, status.policy)
 }
@@ -263,7 +266,7 @@ mod tests {
     #[test]
     fn copied_gains_are_valid_toml() {
         let status = Status { target_hz: 30.0, policy: "feedback".to_owned(), ..Status::default() };
-        for law in [Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, margin: 0.1 }] {
+        for law in [Law::Printed { alpha: 1e-4, beta: 5.0 }, Law::Corrected { kappa: 0.5, lead: 0.2, margin: 0.1 }] {
             let text = as_toml(&status, &law);
             let table: toml::Table = text.parse().unwrap();
             assert_eq!(table["target"]["frame_hz"].as_float(), Some(30.0), "{text}");

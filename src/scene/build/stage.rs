@@ -33,6 +33,7 @@ pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile
         alpha: gain("alpha", f.alpha, allowed(1e-9..=1.0, "")),
         beta: gain("beta", f.beta, allowed(1e-6..=1e3, "")),
         kappa: gain("kappa", f.kappa, allowed(1e-3..=0.999, "")),
+        lead: gain("lead", f.lead, allowed(0.0..=0.99, "")),
         margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
     });
     Target {

@@ -81,6 +81,8 @@ pub struct TargetFile {
     pub beta: Option<f64>,
     /// Gain κ of the corrected law, above 0, below 1. Default: the law's own.
     pub kappa: Option<f64>,
+    /// Gain λ of the corrected law on the error's change, 0 … 0.99. Default: the law's own.
+    pub lead: Option<f64>,
     /// Share of the frame that is left free, 0 … 0.9. Default: of feedback its law's own, of policies that predict 0.02.
     pub margin: Option<f64>,
 }

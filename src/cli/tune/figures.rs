@@ -1,0 +1,155 @@
+//! The figure of a tuning: the plant, step responses, where gains swing, and late frames over the speed of the machine.
+//!
+//! In: a plant and what was found. Out: SVG and PNG in a folder. Never here: numbers that are not in the table or played for it.
+
+use super::super::chart::figure::{self, Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::{Identified, Tuned};
+use crate::control::Law;
+use crate::tune::{Disturbance, Measures, Plant, Start, Trial, play};
+use anyhow::Context;
+use std::path::{Path, PathBuf};
+
+/// Seconds of a step response that are shown.
+const SHOWN_S: f64 = 2.0;
+/// Cells of the map along α and along β.
+const CELLS: [usize; 2] = [24, 12];
+/// The map's α and β.
+const ALPHA: (f64, f64) = (1e-6, 1e-1);
+const BETA: (f64, f64) = (0.05, 50.0);
+/// Seconds of a map cell's trial.
+const MAP_S: f64 = 3.0;
+/// Speeds of the machine that are charted.
+const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
+
+/// Draws and writes the figure.
+pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuned) -> anyhow::Result<[PathBuf; 2]> {
+    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), misses(on, tuned)];
+    let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
+    let figure = Figure { title, panels, columns: 2 };
+    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
+    let paths = ["svg", "png"].map(|kind| folder.join(format!("tune-{stem}.{kind}")));
+    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(paths)
+}
+
+fn layer(label: impl Into<String>, colour: Colour, mark: Mark) -> Layer {
+    Layer { label: label.into(), colour, mark }
+}
+
+/// The fitted line over what was measured.
+fn fit(plant: &Plant) -> Panel {
+    let points: Vec<_> = plant.points.iter().map(|&(x, y)| (1e-3 * x, 1e3 * y)).collect();
+    let x = span(points.iter().map(|p| p.0).chain([0.0]), false);
+    let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
+    let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
+    Panel {
+        title: "the plant: measured, and the fitted line".to_owned(),
+        x: Axis::linear("polygons, thousands", x.0.max(0.0), x.1),
+        y: Axis::linear("time of a frame, ms", y.0.max(0.0), y.1),
+        layers: vec![
+            layer("frames", Colour::Sky, Mark::Dots(points)),
+            layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
+        ],
+    }
+}
+
+fn calm(on: &Identified, law: Law, rate: f64, seconds: f64) -> Trial {
+    Trial {
+        law,
+        target_hz: on.target_hz,
+        speed: 1.0,
+        start: Start::Rate(rate),
+        disturbance: Disturbance::Nothing,
+        noise: 0.0,
+        seed: 0,
+        seconds,
+    }
+}
+
+/// From 0.4 and from 2.5 times the wanted rate.
+fn responses(on: &Identified, tuned: &Tuned) -> Panel {
+    let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
+    for (row, colour) in tuned.rows.iter().zip(Colour::LINES) {
+        for (k, rate) in [0.4, 2.5].into_iter().enumerate() {
+            let beats = play(&on.plant, &calm(on, row.verdict.law, rate, SHOWN_S));
+            let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
+            layers.push(layer(if k == 0 { row.name } else { "" }, colour, Mark::Line(line)));
+        }
+    }
+    Panel {
+        title: "from 0.4 and from 2.5 times the rate".to_owned(),
+        x: Axis::linear("time, s", 0.0, SHOWN_S),
+        y: Axis::log("time of a frame over the wanted one", 0.2, 4.0),
+        layers,
+    }
+}
+
+/// Where the printed law swings, is slow, or holds, over (α, β); the chosen gains as a dot.
+fn map(on: &Identified, tuned: &Tuned) -> Panel {
+    let [columns, rows] = CELLS;
+    let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
+    let mut cells: [Vec<[f64; 4]>; 3] = Default::default();
+    for column in 0..columns {
+        for row in 0..rows {
+            let (a, b) = (step(ALPHA, columns, column), step(BETA, rows, row));
+            let (a_end, b_end) = (step(ALPHA, columns, column + 1), step(BETA, rows, row + 1));
+            let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
+            cells[kind(on, law)].push([a, a_end, b, b_end]);
+        }
+    }
+    let [good, slow, swings] = cells;
+    let found = tuned.rows.iter().filter_map(|row| match row.verdict.law {
+        Law::Printed { alpha, beta } if row.name.ends_with("found") => Some((alpha, beta)),
+        _ => None,
+    });
+    Panel {
+        title: "the printed law over its gains".to_owned(),
+        x: Axis::log("α", ALPHA.0, ALPHA.1),
+        y: Axis::log("β", BETA.0, BETA.1),
+        layers: vec![
+            layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
+            layer("slower, or elsewhere", Colour::Sky, Mark::Cells(slow)),
+            layer("swings for ever", Colour::Red, Mark::Cells(swings)),
+            layer("chosen", Colour::Blue, Mark::Dots(found.collect())),
+        ],
+    }
+}
+
+/// 0: settles within a second from both starts; 1: later, or not; 2: swings.
+fn kind(on: &Identified, law: Law) -> usize {
+    let measured = [0.4, 2.5].map(|rate| Measures::of(&play(&on.plant, &calm(on, law, rate, MAP_S))));
+    if measured.iter().any(|m| m.cycle.is_some()) {
+        2
+    } else {
+        usize::from(!measured.iter().all(|m| m.settle_s.is_some_and(|s| s <= 1.0)))
+    }
+}
+
+/// Late frames over the speed of the machine, the load 40 % up for a third of the time.
+fn misses(on: &Identified, tuned: &Tuned) -> Panel {
+    let share = |law: Law, speed: f64| {
+        let trial = Trial {
+            speed,
+            disturbance: Disturbance::Load(1.4),
+            noise: on.plant.line.scatter,
+            seed: 1,
+            start: Start::Rate(speed),
+            ..calm(on, law, 1.0, 4.0)
+        };
+        100.0 * Measures::of(&play(&on.plant, &trial)).miss_share
+    };
+    let lines = tuned.rows.iter().zip(Colour::LINES).map(|(row, colour)| {
+        layer(row.name, colour, Mark::Line(SPEEDS.iter().map(|&s| (s, share(row.verdict.law, s))).collect()))
+    });
+    let layers: Vec<_> = lines.collect();
+    let values = layers.iter().flat_map(|l| if let Mark::Line(points) = &l.mark { points.clone() } else { Vec::new() });
+    let high = values.map(|p| p.1).fold(1.0, f64::max);
+    Panel {
+        title: "tuned at 1, run on a machine of another speed, load + 40 %".to_owned(),
+        x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
+        y: Axis::linear("late frames, %", 0.0, 1.05 * high),
+        layers,
+    }
+}

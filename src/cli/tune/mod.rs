@@ -1,0 +1,195 @@
+//! `tune`: finds, explains and writes down feedback gains for a scene.
+//!
+//! In: a scene, a machine (declared, or the one present with `--live`). Out: a table, a fragment of TOML that `run --gains` and a scene
+//! take, a figure. Never here: how gains are judged ([`crate::tune`] does), the experiment's frames ([`crate::frame`] draws them).
+
+mod figures;
+pub(super) mod gains;
+mod told;
+
+use super::Exit;
+use super::args::TuneArgs;
+use super::output::{BadInput, data, message};
+use super::progress::Bar;
+use crate::compositor::{Gpu, Offscreen, RendererOptions, Size};
+use crate::control::Law;
+use crate::frame::{Drawing, Experiment, Session, experiment};
+use crate::scene::format::ExecutorKind;
+use crate::scene::{Scene, Source, load};
+use crate::tune::{Extent, Family, Found, Plant, Search, Verdict, explain, judge, relay_gains, search};
+use anyhow::Context;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames of the experiment, and of the quick one.
+const FRAMES: [u64; 2] = [360, 150];
+/// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
+const NORMALISED: f64 = 0.046;
+
+/// A plant, and on what it was found.
+struct Identified {
+    scene: Scene,
+    plant: Plant,
+    target_hz: f64,
+    machine: String,
+}
+
+/// One law beside its name in the table.
+struct Row {
+    name: &'static str,
+    verdict: Verdict,
+}
+
+/// What a search over all families came to.
+struct Tuned {
+    rows: Vec<Row>,
+    found: Vec<(Family, Found)>,
+    best: Law,
+    interrupted: bool,
+}
+
+/// Tunes a scene, or explains given gains.
+pub(super) fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
+    let given = args.analyse.as_deref().map(gains::parsed).transpose()?;
+    let fragment = args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", stem(&args.scene))));
+    if given.is_none() && fragment.exists() && !args.force {
+        let why = format!("{} is there already; --force overwrites it, --gains FILE names another", fragment.display());
+        return Err(BadInput(why).into());
+    }
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let Some(identified) = identify(args, &stopped)? else { return Ok(Exit::Interrupted) };
+    match given {
+        Some(law) => analyse(args, &identified, law),
+        None => tune(args, &identified, &fragment, &stopped),
+    }
+}
+
+/// The scene's name as a part of a file's name.
+fn stem(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Draws the experiment and fits the plant; `None` where it was stopped.
+fn identify(args: &TuneArgs, stopped: &AtomicBool) -> anyhow::Result<Option<Identified>> {
+    let scene = scene(args)?;
+    let target_hz = scene.target.frame_hz;
+    let [width, height] = args.size.unwrap_or([1280, 720]);
+    let size = Size { width, height };
+    let session = Session::open(scene.clone())?;
+    let drawing = if args.live { live(size)? } else { Drawing::Nothing };
+    let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
+    let bar = Bar::new("experiment", args.quiet || args.json);
+    let done = experiment(session, plan, &mut |share| {
+        bar.tell(share, "drawing at many resolutions".to_owned());
+        !stopped.load(Ordering::Relaxed)
+    })?;
+    drop(bar);
+    if done.interrupted {
+        message("interrupted before the experiment was over: nothing is known yet, and nothing was written");
+        return Ok(None);
+    }
+    let plant = Plant::identify(&done.observed).map_err(|why| BadInput(format!("{}: {why}", scene.name)))?;
+    let machine = done.adapter.unwrap_or_else(|| format!("the declared machine `{}`", scene.machine.preset));
+    Ok(Some(Identified { scene, plant, target_hz, machine }))
+}
+
+/// The scene with what the arguments change in it; in virtual time unless the machine present is meant.
+fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
+    let executor = if args.live { ExecutorKind::Threads } else { ExecutorKind::Lockstep };
+    let flags = [
+        ("executor", Some(format!("\"{}\"", executor.name()))),
+        ("target.frame_hz", args.target_fps.map(|f| f.to_string())),
+        ("machine.seed", args.seed.map(|n| n.to_string())),
+    ];
+    let flags = flags.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+    let overrides: Vec<_> = args.set.iter().cloned().chain(flags).collect();
+    Ok(load(&Source::open(&args.scene)?, &overrides)?)
+}
+
+fn live(size: Size) -> anyhow::Result<Drawing> {
+    let gpu = Gpu::headless()?;
+    let options = RendererOptions::for_adapter(&gpu.info);
+    Ok(Drawing::Every(Box::new(Offscreen::new(gpu, size, options)?)))
+}
+
+fn extent(args: &TuneArgs) -> Extent {
+    if args.quick { Extent::QUICK } else { Extent::FULL }
+}
+
+/// Explains the gains that were given.
+fn analyse(args: &TuneArgs, on: &Identified, law: Law) -> anyhow::Result<Exit> {
+    let explanation = explain(&on.plant, law, on.target_hz);
+    let verdict = judge(&on.plant, law, on.target_hz, extent(args));
+    data(&if args.json {
+        told::analysis_json(on, law, &explanation, &verdict)?
+    } else {
+        told::analysis(on, law, &explanation, &verdict)
+    })?;
+    Ok(Exit::Ok)
+}
+
+/// Finds gains, tells of them and writes them down.
+fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool) -> anyhow::Result<Exit> {
+    refuse_out_of_reach(on)?;
+    let folder = &args.out;
+    std::fs::create_dir_all(folder)
+        .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
+    let tuned = look_for_gains(args, on, stopped)?;
+    gains::write(fragment, &gains::fragment(tuned.best, &told::comment(on, &tuned)))?;
+    let files = figures::write(folder, &stem(&on.scene.name), on, &tuned)?;
+    let all: Vec<_> = std::iter::once(fragment.to_owned()).chain(files).collect();
+    data(&if args.json { told::json(on, &tuned, &all)? } else { told::text(on, &tuned, &all) })?;
+    if tuned.interrupted {
+        message("interrupted: the best gains so far were written");
+        return Ok(Exit::Interrupted);
+    }
+    Ok(Exit::Ok)
+}
+
+/// A target that no resolution can reach has no gains.
+fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
+    let explanation = explain(&on.plant, Law::CORRECTED, on.target_hz);
+    if explanation.near.is_none() {
+        return Err(BadInput(format!("{}: {}", on.scene.name, explanation.sentences)).into());
+    }
+    Ok(())
+}
+
+/// Searches every family of laws, and judges what they are to be compared with.
+fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuned> {
+    let extent = extent(args);
+    let mut found = Vec::new();
+    for (family, name) in [(Family::Corrected, "corrected law"), (Family::Printed, "printed law")] {
+        let bar = Bar::new(name, args.quiet || args.json);
+        let mut go_on = |share: f64, best: &Verdict| {
+            bar.tell(share, format!("{}: {:.3}", gains::told(best.law), best.objective));
+            !stopped.load(Ordering::Relaxed)
+        };
+        let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent, go_on: &mut go_on };
+        found.extend(search(&mut setting, family).map(|f| (family, f)));
+        if stopped.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let best = found.iter().map(|(_, f)| &f.best).min_by(|a, b| a.objective.total_cmp(&b.objective));
+    let best = best.context("not one candidate could be judged")?.law;
+    let judged = |name, law| Row { name, verdict: judge(&on.plant, law, on.target_hz, extent) };
+    let mut rows: Vec<_> =
+        found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
+    rows.push(judged("corrected, its own", Law::CORRECTED));
+    rows.push(judged("printed, α = 1e-4", Law::PRINTED));
+    rows.push(judged("normalised, α = k/f₀", Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 }));
+    rows.extend(relay_gains(&on.plant, on.target_hz, 0.1).map(|law| judged("relay (Ziegler-Nichols)", law)));
+    let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
+    Ok(Tuned { rows, found, best, interrupted })
+}
+
+fn family_name(family: Family) -> &'static str {
+    match family {
+        Family::Corrected => "corrected, found",
+        Family::Printed => "printed, found",
+    }
+}

@@ -1,0 +1,186 @@
+//! What `tune` found, as text for people and as JSON for programs.
+//!
+//! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
+
+use super::super::chart::table::{Cell, Table};
+use super::{Identified, Tuned, gains};
+use crate::control::Law;
+use crate::tune::{Explanation, Verdict};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// The table of a tuning, what it was found on, the files.
+pub(super) fn text(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> String {
+    let mut table = Table::new(&[
+        "law",
+        "gains",
+        "settle_s",
+        "overshoot",
+        "miss_share",
+        "gain_margin",
+        "delay_margin",
+        "reversals",
+        "quality",
+        "robust_to",
+        "objective",
+    ]);
+    for row in &tuned.rows {
+        let v = &row.verdict;
+        let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
+        table.rows.push(vec![
+            row.name.into(),
+            gains::told(v.law).into(),
+            settle,
+            Cell::Number(v.overshoot, 3),
+            Cell::Number(v.miss_share, 4),
+            Cell::Number(v.gain_margin, 1),
+            Cell::Number(v.delay_margin as f64, 0),
+            Cell::Number(v.reversals, 4),
+            Cell::Number(v.quality, 3),
+            robust(v).into(),
+            Cell::Number(v.objective, 4),
+        ]);
+    }
+    let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
+    format!("{}\n{}\nbest: {}\nfiles: {}\n", plant(on), table.text(), gains::told(tuned.best), files.join(", "))
+}
+
+/// What the plant is, in a few lines.
+fn plant(on: &Identified) -> String {
+    let line = &on.plant.line;
+    let reach = on.plant.reach(1.0);
+    format!(
+        "{} at {} Hz on {}\n  a frame takes {:.2} ms + {:.1} ns a polygon (95 %: {:.1} to {:.1}), scatter {:.1} %, dead time {} frames\n  \
+         what is in view can take {:.2} to {:.2} ms\n",
+        on.scene.name,
+        on.target_hz,
+        on.machine,
+        1e3 * line.intercept,
+        1e9 * line.slope,
+        1e9 * line.slope_95.0,
+        1e9 * line.slope_95.1,
+        100.0 * line.scatter,
+        on.plant.dead_time,
+        1e3 * reach.least_s,
+        1e3 * reach.most_s,
+    )
+}
+
+/// The speeds of the machine that a law bears.
+fn robust(v: &Verdict) -> String {
+    match (&v.robust_to[..], v.asked.len()) {
+        (_, 0) => "out of reach".to_owned(),
+        ([], _) => "none".to_owned(),
+        (all, _) => all.iter().map(|s| format!("{s}x")).collect::<Vec<_>>().join(" "),
+    }
+}
+
+/// What stands above the fragment.
+pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
+    let verdict = tuned.rows.iter().find(|row| row.verdict.law == tuned.best).map(|row| &row.verdict);
+    let worth = verdict.map_or_else(String::new, |v| {
+        let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
+        format!(
+            "\n{settle}, {:.2} % of frames late, gain margin {:.1}, delay margin {} frames",
+            100.0 * v.miss_share,
+            v.gain_margin,
+            v.delay_margin
+        )
+    });
+    format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
+}
+
+/// The same as JSON.
+pub(super) fn json(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> anyhow::Result<String> {
+    let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(row.name, &row.verdict)).collect();
+    let tried: Vec<_> = tuned
+        .found
+        .iter()
+        .flat_map(|(_, f)| {
+            f.tried.iter().map(|(law, objective)| json!({ "gains": law_json(*law), "objective": objective }))
+        })
+        .collect();
+    let whole = json!({
+        "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
+        "best": law_json(tuned.best), "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
+    });
+    Ok(serde_json::to_string_pretty(&whole)? + "\n")
+}
+
+fn plant_json(on: &Identified) -> Value {
+    let line = &on.plant.line;
+    let reach = on.plant.reach(1.0);
+    json!({
+        "fixed_ms": 1e3 * line.intercept, "polygon_ns": 1e9 * line.slope,
+        "polygon_ns_95": [1e9 * line.slope_95.0, 1e9 * line.slope_95.1], "scatter": line.scatter,
+        "dead_time_frames": on.plant.dead_time, "reach_ms": [1e3 * reach.least_s, 1e3 * reach.most_s],
+    })
+}
+
+fn row_json(name: &str, v: &Verdict) -> Value {
+    json!({
+        "law": name, "gains": law_json(v.law), "settle_s": v.settle_s, "overshoot": v.overshoot, "miss_share": v.miss_share,
+        "gain_margin": v.gain_margin, "delay_margin_frames": v.delay_margin, "reversals": v.reversals, "quality": v.quality,
+        "robust_to": v.robust_to, "asked": v.asked, "objective": v.objective,
+    })
+}
+
+fn law_json(law: Law) -> Value {
+    match law {
+        Law::Printed { alpha, beta } => json!({ "law": "printed", "alpha": alpha, "beta": beta }),
+        Law::Corrected { kappa, lead, margin } => {
+            json!({ "law": "corrected", "kappa": kappa, "lead": lead, "margin": margin })
+        }
+    }
+}
+
+/// Given gains, explained.
+pub(super) fn analysis(on: &Identified, law: Law, e: &Explanation, v: &Verdict) -> String {
+    let near = e.near.map_or_else(String::new, |near| {
+        format!(
+            "  near the set point a frame removes {:.1} % of an error; gain margin {:.2}, delay margin {} frames\n",
+            100.0 * near.gain,
+            v.gain_margin,
+            v.delay_margin
+        )
+    });
+    let rests: Vec<_> = e
+        .rests
+        .iter()
+        .map(|r| {
+            format!("ε̂ = {:.4} at {:.2} of its time{}", r.eps_hat, r.ratio, if r.clamped { " (a limit)" } else { "" })
+        })
+        .collect();
+    let cycle = e.cycle.map_or_else(String::new, |c| {
+        format!("  it swings by {:.1} % of its time every {:.3} s\n", 100.0 * c.amplitude, c.period_s)
+    });
+    let settle = |k: usize| e.from[k].settle_s.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
+    format!(
+        "{}  {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  rests: {}\n{cycle}  settles from 0.4 of the rate: {}, from \
+         2.5: {}; overshoot {:.2}, {:.2}; late {:.2} % of disturbed frames\n\n{}\n",
+        plant(on),
+        gains::told(law),
+        1e3 * e.set_s,
+        100.0 * e.share,
+        rests.join("; "),
+        settle(0),
+        settle(1),
+        e.from[0].overshoot,
+        e.from[1].overshoot,
+        100.0 * v.miss_share,
+        e.sentences
+    )
+}
+
+/// The same as JSON.
+pub(super) fn analysis_json(on: &Identified, law: Law, e: &Explanation, v: &Verdict) -> anyhow::Result<String> {
+    let rests: Vec<_> =
+        e.rests.iter().map(|r| json!({ "eps": r.eps_hat, "ratio": r.ratio, "clamped": r.clamped })).collect();
+    let whole = json!({
+        "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
+        "analysis": row_json("given", v), "given": law_json(law), "set_ms": 1e3 * e.set_s, "share": e.share,
+        "loop_gain": e.near.map(|n| n.gain), "rests": rests,
+        "cycle": e.cycle.map(|c| json!({ "amplitude": c.amplitude, "period_s": c.period_s })), "sentences": e.sentences,
+    });
+    Ok(serde_json::to_string_pretty(&whole)? + "\n")
+}

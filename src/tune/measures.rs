@@ -1,0 +1,175 @@
+//! What a played loop is worth: how soon it settles, how far it overshoots, how often it is late, whether it swings.
+//!
+//! In: the frames of a trial. Out: numbers. Never here: what they weigh against each other.
+
+use super::play::Beat;
+use crate::control::Status;
+
+/// Settled: the median of nine frames lies within this part of the set point, and stays there.
+pub const BAND: f64 = 0.05;
+/// A frame is late past this part of the time it may take.
+pub const LATE: f64 = 1.05;
+/// Frames of the running median.
+const MEDIAN: usize = 9;
+/// Frames within which two turns of the loop variable are a reversal.
+const REVERSAL: usize = 3;
+/// A swing below this part of the set point is a level or a dead zone, not a cycle.
+const CYCLE_LEAST: f64 = 0.05;
+
+/// A swing that does not die away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// Half the way from its lowest to its highest t/T_set.
+    pub amplitude: f64,
+    /// Its period, wall seconds.
+    pub period_s: f64,
+}
+
+/// One trial in numbers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measures {
+    /// Wall seconds after which it stays within ± 5 % of the set point, or on a limit of its range; `None` where it does not.
+    pub settle_s: Option<f64>,
+    /// How far t/T_set went past 1 on the other side of where it began, ≥ 0.
+    pub overshoot: f64,
+    /// Share of frames that took 5 % longer than they may.
+    pub miss_share: f64,
+    /// Mean |t/T_set − 1|, or the distance from the limit it must rest on.
+    pub error: f64,
+    /// Turns back within three frames, a frame.
+    pub reversals: f64,
+    /// Levels n that changed in the second half, a frame.
+    pub chatter: f64,
+    /// Mean share of the polygons that the time would have paid for, 0 … 1.
+    pub quality: f64,
+    /// The swing that is left in the last third, if there is one; to be asked of trials without noise alone.
+    pub cycle: Option<Cycle>,
+    /// Whether it ends on a limit of its range.
+    pub clamped: bool,
+}
+
+impl Measures {
+    /// Measures the frames of a trial, at least one.
+    #[must_use]
+    pub fn of(beats: &[Beat]) -> Self {
+        let count = beats.len().max(1) as f64;
+        let mean = |value: &dyn Fn(&Beat) -> f64| beats.iter().map(value).sum::<f64>() / count;
+        let second_half = &beats[beats.len() / 2..];
+        Self {
+            settle_s: settle_s(beats),
+            overshoot: overshoot(beats),
+            miss_share: mean(&|b| f64::from(u8::from(b.late))),
+            error: mean(&error),
+            reversals: f64::from(reversals(beats)) / count,
+            chatter: f64::from(second_half.iter().map(|b| b.switches).sum::<u32>()) / second_half.len().max(1) as f64,
+            quality: mean(&|b| (b.polygons / b.polygons_ideal).clamp(0.0, 1.0)),
+            cycle: cycle(&beats[beats.len() * 2 / 3..]),
+            clamped: beats.last().is_some_and(rests_on_a_limit),
+        }
+    }
+}
+
+fn rests_on_a_limit(beat: &Beat) -> bool {
+    matches!(beat.status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed)
+}
+
+fn error(beat: &Beat) -> f64 {
+    if rests_on_a_limit(beat) { 0.0 } else { (beat.ratio - 1.0).abs() }
+}
+
+/// The time of the frame after the last whose running median is off.
+fn settle_s(beats: &[Beat]) -> Option<f64> {
+    let mut window = [0.0; MEDIAN];
+    let good = |at: usize, window: &mut [f64; MEDIAN]| {
+        let from = at.saturating_sub(MEDIAN / 2).min(beats.len().saturating_sub(MEDIAN));
+        let near = &beats[from..(from + MEDIAN).min(beats.len())];
+        let held = &mut window[..near.len()];
+        held.iter_mut().zip(near).for_each(|(slot, b)| *slot = b.ratio);
+        held.sort_unstable_by(f64::total_cmp);
+        (held[held.len() / 2] - 1.0).abs() <= BAND || rests_on_a_limit(&beats[at])
+    };
+    let last_bad = (0..beats.len()).rev().find(|&at| !good(at, &mut window));
+    match last_bad {
+        None => Some(0.0),
+        Some(at) => beats.get(at + 1).map(|b| b.time_s),
+    }
+}
+
+/// How far the loop went past the set point on the far side, before it first came to rest there.
+fn overshoot(beats: &[Beat]) -> f64 {
+    let Some(first) = beats.first() else { return 0.0 };
+    let past = |b: &Beat| if first.ratio >= 1.0 { 1.0 - b.ratio } else { b.ratio - 1.0 };
+    beats.iter().filter(|b| !rests_on_a_limit(b)).map(past).fold(0.0, f64::max)
+}
+
+/// How often ε̂ went one way and within three frames the other.
+fn reversals(beats: &[Beat]) -> u32 {
+    let way =
+        |w: &[Beat]| (w[1].eps_hat / w[0].eps_hat - 1.0).signum() * f64::from(u8::from(w[1].eps_hat != w[0].eps_hat));
+    let (mut count, mut last) = (0, None::<(usize, f64)>);
+    for (at, now) in beats.windows(2).map(way).enumerate().filter(|(_, w)| *w != 0.0) {
+        count += u32::from(last.is_some_and(|(k, before)| before != now && at - k <= REVERSAL));
+        last = Some((at, now));
+    }
+    count
+}
+
+/// The swing of frames that should be at rest.
+fn cycle(tail: &[Beat]) -> Option<Cycle> {
+    let (low, high) = tail.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), b| (l.min(b.ratio), h.max(b.ratio)));
+    let amplitude = 0.5 * (high - low);
+    if amplitude.is_nan() || amplitude <= CYCLE_LEAST {
+        return None;
+    }
+    let middle = 0.5 * (high + low);
+    let rises = tail.windows(2).filter(|w| w[0].ratio < middle && w[1].ratio >= middle);
+    let times: Vec<_> = rises.map(|w| w[1].time_s).collect();
+    match times[..] {
+        // once up and never down again is a drift
+        [] | [_] => None,
+        [first, .., last] => Some(Cycle { amplitude, period_s: (last - first) / (times.len() - 1) as f64 }),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn beats(ratio: impl Fn(usize) -> f64) -> Vec<Beat> {
+        let beat = |k: usize| Beat {
+            time_s: (k + 1) as f64 / 30.0,
+            ratio: ratio(k),
+            late: ratio(k) > 1.2,
+            eps_hat: 1.0 / ratio(k),
+            polygons: 50.0,
+            polygons_ideal: 100.0,
+            switches: u32::from(k.is_multiple_of(10)),
+            status: Status::Moving,
+        };
+        (0..300).map(beat).collect()
+    }
+
+    #[test]
+    fn a_loop_that_decays_settles_when_its_error_is_five_hundredths() {
+        // 1 + 1.5·0.9^k is within 0.05 from k = 33 on
+        let measured = Measures::of(&beats(|k| 1.0 + 1.5 * 0.9_f64.powi(k as i32)));
+        let settle_s = measured.settle_s.unwrap();
+        assert!((settle_s - 34.0 / 30.0).abs() < 4.0 / 30.0, "{settle_s}");
+        assert!(measured.cycle.is_none() && measured.overshoot == 0.0 && measured.quality == 0.5);
+        assert!((measured.chatter - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_loop_that_swings_never_settles_and_says_how() {
+        let measured = Measures::of(&beats(|k| 1.0 + 0.4 * libm::sin(k as f64 * std::f64::consts::TAU / 15.0)));
+        let cycle = measured.cycle.unwrap();
+        assert_eq!(measured.settle_s, None);
+        assert!((cycle.amplitude - 0.4).abs() < 0.01 && (cycle.period_s - 0.5).abs() < 0.01, "{cycle:?}");
+    }
+
+    #[test]
+    fn going_to_and_fro_is_counted() {
+        let measured = Measures::of(&beats(|k| if k % 2 == 0 { 1.0 } else { 1.01 }));
+        assert!(measured.reversals > 0.9, "{}", measured.reversals);
+    }
+}

@@ -1,0 +1,230 @@
+//! How the time of a frame answers to its polygons: what an experiment shows of a scene on a machine.
+//!
+//! In: frames drawn at resolutions that a design chose. Out: t = fixed + c · polygons, the noise around it, and after how many
+//! frames a change shows. Never here: who drew the frames, a law.
+//! Theory: `docs/theory/control.md`, eq. 26.
+
+use super::line::Line;
+use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy};
+use std::time::Duration;
+
+/// One frame of an experiment.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Observed {
+    /// What was in view.
+    pub views: Vec<ObjectView>,
+    /// Triangles that the controller asked for.
+    pub polygons: f64,
+    /// What the frame took, seconds.
+    pub work_s: f64,
+}
+
+/// A scene's picture on a machine, as its controller feels it.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plant {
+    /// Seconds a frame against polygons.
+    pub line: Line,
+    /// Frames after which a change of polygons shows in the measured time; 0: in the same frame.
+    pub dead_time: usize,
+    /// What was in view, frame by frame; never empty.
+    pub frames: Vec<Vec<ObjectView>>,
+    /// Points of the experiment: polygons, and the seconds of the frame in which they showed.
+    pub points: Vec<(f64, f64)>,
+}
+
+/// Why there is no plant to control.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum NoPlant {
+    /// No object in view can be drawn in more than one way.
+    #[error("nothing in view can be drawn at more than one resolution: there is nothing to control")]
+    NothingToControl,
+    /// Time does not go up with polygons.
+    #[error(
+        "the time of a frame does not answer to its polygons ({slope_ns:.2} ns each, 95 % between {low_ns:.2} and {high_ns:.2}): \
+         no gain can hold it"
+    )]
+    NoAnswer {
+        /// Fitted nanoseconds a polygon.
+        slope_ns: f64,
+        /// Lower end of its interval.
+        low_ns: f64,
+        /// Upper end of its interval.
+        high_ns: f64,
+    },
+    /// Too few frames, or times that are no numbers.
+    #[error("{frames} frames with a sound time are too few to tell how they answer: at least 30 are needed")]
+    TooFew {
+        /// How many there were.
+        frames: usize,
+    },
+}
+
+/// The times that a plant can be brought to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reach {
+    /// With everything in view at its coarsest, seconds.
+    pub least_s: f64,
+    /// With everything in view as fine as a controller draws it, seconds.
+    pub most_s: f64,
+}
+
+/// The longest dead time that is looked for, frames.
+const DEAD_TIME_MAX: usize = 4;
+/// A dead time is believed where it leaves this part of the scatter, or less, that a shorter one leaves.
+const BETTER: f64 = 0.9;
+/// Fewer frames teach nothing.
+const FRAMES_MIN: usize = 30;
+
+impl Plant {
+    /// Fits a plant to the frames of an experiment, in their order.
+    ///
+    /// # Errors
+    /// [`NoPlant`] where there is none.
+    pub fn identify(observed: &[Observed]) -> Result<Self, NoPlant> {
+        let sound = |o: &&Observed| o.work_s.is_finite() && o.work_s > 0.0 && o.polygons.is_finite();
+        let frames = observed.iter().filter(sound).count();
+        if frames < FRAMES_MIN {
+            return Err(NoPlant::TooFew { frames });
+        }
+        let (least, most) =
+            observed.iter().fold((f64::INFINITY, 0.0_f64), |(l, m), o| (l.min(o.polygons), m.max(o.polygons)));
+        if most <= least {
+            return Err(NoPlant::NothingToControl);
+        }
+        let (dead_time, line) = best_dead_time(observed).ok_or(NoPlant::NothingToControl)?;
+        if line.slope_95.0 <= 0.0 {
+            let [slope_ns, low_ns, high_ns] = [line.slope, line.slope_95.0, line.slope_95.1].map(|s| 1e9 * s);
+            return Err(NoPlant::NoAnswer { slope_ns, low_ns, high_ns });
+        }
+        let frames = observed.iter().map(|o| o.views.clone()).collect();
+        Ok(Self { line, dead_time, frames, points: delayed(observed, dead_time) })
+    }
+
+    /// Seconds that `polygons` take on a machine `speed` times as fast.
+    #[must_use]
+    pub fn seconds(&self, polygons: f64, speed: f64) -> f64 {
+        // a fit through few large frames may put the fixed part below zero; a frame takes some time
+        self.line.at(polygons).max(1e-3 * self.line.slope * polygons).max(1e-9) / speed
+    }
+
+    /// What was in view in frame `k`; the experiment runs forth and back for ever.
+    #[must_use]
+    pub fn views(&self, k: usize) -> &[ObjectView] {
+        let last = self.frames.len() - 1;
+        let place = k % (2 * last).max(1);
+        &self.frames[if place > last { 2 * last - place } else { place }]
+    }
+
+    /// What the picture can take between its coarsest and its finest, on a machine `speed` times as fast.
+    #[must_use]
+    pub fn reach(&self, speed: f64) -> Reach {
+        let end = |factor: f64| {
+            let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 30.0);
+            control.plan(self.views(0));
+            control.coarsen(factor);
+            let polygons = control.plan(self.views(0)).polygons;
+            control.observe(FrameWork { work: Duration::ZERO, draw: Duration::ZERO, skip: true });
+            self.seconds(polygons, speed)
+        };
+        Reach { least_s: end(1e12), most_s: end(1e-12) }
+    }
+
+    /// s: the share of a frame of `time_s` seconds that goes with its polygons (control.md, eq. 3).
+    #[must_use]
+    pub fn share(&self, time_s: f64, speed: f64) -> f64 {
+        (1.0 - self.line.intercept.max(0.0) / speed / time_s).clamp(0.0, 1.0)
+    }
+}
+
+/// The shortest dead time that no longer one betters clearly.
+fn best_dead_time(observed: &[Observed]) -> Option<(usize, Line)> {
+    let mut best: Option<(usize, Line)> = None;
+    for frames in 0..=DEAD_TIME_MAX {
+        let Some(line) = Line::through(&delayed(observed, frames)) else { continue };
+        if best.is_none_or(|(_, held)| line.slope > 0.0 && line.scatter < BETTER * held.scatter) {
+            best = Some((frames, line));
+        }
+    }
+    best
+}
+
+/// Polygons beside the time of the frame so many later.
+fn delayed(observed: &[Observed], frames: usize) -> Vec<(f64, f64)> {
+    observed.iter().zip(observed.iter().skip(frames)).map(|(cause, effect)| (cause.polygons, effect.work_s)).collect()
+}
+
+#[cfg(test)]
+pub(super) mod tests {
+    use super::*;
+    use crate::control::{Kind, Shading};
+    use metachron_agents::{AgentId, ResolutionRange};
+
+    /// A tube of 1.6 m and a ball.
+    pub fn views() -> Vec<ObjectView> {
+        let object = |id, kind, range, pixels| ObjectView {
+            id: AgentId(id),
+            kind,
+            range,
+            shading: (Shading::default(), Shading::default()),
+            pixels,
+            off_centre: 0.0,
+            from_focus_m: 0.0,
+            distance_m: 0.6,
+            speed_px_s: 0.0,
+            importance: 1.0,
+            visible: true,
+        };
+        let ball = Kind::Primitive { radius_m: 0.02, triangles: std::array::from_fn(|n| 48 << n) };
+        vec![
+            object(
+                0,
+                Kind::Tube { length_m: 1.6, radius_m: 0.015 },
+                ResolutionRange { eps_m: (5e-4, 0.04), n: (0, 5) },
+                1e9,
+            ),
+            object(1, ball, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 6) }, 2e4),
+        ]
+    }
+
+    /// An experiment on a plant of `fixed_s` and `polygon_s` that answers `dead_time` frames late.
+    pub fn observed(fixed_s: f64, polygon_s: f64, dead_time: usize) -> Vec<Observed> {
+        let polygons = |k: usize| 2e3 * (1.0 + ((k * 7919) % 97) as f64);
+        let frame = |k: usize| {
+            let noise = 1.0 + 0.02 * (((k * 31) % 17) as f64 / 8.0 - 1.0);
+            let work_s = noise * (fixed_s + polygon_s * polygons(k.saturating_sub(dead_time)));
+            Observed { views: views(), polygons: polygons(k), work_s }
+        };
+        (0..200).map(frame).collect()
+    }
+
+    #[test]
+    fn a_plant_is_told_by_its_frames() {
+        for dead_time in [0, 1, 2] {
+            let plant = Plant::identify(&observed(7e-3, 0.22e-6, dead_time)).unwrap();
+            assert_eq!(plant.dead_time, dead_time);
+            assert!((plant.line.slope / 0.22e-6 - 1.0).abs() < 0.02, "{:?}", plant.line);
+            assert!((plant.line.intercept / 7e-3 - 1.0).abs() < 0.05, "{:?}", plant.line);
+        }
+    }
+
+    #[test]
+    fn where_nothing_answers_there_is_no_plant() {
+        assert!(matches!(Plant::identify(&observed(7e-3, 0.0, 0)), Err(NoPlant::NoAnswer { .. })));
+        let mut still = observed(7e-3, 1e-6, 0);
+        still.iter_mut().for_each(|o| o.polygons = 5.0);
+        assert_eq!(Plant::identify(&still), Err(NoPlant::NothingToControl));
+        assert_eq!(Plant::identify(&still[..5]), Err(NoPlant::TooFew { frames: 5 }));
+    }
+
+    #[test]
+    fn views_run_forth_and_back() {
+        let mut plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
+        plant.frames.truncate(3);
+        plant.frames.iter_mut().enumerate().for_each(|(k, views)| views[0].distance_m = k as f64);
+        let order: Vec<_> = (0..8).map(|k| plant.views(k)[0].distance_m as u32).collect();
+        assert_eq!(order, [0, 1, 2, 1, 0, 1, 2, 1]);
+        plant.frames.truncate(1);
+        assert_eq!(plant.views(7)[0].distance_m, 0.0);
+    }
+}
