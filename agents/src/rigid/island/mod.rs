@@ -21,7 +21,7 @@ use super::motion::Motion;
 use super::{Joint, RigidBody, RigidError};
 use crate::{AgentId, Companion, SimSpan, StepError, StepReport, Surroundings, check_span};
 use crew::Crew;
-use direct::Direct;
+use direct::{Direct, Reach};
 use glam::DVec3;
 use member::{Ground, Member};
 use pile::Pile;
@@ -39,6 +39,7 @@ pub(super) struct Island {
     gravity: DVec3,
     solver: Solver,
     watch: Watch,
+    reach: Reach,
     /// How long nobody has looked who touches whom in a pile, seconds.
     unseen_s: f64,
     /// How long everybody has been calm, seconds.
@@ -71,10 +72,6 @@ const CALM_M_S: f64 = 2e-3;
 const REST_S: f64 = 0.5;
 /// In a pile it is looked at this often who touches whom, seconds: a fifth of the cost of its step each time (measured).
 const LOOK_S: f64 = 1.0 / 30.0;
-/// A pile that has shrunk to this few contacts may be solved directly again: half of what overruns the direct solve.
-const FEW_CONTACTS: usize = 48;
-/// The direct solve is not tried on more bodies without joints.
-const FEW_MEMBERS: usize = 24;
 
 /// One step of `leader` and everybody it leads. `apart`: one number a companion, zero stays, equal ones leave together.
 ///
@@ -111,6 +108,7 @@ impl Island {
             gravity: leader.gravity,
             solver: Solver::Few(Box::default()),
             watch: Watch::default(),
+            reach: Reach::default(),
             unseen_s: LOOK_S,
             calm_s: 0.0,
             before: Vec::new(),
@@ -187,7 +185,7 @@ impl Island {
 
     /// Chooses who solves, and lets it know who is here.
     fn settle(&mut self) {
-        let many = self.held.is_empty() && self.members.len() > FEW_MEMBERS;
+        let many = self.held.is_empty() && !direct::may_suit(self.members.len());
         match &mut self.solver {
             Solver::Few(_) if many => self.go_many(),
             Solver::Few(direct) => direct.settle(&self.members, &self.ground, &self.held),
@@ -252,7 +250,7 @@ impl Island {
         match &mut self.solver {
             Solver::Few(direct) => {
                 direct.advance((&mut self.members, &self.ground), &self.held, h)?;
-                if direct.is_overrun(self.members.len()) {
+                if direct.is_overrun() {
                     self.go_many();
                 }
                 Ok(())
@@ -272,7 +270,7 @@ impl Island {
 
     /// Notes who touches whom; every [`APART_S`] tells who has come apart.
     fn watch(&mut self, dt_s: f64, apart: &mut Vec<u32>) {
-        let Self { watch, members, held, solver, unseen_s, .. } = self;
+        let Self { watch, reach, members, held, solver, unseen_s, .. } = self;
         *unseen_s += dt_s;
         let shrunk = match solver {
             Solver::Few(direct) => {
@@ -281,8 +279,12 @@ impl Island {
             }
             Solver::Many(pile) if *unseen_s >= LOOK_S => {
                 *unseen_s = 0.0;
-                let contacts = pile.touches(members, |a, b| watch.join(a, b));
-                contacts < FEW_CONTACTS && members.len() <= FEW_MEMBERS
+                reach.clear();
+                let contacts = pile.touches(members, |a, b| {
+                    watch.join(a, b);
+                    reach.note(a, b);
+                });
+                reach.suits(members.len(), contacts)
             }
             Solver::Many(_) => false,
         };

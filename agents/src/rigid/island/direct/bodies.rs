@@ -4,7 +4,7 @@
 
 use super::super::member::Member;
 use super::near::Contact;
-use super::newton::{Law, Mass, NOBODY, Row, Twist};
+use super::row::{Law, Mass, NOBODY, Row, Twist};
 use glam::{DMat3, DVec3};
 
 /// A spring softer than this, as ω²h² of what it pulls, is a force at both ends of the part: it then keeps its energy.

@@ -5,7 +5,7 @@
 
 use super::super::Held;
 use super::super::member::Member;
-use super::newton::{Law, NOBODY, Row};
+use super::row::{Law, NOBODY, Row};
 use crate::rigid::{Joint, JointKind};
 use glam::{DQuat, DVec3};
 

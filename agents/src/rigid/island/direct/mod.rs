@@ -10,8 +10,12 @@
 
 mod bodies;
 mod joints;
+mod matrix;
 mod near;
 mod newton;
+mod order;
+mod reach;
+mod row;
 
 use super::Held;
 use super::member::{Ground, Member};
@@ -20,7 +24,9 @@ use bodies::{contact_rows, gap_now, is_soft, middle, push, weigh};
 use glam::DVec3;
 use joints::JointRow;
 use near::{Near, Warm};
-use newton::{Law, Mass, NOBODY, Newton, Row, Twist};
+use newton::Newton;
+pub(super) use reach::{Reach, may_suit};
+use row::{Law, Mass, NOBODY, Row, Twist};
 
 /// The direct solve and its memory.
 #[derive(Default)]
@@ -68,10 +74,6 @@ const TURN_MAX: f64 = 0.1;
 const TREMOR_MAX: f64 = 1.0;
 /// Nearer than this share of its size a body touches.
 const MARGIN_SHARE: f64 = 2e-3;
-/// More contacts than this are a pile's business.
-const CONTACTS_MAX: usize = 96;
-/// A factorisation that costs more than this many products is too dear: sixteen bodies that all touch each other.
-const WORK_MAX: usize = 400_000;
 
 impl Direct {
     /// Who is here has changed.
@@ -81,8 +83,8 @@ impl Direct {
     }
 
     /// Whether the last part had more contacts, or bodies more entangled, than this solve is for.
-    pub(super) fn is_overrun(&mut self, members: usize) -> bool {
-        self.near.contacts.len() > CONTACTS_MAX || self.newton.work(&self.rows, members) > WORK_MAX
+    pub(super) fn is_overrun(&self) -> bool {
+        reach::is_overrun(self.near.contacts.len(), self.newton.work())
     }
 
     /// The longest part that jointed bodies take, seconds: none turns far, and none trembles between the forces that its
@@ -208,6 +210,8 @@ impl Direct {
             let at = self.rows.len() - 3;
             self.rows[at].bias = contact.gap_m.max(0.0) / h;
         }
+        let joined = self.rows.iter().filter(|row| row.b != NOBODY).map(|row| (row.a, row.b));
+        self.newton.link(members.len(), joined);
     }
 
     /// Measures what turning adds to the joints' errors; whether that asks for another solve.

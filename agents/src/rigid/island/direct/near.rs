@@ -7,7 +7,7 @@
 
 use super::super::Held;
 use super::super::member::{Ground, Member};
-use super::newton::NOBODY;
+use super::row::NOBODY;
 use crate::AgentId;
 use glam::{DQuat, DVec3};
 use rapier3d::parry::math::{Pose, Rotation};

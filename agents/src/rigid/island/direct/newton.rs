@@ -8,61 +8,9 @@
 //! millionth of the row's own inverse mass; what yields under R is taken back by λ₀ ← λ, a few times. Friction's
 //! disc takes its radius μ λₙ from the pass before: where the passes meet, the law is Coulomb's own, without dilation.
 
-use crate::envelope::Envelope;
-use glam::{DMat3, DVec3};
-
-/// Where a row has no second body.
-pub(super) const NOBODY: u32 = u32::MAX;
-
-/// One scalar constraint: u = lin·(v_a − v_b) + turn_a·ω_a − turn_b·ω_b.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Row {
-    /// The first body.
-    pub a: u32,
-    /// The second body, or [`NOBODY`].
-    pub b: u32,
-    /// Direction of the impulse on `a`.
-    pub lin: DVec3,
-    /// Lever on `a`.
-    pub turn_a: DVec3,
-    /// Lever on `b`.
-    pub turn_b: DVec3,
-    /// What the row asks for.
-    pub law: Law,
-    /// Velocity added to u before the law is asked, m/s or rad/s.
-    pub bias: f64,
-    /// Impulse, N·s or N·m·s: the start, and the answer.
-    pub lambda: f64,
-}
-
-/// What a row asks of its velocity and impulse.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Law {
-    /// u + b = 0.
-    Equal,
-    /// u + b ≥ 0, λ ≥ 0, one of them zero.
-    AtLeast,
-    /// u + b = −λ · compliance: a spring and its damper over the step.
-    Spring(f64),
-    /// As `AtLeast`; the two rows after it are friction with this coefficient.
-    Normal(f64),
-    /// Friction: u = 0 within the disc, at its edge against u.
-    Tangent,
-}
-
-/// A body's mass.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Mass {
-    /// Kilograms.
-    pub mass_kg: f64,
-    /// World axes, kg·m².
-    pub inertia: DMat3,
-    /// Its inverse.
-    pub inverse: DMat3,
-}
-
-/// Linear and angular velocity of a body.
-pub(super) type Twist = [DVec3; 2];
+use super::matrix::Matrix;
+use super::row::{Law, Mass, Row, Twist};
+use glam::DVec3;
 
 /// How a solve went.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -76,8 +24,7 @@ pub(super) struct Outcome {
 /// Room to work in; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Newton {
-    matrix: Envelope<6>,
-    first_body: Vec<u32>,
+    matrix: Matrix,
     /// R of each row.
     give: Vec<f64>,
     /// λ₀ of each row; for a normal's friction the radius is in `radius`.
@@ -124,23 +71,17 @@ impl Newton {
         outcome
     }
 
-    /// What a factorisation of these rows' matrix costs.
-    pub(super) fn work(&mut self, rows: &[Row], bodies: usize) -> usize {
-        self.link(rows, bodies);
-        Envelope::<6>::work(&self.first_body)
+    /// Learns whom the next solves' rows join.
+    pub(super) fn link(&mut self, bodies: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) {
+        self.matrix.link(bodies, pairs);
     }
 
-    fn link(&mut self, rows: &[Row], bodies: usize) {
-        self.first_body.clear();
-        self.first_body.extend(0..bodies as u32);
-        for row in rows.iter().filter(|row| row.b != NOBODY) {
-            let first = &mut self.first_body[row.a.max(row.b) as usize];
-            *first = (*first).min(row.a).min(row.b);
-        }
+    /// What a factorisation costs for those, in products.
+    pub(super) fn work(&self) -> usize {
+        self.matrix.work()
     }
 
     fn prepare(&mut self, rows: &[Row], masses: &[Mass], velocities: &[Twist]) {
-        self.link(rows, masses.len());
         self.free.clear();
         self.free.extend_from_slice(velocities);
         self.give.clear();
@@ -234,14 +175,13 @@ impl Newton {
     /// Turns the gradient into Newton's direction and writes the rows' velocities along it; the slope along it.
     fn descend(&mut self, rows: &[Row], masses: &[Mass]) -> f64 {
         self.assemble(rows, masses);
-        if !self.matrix.factor() {
-            return 0.0;
-        }
         let mut slope = 0.0;
         self.along.clear();
         self.along.extend_from_slice(&self.gradient);
         self.gradient.iter_mut().for_each(|g| *g = -*g);
-        self.matrix.solve(&mut self.gradient);
+        if !self.matrix.solve(&mut self.gradient) {
+            return 0.0;
+        }
         self.along.iter().zip(&self.gradient).for_each(|(g, d)| slope += g * d);
         self.along.clear();
         let step = &self.gradient;
@@ -256,24 +196,16 @@ impl Newton {
 
     /// M + Jᵀ R⁻¹ J over the active rows.
     fn assemble(&mut self, rows: &[Row], masses: &[Mass]) {
-        self.matrix.shape(&self.first_body);
-        for (body, mass) in masses.iter().enumerate() {
-            for k in 0..3 {
-                let unit = |at: usize| std::array::from_fn(|i| f64::from(u8::from(i == at)));
-                self.matrix.add((body, body), mass.mass_kg, unit(k), unit(k));
-                let column = mass.inertia.col(k);
-                self.matrix.add((body, body), 1.0, [0.0, 0.0, 0.0, column.x, column.y, column.z], unit(3 + k));
-            }
-        }
+        self.matrix.start(masses);
         let mut i = 0;
         while i < rows.len() {
             let stiff = 1.0 / self.give[i];
             match rows[i].law {
-                Law::Equal | Law::Spring(_) => rows[i].stiffen(stiff, &mut self.matrix),
-                Law::AtLeast if rows[i].lambda > 0.0 => rows[i].stiffen(stiff, &mut self.matrix),
+                Law::Equal | Law::Spring(_) => self.matrix.stiffen(&rows[i], stiff),
+                Law::AtLeast if rows[i].lambda > 0.0 => self.matrix.stiffen(&rows[i], stiff),
                 Law::Normal(_) => {
                     if rows[i].lambda > 0.0 {
-                        rows[i].stiffen(stiff, &mut self.matrix);
+                        self.matrix.stiffen(&rows[i], stiff);
                     }
                     self.stiffen_friction(&rows[i + 1], &rows[i + 2], i);
                     i += 2;
@@ -290,8 +222,8 @@ impl Newton {
         let (s, t) = (wanted(first, normal + 1), wanted(second, normal + 2));
         let (size, radius) = (libm::hypot(s, t), self.radius[normal]);
         if size <= radius {
-            first.stiffen(1.0 / self.give[normal + 1], &mut self.matrix);
-            second.stiffen(1.0 / self.give[normal + 2], &mut self.matrix);
+            self.matrix.stiffen(first, 1.0 / self.give[normal + 1]);
+            self.matrix.stiffen(second, 1.0 / self.give[normal + 2]);
         } else if radius > 0.0 {
             let (cos, sin) = (s / size, t / size);
             let across = Row {
@@ -300,7 +232,7 @@ impl Newton {
                 turn_b: second.turn_b * cos - first.turn_b * sin,
                 ..*first
             };
-            across.stiffen(radius / (size * self.give[normal + 1]), &mut self.matrix);
+            self.matrix.stiffen(&across, radius / (size * self.give[normal + 1]));
         }
     }
 
@@ -354,69 +286,5 @@ impl Newton {
             }
         }
         worst
-    }
-}
-
-impl Row {
-    /// u, from the twist of each body.
-    fn velocity_of(&self, twist: impl Fn(u32) -> Twist) -> f64 {
-        let [v, w] = twist(self.a);
-        let of_a = self.lin.dot(v) + self.turn_a.dot(w);
-        if self.b == NOBODY {
-            return of_a;
-        }
-        let [v, w] = twist(self.b);
-        of_a - self.lin.dot(v) - self.turn_b.dot(w)
-    }
-
-    /// u.
-    pub(super) fn velocity(&self, velocities: &[Twist]) -> f64 {
-        self.velocity_of(|body| velocities[body as usize])
-    }
-
-    /// Whether it acts on this body.
-    pub(super) fn joins(&self, body: u32) -> bool {
-        self.a == body || self.b == body
-    }
-
-    /// The row's own inverse mass.
-    pub(super) fn mobility(&self, masses: &[Mass]) -> f64 {
-        let of = |body: u32, turn: DVec3| {
-            let mass = &masses[body as usize];
-            self.lin.length_squared() / mass.mass_kg + turn.dot(mass.inverse * turn)
-        };
-        of(self.a, self.turn_a) + if self.b == NOBODY { 0.0 } else { of(self.b, self.turn_b) }
-    }
-
-    /// Adds Jᵀ impulse.
-    fn scatter(&self, impulse: f64, into: &mut [f64]) {
-        let mut add = |body: u32, sign: f64, turn: DVec3| {
-            let at = 6 * body as usize;
-            let (linear, angular) = (self.lin * (sign * impulse), turn * (sign * impulse));
-            into[at..at + 6]
-                .iter_mut()
-                .zip(linear.to_array().into_iter().chain(angular.to_array()))
-                .for_each(|(g, part)| *g += part);
-        };
-        add(self.a, 1.0, self.turn_a);
-        if self.b != NOBODY {
-            add(self.b, -1.0, self.turn_b);
-        }
-    }
-
-    /// Adds weight · Jᵀ J.
-    fn stiffen(&self, weight: f64, matrix: &mut Envelope<6>) {
-        let six = |sign: f64, turn: DVec3| {
-            let (l, t) = (self.lin * sign, turn * sign);
-            [l.x, l.y, l.z, t.x, t.y, t.z]
-        };
-        let a = (self.a as usize, six(1.0, self.turn_a));
-        matrix.add((a.0, a.0), weight, a.1, a.1);
-        if self.b != NOBODY {
-            let b = (self.b as usize, six(-1.0, self.turn_b));
-            matrix.add((b.0, b.0), weight, b.1, b.1);
-            let (row, column) = if a.0 > b.0 { (a, b) } else { (b, a) };
-            matrix.add((row.0, column.0), weight, row.1, column.1);
-        }
     }
 }

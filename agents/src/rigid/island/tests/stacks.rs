@@ -38,6 +38,16 @@ fn a_stack_stands_and_does_not_sink_whatever_stands_on_it() {
 }
 
 #[test]
+fn forty_boxes_carry_a_thousandfold_load() {
+    let mut party = stack(40, 1000.0);
+    party.run(1.0 / 60.0, 2.0);
+    let (sink, aside) = lean(&party);
+    // forty single-precision gaps of boxes of 1 m, and the slop of 1e-5 of a box's size at each
+    assert!(sink.abs() < 1.2e-3, "sank {sink:e} m");
+    assert!(aside < 4e-4, "went {aside:e} m aside");
+}
+
+#[test]
 fn a_stack_comes_to_rest_as_one() {
     let mut party = stack(5, 1.0);
     let rested = (0..500).find(|_| party.step(0.01).at_rest).expect("it rests within five seconds");
@@ -67,6 +77,21 @@ fn merged_boxes_stick_below_the_angle_of_friction_and_slide_above_it() {
     let (low, high) = run(slope);
     assert!((low / closed - 1.0).abs() < 5e-3, "the lower one slid {low} m, not {closed}");
     assert!((high / closed - 1.0).abs() < 5e-3, "the upper one slid {high} m, not {closed}");
+}
+
+#[test]
+fn boxes_that_start_inside_each_other_part_and_keep_no_speed() {
+    let free = |z: f64| RigidSpec { gravity: DVec3::ZERO, ..cube(0.1, DVec3::Z * z) };
+    let mut party = Party::new([free(0.0), free(0.17)]);
+    let mut fastest = 0.0_f64;
+    for _ in 0..120 {
+        party.step(1.0 / 60.0);
+        fastest = fastest.max(party.state(0).velocity.length()).max(party.state(1).velocity.length());
+    }
+    let apart = party.state(1).position.z - party.state(0).position.z;
+    // single precision gaps, and the slop of 1e-5 of a box's size
+    assert!((apart - 0.2).abs() < 1e-5, "{apart} m apart");
+    assert!(fastest < 1e-9, "{fastest} m/s"); // what the solve may miss
 }
 
 #[test]
