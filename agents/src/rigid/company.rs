@@ -59,6 +59,12 @@ pub(super) struct Guest {
 
 /// Who accelerates otherwise than gravity would have it by more than this is held by something, m/s².
 const HELD_M_S2: f64 = 0.1;
+/// Bodies that come together by more than this share of the smaller one's size in a step are too fast for their clocks.
+const COARSE_SHARE: f64 = 0.05;
+/// How many steps ahead a landing is foreseen: one to be told of, one to move in.
+const FORESEEN: f64 = 2.0;
+/// Who bounces by more than this does not stay where it lands.
+const STAYS: f64 = 0.5;
 /// The gap at which two balls touch, as a share of the radius: their distance is known to rounding.
 const BALL_SKIN_SHARE: f64 = 1e-9;
 
@@ -118,6 +124,33 @@ impl Company {
             let closing = motion.velocity.dot(towards.normalize_or_zero());
             if towards.length() < reach && (closing > WAKE_M_S || towards == DVec3::ZERO) {
                 self.knocks.push(neighbour.id);
+            }
+        }
+    }
+
+    /// Finds who will land within two steps of `dt` seconds, while something holds one of the two up: they share a world from
+    /// before they touch.
+    ///
+    /// Who takes steps as long as a good part of its own size would else be stopped by several at once, each of whom knows
+    /// nothing yet of what the others gave it, or by nobody.
+    pub(super) fn foresee(
+        &mut self,
+        (mover, motion): (&Mover, &Motion),
+        (gravity, dt): (DVec3, f64),
+        (mass_kg, held): (f64, bool),
+    ) {
+        let Self { guests, count, room, form, pairs, .. } = self;
+        let fall = Fall { gravity, spin_max: 0.0 };
+        for guest in guests[..*count].iter().filter(|g| g.touchable && g.is_rigid() && g.restitution <= STAYS) {
+            let Some(neighbour) = guest.other.neighbour() else { continue };
+            let coarse = guest.approach_m_s(motion.velocity) * dt > COARSE_SHARE * mover.radius_m.min(guest.radius_m);
+            let held = held || neighbour.snapshot.acceleration.distance(gravity) > HELD_M_S2;
+            if coarse && held {
+                let (free_s, closing) =
+                    guest.approach(&placed(form, motion), (mover, motion, fall), FORESEEN * dt, room);
+                if free_s < FORESEEN * dt && closing > 0.0 {
+                    pairs.of(neighbour.id, guest.reduced_kg(mass_kg)).expect_contact();
+                }
             }
         }
     }

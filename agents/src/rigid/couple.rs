@@ -101,6 +101,9 @@ impl RigidBody {
         self.stand = if seen { self.feet() } else { None };
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received != DVec3::ZERO;
+        let stands = self.stand.is_some() || self.touching;
+        let flight = (&self.world.mover, &self.motion);
+        self.company.foresee(flight, (self.gravity, dt), (self.spread.mass_kg, held || stands));
         self.company.settle(around, dt, (self.gravity, held));
     }
 

@@ -6,16 +6,15 @@
 use super::company::{Company, Guest, placed};
 use super::meeting::{Found, Me, Meeting};
 use super::obstacles::Obstacles;
+use super::pair::RESERVE_M_S;
 use crate::coupling::touch::touches;
-use crate::coupling::{Contact, Place, Slots, Touch};
+use crate::coupling::{Contact, PUSH_OUT_SHARE, Place, Slots, Touch};
 use glam::DVec3;
 
 /// A contact farther than this from closing within the part is left out, metres.
 const SLACK_M: f64 = 1e-5;
 /// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by.
 const BOUND_SHARE: f64 = 2e-5;
-/// The share of push-out that an empty tank leaves: without any, bodies that lie on each other would sink for good.
-const PUSH_OUT_LEAST: f64 = 0.25;
 
 impl Meeting {
     /// Places within the skin of everything, for a blow.
@@ -60,12 +59,12 @@ impl Meeting {
             let from = self.found.len();
             self.take_up(me, Some((i, guest)), (guest.friction, 0.0, 0.0));
             self.keep_closing(from, h);
-            let fade = guest.other.id().and_then(|id| pairs.get(id)).map_or(1.0, |pair| pair.fade());
+            let pair = guest.other.id().and_then(|id| pairs.get(id));
+            let pushed_m_s = pair.map_or(RESERVE_M_S, |pair| pair.push_out_m_s());
             let age_s = guest.other.age_s().abs().max(guest.other.answers_within_s()) + after_s;
             for found in &mut self.found[from..] {
                 found.contact.age_s = age_s;
-                let depth = found.contact.gap_m;
-                found.contact.gap_m = if depth < 0.0 { depth * fade.max(PUSH_OUT_LEAST) } else { depth };
+                found.contact.gap_m = found.contact.gap_m.max(-pushed_m_s * h.max(age_s) / PUSH_OUT_SHARE);
             }
         }
     }

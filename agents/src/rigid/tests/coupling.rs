@@ -244,6 +244,29 @@ fn what_is_not_finite_in_one_never_reaches_another() {
 }
 
 #[test]
+fn balls_that_start_inside_each_other_part_without_gaining_energy() {
+    for (rates, restitution) in RATES.into_iter().flat_map(|rates| [(rates, 0.0), (rates, 1.0)]) {
+        let mut stage = Stage::new(Faults::default());
+        let still =
+            RigidSpec { gravity: DVec3::ZERO, restitution, ..spec(Solid::Ball { radius_m: RADIUS }, DVec3::ZERO) };
+        let make = |x: f64, v: f64| {
+            RigidBody::new(RigidSpec { position: DVec3::X * x, velocity: DVec3::X * v, ..still.clone() }).unwrap()
+        };
+        let ids = [(0.0, 0.2, rates[0]), (1.4 * RADIUS, 0.0, rates[1])].map(|(x, v, hz)| stage.add(make(x, v), hz));
+        let mut fastest = 0.0_f64;
+        stage.run(3.0, |stage| {
+            let now = stage.newest(ids[0]).time.as_secs_f64();
+            let [one, two] = ids.map(|id| stage.settled(id, now).state.velocity);
+            fastest = fastest.max(one.distance(two));
+        });
+        let [one, two] = ids.map(|id| stage.settled(id, 3.0).state.position);
+        println!("{rates:?}, e {restitution}: {fastest} m/s, {} m apart", one.distance(two));
+        assert!(one.distance(two) > 1.99 * RADIUS, "{rates:?}, e {restitution}: {} m apart", one.distance(two));
+        assert!(fastest < 0.2 + 1e-9, "{rates:?}, e {restitution}: {fastest} m/s"); // as fast as they came together
+    }
+}
+
+#[test]
 fn a_ball_that_hits_two_at_once_shares_its_blow_evenly() {
     for (rates, restitution) in RATES.into_iter().flat_map(|rates| [(rates, 0.0), (rates, 1.0)]) {
         let mut stage = Stage::new(Faults::default());
