@@ -95,6 +95,11 @@ impl Stage {
         self.actors[id.0 as usize].published.last().expect("published when it was added")
     }
 
+    /// What an agent weighs, kg.
+    pub(crate) fn mass_kg(&self, id: AgentId) -> f64 {
+        self.actors[id.0 as usize].agent.mass_kg()
+    }
+
     /// Changes what others see of an agent.
     pub(crate) fn spoil(&mut self, id: AgentId, change: impl FnOnce(&mut Snapshot)) {
         let last = self.actors[id.0 as usize].published.last_mut().expect("published when it was added");

@@ -14,10 +14,19 @@ use glam::{DMat3, DVec3};
 pub(super) struct Ties {
     /// The springs.
     pub all: Vec<Tie>,
-    /// Whom each pulls in return: which guest, and where.
-    ends: Vec<Option<(usize, Anchor)>>,
+    /// Whom each pulls in return.
+    ends: Vec<Option<End>>,
     /// Room for one answer.
     room: Vec<DVec3>,
+}
+
+/// The other end of a spring.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    guest: usize,
+    anchor: Anchor,
+    /// Whether a tool holds, or the scene links.
+    kind: PairKind,
 }
 
 impl Ties {
@@ -39,14 +48,14 @@ impl Ties {
         for pull in around.pulls() {
             let by = pull.by.and_then(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
             self.all.push(Tie::led(pull));
-            self.ends.push(by.map(|guest| (guest, Anchor::Local(DVec3::ZERO))));
+            self.ends.push(by.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
         }
         for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
             let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
             let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
             if let Some(guest) = guest.filter(|_| owned) {
                 self.all.push(Tie { rest_m: link.rest_m, ..Tie::led(spring_of(link)) });
-                self.ends.push(Some((guest, link.there)));
+                self.ends.push(Some(End { guest, anchor: link.there, kind: PairKind::Attachment }));
             }
         }
     }
@@ -58,11 +67,11 @@ impl Ties {
     pub(super) fn aim(&mut self, company: &Company) {
         let Self { all, ends, room } = self;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
-            let Some((i, anchor)) = *end else { continue };
+            let Some(End { guest: i, anchor, .. }) = *end else { continue };
             let other = &company.guests()[i].other;
             let Some((target, velocity)) = other.point(anchor) else { continue };
             (tie.pull.target, tie.pull.target_velocity) = (target, velocity);
-            let shared = ends.iter().flatten().filter(|(with, _)| *with == i).count();
+            let shared = ends.iter().flatten().filter(|end| end.guest == i).count();
             let mut slots = Slots::default();
             other.hold(&mut slots, anchor);
             let column = |axis: DVec3| {
@@ -82,7 +91,7 @@ impl Ties {
         let Self { all, ends, room } = self;
         let after_s = company.after_s;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
-            let Some((i, anchor)) = *end else {
+            let Some(End { guest: i, anchor, kind }) = *end else {
                 tie.pull.target += tie.pull.target_velocity * h;
                 continue;
             };
@@ -97,8 +106,7 @@ impl Ties {
             other.push(room, h);
             if let Some(id) = other.id() {
                 let state = exchange.pair_mut(id);
-                state.kind =
-                    if tie.pull.by.is_some() && other.is_held() { PairKind::Grasp } else { PairKind::Attachment };
+                state.kind = kind;
                 state.contacts = state.contacts.max(1);
             }
         }
