@@ -5,40 +5,17 @@
 //! Stacks: cubes of 1 m and 1000 kg, a millimetre apart at the start, friction 0.5, 10 s. Chains: capsules of 0.2 m and 1 kg
 //! on ball joints, 5 s. The last body is heavier by the ratio.
 
+mod bodies;
+
+use bodies::{built, floor, spec, step};
 use glam::{DQuat, DVec3};
 use metachron_agents::rigid::{Joint, JointKind, RigidBody, RigidSpec};
 use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{Agent, AgentId, Body, Companion, RigidState, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_agents::{Agent, AgentId, Body, RigidState, SimSpan, Snapshot};
 use std::sync::Arc;
-use std::time::Instant;
-
-fn spec(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
-    RigidSpec {
-        solid,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: DVec3::Z * -9.81,
-        obstacles: Arc::from([]),
-        joints: Arc::from([]),
-        sleep: false,
-    }
-}
 
 fn stack(count: u32, ratio: f64) -> Vec<RigidSpec> {
-    let floor = Obstacle {
-        name: "floor".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-    };
-    let obstacles: Arc<[Obstacle]> = Arc::from([floor]);
+    let obstacles: Arc<[Obstacle]> = Arc::from([floor()]);
     let cube = Solid::Box { half_extents_m: DVec3::splat(0.5) };
     let mass = |i: u32| if i + 1 == count { 1000.0 * ratio } else { 1000.0 };
     let at = |i: u32| DVec3::Z * (0.5 + 1.001 * f64::from(i));
@@ -83,36 +60,21 @@ fn stretch(bodies: &[RigidBody]) -> f64 {
 fn run(bodies: &mut [RigidBody], dt: f64, seconds: f64, mut watch: impl FnMut(&[RigidBody])) -> (f64, f64) {
     let span = SimSpan::from_secs_f64(dt).expect("dt is a span");
     let steps = (seconds / dt).round() as u32;
-    let (mut spent, mut parts) = (0.0, 0);
+    let (mut spent, mut parts, mut apart) = (0.0, 0, Vec::new());
     for _ in 0..steps {
-        let (leader, others) = bodies.split_first_mut().expect("there is a body");
-        let mut others: Vec<Companion<'_>> = (1..)
-            .zip(others.iter_mut())
-            .map(|(i, agent)| Companion {
-                id: AgentId(i),
-                agent,
-                around: Surroundings::alone(AgentId(i), SimTime::ZERO),
-            })
-            .collect();
-        let start = Instant::now();
-        let around = Surroundings::alone(AgentId(0), SimTime::ZERO);
-        let report = leader.lead(span, &around, &mut others, &mut Vec::new()).expect("nobody is lost");
-        spent += start.elapsed().as_secs_f64();
+        let (report, took_s) = step(bodies, span, &mut apart);
+        spent += took_s;
         parts += report.substeps;
         watch(bodies);
     }
     (spent / f64::from(steps) * 1e6, f64::from(parts) / f64::from(steps))
 }
 
-fn built(specs: Vec<RigidSpec>) -> Vec<RigidBody> {
-    specs.into_iter().map(|spec| RigidBody::new(spec).expect("the body can be built")).collect()
-}
-
 fn main() {
     println!("test,ratio,inv_dt,sink_m,lateral_m,stretch_max_m,us_per_step,parts_per_step");
     for inv_dt in [60.0, 240.0] {
         for ratio in [1.0, 100.0, 1000.0] {
-            for count in [2, 10] {
+            for count in [2, 10, 24, 40, 100] {
                 let mut bodies = built(stack(count, ratio));
                 let (us, parts) = run(&mut bodies, 1.0 / inv_dt, 10.0, |_| {});
                 let top = state(&bodies[count as usize - 1]).position;

@@ -4,10 +4,13 @@
 //!
 //! Both worlds have the same boxes and the same solver settings and are stepped in turn, so that a busy machine slows both.
 
-use glam::{DQuat, DVec3};
+mod bodies;
+
+use bodies::{built, floor, spec, step};
+use glam::DVec3;
+use metachron_agents::SimSpan;
 use metachron_agents::rigid::{RigidBody, RigidSpec};
 use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{Agent, AgentId, Companion, SimSpan, SimTime, Surroundings};
 use rapier3d::prelude::*;
 use std::sync::Arc;
 use std::time::Instant;
@@ -21,31 +24,13 @@ fn place(side: u32, i: u32) -> DVec3 {
     DVec3::new(at(i % side), at(i / side % side), at(i / side / side) + 1.01 * HALF)
 }
 
-fn bodies(side: u32) -> Vec<RigidBody> {
-    let floor = Obstacle {
-        name: "floor".to_owned(),
-        solid: Solid::Plane,
-        position: DVec3::ZERO,
-        rotation: DQuat::IDENTITY,
-        friction: 0.5,
-        restitution: 0.0,
-    };
-    let obstacles: Arc<[Obstacle]> = Arc::from([floor]);
-    let spec = |i: u32| RigidSpec {
-        solid: Solid::Box { half_extents_m: DVec3::splat(HALF) },
-        position: place(side, i),
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg: 1.0,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: DVec3::Z * -9.81,
-        obstacles: obstacles.clone(),
-        joints: Arc::from([]),
-        sleep: false,
-    };
-    (0..side.pow(3)).map(|i| RigidBody::new(spec(i)).expect("a box can be built")).collect()
+fn boxes(side: u32) -> Vec<RigidBody> {
+    let obstacles: Arc<[Obstacle]> = Arc::from([floor()]);
+    let solid = Solid::Box { half_extents_m: DVec3::splat(HALF) };
+    built(
+        (0..side.pow(3))
+            .map(|i| RigidSpec { obstacles: obstacles.clone(), ..spec(solid.clone(), place(side, i), 1.0) }),
+    )
 }
 
 fn plain(side: u32) -> PhysicsWorld {
@@ -77,22 +62,18 @@ fn plain(side: u32) -> PhysicsWorld {
 
 fn main() {
     let side = std::env::args().nth(1).and_then(|side| side.parse().ok()).unwrap_or(10);
-    let (mut bodies, mut world) = (bodies(side), plain(side));
+    let (mut bodies, mut world) = (boxes(side), plain(side));
     let span = SimSpan::from_secs_f64(DT).expect("dt is a span");
-    let (leader, others) = bodies.split_first_mut().expect("there is a box");
-    let around = |i| Surroundings::alone(AgentId(i), SimTime::ZERO);
-    let mut others: Vec<Companion<'_>> =
-        (1..).zip(others.iter_mut()).map(|(i, agent)| Companion { id: AgentId(i), agent, around: around(i) }).collect();
     let (mut ours, mut theirs, mut apart) = (Vec::new(), Vec::new(), Vec::new());
-    for step in 0..STEPS {
+    for number in 0..STEPS {
+        let (_, island_s) = step(&mut bodies, span, &mut apart);
         let start = Instant::now();
-        leader.lead(span, &around(0), &mut others, &mut apart).expect("nobody is lost");
-        let middle = Instant::now();
         world.step();
+        let plain_s = start.elapsed().as_secs_f64();
         // the first steps build both worlds
-        if step >= STEPS / 8 {
-            ours.push(middle.duration_since(start).as_secs_f64() * 1e6);
-            theirs.push(middle.elapsed().as_secs_f64() * 1e6);
+        if number >= STEPS / 8 {
+            ours.push(island_s * 1e6);
+            theirs.push(plain_s * 1e6);
         }
     }
     println!("boxes,share_of_steps,island_us_per_step,rapier_us_per_step,ratio");

@@ -6,8 +6,7 @@
 use glam::{DQuat, DVec3};
 use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
 use metachron_agents::{
-    Agent, AgentId, Anchor, Body, Grasp, Neighbour, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot,
-    Surroundings, ToolState,
+    Agent, AgentId, Anchor, Body, Grasp, Neighbour, SimSpan, SimTime, Snapshot, Surroundings, ToolState,
 };
 use std::sync::Arc;
 use std::time::Instant;
@@ -15,28 +14,9 @@ use std::time::Instant;
 /// The clamped soft tube of `tests/reference/cosserat_tube.json`, 1 m along +x.
 fn tube(segments: usize, self_contact: bool) -> Tube {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
-    let resolution = Resolution { eps_m: 1.0 / segments as f64, n: 3 };
-    let spec = TubeSpec {
-        path_m: vec![DVec3::ZERO, DVec3::X],
-        section,
-        mass_per_length_kg_m,
-        resolution,
-        range: ResolutionRange::fixed(resolution),
-        segments: Some(segments),
-        substeps: 1,
-        damping_per_s: 6.0,
-        clamp: [true, false],
-        pin: [false; 2],
-        attachments: vec![],
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact,
-        friction: 0.0,
-        gravity: DVec3::NEG_Z * 9.81,
-        obstacles: Arc::from([]),
-        sleep: false,
-    };
+    let free = TubeSpec::free(vec![DVec3::ZERO, DVec3::X], Section::hollow(0.015, 0.002, material), segments);
+    let gravity = DVec3::NEG_Z * 9.81;
+    let spec = TubeSpec { damping_per_s: 6.0, clamp: [true, false], self_contact, gravity, ..free };
     Tube::new(spec).expect("the reference tube is a tube")
 }
 

@@ -62,26 +62,16 @@ fn floor() -> Obstacle {
 
 fn tube(clamp: bool, damping_per_s: f64) -> Box<dyn Agent> {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    let section = Section::hollow(0.015, 0.002, material);
     let spec = TubeSpec {
-        path_m: vec![DVec3::ZERO, DVec3::X],
-        section,
-        mass_per_length_kg_m,
         resolution: Resolution { eps_m: 1.0 / 16.0, n: 3 },
         range: ResolutionRange { eps_m: (1e-3, 1.0), n: (0, 5) },
         segments: None,
-        substeps: 1,
         damping_per_s,
         clamp: [clamp, false],
-        pin: [false; 2],
-        attachments: vec![],
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact: false,
         friction: 0.3,
         gravity: GRAVITY,
-        obstacles: Arc::from([]),
-        sleep: false,
+        ..TubeSpec::free(vec![DVec3::ZERO, DVec3::X], section, 16)
     };
     Box::new(Tube::new(spec).unwrap())
 }

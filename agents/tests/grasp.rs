@@ -16,29 +16,11 @@ const STIFFNESS_N_M: f64 = 40.0;
 /// Half a metre of soft tube along x, held at both ends, no gravity: nothing but the tool moves it.
 fn tube() -> Tube {
     let material = Material { young_pa: 1e5, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    let section = Section::hollow(0.015, 0.002, material);
     let resolution = Resolution { eps_m: 0.02, n: 3 };
-    let spec = TubeSpec {
-        path_m: vec![DVec3::ZERO, DVec3::X * 0.5],
-        section,
-        mass_per_length_kg_m,
-        resolution,
-        range: ResolutionRange::fixed(resolution),
-        segments: None,
-        substeps: 1,
-        damping_per_s: 8.0,
-        clamp: [true; 2],
-        pin: [false; 2],
-        attachments: vec![],
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact: false,
-        friction: 0.3,
-        gravity: DVec3::ZERO,
-        obstacles: Arc::from([]),
-        sleep: true,
-    };
-    Tube::new(spec).unwrap()
+    let free = TubeSpec::free(vec![DVec3::ZERO, DVec3::X * 0.5], section, 25);
+    let range = ResolutionRange::fixed(resolution);
+    Tube::new(TubeSpec { resolution, range, damping_per_s: 8.0, clamp: [true; 2], sleep: true, ..free }).unwrap()
 }
 
 /// Shuts over the tube, lifts it by 4 cm, waits, and opens at 6 s.

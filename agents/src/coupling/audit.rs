@@ -8,6 +8,7 @@
 //! Exact for rigid bodies whose acceleration is constant meanwhile. Of tubes the state counts as it was published, with the
 //! change of velocities: what a shift of positions does to the elastic energy is left out, of second order in the impulse.
 
+use super::other::turned;
 use super::{Impulse, Ledger, Site};
 use crate::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
 use glam::{DMat3, DQuat, DVec3};
@@ -106,10 +107,6 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     state.velocity += a * h;
     state.rotation = turned(state.rotation, state.spin * h);
     Some(state)
-}
-
-fn turned(rotation: DQuat, by: DVec3) -> DQuat {
-    (DQuat::from_scaled_axis(by) * rotation).normalize()
 }
 
 impl Audit {
@@ -225,7 +222,7 @@ pub fn rigid_inertia(mass_kg: f64, moments_kg_m2: DVec3, rotation: DQuat) -> Ine
 mod tests {
     use super::*;
     use crate::rod::{Material, Section, Tube, TubeSpec};
-    use crate::{Agent, Anchor, Pull, Resolution, ResolutionRange, SimSpan, Surroundings};
+    use crate::{Agent, Anchor, Pull, SimSpan, Surroundings};
 
     const MOMENTS: DVec3 = DVec3::new(0.02, 0.03, 0.04);
 
@@ -293,28 +290,8 @@ mod tests {
     /// A free tube that a hand has swung for a while.
     fn swung() -> Tube {
         let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-        let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
-        let spec = TubeSpec {
-            path_m: vec![DVec3::ZERO, DVec3::X],
-            section,
-            mass_per_length_kg_m,
-            resolution: Resolution { eps_m: 0.1, n: 0 },
-            range: ResolutionRange { eps_m: (0.01, 1.0), n: (0, 0) },
-            segments: Some(12),
-            substeps: 1,
-            damping_per_s: 0.0,
-            clamp: [false; 2],
-            pin: [false; 2],
-            attachments: vec![],
-            peristalsis: None,
-            pressure_pa: 0.0,
-            self_contact: false,
-            friction: 0.0,
-            gravity: DVec3::ZERO,
-            obstacles: [].into(),
-            sleep: false,
-        };
-        let mut tube = Tube::new(spec).unwrap();
+        let section = Section::hollow(0.015, 0.002, material);
+        let mut tube = Tube::new(TubeSpec::free(vec![DVec3::ZERO, DVec3::X], section, 12)).unwrap();
         let hand = Pull {
             by: None,
             anchor: Anchor::Arc(0.8),

@@ -440,6 +440,6 @@ impl Other {
 }
 
 /// A rotation turned on by a small or large rotation vector in world axes.
-fn turned(rotation: DQuat, by: DVec3) -> DQuat {
+pub(super) fn turned(rotation: DQuat, by: DVec3) -> DQuat {
     if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
 }

@@ -109,6 +109,36 @@ pub struct Material {
     pub shear_factor: f64,
 }
 
+impl TubeSpec {
+    /// A free tube along `path_m` of this section and mass per length, in `segments` equal parts: held nowhere, nothing pulls
+    /// at it, damps it or rubs on it, it touches neither itself nor anything that never moves, keeps its resolution, never sleeps.
+    #[must_use]
+    pub fn free(path_m: Vec<DVec3>, (section, mass_per_length_kg_m): (Section, f64), segments: usize) -> Self {
+        let length_m: f64 = path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+        let resolution = Resolution { eps_m: length_m / segments.max(1) as f64, n: 0 };
+        Self {
+            path_m,
+            section,
+            mass_per_length_kg_m,
+            resolution,
+            range: ResolutionRange::fixed(resolution),
+            segments: Some(segments),
+            substeps: 1,
+            damping_per_s: 0.0,
+            clamp: [false; 2],
+            pin: [false; 2],
+            attachments: Vec::new(),
+            peristalsis: None,
+            pressure_pa: 0.0,
+            self_contact: false,
+            friction: 0.0,
+            gravity: DVec3::ZERO,
+            obstacles: [].into(),
+            sleep: false,
+        }
+    }
+}
+
 impl Section {
     /// The section of a round tube, and its mass per length in kg/m.
     #[must_use]

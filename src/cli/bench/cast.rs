@@ -64,27 +64,16 @@ fn rod(place: DVec3) -> anyhow::Result<Tube> {
     const LENGTH_M: f64 = 1.0;
     const SEGMENTS: usize = 64;
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 0.5 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
-    let resolution = Resolution { eps_m: LENGTH_M / SEGMENTS as f64, n: 1 };
+    let section = Section::hollow(0.015, 0.002, material);
+    let free = TubeSpec::free(vec![place, place + DVec3::X * LENGTH_M], section, SEGMENTS);
+    let eps_m = LENGTH_M / SEGMENTS as f64;
     let spec = TubeSpec {
-        path_m: vec![place, place + DVec3::X * LENGTH_M],
-        section,
-        mass_per_length_kg_m,
-        resolution,
-        range: ResolutionRange { eps_m: (resolution.eps_m, resolution.eps_m), n: (0, N_MAX) },
-        segments: Some(SEGMENTS),
-        substeps: 1,
+        resolution: Resolution { eps_m, n: 1 },
+        range: ResolutionRange { eps_m: (eps_m, eps_m), n: (0, N_MAX) },
         damping_per_s: 6.0,
         clamp: [true, false],
-        pin: [false; 2],
-        attachments: Vec::new(),
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact: false,
-        friction: 0.0,
         gravity: DVec3::NEG_Z * 9.81,
-        obstacles: Arc::new([]),
-        sleep: false,
+        ..free
     };
     Tube::new(spec).context("the rod")
 }

@@ -10,32 +10,15 @@ use super::config::Config;
 use super::*;
 use crate::{Agent, AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Surroundings};
 use glam::DVec3;
-use std::sync::Arc;
 
 /// The reference tube of `tests/reference/cosserat_tube.json` with this modulus, along +x from the origin, 1 m.
 pub fn reference_spec(young_pa: f64, segments: usize) -> TubeSpec {
     let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
-    let resolution = Resolution { eps_m: 1.0 / segments as f64, n: 3 };
     TubeSpec {
-        path_m: vec![DVec3::ZERO, DVec3::X],
-        section,
-        mass_per_length_kg_m,
-        resolution,
+        resolution: Resolution { eps_m: 1.0 / segments as f64, n: 3 },
         range: ResolutionRange { eps_m: (1e-4, 1.0), n: (0, 5) },
-        segments: Some(segments),
-        substeps: 1,
-        damping_per_s: 0.0,
-        clamp: [false; 2],
-        pin: [false; 2],
-        attachments: vec![],
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact: false,
         friction: 0.3,
-        gravity: DVec3::ZERO,
-        obstacles: Arc::from([]),
-        sleep: false,
+        ..TubeSpec::free(vec![DVec3::ZERO, DVec3::X], Section::hollow(0.015, 0.002, material), segments)
     }
 }
 

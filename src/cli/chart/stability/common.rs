@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_agents::rigid::RigidSpec;
 use metachron_agents::rod::{Material, Section, TubeSpec};
 use metachron_agents::shape::Solid;
-use metachron_agents::{Anchor, Pull, Resolution, ResolutionRange};
+use metachron_agents::{Anchor, Pull};
 
 /// The pull of the Earth, m/s².
 pub(in super::super) const GRAVITY: f64 = 9.81;
@@ -12,27 +12,7 @@ pub(in super::super) const GRAVITY: f64 = 9.81;
 /// A free tube of 1 MPa with a wall of an eighth of its radius, no weight, no damping, no friction.
 pub(in super::super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: usize) -> TubeSpec {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-    let (section, mass_per_length_kg_m) = Section::hollow(radius_m, radius_m / 8.0, material);
-    TubeSpec {
-        path_m,
-        section,
-        mass_per_length_kg_m,
-        resolution: Resolution { eps_m: 0.01, n: 0 },
-        range: ResolutionRange { eps_m: (1e-4, 1.0), n: (0, 0) },
-        segments: Some(segments),
-        substeps: 1,
-        damping_per_s: 0.0,
-        clamp: [false; 2],
-        pin: [false; 2],
-        attachments: vec![],
-        peristalsis: None,
-        pressure_pa: 0.0,
-        self_contact: false,
-        friction: 0.0,
-        gravity: DVec3::ZERO,
-        obstacles: [].into(),
-        sleep: false,
-    }
+    TubeSpec::free(path_m, Section::hollow(radius_m, radius_m / 8.0, material), segments)
 }
 
 /// A free rigid body at rest at `position`, no weight, no friction, no rebound.
