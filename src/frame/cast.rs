@@ -130,6 +130,7 @@ pub(super) fn machine(scene: &Scene) -> Machine {
     machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
     machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
     machine.spikes = wish.spikes.unwrap_or(machine.spikes);
+    machine.load.clone_from(&wish.load);
     machine.seed = wish.seed.unwrap_or(machine.seed);
     machine
 }

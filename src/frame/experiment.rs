@@ -1,7 +1,7 @@
 //! A scene drawn at resolutions that a design chooses, to see how its frames answer.
 //!
-//! In: a session, what draws. Out: what was in view, the polygons and the time of every frame. The controller learns nothing
-//! meanwhile. Never here: what the numbers mean ([`crate::tune`] says).
+//! In: a session, what draws; or a [`Design`] for whoever draws the frames. Out: what was in view, the polygons and the time of every
+//! frame. The controller learns nothing meanwhile. Never here: what the numbers mean ([`crate::tune`] says).
 //! The design: steps over the whole range, then a pseudo-random binary sequence around its middle, so that both the line and the
 //! delay can be told apart from a drift of the scene.
 
@@ -9,7 +9,7 @@ use super::error::SessionError;
 use super::headless::{Drawing, one_frame};
 use super::session::Session;
 use crate::compositor::{Size, Style};
-use crate::control::{Law, Policy};
+use crate::control::{Law, PictureControl, Policy};
 use crate::tune::Observed;
 use std::time::Duration;
 
@@ -52,32 +52,62 @@ pub fn experiment(
     mut plan: Experiment,
     go_on: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Experimented, SessionError> {
-    session.control().set_policy(Policy::Feedback);
-    session.control().set_law(Law::CORRECTED);
     let period = session.period();
-    let (mut observed, mut interrupted, mut register) = (Vec::with_capacity(plan.frames as usize), false, 1_u32);
-    let mut due = Duration::ZERO;
-    for frame in 0..WARM_UP + plan.frames {
+    let mut design = Design::begin(session.control(), plan.frames);
+    let (mut due, mut interrupted) = (Duration::ZERO, false);
+    while design.done() < 1.0 && !interrupted {
         session.wait_until(due);
-        if interrupted {
-            break;
-        }
-        if let Some(share) = level(frame, &mut register) {
-            session.control().seek(share);
-        }
+        design.choose(session.control());
         let record = one_frame(&mut session, (plan.size, Style::default()), &mut plan.drawing, true)?;
-        if frame >= WARM_UP {
-            let polygons = session.control().last_plan().polygons;
-            observed.push(Observed { views: session.views().to_vec(), polygons, work_s: 1e-3 * record.frame_ms });
-        }
-        interrupted = !go_on(frame as f64 / (WARM_UP + plan.frames) as f64);
+        design.note(&mut session, 1e-3 * record.frame_ms);
+        interrupted = !go_on(design.done());
         due = (due + period).max(session.now());
     }
+    let finished = design.done() >= 1.0;
     let adapter = match &plan.drawing {
         Drawing::Every(gpu) | Drawing::Last(gpu) => Some(gpu.gpu().describe()),
         Drawing::Nothing => None,
     };
-    Ok(Experimented { observed, adapter, interrupted })
+    Ok(Experimented { observed: design.observed, adapter, interrupted: interrupted && !finished })
+}
+
+/// The experiment, frame by frame.
+pub(super) struct Design {
+    frames: u64,
+    frame: u64,
+    register: u32,
+    /// Its frames so far, without those of the warm-up.
+    pub observed: Vec<Observed>,
+}
+
+impl Design {
+    /// An experiment of so many frames beside the warm-up; `control` is brought to the law whose range it goes over.
+    pub fn begin(control: &mut PictureControl, frames: u64) -> Self {
+        control.set_policy(Policy::Feedback);
+        control.set_law(Law::CORRECTED);
+        Self { frames, frame: 0, register: 1, observed: Vec::with_capacity(frames as usize) }
+    }
+
+    /// Brings `control` to where the next frame is to be drawn.
+    pub fn choose(&mut self, control: &mut PictureControl) {
+        if let Some(share) = level(self.frame, &mut self.register) {
+            control.seek(share);
+        }
+    }
+
+    /// Writes down the frame that was drawn, and what it took.
+    pub fn note(&mut self, session: &mut Session, work_s: f64) {
+        if self.frame >= WARM_UP {
+            let polygons = session.control().last_plan().polygons;
+            self.observed.push(Observed { views: session.views().to_vec(), polygons, work_s });
+        }
+        self.frame += 1;
+    }
+
+    /// The share that is done, 0 … 1.
+    pub fn done(&self) -> f64 {
+        self.frame as f64 / (WARM_UP + self.frames) as f64
+    }
 }
 
 /// Where in the range frame `frame` is drawn; `None`: where the last one was.

@@ -297,7 +297,7 @@ impl Session {
             if drawn { prices.object_s(level.shading, level.polygons, view.pixels) } else { 0.0 }
         };
         let objects_s: f64 = self.views.iter().zip(&self.control.last_plan().levels).map(of).sum();
-        let cost = self.machine.frame_time(prices.backdrop_s(backdrop) + objects_s, self.frames());
+        let cost = self.machine.frame_time(prices.backdrop_s(backdrop) + objects_s, self.frames(), self.now());
         self.run.spend(cost);
     }
 

@@ -6,11 +6,13 @@ use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
 use super::panels::{self, Meter};
 use super::session::{Finished, Session};
+use super::tuning::{self, Tuned, Tuning};
 use crate::compositor::viewer::{
     Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
     run_window,
 };
-use crate::compositor::{Camera, Gpu, Hand, Hit, Picture, Ray};
+use crate::compositor::{Camera, Gpu, Hand, Hit, Picture, Ray, viewer};
+use crate::control::Policy;
 use crate::runtime::Drive;
 use crate::scene::{self, Scene, SceneError, Source};
 use glam::DVec3;
@@ -76,6 +78,7 @@ struct WindowShow<'a> {
     meter: Meter,
     notices: Vec<(Instant, Message)>,
     hand: Option<Hand>,
+    tuning: Option<Tuning>,
     started: Duration,
     refreshed: Option<Duration>,
     last: FrameRecord,
@@ -110,6 +113,7 @@ impl<'a> WindowShow<'a> {
             session,
             plan,
             hand: None,
+            tuning: None,
             started: Duration::ZERO,
             refreshed: None,
             last: FrameRecord::default(),
@@ -130,6 +134,7 @@ impl<'a> WindowShow<'a> {
     }
 
     fn replace(&mut self, mut session: Session) {
+        self.stop_tuning();
         session.keep_frames(kept(&self.plan));
         session.drive(Drive::Speed(self.speed));
         if !self.running {
@@ -231,6 +236,42 @@ impl<'a> WindowShow<'a> {
         }
     }
 
+    fn tune(&mut self) {
+        self.stop_tuning();
+        self.tuning = Some(Tuning::begin(self.session.control()));
+    }
+
+    /// Stops looking for gains, where anybody does: what holds the picture is as it was.
+    fn stop_tuning(&mut self) {
+        if let Some(tuning) = self.tuning.take() {
+            tuning.stop(self.session.control());
+        }
+    }
+
+    /// Takes the gains of a search that is over.
+    fn take_gains(&mut self) {
+        let Some(tuning) = self.tuning.take_if(|tuning| tuning.is_over()) else { return };
+        match tuning.end() {
+            Tuned::Found(verdict) => {
+                if let crate::tune::Contender::Feedback(law) = verdict.contender {
+                    self.session.control().set_policy(Policy::Feedback);
+                    self.session.control().set_law(law);
+                }
+                self.say(Weight::Note, format!("tuned: {}", tuning::told(&verdict)));
+            }
+            Tuned::Refused(why) => self.say(Weight::Warning, format!("not tuned: {why}")),
+        }
+    }
+
+    /// Lets the experiment have its frame.
+    fn note_frame(&mut self) {
+        let Some(tuning) = &mut self.tuning else { return };
+        if let Err(error) = tuning.note(&mut self.session, 1e-3 * self.last.frame_ms) {
+            self.stop_tuning();
+            self.say(Weight::Failure, format!("not tuned: {error}"));
+        }
+    }
+
     /// How much of a run that ends by itself is done, 0 … 1.
     fn share_done(&self) -> Option<f64> {
         let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
@@ -276,6 +317,9 @@ const fn kept(plan: &WindowPlan) -> usize {
 
 impl Show for WindowShow<'_> {
     fn apply(&mut self, action: Action) {
+        if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
+            self.stop_tuning();
+        }
         match action {
             Action::Run => self.drive(Drive::Run),
             Action::Pause => self.drive(Drive::Pause),
@@ -291,6 +335,8 @@ impl Show for WindowShow<'_> {
             Action::Law(law) => self.session.control().set_law(panels::control_law(law)),
             Action::Sliders(sliders) => self.session.control().set_sliders(sliders),
             Action::Freeze(frozen) => self.session.control().freeze(frozen),
+            Action::Tune => self.tune(),
+            Action::StopTuning => self.stop_tuning(),
             Action::DragStart(hit) => {
                 self.pull(Some(Hand { object: hit.object, anchor: hit.anchor, target: hit.point_m }));
             }
@@ -307,6 +353,7 @@ impl Show for WindowShow<'_> {
             self.begin();
         }
         self.pass_time();
+        self.take_gains();
         self.refresh();
         let now = Instant::now();
         self.notices.retain(|(until, _)| now < *until);
@@ -316,6 +363,13 @@ impl Show for WindowShow<'_> {
         (self.status.running, self.status.speed) = (self.running, self.speed);
         self.status.held =
             self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
+        self.status.tuning = self.tuning.as_ref().map(|tuning| {
+            let (done, words) = tuning.progress();
+            viewer::Tuning { done, words }
+        });
+        if let Some(tuning) = &mut self.tuning {
+            tuning.choose(self.session.control());
+        }
         self.session.compose(&view.camera, view.size, view.style, self.hand);
         if self.session.is_virtual() {
             self.session.spend_declared(view.size);
@@ -330,8 +384,12 @@ impl Show for WindowShow<'_> {
         }
         let declared = || self.session.now().saturating_sub(self.started);
         let (work, draw) = if self.session.is_virtual() { (declared(), declared()) } else { (times.work, times.draw) };
-        let (gpu, skip) = (times.draw_gpu, times.skip.is_some());
-        self.last = self.session.finish(self.started, Finished { work, draw, gpu, skip });
+        let unlike = times.skip.is_some();
+        let skip = unlike || self.tuning.as_ref().is_some_and(Tuning::draws);
+        self.last = self.session.finish(self.started, Finished { work, draw, gpu: times.draw_gpu, skip });
+        if !unlike {
+            self.note_frame();
+        }
     }
 
     fn status(&self) -> &Status {
@@ -371,14 +429,23 @@ mod tests {
     use crate::compositor::{Size, Style};
     use std::path::Path;
 
-    fn plan() -> WindowPlan {
+    fn plan(scene: &str) -> WindowPlan {
         let overrides = vec![("executor".to_owned(), "\"lockstep\"".to_owned())];
-        let source = Source::open("pendulum").unwrap();
+        let source = Source::open(scene).unwrap();
         WindowPlan { source, overrides, size: None, screenshots: PathBuf::from("."), seconds: None, frames: None }
     }
 
     fn with_show(check: impl FnOnce(&mut WindowShow<'_>)) {
-        let plan = plan();
+        with_scene("pendulum", check);
+    }
+
+    /// A scene whose picture has something to control.
+    fn with_tube(check: impl FnOnce(&mut WindowShow<'_>)) {
+        with_scene("tube", check);
+    }
+
+    fn with_scene(scene: &str, check: impl FnOnce(&mut WindowShow<'_>)) {
+        let plan = plan(scene);
         let session = Session::open(scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
         let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
         check(&mut WindowShow::new(session, plan, &mut go_on));
@@ -386,8 +453,11 @@ mod tests {
 
     /// One picture and its account.
     fn frame(show: &mut WindowShow<'_>, skip: Option<Skip>) {
-        let view =
-            ViewRequest { size: Size { width: 64, height: 48 }, camera: show.scene_camera(), style: Style::default() };
+        let view = ViewRequest {
+            size: Size { width: 1280, height: 720 },
+            camera: show.scene_camera(),
+            style: Style::default(),
+        };
         show.compose(&view);
         show.measured(&FrameTimes { skip, ..FrameTimes::default() });
     }
@@ -456,6 +526,63 @@ mod tests {
             assert!(show.session.sim_now() > before);
             show.apply(Action::Reload);
             assert_eq!(show.session.scene().name, "pendulum");
+        });
+    }
+
+    #[test]
+    fn tuning_draws_its_experiment_searches_beside_the_show_and_takes_what_it_finds() {
+        with_tube(|show| {
+            let before = show.session.control().law();
+            show.apply(Action::Tune);
+            (0..160).for_each(|_| frame(show, None));
+            let tuning = show.status().tuning.clone().expect("it is under way");
+            assert!((0.39..=1.0).contains(&tuning.done), "{tuning:?}");
+            assert_eq!(show.session.control().law(), before, "until gains are found the old ones hold the picture");
+            let frames = (0..6000).take_while(|_| {
+                frame(show, None);
+                std::thread::sleep(Duration::from_millis(10)); // the search has a thread of its own
+                show.tuning.is_some()
+            });
+            assert!(frames.count() < 6000, "it ends");
+            frame(show, None);
+            assert_eq!(show.status().tuning, None);
+            assert_ne!(show.session.control().law(), before);
+            let [message] = &show.status().messages[..] else { panic!("one message: {:?}", show.status().messages) };
+            assert!(message.weight == Weight::Note && message.text.starts_with("tuned: κ"), "{}", message.text);
+        });
+    }
+
+    #[test]
+    fn tuning_that_is_cancelled_leaves_everything_as_it_was() {
+        for frames in [20, 170] {
+            with_tube(|show| {
+                let held = |show: &mut WindowShow<'_>| (show.session.control().policy(), show.session.control().law());
+                show.session.set_policy("adaptive");
+                let before = held(show);
+                show.apply(Action::Tune);
+                (0..frames).for_each(|_| frame(show, None));
+                show.apply(Action::StopTuning);
+                frame(show, None);
+                assert_eq!((held(show), show.status().tuning.clone()), (before, None));
+                assert!(show.status().messages.is_empty(), "{:?}", show.status().messages);
+            });
+        }
+    }
+
+    #[test]
+    fn a_scene_that_leaves_nothing_to_tune_says_why() {
+        with_tube(|show| {
+            show.apply(Action::TargetFps(1000.0));
+            show.apply(Action::Tune);
+            for _ in 0..2000 {
+                frame(show, None);
+                if show.tuning.is_none() {
+                    break;
+                }
+                std::thread::sleep(Duration::from_millis(5));
+            }
+            let [message] = &show.status().messages[..] else { panic!("one message: {:?}", show.status().messages) };
+            assert!(message.weight == Weight::Warning && message.text.contains("coarsest"), "{}", message.text);
         });
     }
 

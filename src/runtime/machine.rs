@@ -21,6 +21,8 @@ pub struct Machine {
     pub wander_sd: f64,
     /// Share of frames that take half as long again, `0..=1`.
     pub spikes: f64,
+    /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time, before the first once.
+    pub load: Vec<(f64, f64)>,
     /// Which noise: equal seeds give equal runs.
     pub seed: u64,
 }
@@ -95,6 +97,7 @@ impl Machine {
             noise_sd: 0.0,
             wander_sd: 0.0,
             spikes: 0.0,
+            load: Vec::new(),
             seed: 1,
         }
     }
@@ -123,11 +126,16 @@ impl Machine {
         us * 1e-6 * self.noise(stream, count)
     }
 
-    /// What the frame `count` takes that should take `seconds`: white noise, noise that wanders, spikes.
+    /// What the frame `count` takes that begins `at` and should take `seconds`: load, white noise, noise that wanders, spikes.
     #[must_use]
-    pub fn frame_time(&self, seconds: f64, count: u64) -> Duration {
+    pub fn frame_time(&self, seconds: f64, count: u64, at: Duration) -> Duration {
         let spike = if uniform(self.seed, SPIKE_STREAM, count) < sound(self.spikes) { SPIKE } else { 1.0 };
-        duration(seconds * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
+        duration(seconds * self.load(at.as_secs_f64()) * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
+    }
+
+    /// How many times its declared time a frame takes that begins after so many wall seconds.
+    fn load(&self, wall_s: f64) -> f64 {
+        self.load.iter().take_while(|(at_s, _)| *at_s <= wall_s).last().map_or(1.0, |(_, factor)| *factor)
     }
 
     /// A log-normal factor of mean 1 whose logarithm keeps nine tenths of itself from one frame to the next: the sum of what
@@ -260,7 +268,7 @@ mod tests {
     fn frames_wander_and_spike_as_declared() {
         let machine = Machine { wander_sd: 0.05, spikes: 0.01, ..Machine::default() };
         let n = 20_000_u64;
-        let x: Vec<f64> = (0..n).map(|frame| machine.frame_time(1.0, frame).as_secs_f64()).collect();
+        let x: Vec<f64> = (0..n).map(|frame| machine.frame_time(1.0, frame, Duration::ZERO).as_secs_f64()).collect();
         let spikes = x.iter().filter(|x| **x > 1.3).count() as f64 / n as f64;
         let calm: Vec<f64> = x.iter().map(|x| if *x > 1.3 { x / SPIKE } else { *x } - 1.0).collect();
         let moment = |lag: usize| calm.iter().zip(&calm[lag..]).map(|(a, b)| a * b).sum::<f64>() / n as f64;
@@ -268,6 +276,14 @@ mod tests {
         assert!((moment(0).sqrt() - 0.05).abs() < 0.004, "deviation {}", moment(0).sqrt());
         assert!((moment(1) / moment(0) - 0.9).abs() < 0.03, "kept {}", moment(1) / moment(0));
         assert!((spikes - 0.01).abs() < 0.003, "spikes {spikes}");
+    }
+
+    #[test]
+    fn a_load_counts_from_its_time_until_the_next() {
+        let machine = Machine { load: vec![(1.0, 2.5), (3.0, 0.5)], ..Machine::default() };
+        let took = |at_ms: u64| machine.frame_time(0.01, 0, Duration::from_millis(at_ms)).as_secs_f64();
+        let expected = [(0, 0.01), (999, 0.01), (1000, 0.025), (2999, 0.025), (3000, 0.005), (9000, 0.005)];
+        assert!(expected.iter().all(|&(at_ms, s)| (took(at_ms) - s).abs() < 1e-9));
     }
 
     #[test]
@@ -281,7 +297,7 @@ mod tests {
     #[test]
     fn prices_that_are_no_price_cost_nothing() {
         let machine = Machine { spikes: f64::NAN, ..Machine::default() };
-        assert_eq!(machine.frame_time(f64::NAN, 0), Duration::ZERO);
+        assert_eq!(machine.frame_time(f64::NAN, 0, Duration::ZERO), Duration::ZERO);
         assert_eq!(machine.step_s("tube", f64::INFINITY, 0, 0), 2e-6);
     }
 

@@ -142,6 +142,8 @@ pub struct Machine {
     pub wander: Option<f64>,
     /// Share of frames that take half as long again, 0 … 1.
     pub spikes: Option<f64>,
+    /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time.
+    pub load: Vec<(f64, f64)>,
     /// Seed of the noise.
     pub seed: Option<u64>,
 }

@@ -1,27 +1,18 @@
 //! Why a pair of gains is slow, swings, or is fine.
 //!
-//! In: a plant, a law with its gains, a target. Out: the loop near its set point, where it comes to rest, and two sentences that a
+//! In: a plant, a contender with its gains, a target. Out: the loop near its set point, where it can rest, and two sentences that a
 //! person can act on. Never here: other gains than those that were asked about.
 
-use super::disturb::Disturbance;
+use super::contender::Contender;
 use super::margins::Loop;
 use super::measures::{Cycle, Measures};
 use super::plant::{Plant, Reach};
-use super::play::{Beat, Start, Trial, play};
+use super::play::{Start, Trial, play};
+use super::rests::{FixedPoint, fixed_points};
+use super::trials::speeds_in_reach;
 use crate::control::Law;
 
-/// Where a loop comes to rest.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FixedPoint {
-    /// The loop variable ε̂ there.
-    pub eps_hat: f64,
-    /// t/T_set there.
-    pub ratio: f64,
-    /// Whether it rests on a limit of what is in view.
-    pub clamped: bool,
-}
-
-/// A law on a plant, explained.
+/// A contender on a plant, explained.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
     /// What the picture can take at all.
@@ -32,132 +23,100 @@ pub struct Explanation {
     pub share: f64,
     /// The loop near the set point; `None` where the set point is out of reach.
     pub near: Option<Loop>,
-    /// The places at which it rests, from starts between a quarter and four times the wanted rate, by rising ε̂.
+    /// The places at which it can rest, by rising ε̂.
     pub rests: Vec<FixedPoint>,
     /// From 0.4 and from 2.5 times the wanted rate, without noise.
     pub from: [Measures; 2],
-    /// The swing that is left, if there is one.
+    /// The swing that is left from a start between a quarter and four times the wanted rate, if there is one.
     pub cycle: Option<Cycle>,
+    /// Levels n that change in a frame when it should be at rest, the worst of the same starts.
+    pub chatter: f64,
     /// What that means.
     pub sentences: String,
 }
 
-/// Starts whose rests are looked at, in parts of the wanted rate.
+/// Starts that are played, in parts of the wanted rate.
 const STARTS: [f64; 7] = [0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0];
 /// Seconds that a calm trial is watched.
 const WATCH_S: f64 = 12.0;
-/// Rests nearer than this, in proportion, are one.
-const SAME: f64 = 0.06;
 /// Slower than this is slow, seconds.
 const SLOW_S: f64 = 1.0;
 /// A loop nearer than this factor to swinging has little room.
 const LITTLE_ROOM: f64 = 2.0;
 
-/// Explains what `law` does to `plant` at `target_hz`.
+/// Explains what `contender` does to `plant` at `target_hz`.
 #[must_use]
-pub fn explain(plant: &Plant, law: Law, target_hz: f64) -> Explanation {
+pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -> Explanation {
+    let contender = contender.into();
     let calm = |rate: f64| {
-        let trial = Trial {
-            law,
-            target_hz,
-            speed: 1.0,
-            start: Start::Rate(rate),
-            disturbance: Disturbance::Nothing,
-            noise: 0.0,
-            seed: 0,
-            seconds: WATCH_S,
-        };
-        play(plant, &trial)
+        let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S, ..Trial::calm(contender, target_hz) };
+        Measures::of(&play(plant, &trial))
     };
     let runs = STARTS.map(calm);
-    let from = [&runs[1], &runs[5]].map(|beats| Measures::of(beats));
-    let set_s = law.set_share() / target_hz;
+    let set_s = contender.set_share() / target_hz;
     let mut explanation = Explanation {
         reach: plant.reach(1.0),
         set_s,
         share: plant.share(set_s, 1.0),
-        near: local_loop(plant, law, target_hz),
-        rests: rests(&runs),
-        cycle: runs.iter().find_map(|beats| Measures::of(beats).cycle),
-        from,
+        near: contender.local_loop(plant, target_hz, 1.0),
+        rests: fixed_points(plant, contender, target_hz),
+        cycle: runs.iter().find_map(|measured| measured.cycle),
+        chatter: runs.iter().map(|measured| measured.chatter).fold(0.0, f64::max),
+        from: [runs[1], runs[5]],
         sentences: String::new(),
     };
-    explanation.sentences = explanation.tell(law, target_hz);
+    explanation.sentences = explanation.tell(contender, target_hz);
     explanation
 }
 
-/// The loop near the set point (control.md, eq. 4, 8 and 21); `None` where the picture cannot take that time.
-pub(super) fn local_loop(plant: &Plant, law: Law, target_hz: f64) -> Option<Loop> {
-    let set_s = law.set_share() / target_hz;
+/// Why no gain can bring `plant` to `target_hz`; `None` where one can, on this machine or, where the finest picture leaves time, on a slower
+/// one. Two sentences.
+#[must_use]
+pub fn refusal(plant: &Plant, target_hz: f64) -> Option<String> {
     let reach = plant.reach(1.0);
-    if !(reach.least_s <= set_s && set_s <= reach.most_s) {
-        return None;
-    }
-    let share = plant.share(set_s, 1.0);
-    let (gain, lead) = match law {
-        Law::Corrected { kappa, lead, .. } => (kappa * share, lead * share),
-        Law::Printed { alpha, .. } => (alpha * share * target_hz / rest_of(plant, law, target_hz), 0.0),
-    };
-    Some(Loop { gain, lead, dead_time: plant.dead_time })
+    let too_slow = reach.least_s > 1.0 / target_hz;
+    (too_slow || speeds_in_reach(plant, target_hz).is_empty())
+        .then(|| tell_of_the_range(reach, 1.0 / target_hz, target_hz))
 }
 
-/// ε̂ with which a law begins that is put where the frame takes its time.
-fn rest_of(plant: &Plant, law: Law, target_hz: f64) -> f64 {
-    let trial = Trial {
-        law,
-        target_hz,
-        speed: 1.0,
-        start: Start::Target,
-        disturbance: Disturbance::Nothing,
-        noise: 0.0,
-        seed: 0,
-        seconds: 0.5 / target_hz,
-    };
-    play(plant, &trial).first().map_or(1.0, |beat| beat.eps_hat)
-}
-
-/// Where the runs end, each place once.
-fn rests(runs: &[Vec<Beat>]) -> Vec<FixedPoint> {
-    let mut found: Vec<FixedPoint> = Vec::new();
-    for beats in runs {
-        let (Some(last), None) = (beats.last(), Measures::of(beats).cycle) else { continue };
-        let point = FixedPoint { eps_hat: last.eps_hat, ratio: last.ratio, clamped: last.status.clamped().is_some() };
-        if found.iter().all(|held| (held.eps_hat / point.eps_hat).ln().abs() > SAME) {
-            found.push(point);
-        }
-    }
-    found.sort_by(|a, b| a.eps_hat.total_cmp(&b.eps_hat));
-    found
+/// A time that is out of reach, and what to ask for instead.
+fn tell_of_the_range(Reach { least_s, most_s }: Reach, set_s: f64, target_hz: f64) -> String {
+    let (end, why) = if set_s < least_s { ("coarsest", "too long") } else { ("finest", "less than it may") };
+    format!(
+        "At {target_hz} Hz a frame may take {:.2} ms, and what is in view takes {:.2} to {:.2} ms: it rests at its {end} and takes {why}. Ask \
+         for a rate between {:.0} and {:.0} Hz, or widen the ranges of ε and n.",
+        1e3 * set_s,
+        1e3 * least_s,
+        1e3 * most_s,
+        1.0 / most_s,
+        1.0 / least_s
+    )
 }
 
 impl Explanation {
     /// Two sentences: what it does and why, and what to change.
-    fn tell(&self, law: Law, target_hz: f64) -> String {
-        let ms = |s: f64| 1e3 * s;
-        let Reach { least_s, most_s } = self.reach;
+    fn tell(&self, contender: Contender, target_hz: f64) -> String {
         let Some(near) = self.near else {
-            let (end, why) =
-                if self.set_s < least_s { ("coarsest", "too long") } else { ("finest", "less than it may") };
-            return format!(
-                "At {target_hz} Hz a frame may take {:.2} ms, and what is in view takes {:.2} to {:.2} ms: it rests at its {end} and takes \
-                 {why}. Ask for a rate between {:.0} and {:.0} Hz, or widen the ranges of ε and n.",
-                ms(self.set_s),
-                ms(least_s),
-                ms(most_s),
-                1.0 / most_s,
-                1.0 / least_s
-            );
+            return tell_of_the_range(self.reach, self.set_s, target_hz);
         };
+        let settle = self.from.iter().map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten();
+        let Contender::Feedback(law) = contender else { return self.tell_of_prices(near, settle) };
         let (name, value) = knob(law);
         let margin = near.gain_margin();
-        let settle = self.from.iter().map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten();
         let safe = value * margin / LITTLE_ROOM;
+        if let [FixedPoint { eps_hat, ratio, clamped: true }] = self.rests[..] {
+            return format!(
+                "It rests on a limit, ε̂ = {eps_hat:.3} at {ratio:.2} of its time, though what is in view could take all of it: β ties n to \
+                 ε̂, and the n that comes with it is too {}. Use the corrected law, which chooses n by itself.",
+                if ratio < 1.0 { "low" } else { "high" }
+            );
+        }
         if !near.is_stable() || self.cycle.is_some() {
             return self.tell_of_a_swing(near, (name, value, margin));
         }
         if let [first, .., last] = &self.rests[..] {
             return format!(
-                "It comes to rest in {} places, from ε̂ = {:.3} ({:.2} of the time) to {:.3} ({:.2}), depending on where it begins: n = ⌊ρ⌋ \
+                "It can rest in {} places, from ε̂ = {:.3} ({:.2} of the time) to {:.3} ({:.2}), depending on where it begins: n = ⌊ρ⌋ \
                  makes frames slower where ε̂ grows. Use the corrected law, which has one.",
                 self.rests.len(),
                 first.eps_hat,
@@ -183,6 +142,26 @@ impl Explanation {
             None => format!(
                 "It does not come within 5 % of its time in {WATCH_S} s: each frame removes {removes:.2} % of an error, or the levels of what is \
                  in view are too coarse for the target. Raise {name} from {value:.2e} to {safe:.2e}, or widen the ranges of ε and n."
+            ),
+        }
+    }
+
+    /// The policy that predicts has no gain to be set: its filter weighs what it measures.
+    fn tell_of_prices(&self, near: Loop, settle: Option<f64>) -> String {
+        let learns = 100.0 * near.gain;
+        match settle {
+            Some(s) if s <= SLOW_S => format!(
+                "It settles in {s:.2} s: each frame corrects {learns:.0} % of what it believes wrongly of the machine, and it bears {} more \
+                 frames of delay before it swings. Nothing needs to be changed.",
+                near.delay_margin()
+            ),
+            Some(s) => format!(
+                "It takes {s:.1} s to settle: each frame corrects {learns:.0} % of what it believes wrongly of the machine, and what it \
+                 believes falls by 5 % a frame at most. Tell it the prices of this machine in `[machine]`, or let it measure them."
+            ),
+            None => format!(
+                "It does not come within 5 % of its time in {WATCH_S} s, though each frame corrects {learns:.0} % of what it believes wrongly of \
+                 the machine: what is in view has levels too coarse for the target. Widen the ranges of ε and n."
             ),
         }
     }
@@ -244,10 +223,27 @@ mod tests {
     #[test]
     fn a_gain_that_is_too_high_swings() {
         // 5 times the slope's boundary of 2 ε̂/(s f)
-        let near = local_loop(&plant(), Law::PRINTED, 30.0).unwrap();
+        let near = Contender::from(Law::PRINTED).local_loop(&plant(), 30.0, 1.0).unwrap();
         let alpha = 1e-4 * 5.0 * near.gain_margin();
         let told = explain(&plant(), Law::Printed { alpha, beta: 1e-6 }, 30.0);
         assert!(told.sentences.starts_with("It swings"), "{}", told.sentences);
+    }
+
+    #[test]
+    fn the_policy_that_predicts_is_fine_and_says_what_it_learns() {
+        let told = explain(&plant(), Contender::ADAPTIVE, 30.0);
+        assert!(told.sentences.starts_with("It settles in"), "{}", told.sentences);
+        assert_eq!(told.rests.len(), 1, "{:?}", told.rests);
+    }
+
+    #[test]
+    fn a_target_is_refused_where_no_machine_that_is_asked_can_take_it() {
+        assert_eq!(refusal(&plant(), 30.0), None);
+        assert!(refusal(&plant(), 200.0).unwrap().contains("coarsest"));
+        assert!(refusal(&plant(), 0.1).unwrap().contains("finest"));
+        // the finest leaves time here, and a machine of a quarter of the speed would need it
+        let most_s = plant().reach(1.0).most_s;
+        assert_eq!(refusal(&plant(), 0.4 / most_s), None);
     }
 
     #[test]

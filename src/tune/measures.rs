@@ -3,7 +3,6 @@
 //! In: the frames of a trial. Out: numbers. Never here: what they weigh against each other.
 
 use super::play::Beat;
-use crate::control::Status;
 
 /// Settled: the median of nine frames lies within this part of the set point, and stays there.
 pub const BAND: f64 = 0.05;
@@ -28,23 +27,25 @@ pub struct Cycle {
 /// One trial in numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures {
-    /// Wall seconds after which it stays within ± 5 % of the set point, or on a limit of its range; `None` where it does not.
+    /// Wall seconds after which it stays within ± 5 % of the set point, or where what is in view allows no more; `None` where it does not.
     pub settle_s: Option<f64>,
     /// How far t/T_set went past 1 on the other side of where it began, ≥ 0.
     pub overshoot: f64,
     /// Share of frames that took 5 % longer than they may.
     pub miss_share: f64,
-    /// Mean |t/T_set − 1|, or the distance from the limit it must rest on.
+    /// The same without a step: a frame counts nothing up to its time, 1 from 5 % past it, and by a straight line between.
+    pub overrun: f64,
+    /// Mean |t/T_set − 1|, 0 where what is in view allows no more.
     pub error: f64,
     /// Turns back within three frames, a frame.
     pub reversals: f64,
     /// Levels n that changed in the second half, a frame.
     pub chatter: f64,
-    /// Mean share of the polygons that the time would have paid for, 0 … 1.
+    /// Mean share of the polygons that the whole time of a frame would have paid for, 0 … 1.
     pub quality: f64,
     /// The swing that is left in the last third, if there is one; to be asked of trials without noise alone.
     pub cycle: Option<Cycle>,
-    /// Whether it ends on a limit of its range.
+    /// Whether it ends where what is in view allows no more.
     pub clamped: bool,
 }
 
@@ -58,40 +59,44 @@ impl Measures {
         Self {
             settle_s: settle_s(beats),
             overshoot: overshoot(beats),
-            miss_share: mean(&|b| f64::from(u8::from(b.late))),
+            miss_share: mean(&|b| f64::from(u8::from(b.part > LATE))),
+            overrun: mean(&|b| ((b.part - 1.0) / (LATE - 1.0)).clamp(0.0, 1.0)),
             error: mean(&error),
             reversals: f64::from(reversals(beats)) / count,
             chatter: f64::from(second_half.iter().map(|b| b.switches).sum::<u32>()) / second_half.len().max(1) as f64,
             quality: mean(&|b| (b.polygons / b.polygons_ideal).clamp(0.0, 1.0)),
             cycle: cycle(&beats[beats.len() * 2 / 3..]),
-            clamped: beats.last().is_some_and(rests_on_a_limit),
+            clamped: beats.last().is_some_and(|b| b.at_end),
         }
     }
 }
 
-fn rests_on_a_limit(beat: &Beat) -> bool {
-    matches!(beat.status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed)
-}
-
 fn error(beat: &Beat) -> f64 {
-    if rests_on_a_limit(beat) { 0.0 } else { (beat.ratio - 1.0).abs() }
+    if beat.at_end { 0.0 } else { (beat.ratio - 1.0).abs() }
 }
 
-/// The time of the frame after the last whose running median is off.
+/// Wall seconds after which a trial stays within ± 5 %, or rests where nothing better is to be had.
 fn settle_s(beats: &[Beat]) -> Option<f64> {
+    let rows: Vec<_> = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
+    settled_after(&rows, |at| beats[at].at_end)
+}
+
+/// The time of the frame after the last at which the running median of nine (time, t/T_set) is past ± 5 % and which does not `rest`
+/// on a limit; `None` where the last is still past.
+#[must_use]
+pub fn settled_after(rows: &[(f64, f64)], rests: impl Fn(usize) -> bool) -> Option<f64> {
     let mut window = [0.0; MEDIAN];
-    let good = |at: usize, window: &mut [f64; MEDIAN]| {
-        let from = at.saturating_sub(MEDIAN / 2).min(beats.len().saturating_sub(MEDIAN));
-        let near = &beats[from..(from + MEDIAN).min(beats.len())];
+    let mut good = |at: usize| {
+        let from = at.saturating_sub(MEDIAN / 2).min(rows.len().saturating_sub(MEDIAN));
+        let near = &rows[from..(from + MEDIAN).min(rows.len())];
         let held = &mut window[..near.len()];
-        held.iter_mut().zip(near).for_each(|(slot, b)| *slot = b.ratio);
+        held.iter_mut().zip(near).for_each(|(slot, (_, ratio))| *slot = *ratio);
         held.sort_unstable_by(f64::total_cmp);
-        (held[held.len() / 2] - 1.0).abs() <= BAND || rests_on_a_limit(&beats[at])
+        (held[held.len() / 2] - 1.0).abs() <= BAND || rests(at)
     };
-    let last_bad = (0..beats.len()).rev().find(|&at| !good(at, &mut window));
-    match last_bad {
+    match (0..rows.len()).rev().find(|&at| !good(at)) {
         None => Some(0.0),
-        Some(at) => beats.get(at + 1).map(|b| b.time_s),
+        Some(at) => rows.get(at + 1).map(|(time_s, _)| *time_s),
     }
 }
 
@@ -99,7 +104,7 @@ fn settle_s(beats: &[Beat]) -> Option<f64> {
 fn overshoot(beats: &[Beat]) -> f64 {
     let Some(first) = beats.first() else { return 0.0 };
     let past = |b: &Beat| if first.ratio >= 1.0 { 1.0 - b.ratio } else { b.ratio - 1.0 };
-    beats.iter().filter(|b| !rests_on_a_limit(b)).map(past).fold(0.0, f64::max)
+    beats.iter().filter(|b| !b.at_end).map(past).fold(0.0, f64::max)
 }
 
 /// How often ε̂ went one way and within three frames the other.
@@ -134,17 +139,19 @@ fn cycle(tail: &[Beat]) -> Option<Cycle> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::control::Status;
 
     fn beats(ratio: impl Fn(usize) -> f64) -> Vec<Beat> {
         let beat = |k: usize| Beat {
             time_s: (k + 1) as f64 / 30.0,
             ratio: ratio(k),
-            late: ratio(k) > 1.2,
+            part: 0.9 * ratio(k),
             eps_hat: 1.0 / ratio(k),
             polygons: 50.0,
             polygons_ideal: 100.0,
             switches: u32::from(k.is_multiple_of(10)),
             status: Status::Moving,
+            at_end: false,
         };
         (0..300).map(beat).collect()
     }
@@ -165,6 +172,14 @@ mod tests {
         let cycle = measured.cycle.unwrap();
         assert_eq!(measured.settle_s, None);
         assert!((cycle.amplitude - 0.4).abs() < 0.01 && (cycle.period_s - 0.5).abs() < 0.01, "{cycle:?}");
+    }
+
+    #[test]
+    fn a_frame_is_late_by_degrees_and_missed_from_a_twentieth_on() {
+        // 0.9 of 1.0 on time, of 1.14 half way, of 1.2 missed: a third each
+        let measured = Measures::of(&beats(|k| [1.0, 1.025 / 0.9, 1.2][k % 3]));
+        assert!((measured.miss_share - 1.0 / 3.0).abs() < 1e-9, "{}", measured.miss_share);
+        assert!((measured.overrun - 0.5).abs() < 1e-9, "{}", measured.overrun);
     }
 
     #[test]

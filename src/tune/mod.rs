@@ -3,8 +3,9 @@
 //! In: frames of an experiment ([`Observed`]). Out: the plant behind them ([`Plant`]), what a law does to it ([`explain`], [`judge`])
 //! and the gains that do best ([`search()`]). Closed loops are played with the controller that draws, [`crate::control::PictureControl`],
 //! on the fitted plant, so that what is found is what runs. Never here: scenes, threads of agents, drawing, files.
-//! Theory: `docs/theory/control.md`, section 6.
+//! Theory: `docs/theory/control.md`, section 8.
 
+mod contender;
 mod disturb;
 mod explain;
 mod line;
@@ -13,16 +14,22 @@ mod measures;
 mod plant;
 mod play;
 mod relay;
+mod rests;
 mod search;
 mod trials;
 
+#[cfg(test)]
+mod tests;
+
+pub use contender::Contender;
 pub use disturb::Disturbance;
-pub use explain::{Explanation, FixedPoint, explain};
+pub use explain::{Explanation, explain, refusal};
 pub use line::Line;
 pub use margins::Loop;
-pub use measures::{BAND, Cycle, LATE, Measures};
+pub use measures::{BAND, Cycle, LATE, Measures, settled_after};
 pub use plant::{NoPlant, Observed, Plant, Reach};
 pub use play::{Beat, Start, Trial, play};
 pub use relay::relay_gains;
+pub use rests::{FixedPoint, fixed_points};
 pub use search::{Family, Found, Search, search};
-pub use trials::{Extent, Verdict, judge};
+pub use trials::{Extent, Verdict, judge, speeds_in_reach};

@@ -5,8 +5,7 @@
 //! Theory: `docs/theory/control.md`, eq. 26.
 
 use super::line::Line;
-use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy};
-use std::time::Duration;
+use crate::control::{Law, ObjectView, PictureControl, Policy};
 
 /// One frame of an experiment.
 #[derive(Debug, Clone, PartialEq)]
@@ -69,6 +68,14 @@ pub struct Reach {
     pub most_s: f64,
 }
 
+impl Reach {
+    /// Whether a time lies in it.
+    #[must_use]
+    pub fn holds(self, time_s: f64) -> bool {
+        self.least_s <= time_s && time_s <= self.most_s
+    }
+}
+
 /// The longest dead time that is looked for, frames.
 const DEAD_TIME_MAX: usize = 4;
 /// A dead time is believed where it leaves this part of the scatter, or less, that a shorter one leaves.
@@ -92,7 +99,10 @@ impl Plant {
         if most <= least {
             return Err(NoPlant::NothingToControl);
         }
-        let (dead_time, line) = best_dead_time(observed).ok_or(NoPlant::NothingToControl)?;
+        // polygons may come and go with what is in view though none of it has a choice
+        let (coarsest, finest) = ends(&observed[0].views);
+        let (dead_time, line) =
+            best_dead_time(observed).filter(|_| finest > coarsest).ok_or(NoPlant::NothingToControl)?;
         if line.slope_95.0 <= 0.0 {
             let [slope_ns, low_ns, high_ns] = [line.slope, line.slope_95.0, line.slope_95.1].map(|s| 1e9 * s);
             return Err(NoPlant::NoAnswer { slope_ns, low_ns, high_ns });
@@ -108,6 +118,17 @@ impl Plant {
         self.line.at(polygons).max(1e-3 * self.line.slope * polygons).max(1e-9) / speed
     }
 
+    /// The same picture on a machine `speed` times as fast.
+    #[must_use]
+    pub fn on(&self, speed: f64) -> Self {
+        let mut plant = self.clone();
+        let line = &mut plant.line;
+        (line.intercept, line.slope) = (line.intercept / speed, line.slope / speed);
+        line.slope_95 = (line.slope_95.0 / speed, line.slope_95.1 / speed);
+        plant.points.iter_mut().for_each(|(_, seconds)| *seconds /= speed);
+        plant
+    }
+
     /// What was in view in frame `k`; the experiment runs forth and back for ever.
     #[must_use]
     pub fn views(&self, k: usize) -> &[ObjectView] {
@@ -119,15 +140,8 @@ impl Plant {
     /// What the picture can take between its coarsest and its finest, on a machine `speed` times as fast.
     #[must_use]
     pub fn reach(&self, speed: f64) -> Reach {
-        let end = |factor: f64| {
-            let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 30.0);
-            control.plan(self.views(0));
-            control.coarsen(factor);
-            let polygons = control.plan(self.views(0)).polygons;
-            control.observe(FrameWork { work: Duration::ZERO, draw: Duration::ZERO, skip: true });
-            self.seconds(polygons, speed)
-        };
-        Reach { least_s: end(1e12), most_s: end(1e-12) }
+        let (least, most) = ends(self.views(0));
+        Reach { least_s: self.seconds(least, speed), most_s: self.seconds(most, speed) }
     }
 
     /// s: the share of a frame of `time_s` seconds that goes with its polygons (control.md, eq. 3).
@@ -135,6 +149,17 @@ impl Plant {
     pub fn share(&self, time_s: f64, speed: f64) -> f64 {
         (1.0 - self.line.intercept.max(0.0) / speed / time_s).clamp(0.0, 1.0)
     }
+}
+
+/// Polygons of what is in view at its coarsest, and as fine as a controller draws it.
+pub(super) fn ends(views: &[ObjectView]) -> (f64, f64) {
+    let end = |factor: f64| {
+        let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 30.0);
+        control.plan(views);
+        control.coarsen(factor);
+        control.plan(views).polygons
+    };
+    (end(1e12), end(1e-12))
 }
 
 /// The shortest dead time that no longer one betters clearly.
@@ -187,6 +212,18 @@ pub(super) mod tests {
         ]
     }
 
+    /// A long thin tube whose ε̂ reaches from 0.01 to 1.
+    pub fn tube_alone() -> ObjectView {
+        let [tube, _] = <[ObjectView; 2]>::try_from(views()).unwrap();
+        ObjectView { range: ResolutionRange { eps_m: (4e-4, 0.04), n: (0, 5) }, ..tube }
+    }
+
+    /// A plant without noise, with these in view.
+    pub fn plant_of(views: Vec<ObjectView>, fixed_s: f64, polygon_s: f64) -> Plant {
+        let points: Vec<_> = (1..40).map(|k| (1e3 * f64::from(k), fixed_s + polygon_s * 1e3 * f64::from(k))).collect();
+        Plant { line: Line::through(&points).unwrap(), dead_time: 0, frames: vec![views], points }
+    }
+
     /// An experiment on a plant of `fixed_s` and `polygon_s` that answers `dead_time` frames late.
     pub fn observed(fixed_s: f64, polygon_s: f64, dead_time: usize) -> Vec<Observed> {
         let polygons = |k: usize| 2e3 * (1.0 + ((k * 7919) % 97) as f64);
@@ -215,6 +252,12 @@ pub(super) mod tests {
         still.iter_mut().for_each(|o| o.polygons = 5.0);
         assert_eq!(Plant::identify(&still), Err(NoPlant::NothingToControl));
         assert_eq!(Plant::identify(&still[..5]), Err(NoPlant::TooFew { frames: 5 }));
+        let mut fixed = observed(7e-3, 1e-6, 0);
+        let fix = |view: &mut ObjectView| {
+            view.range = ResolutionRange { eps_m: (view.range.eps_m.0, view.range.eps_m.0), n: (1, 1) }
+        };
+        fixed.iter_mut().flat_map(|o| &mut o.views).for_each(fix);
+        assert_eq!(Plant::identify(&fixed), Err(NoPlant::NothingToControl), "polygons that nobody chose");
     }
 
     #[test]

@@ -3,9 +3,11 @@
 //! In: a [`Trial`]. Out: its frames. The controller is the one that draws; the plant is the fitted one. Equal trials give equal
 //! frames on every machine. Never here: what makes a trial good.
 
+use super::contender::Contender;
 use super::disturb::{Dice, Disturbance};
-use super::plant::Plant;
-use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Status};
+use super::plant::{Plant, ends};
+use crate::control::{FrameWork, Law, ObjectView, PictureControl, Status};
+use metachron_budget::Bound;
 use std::time::Duration;
 
 /// Where a trial begins.
@@ -20,8 +22,8 @@ pub enum Start {
 /// One loop to be played.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// The law with its gains.
-    pub law: Law,
+    /// Who holds the picture.
+    pub contender: Contender,
     /// Frames a second that are wanted, > 0.
     pub target_hz: f64,
     /// How many times as fast as the plant's machine this one is, > 0.
@@ -38,6 +40,23 @@ pub struct Trial {
     pub seconds: f64,
 }
 
+impl Trial {
+    /// Ten seconds at rest on the plant's own machine, without noise.
+    #[must_use]
+    pub fn calm(contender: impl Into<Contender>, target_hz: f64) -> Self {
+        Self {
+            contender: contender.into(),
+            target_hz,
+            speed: 1.0,
+            start: Start::Target,
+            disturbance: Disturbance::Nothing,
+            noise: 0.0,
+            seed: 0,
+            seconds: 10.0,
+        }
+    }
+}
+
 /// One frame of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beat {
@@ -45,30 +64,34 @@ pub struct Beat {
     pub time_s: f64,
     /// Its time over the wanted one, t/T_set.
     pub ratio: f64,
-    /// Whether it took 5 % longer than the frame may, T.
-    pub late: bool,
+    /// Its time over what a frame may take, t/T.
+    pub part: f64,
     /// The loop variable ε̂.
     pub eps_hat: f64,
     /// Triangles drawn.
     pub polygons: f64,
-    /// Triangles that would have taken just T_set, as far as the range reaches.
+    /// Triangles that would have taken just T, the whole time of a frame, as far as the range reaches: what a margin costs shows here.
     pub polygons_ideal: f64,
     /// Objects whose level n is not the one of the frame before.
     pub switches: u32,
     /// What the controller says of itself.
     pub status: Status,
+    /// Whether it rests where what is in view allows no more: not at a limit that is its own alone.
+    pub at_end: bool,
 }
 
-/// A frame past this part of its time is late.
-const LATE: f64 = 1.05;
+/// Frames in which a policy that learns comes to rest before a trial: κ falls by 5 % a frame at most, and by four times here.
+const WARM_UP: usize = 80;
+/// So near to an end of the range, in proportion, is that end: a tube has whole intervals.
+const NEAR: f64 = 0.03;
 /// Corrections to a start: levels are coarser than what is asked for.
 const AIMS: usize = 4;
 
 /// Plays a trial.
 #[must_use]
 pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
-    let mut control = PictureControl::new(Policy::Feedback, trial.law, trial.target_hz);
-    let set_s = control.set_point_s();
+    let mut control = trial.contender.control(plant, trial.target_hz);
+    let set_s = trial.contender.set_share() / trial.target_hz;
     place(&mut control, plant, trial, set_s);
     let mut dice = Dice::new(trial.seed);
     let mut beats: Vec<Beat> = Vec::with_capacity((trial.seconds * trial.target_hz) as usize + 1);
@@ -92,18 +115,42 @@ pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
         let work = Duration::from_secs_f64(work_s);
         control.observe(FrameWork { work, draw: work, skip: false });
         time_s += work_s.max(1.0 / trial.target_hz);
+        let status = control.status();
+        let at_end = is_at_end(trial.contender, status, polygons, &views);
         beats.push(Beat {
             time_s,
             ratio: work_s / set_s,
-            late: work_s * trial.target_hz > LATE,
+            part: work_s * trial.target_hz,
             eps_hat: control.eps_hat(),
             polygons,
-            polygons_ideal: plant.line.x_of(set_s * trial.speed / load).clamp(1.0, plan_full(&control)),
+            polygons_ideal: if at_end && status == Status::Clamped(Bound::Finest) {
+                polygons
+            } else {
+                plant.line.x_of(trial.speed / load / trial.target_hz).clamp(1.0, plan_full(&control))
+            },
             switches,
-            status: control.status(),
+            status,
+            at_end,
         });
     }
     beats
+}
+
+/// Whether a controller of this status that draws so many polygons cannot do better. The printed law ties n to ε̂, so that an end of its ε̂
+/// is not always an end of the picture.
+fn is_at_end(contender: Contender, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
+    let printed = matches!(contender, Contender::Feedback(Law::Printed { .. }));
+    match status {
+        Status::Clamped(bound) if printed => {
+            let (least, most) = ends(views);
+            match bound {
+                Bound::Finest => polygons >= (1.0 - NEAR) * most,
+                Bound::Coarsest => polygons <= (1.0 + NEAR) * least,
+            }
+        }
+        Status::Clamped(_) | Status::BetweenLevels | Status::Fixed => true,
+        _ => false,
+    }
 }
 
 fn plan_full(control: &PictureControl) -> f64 {
@@ -112,14 +159,34 @@ fn plan_full(control: &PictureControl) -> f64 {
 
 /// Brings the picture to where the trial begins.
 fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64) {
-    let wanted_s = match trial.start {
-        Start::Target => set_s,
-        Start::Rate(factor) => set_s / factor,
+    let rate = match trial.start {
+        Start::Target => 1.0,
+        Start::Rate(rate) => rate,
     };
-    let wanted = plant.line.x_of(wanted_s * trial.speed).max(1.0);
+    if matches!(trial.contender, Contender::Adaptive { .. }) {
+        // its state is what it has learnt: it comes from a machine on which this picture takes just its time
+        return learn(control, plant, trial.speed / rate);
+    }
+    // it was at rest before: what comes is a surprise to it
+    control.plan(plant.views(0));
+    control.observe(FrameWork {
+        work: Duration::from_secs_f64(set_s),
+        draw: Duration::from_secs_f64(set_s),
+        skip: false,
+    });
+    let wanted = plant.line.x_of(set_s / rate * trial.speed).max(1.0);
     for _ in 0..AIMS {
         let polygons = control.plan(plant.views(0)).polygons;
         control.coarsen(polygons / wanted);
+    }
+}
+
+/// Lets a policy that predicts come to rest on a machine so fast.
+fn learn(control: &mut PictureControl, plant: &Plant, speed: f64) {
+    for _ in 0..WARM_UP {
+        let polygons = control.plan(plant.views(0)).polygons;
+        let work = Duration::from_secs_f64(plant.seconds(polygons, speed));
+        control.observe(FrameWork { work, draw: work, skip: false });
     }
 }
 
@@ -146,16 +213,7 @@ mod tests {
     use super::*;
 
     fn trial(start: Start) -> Trial {
-        Trial {
-            law: Law::CORRECTED,
-            target_hz: 30.0,
-            speed: 1.0,
-            start,
-            disturbance: Disturbance::Nothing,
-            noise: 0.0,
-            seed: 1,
-            seconds: 2.0,
-        }
+        Trial { start, seed: 1, seconds: 2.0, ..Trial::calm(Law::CORRECTED, 30.0) }
     }
 
     #[test]

@@ -6,13 +6,16 @@ use super::plant::Plant;
 use crate::control::{FrameWork, Law, PictureControl, Policy};
 use std::time::Duration;
 
+/// Gains that the law takes.
+const GAINS: (f64, f64) = (0.01, 0.99);
 /// The relay moves ln ε by so much to either side.
 const HEIGHT: f64 = 0.2;
 /// Frames of the experiment, and those that are left out at its start.
 const FRAMES: usize = 240;
 const WARM_UP: usize = 60;
 
-/// The PI law that Ziegler and Nichols' rule gives for what a relay makes of the loop at `target_hz`; `None` where it does not swing.
+/// The PI law that Ziegler and Nichols' rule gives for what a relay makes of the loop at `target_hz`, as far as the law takes such gains;
+/// `None` where it does not swing.
 #[must_use]
 pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     let errors = relay(plant, target_hz, margin);
@@ -26,7 +29,8 @@ pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     let period = tail.len() as f64 / rises as f64;
     let ultimate = 4.0 * HEIGHT / (std::f64::consts::PI * amplitude);
     let proportional = 0.45 * ultimate;
-    Some(Law::Corrected { kappa: proportional * 1.2 / period, lead: proportional, margin })
+    let kappa = (proportional * 1.2 / period).clamp(GAINS.0, GAINS.1);
+    Some(Law::Corrected { kappa, lead: proportional.min(GAINS.1), margin })
 }
 
 /// ln(t/T_set) of frames whose ln ε a relay moves against it, without noise.
@@ -62,7 +66,7 @@ mod tests {
             let Some(Law::Corrected { kappa, lead, .. }) = relay_gains(&plant, 30.0, 0.1) else { panic!("it swings") };
             // a square wave of 2(d+1) frames and s·h: the rule gives 0.45·4/(π s), and a 1.2/Tu of it for the integral
             let s = plant.share(0.9 / 30.0, 1.0);
-            let expected = 0.45 * 4.0 / (std::f64::consts::PI * s);
+            let expected: f64 = 0.45 * 4.0 / (std::f64::consts::PI * s);
             assert!((lead / expected - 1.0).abs() < 0.15, "{dead_time}: {lead} and {expected}");
             let period = 2.0 * (dead_time as f64 + 1.0);
             assert!((kappa / (lead * 1.2 / period) - 1.0).abs() < 0.15, "{dead_time}: {kappa}");

@@ -1,15 +1,14 @@
 //! A law judged: all that may upset it, on machines of several speeds, with several seeds.
 //!
-//! In: a plant, a law, a target. Out: a [`Verdict`] with one number to be made small. Trials are dealt to all cores; the verdict does
+//! In: a plant, a contender, a target. Out: a [`Verdict`] with one number to be made small. Trials are dealt to all cores; the verdict does
 //! not depend on who plays which. Never here: which gains to try.
 
+use super::contender::Contender;
 use super::disturb::Disturbance;
-use super::explain::local_loop;
 use super::margins::Loop;
 use super::measures::Measures;
 use super::plant::Plant;
 use super::play::{Start, Trial, play};
-use crate::control::Law;
 use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
@@ -21,20 +20,22 @@ pub struct Extent {
     pub seeds: u64,
     /// Wall seconds of a trial are this many thousandths.
     pub millis: u64,
+    /// Threads that play, ≥ 1; `None`: as many as there are cores.
+    pub threads: Option<NonZero<usize>>,
 }
 
 impl Extent {
     /// Ten seeds, four seconds each.
-    pub const FULL: Self = Self { seeds: 10, millis: 4000 };
-    /// Two seeds, three seconds each.
-    pub const QUICK: Self = Self { seeds: 2, millis: 3000 };
+    pub const FULL: Self = Self { seeds: 10, millis: 4000, threads: None };
+    /// Two seeds, two seconds each.
+    pub const QUICK: Self = Self { seeds: 2, millis: 2000, threads: None };
 }
 
 /// What a law came to.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// The law with its gains.
-    pub law: Law,
+    /// Who was judged.
+    pub contender: Contender,
     /// The worse of the settling times from 0.4 and from 2.5 times the wanted rate, wall seconds; `None` where one does not settle.
     pub settle_s: Option<f64>,
     /// The worse overshoot of the two.
@@ -43,17 +44,18 @@ pub struct Verdict {
     pub miss_share: f64,
     /// Turns back within three frames, a frame, over all disturbances.
     pub reversals: f64,
-    /// Mean share of the polygons that the time would have paid for.
+    /// Mean share of the polygons that the whole time of a frame would have paid for.
     pub quality: f64,
-    /// The factor on the gains at which it begins to swing for ever.
+    /// The factor on the gains at which it begins to swing for ever, at the worst of the speeds that were asked.
     pub gain_margin: f64,
-    /// How many frames later a change may show.
+    /// How many frames later a change may show, at the worst of them.
     pub delay_margin: usize,
-    /// Speeds of the machine, in parts of the plant's own, at which it settles within a second and does not swing; those whose
-    /// target the picture cannot reach are not asked.
+    /// Speeds of the machine, in parts of the plant's own, at which it settles within a second and does not swing.
     pub robust_to: Vec<f64>,
-    /// Speeds that were asked.
+    /// Speeds that were asked: those at which the picture can be made to take the time of a frame.
     pub asked: Vec<f64>,
+    /// Of them the one nearest to the machine's own, at which all else was measured; 1 where none was asked.
+    pub at_speed: f64,
     /// The number to be made small: see [`Verdict::objective`].
     pub objective: f64,
 }
@@ -71,66 +73,68 @@ const DELAY_MARGIN: usize = 2;
 /// What a late frame, a reversal, a lost part of quality, a second of settling and a missing margin count beside an error of one.
 const WEIGHTS: [f64; 5] = [2.0, 0.1, 1.0, 0.1, 1.0];
 
-/// Judges `law` on `plant` at `target_hz`.
+/// Speeds of the machine, in parts of the plant's own and in rising order, at which what is in view can be made to take the time of a frame.
 #[must_use]
-pub fn judge(plant: &Plant, law: Law, target_hz: f64, extent: Extent) -> Verdict {
-    let calm = |speed: f64, rate: f64| Trial {
-        law,
-        target_hz,
-        speed,
-        start: Start::Rate(rate),
-        disturbance: Disturbance::Nothing,
-        noise: 0.0,
-        seed: 0,
-        seconds: 1e-3 * extent.millis as f64,
-    };
-    let asked: Vec<f64> = SPEEDS.into_iter().filter(|&speed| can_reach(plant, law, target_hz, speed)).collect();
+pub fn speeds_in_reach(plant: &Plant, target_hz: f64) -> Vec<f64> {
+    // by T, not by a law's own set point: a law must not choose which speeds it is asked for
+    SPEEDS.into_iter().filter(|&speed| plant.reach(speed).holds(1.0 / target_hz)).collect()
+}
+
+/// Judges `contender` on `plant` at `target_hz`.
+#[must_use]
+pub fn judge(plant: &Plant, contender: impl Into<Contender>, target_hz: f64, extent: Extent) -> Verdict {
+    let contender = contender.into();
+    let asked = speeds_in_reach(plant, target_hz);
+    let far = |speed: f64| libm::fabs(libm::log(speed));
+    let own = asked.iter().copied().min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0);
+    let seconds = 1e-3 * extent.millis as f64;
+    let calm =
+        |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(contender, target_hz) };
     let starts: Vec<_> = asked.iter().flat_map(|&speed| STARTS.map(|rate| calm(speed, rate))).collect();
-    let upset = disturbed(&calm(1.0, 1.0), plant.line.scatter, extent);
-    let played = play_all(plant, &[starts.clone(), upset].concat());
+    let upset = disturbed(&calm(own, 1.0), plant.line.scatter, extent);
+    let played = play_all(plant, &[starts.clone(), upset].concat(), extent);
     let (settling, upset) = played.split_at(starts.len());
     let at_speed = |speed: f64| starts.iter().zip(settling).filter(move |(t, _)| t.speed == speed).map(|(_, m)| *m);
     let good = |m: Measures| m.settle_s.is_some_and(|s| s <= SETTLE_MAX_S) && m.cycle.is_none();
-    let own = if asked.contains(&1.0) { 1.0 } else { asked.first().copied().unwrap_or(1.0) };
-    let worst = at_speed(own).map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten();
-    let local = local_loop(plant, law, target_hz);
+    let near: Vec<Loop> = asked.iter().filter_map(|&speed| contender.local_loop(plant, target_hz, speed)).collect();
     let mut verdict = Verdict {
-        law,
-        settle_s: worst,
+        contender,
+        settle_s: at_speed(own).map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten(),
         overshoot: at_speed(own).map(|m| m.overshoot).fold(0.0, f64::max),
         miss_share: mean(upset, |m| m.miss_share),
         reversals: mean(upset, |m| m.reversals),
         quality: mean(upset, |m| m.quality),
-        gain_margin: local.map_or(0.0, Loop::gain_margin),
-        delay_margin: local.map_or(0, Loop::delay_margin),
+        gain_margin: near.iter().map(|l| l.gain_margin()).reduce(f64::min).unwrap_or(0.0),
+        delay_margin: near.iter().map(|l| l.delay_margin()).min().unwrap_or(0),
         robust_to: asked.iter().copied().filter(|&speed| at_speed(speed).all(good)).collect(),
         asked,
+        at_speed: own,
         objective: 0.0,
     };
-    verdict.objective = verdict.weigh(mean(upset, |m| m.error), 1e-3 * extent.millis as f64);
+    verdict.objective = verdict.weigh(mean(upset, |m| m.error), mean(upset, |m| m.overrun), seconds);
     verdict
 }
 
 impl Verdict {
     /// Mean error, late frames, reversals, lost quality, settling and missing margins in one number (control.md, eq. 29).
-    fn weigh(&self, error: f64, longest_s: f64) -> f64 {
+    fn weigh(&self, error: f64, overrun: f64, longest_s: f64) -> f64 {
         let [late, reversal, quality, settling, margin] = WEIGHTS;
         let missing = (1.0 - self.gain_margin / GAIN_MARGIN).max(0.0)
             + (1.0 - self.delay_margin as f64 / DELAY_MARGIN as f64).max(0.0)
             + (self.asked.len() - self.robust_to.len()) as f64 / SPEEDS.len() as f64;
         error
-            + late * self.miss_share
+            + late * overrun
             + reversal * self.reversals
             + quality * (1.0 - self.quality)
             + settling * self.settle_s.unwrap_or(2.0 * longest_s)
             + margin * missing
     }
-}
 
-/// Whether the target lies in what the picture can take on a machine so fast.
-fn can_reach(plant: &Plant, law: Law, target_hz: f64, speed: f64) -> bool {
-    let (set_s, reach) = (law.set_share() / target_hz, plant.reach(speed));
-    reach.least_s <= set_s && set_s <= reach.most_s
+    /// Whether it keeps the margins that are asked of gains: a factor of two, and two frames.
+    #[must_use]
+    pub fn is_safe(&self) -> bool {
+        self.gain_margin >= GAIN_MARGIN && self.delay_margin >= DELAY_MARGIN
+    }
 }
 
 /// Trials with every disturbance and every seed.
@@ -145,9 +149,10 @@ fn mean(all: &[Measures], value: impl Fn(&Measures) -> f64) -> f64 {
     all.iter().map(value).sum::<f64>() / all.len().max(1) as f64
 }
 
-/// Plays every trial, on all cores.
-fn play_all(plant: &Plant, trials: &[Trial]) -> Vec<Measures> {
-    let cores = thread::available_parallelism().map_or(1, NonZero::get).min(trials.len().max(1));
+/// Plays every trial.
+fn play_all(plant: &Plant, trials: &[Trial], extent: Extent) -> Vec<Measures> {
+    let threads = extent.threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
+    let threads = threads.min(trials.len().max(1));
     let next = AtomicUsize::new(0);
     let work = || {
         let mut mine = Vec::new();
@@ -160,7 +165,7 @@ fn play_all(plant: &Plant, trials: &[Trial]) -> Vec<Measures> {
         mine
     };
     let mut all: Vec<(usize, Measures)> = thread::scope(|scope| {
-        let hands: Vec<_> = (1..cores).map(|_| scope.spawn(work)).collect();
+        let hands: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
         let mut all = work();
         // a panic in a trial is a bug of ours: it is printed already, and its trials are missing
         hands.into_iter().for_each(|hand| all.extend(hand.join().unwrap_or_default()));
@@ -168,4 +173,37 @@ fn play_all(plant: &Plant, trials: &[Trial]) -> Vec<Measures> {
     });
     all.sort_unstable_by_key(|(at, _)| *at);
     all.into_iter().map(|(_, measures)| measures).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::plant::tests::observed;
+    use super::*;
+    use crate::control::Law;
+
+    fn judged(margin: f64) -> Verdict {
+        let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
+        let extent = Extent { seeds: 1, millis: 2000, threads: None };
+        judge(&plant, Law::Corrected { kappa: 0.5, lead: 0.0, margin }, 30.0, extent)
+    }
+
+    #[test]
+    fn a_margin_costs_the_polygons_that_it_leaves_out() {
+        // of T = 33.3 ms, 7 ms are fixed: a margin m leaves (1 − m − 0.21)/(1 − 0.21) of the polygons, to what disturbances take
+        let (thin, wide) = (judged(0.05), judged(0.5));
+        let expected = (0.5 - 0.21) / (0.95 - 0.21);
+        assert!((wide.quality / thin.quality / expected - 1.0).abs() < 0.1, "{} and {}", wide.quality, thin.quality);
+        assert!(wide.objective > thin.objective + 0.2, "{} and {}", wide.objective, thin.objective);
+        assert_eq!(wide.asked, thin.asked, "the same speeds are asked of every margin");
+    }
+
+    #[test]
+    fn margins_are_those_of_the_worst_speed() {
+        let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
+        let verdict = judged(0.1);
+        // the larger the share of the time that goes with polygons, the larger the loop's gain: the fastest machine is the worst
+        let fastest = verdict.asked.iter().copied().filter(|s| plant.reach(*s).holds(0.03)).fold(0.0, f64::max);
+        let share = plant.share(0.03, fastest);
+        assert!((verdict.gain_margin - 2.0 / (0.5 * share)).abs() < 0.01, "{verdict:?}");
+    }
 }

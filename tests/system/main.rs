@@ -13,4 +13,5 @@ mod scenes;
 mod scenes_coupled;
 mod scenes_soft;
 mod throughput;
+mod tune;
 mod viewer;

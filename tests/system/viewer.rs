@@ -7,7 +7,7 @@ use egui_kittest::kittest::{NodeT, Queryable};
 use glam::DVec3;
 use metachron::compositor::viewer::{
     Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, MOUSE, Message, SHORTCUTS, Screen, Show, Status,
-    ViewRequest, Viewer, Weight, Wishes, keys_text,
+    Tuning, ViewRequest, Viewer, Weight, Wishes, keys_text,
 };
 use metachron::compositor::{Camera, Colouring, Hit, Picture, Ray, Size};
 use metachron_agents::{AgentId, Anchor, Resolution, SimTime};
@@ -59,6 +59,10 @@ impl Show for Fake {
             Action::Law(law) => self.status.law = Some(*law),
             Action::TargetFps(hz) => self.status.target_hz = *hz,
             Action::Speed(speed) => self.status.speed = *speed,
+            Action::Tune => {
+                self.status.tuning = Some(Tuning { done: 0.25, words: "drawing at many resolutions".to_owned() });
+            }
+            Action::StopTuning => self.status.tuning = None,
             Action::DragStart(hit) => {
                 self.status.held = Some(Held { target: hit.point_m, force_n: 0.0 });
             }
@@ -249,6 +253,20 @@ fn a_window_left_alone_asks_for_nothing_whatever_the_numbers() {
         harness.run_steps(30);
         assert_eq!(asked(&mut harness), []);
     }
+}
+
+#[test]
+fn tuning_is_started_watched_and_cancelled() {
+    let mut harness = window();
+    harness.get_by_label("Tune").click();
+    assert_eq!(asked(&mut harness), [Action::Tune]);
+    assert!(harness.query_by_label("Tune").is_none(), "one search at a time");
+    assert!(harness.query_by_label("drawing at many resolutions").is_some());
+    let bar = harness.get_by_role_and_label(egui::Role::ProgressIndicator, "Tuning");
+    assert_eq!(bar.accesskit_node().numeric_value(), Some(25.0));
+    harness.get_by_label("Cancel").click();
+    assert_eq!(asked(&mut harness), [Action::StopTuning]);
+    assert!(harness.query_by_label("Tune").is_some() && harness.query_by_label("Cancel").is_none());
 }
 
 #[test]

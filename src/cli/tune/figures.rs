@@ -5,7 +5,7 @@
 use super::super::chart::figure::{self, Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::{Identified, Tuned};
 use crate::control::Law;
-use crate::tune::{Disturbance, Measures, Plant, Start, Trial, play};
+use crate::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, play};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
@@ -55,25 +55,17 @@ fn fit(plant: &Plant) -> Panel {
     }
 }
 
-fn calm(on: &Identified, law: Law, rate: f64, seconds: f64) -> Trial {
-    Trial {
-        law,
-        target_hz: on.target_hz,
-        speed: 1.0,
-        start: Start::Rate(rate),
-        disturbance: Disturbance::Nothing,
-        noise: 0.0,
-        seed: 0,
-        seconds,
-    }
+fn calm(on: &Identified, contender: impl Into<Contender>, rate: f64, seconds: f64) -> Trial {
+    Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
 }
 
 /// From 0.4 and from 2.5 times the wanted rate.
 fn responses(on: &Identified, tuned: &Tuned) -> Panel {
+    let plant = judged_on(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
     for (row, colour) in tuned.rows.iter().zip(Colour::LINES) {
         for (k, rate) in [0.4, 2.5].into_iter().enumerate() {
-            let beats = play(&on.plant, &calm(on, row.verdict.law, rate, SHOWN_S));
+            let beats = play(&plant, &calm(on, row.verdict.contender, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
             layers.push(layer(if k == 0 { row.name } else { "" }, colour, Mark::Line(line)));
         }
@@ -86,9 +78,14 @@ fn responses(on: &Identified, tuned: &Tuned) -> Panel {
     }
 }
 
+/// The plant on the machine on which the gains were judged.
+fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
+    on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
+}
+
 /// Where the printed law swings, is slow, or holds, over (α, β); the chosen gains as a dot.
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
-    let [columns, rows] = CELLS;
+    let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
     let mut cells: [Vec<[f64; 4]>; 3] = Default::default();
     for column in 0..columns {
@@ -96,12 +93,12 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
             let (a, b) = (step(ALPHA, columns, column), step(BETA, rows, row));
             let (a_end, b_end) = (step(ALPHA, columns, column + 1), step(BETA, rows, row + 1));
             let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
-            cells[kind(on, law)].push([a, a_end, b, b_end]);
+            cells[kind(&plant, calm(on, law, 1.0, MAP_S))].push([a, a_end, b, b_end]);
         }
     }
     let [good, slow, swings] = cells;
-    let found = tuned.rows.iter().filter_map(|row| match row.verdict.law {
-        Law::Printed { alpha, beta } if row.name.ends_with("found") => Some((alpha, beta)),
+    let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
         _ => None,
     });
     Panel {
@@ -118,8 +115,8 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
 }
 
 /// 0: settles within a second from both starts; 1: later, or not; 2: swings.
-fn kind(on: &Identified, law: Law) -> usize {
-    let measured = [0.4, 2.5].map(|rate| Measures::of(&play(&on.plant, &calm(on, law, rate, MAP_S))));
+fn kind(plant: &Plant, calm: Trial) -> usize {
+    let measured = [0.4, 2.5].map(|rate| Measures::of(&play(plant, &Trial { start: Start::Rate(rate), ..calm })));
     if measured.iter().any(|m| m.cycle.is_some()) {
         2
     } else {
@@ -129,19 +126,19 @@ fn kind(on: &Identified, law: Law) -> usize {
 
 /// Late frames over the speed of the machine, the load 40 % up for a third of the time.
 fn misses(on: &Identified, tuned: &Tuned) -> Panel {
-    let share = |law: Law, speed: f64| {
+    let share = |contender: Contender, speed: f64| {
         let trial = Trial {
             speed,
             disturbance: Disturbance::Load(1.4),
             noise: on.plant.line.scatter,
             seed: 1,
             start: Start::Rate(speed),
-            ..calm(on, law, 1.0, 4.0)
+            ..calm(on, contender, 1.0, 4.0)
         };
         100.0 * Measures::of(&play(&on.plant, &trial)).miss_share
     };
     let lines = tuned.rows.iter().zip(Colour::LINES).map(|(row, colour)| {
-        layer(row.name, colour, Mark::Line(SPEEDS.iter().map(|&s| (s, share(row.verdict.law, s))).collect()))
+        layer(row.name, colour, Mark::Line(SPEEDS.iter().map(|&s| (s, share(row.verdict.contender, s))).collect()))
     });
     let layers: Vec<_> = lines.collect();
     let values = layers.iter().flat_map(|l| if let Mark::Line(points) = &l.mark { points.clone() } else { Vec::new() });

@@ -1,9 +1,11 @@
 //! Gains in words: as they are typed after `--analyse`, and as the TOML fragment that `run --gains` and a scene take.
 //!
-//! In: text. Out: a law with its gains, or overrides of a scene. Never here: which gains are good.
+//! In: text. Out: a contender with its gains, or overrides of a scene. Never here: which gains are good.
 
 use super::super::output::BadInput;
+use super::NORMALISED;
 use crate::control::Law;
+use crate::tune::Contender;
 use anyhow::Context;
 use std::path::Path;
 
@@ -13,49 +15,85 @@ const MARGIN: &str = "margin";
 /// Longest fragment, bytes.
 const BYTES_MAX: u64 = 1 << 16;
 
-/// The law that `α=1e-4,β=5` or `kappa=0.5,margin=0.1` means; what is not said is the law's own.
-pub(super) fn parsed(text: &str) -> anyhow::Result<Law> {
-    let mut given = Vec::new();
+/// Gains by name, and the laws that have them.
+const GAINS: [(&[&str], &str); 7] = [
+    (&["α", "alpha"], "alpha"),
+    (&["β", "beta"], "beta"),
+    (&["k"], "k"),
+    (&["κ", "kappa"], "kappa"),
+    (&["λ", "lead"], "lead"),
+    (&["margin"], MARGIN),
+    (&["law"], "law"),
+];
+/// Laws by name, each with the gains that it has.
+const LAWS: [(&str, &[&str]); 5] = [
+    ("printed", &["alpha", "beta"]),
+    ("normalised", &["k", "beta"]),
+    ("corrected", &["kappa", "lead", MARGIN]),
+    ("pi", &["kappa", "lead", MARGIN]),
+    ("adaptive", &[MARGIN]),
+];
+
+/// Who is meant by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target; what is not said is the law's own.
+pub(super) fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
+    let (mut law, mut given) = (None, Vec::new());
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
         let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain is NAME=NUMBER"))?;
-        let value: f64 = value.trim().parse().map_err(|_| refused(text, "each gain is NAME=NUMBER"))?;
-        given.push((canonical(name.trim()).ok_or_else(|| unknown(name.trim()))?, value));
+        let (name, value) = (canonical(name.trim()).ok_or_else(|| unknown(name.trim()))?, value.trim());
+        if name == "law" {
+            law = Some(LAWS.iter().find(|(known, _)| *known == value).ok_or_else(|| no_law(value))?);
+            continue;
+        }
+        let value: f64 = value.parse().map_err(|_| refused(text, "each gain is NAME=NUMBER"))?;
+        given.push((name, value));
     }
-    let value = |name: &str| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v);
-    let has = |names: &[&str]| given.iter().any(|(n, _)| names.contains(n));
-    match (has(&["alpha", "beta"]), has(&["kappa", "lead", MARGIN])) {
-        (true, true) => {
-            Err(refused(text, "α and β are of the printed law, κ, λ and margin of the corrected one: give one law's"))
-        }
-        (false, false) => Err(refused(text, "no gain is given")),
-        (true, false) => {
-            let Law::Printed { alpha, beta } = Law::PRINTED else { return Err(refused(text, "")) };
-            let (alpha, beta) = (value("alpha").unwrap_or(alpha), value("beta").unwrap_or(beta));
-            inside("α", alpha, (1e-9, 1.0))?;
-            inside("β", beta, (1e-6, 1e3))?;
-            Ok(Law::Printed { alpha, beta })
-        }
-        (false, true) => {
-            let Law::Corrected { kappa, lead, margin } = Law::CORRECTED else { return Err(refused(text, "")) };
-            let of = |name, own| value(name).unwrap_or(own);
-            let (kappa, lead, margin) = (of("kappa", kappa), of("lead", lead), of(MARGIN, margin));
-            inside("κ", kappa, (1e-3, 0.999))?;
-            inside("λ", lead, (0.0, 0.99))?;
-            inside(MARGIN, margin, (0.0, 0.9))?;
-            Ok(Law::Corrected { kappa, lead, margin })
-        }
+    if law.is_none() && given.is_empty() {
+        return Err(refused(text, "no gain is given"));
     }
+    let has = |law: &&(&str, &[&str])| given.iter().all(|(name, _)| law.1.contains(name));
+    let law = match law {
+        Some(law) => Some(law).filter(has),
+        None => LAWS.iter().find(has),
+    };
+    let (law, _) = law.ok_or_else(|| {
+        refused(
+            text,
+            "α and β are of the printed law, k of the normalised, κ, λ and margin of the corrected: give one law's",
+        )
+    })?;
+    contender(law, &|name| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v), target_hz)
+}
+
+fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Contender> {
+    let gain = |shown: &str, name: &str, own: f64, range: (f64, f64)| {
+        let gain = value(name).unwrap_or(own);
+        inside(shown, gain, range).map(|()| gain)
+    };
+    let beta = || gain("β", "beta", 5.0, (1e-6, 1e3));
+    let lead = if law == "pi" { 0.2 } else { 0.0 };
+    Ok(match law {
+        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, (1e-9, 1.0))?, beta: beta()? }.into(),
+        "normalised" => {
+            let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
+            Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
+        }
+        "adaptive" => Contender::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
+        _ => Law::Corrected {
+            kappa: gain("κ", "kappa", 0.5, (0.01, 0.99))?,
+            lead: gain("λ", "lead", lead, (0.0, 0.99))?,
+            margin: gain(MARGIN, MARGIN, 0.1, (0.0, 0.9))?,
+        }
+        .into(),
+    })
 }
 
 fn canonical(name: &str) -> Option<&'static str> {
-    match name {
-        "α" | "alpha" => Some("alpha"),
-        "β" | "beta" => Some("beta"),
-        "κ" | "kappa" => Some("kappa"),
-        "λ" | "lead" => Some("lead"),
-        "margin" => Some(MARGIN),
-        _ => None,
-    }
+    GAINS.iter().find(|(names, _)| names.contains(&name)).map(|(_, name)| *name)
+}
+
+fn no_law(name: &str) -> anyhow::Error {
+    let laws = LAWS.map(|(name, _)| name).join(", ");
+    BadInput(format!("there is no law `{name}` (there are: {laws})")).into()
 }
 
 fn inside(name: &str, value: f64, (low, high): (f64, f64)) -> anyhow::Result<()> {
@@ -66,20 +104,27 @@ fn inside(name: &str, value: f64, (low, high): (f64, f64)) -> anyhow::Result<()>
 }
 
 fn unknown(name: &str) -> anyhow::Error {
-    BadInput(format!("there is no gain `{name}` (there are: α or alpha, β or beta, κ or kappa, λ or lead, margin)"))
-        .into()
+    BadInput(format!(
+        "there is no gain `{name}` (there are: α or alpha, β or beta, k, κ or kappa, λ or lead, margin, law)"
+    ))
+    .into()
 }
 
 fn refused(text: &str, why: &str) -> anyhow::Error {
     BadInput(format!("`{text}` gives no gains: {why}; expected such as α=1e-4,β=5 or kappa=0.5,margin=0.1")).into()
 }
 
-/// The law in one line.
-pub(super) fn told(law: Law) -> String {
-    match law {
-        Law::Printed { alpha, beta } => format!("α = {alpha:.3e}, β = {beta:.3}"),
-        Law::Corrected { kappa, lead: 0.0, margin } => format!("κ = {kappa:.3}, margin = {margin:.3}"),
-        Law::Corrected { kappa, lead, margin } => format!("κ = {kappa:.3}, λ = {lead:.3}, margin = {margin:.3}"),
+/// The gains in one line.
+pub(super) fn told(contender: Contender) -> String {
+    match contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {beta:.3}"),
+        Contender::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
+            format!("κ = {kappa:.3}, margin = {margin:.3}")
+        }
+        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+            format!("κ = {kappa:.3}, λ = {lead:.3}, margin = {margin:.3}")
+        }
+        Contender::Adaptive { margin } => format!("margin = {margin:.3}"),
     }
 }
 
@@ -93,6 +138,22 @@ pub(super) fn fragment(law: Law, comment: &str) -> String {
         }
     };
     format!("{comment}[target]\npolicy = \"feedback\"\n{gains}")
+}
+
+/// Refuses a place for the fragment that is taken, or in a folder that is not there.
+pub(super) fn check_place(path: &Path, force: bool) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if folder.is_some_and(|f| !f.is_dir()) {
+        return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
+    }
+    if path.is_dir() {
+        return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
+    }
+    if path.exists() && !force {
+        let why = format!("{} is there already; --force overwrites it, --gains FILE names another", path.display());
+        return Err(BadInput(why).into());
+    }
+    Ok(())
 }
 
 /// The overrides of a scene that the fragment in `path` means.
@@ -117,7 +178,7 @@ pub(in crate::cli) fn overrides(path: &Path) -> anyhow::Result<Vec<(String, Stri
     Ok(target.iter().map(|(key, value)| (format!("target.{key}"), value.to_string())).collect())
 }
 
-/// Writes the fragment; what is there is overwritten with `force` alone.
+/// Writes the fragment.
 pub(super) fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
     std::fs::write(path, fragment).with_context(|| format!("the gains {} cannot be written", path.display()))
 }
@@ -128,15 +189,34 @@ mod tests {
 
     #[test]
     fn gains_are_read_by_greek_and_by_name() {
-        assert_eq!(parsed("α=1e-3,β=2").unwrap(), Law::Printed { alpha: 1e-3, beta: 2.0 });
-        assert_eq!(parsed("kappa=0.25").unwrap(), Law::Corrected { kappa: 0.25, lead: 0.0, margin: 0.1 });
+        let read = |text: &str| parsed(text, 30.0).unwrap();
+        assert_eq!(read("α=1e-3,β=2"), Law::Printed { alpha: 1e-3, beta: 2.0 }.into());
+        assert_eq!(read("k=0.06"), Law::Printed { alpha: 0.002, beta: 5.0 }.into());
+        assert_eq!(read("kappa=0.25"), Law::Corrected { kappa: 0.25, lead: 0.0, margin: 0.1 }.into());
+        assert_eq!(read("law=pi,κ=0.25"), Law::Corrected { kappa: 0.25, lead: 0.2, margin: 0.1 }.into());
+        assert_eq!(read("law=adaptive,margin=0.05"), Contender::Adaptive { margin: 0.05 });
+        assert_eq!(read("law=printed"), Law::PRINTED.into());
+        assert_eq!(read("law=corrected"), Law::CORRECTED.into());
     }
 
     #[test]
     fn gains_that_are_none_are_refused_with_what_is_expected() {
-        for bad in ["", "α", "α=x", "gamma=1", "α=1e-4,κ=0.5", "α=0", "α=-1e-4", "kappa=1", "kappa=nan", "margin=inf"]
-        {
-            let error = parsed(bad).unwrap_err().to_string();
+        for bad in [
+            "",
+            "α",
+            "α=x",
+            "gamma=1",
+            "α=1e-4,κ=0.5",
+            "α=0",
+            "α=-1e-4",
+            "kappa=1",
+            "kappa=nan",
+            "margin=inf",
+            "law=magic",
+            "law=adaptive,κ=0.5",
+            "k=0",
+        ] {
+            let error = parsed(bad, 30.0).unwrap_err().to_string();
             assert!(error.contains("expected") || error.contains("there are"), "{bad}: {error}");
         }
     }

@@ -3,6 +3,7 @@
 //! In: a scene, a machine (declared, or the one present with `--live`). Out: a table, a fragment of TOML that `run --gains` and a scene
 //! take, a figure. Never here: how gains are judged ([`crate::tune`] does), the experiment's frames ([`crate::frame`] draws them).
 
+mod checked;
 mod figures;
 pub(super) mod gains;
 mod told;
@@ -16,7 +17,9 @@ use crate::control::Law;
 use crate::frame::{Drawing, Experiment, Session, experiment};
 use crate::scene::format::ExecutorKind;
 use crate::scene::{Scene, Source, load};
-use crate::tune::{Extent, Family, Found, Plant, Search, Verdict, explain, judge, relay_gains, search};
+use crate::tune::{
+    Contender, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
+};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -31,6 +34,9 @@ const NORMALISED: f64 = 0.046;
 struct Identified {
     scene: Scene,
     plant: Plant,
+    /// Size of its pictures, and whether they were drawn.
+    size: Size,
+    live: bool,
     target_hz: f64,
     machine: String,
 }
@@ -45,24 +51,32 @@ struct Row {
 struct Tuned {
     rows: Vec<Row>,
     found: Vec<(Family, Found)>,
+    /// The best of the feedback laws: what the fragment says.
     best: Law,
     interrupted: bool,
 }
 
+impl Tuned {
+    /// What the best was judged to be.
+    fn verdict(&self) -> Option<&Verdict> {
+        self.rows.iter().map(|row| &row.verdict).find(|v| v.contender == self.best.into())
+    }
+}
+
 /// Tunes a scene, or explains given gains.
 pub(super) fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
-    let given = args.analyse.as_deref().map(gains::parsed).transpose()?;
+    let scene = scene(args)?;
+    let given = args.analyse.as_deref().map(|text| gains::parsed(text, scene.target.frame_hz)).transpose()?;
     let fragment = args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", stem(&args.scene))));
-    if given.is_none() && fragment.exists() && !args.force {
-        let why = format!("{} is there already; --force overwrites it, --gains FILE names another", fragment.display());
-        return Err(BadInput(why).into());
+    if given.is_none() {
+        gains::check_place(&fragment, args.force)?;
     }
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
-    let Some(identified) = identify(args, &stopped)? else { return Ok(Exit::Interrupted) };
+    let Some(identified) = identify(args, scene, &stopped)? else { return Ok(Exit::Interrupted) };
     match given {
-        Some(law) => analyse(args, &identified, law),
+        Some(contender) => analyse(args, &identified, contender),
         None => tune(args, &identified, &fragment, &stopped),
     }
 }
@@ -73,8 +87,7 @@ fn stem(name: &str) -> String {
 }
 
 /// Draws the experiment and fits the plant; `None` where it was stopped.
-fn identify(args: &TuneArgs, stopped: &AtomicBool) -> anyhow::Result<Option<Identified>> {
-    let scene = scene(args)?;
+fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Result<Option<Identified>> {
     let target_hz = scene.target.frame_hz;
     let [width, height] = args.size.unwrap_or([1280, 720]);
     let size = Size { width, height };
@@ -93,7 +106,7 @@ fn identify(args: &TuneArgs, stopped: &AtomicBool) -> anyhow::Result<Option<Iden
     }
     let plant = Plant::identify(&done.observed).map_err(|why| BadInput(format!("{}: {why}", scene.name)))?;
     let machine = done.adapter.unwrap_or_else(|| format!("the declared machine `{}`", scene.machine.preset));
-    Ok(Some(Identified { scene, plant, target_hz, machine }))
+    Ok(Some(Identified { scene, plant, size, live: args.live, target_hz, machine }))
 }
 
 /// The scene with what the arguments change in it; in virtual time unless the machine present is meant.
@@ -120,13 +133,13 @@ fn extent(args: &TuneArgs) -> Extent {
 }
 
 /// Explains the gains that were given.
-fn analyse(args: &TuneArgs, on: &Identified, law: Law) -> anyhow::Result<Exit> {
-    let explanation = explain(&on.plant, law, on.target_hz);
-    let verdict = judge(&on.plant, law, on.target_hz, extent(args));
+fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Result<Exit> {
+    let explanation = explain(&on.plant, contender, on.target_hz);
+    let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
     data(&if args.json {
-        told::analysis_json(on, law, &explanation, &verdict)?
+        told::analysis_json(on, &explanation, &verdict)?
     } else {
-        told::analysis(on, law, &explanation, &verdict)
+        told::analysis(on, &explanation, &verdict)
     })?;
     Ok(Exit::Ok)
 }
@@ -140,8 +153,13 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     let tuned = look_for_gains(args, on, stopped)?;
     gains::write(fragment, &gains::fragment(tuned.best, &told::comment(on, &tuned)))?;
     let files = figures::write(folder, &stem(&on.scene.name), on, &tuned)?;
-    let all: Vec<_> = std::iter::once(fragment.to_owned()).chain(files).collect();
-    data(&if args.json { told::json(on, &tuned, &all)? } else { told::text(on, &tuned, &all) })?;
+    let files: Vec<_> = std::iter::once(fragment.to_owned()).chain(files).collect();
+    let checked = if tuned.interrupted { Vec::new() } else { checked::check(args, on, &tuned, stopped)? };
+    data(&if args.json {
+        told::json(on, &tuned, &checked, &files)?
+    } else {
+        told::text(on, &tuned, &checked, &files)
+    })?;
     if tuned.interrupted {
         message("interrupted: the best gains so far were written");
         return Ok(Exit::Interrupted);
@@ -151,21 +169,17 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
 
 /// A target that no resolution can reach has no gains.
 fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
-    let explanation = explain(&on.plant, Law::CORRECTED, on.target_hz);
-    if explanation.near.is_none() {
-        return Err(BadInput(format!("{}: {}", on.scene.name, explanation.sentences)).into());
-    }
-    Ok(())
+    refusal(&on.plant, on.target_hz).map_or(Ok(()), |why| Err(BadInput(format!("{}: {why}", on.scene.name)).into()))
 }
 
-/// Searches every family of laws, and judges what they are to be compared with.
+/// Searches every family, and judges what they are to be compared with.
 fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuned> {
     let extent = extent(args);
     let mut found = Vec::new();
-    for (family, name) in [(Family::Corrected, "corrected law"), (Family::Printed, "printed law")] {
-        let bar = Bar::new(name, args.quiet || args.json);
+    for family in Family::ALL {
+        let bar = Bar::new(family_name(family), args.quiet || args.json);
         let mut go_on = |share: f64, best: &Verdict| {
-            bar.tell(share, format!("{}: {:.3}", gains::told(best.law), best.objective));
+            bar.tell(share, format!("best so far {}: {:.3}", gains::told(best.contender), best.objective));
             !stopped.load(Ordering::Relaxed)
         };
         let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent, go_on: &mut go_on };
@@ -174,22 +188,46 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
             break;
         }
     }
-    let best = found.iter().map(|(_, f)| &f.best).min_by(|a, b| a.objective.total_cmp(&b.objective));
-    let best = best.context("not one candidate could be judged")?.law;
-    let judged = |name, law| Row { name, verdict: judge(&on.plant, law, on.target_hz, extent) };
+    let best = best_law(&found).context("not one candidate could be judged")?;
+    let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
     let mut rows: Vec<_> =
         found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
-    rows.push(judged("corrected, its own", Law::CORRECTED));
-    rows.push(judged("printed, α = 1e-4", Law::PRINTED));
-    rows.push(judged("normalised, α = k/f₀", Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 }));
-    rows.extend(relay_gains(&on.plant, on.target_hz, 0.1).map(|law| judged("relay (Ziegler-Nichols)", law)));
-    let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
+    let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.contender == best.into()).cloned();
+    rows.extend(verdict.iter().flat_map(|verdict| rivals(on, verdict, extent)));
     Ok(Tuned { rows, found, best, interrupted })
 }
 
-fn family_name(family: Family) -> &'static str {
+/// The best of the laws whose gain is the same at every rate. The printed law's is not, and the policy that predicts has no gains to be
+/// written down: they stand beside it.
+fn best_law(found: &[(Family, Found)]) -> Option<Law> {
+    let law = |(_, f): &(Family, Found)| match f.best.contender {
+        Contender::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
+        _ => None,
+    };
+    found.iter().filter_map(law).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(law, _)| law)
+}
+
+/// What the gains that are found are compared with, a relay's with the same margin.
+fn rivals(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
+    let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
+    let margin = 1.0 - best.contender.set_share();
+    let rivals = [
+        ("corrected, its own", Some(Law::CORRECTED)),
+        ("printed, α = 1e-4", Some(Law::PRINTED)),
+        ("normalised, α = k/f₀", Some(normalised)),
+        ("relay (Ziegler-Nichols)", relay_gains(&on.plant.on(best.at_speed), on.target_hz, margin)),
+    ];
+    let judged = |(name, law): (&'static str, Option<Law>)| {
+        Some(Row { name, verdict: judge(&on.plant, law?, on.target_hz, extent) })
+    };
+    rivals.into_iter().filter_map(judged).collect()
+}
+
+const fn family_name(family: Family) -> &'static str {
     match family {
         Family::Corrected => "corrected, found",
+        Family::Pi => "PI, found",
         Family::Printed => "printed, found",
+        Family::Adaptive => "adaptive, found",
     }
 }

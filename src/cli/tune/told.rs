@@ -3,14 +3,15 @@
 //! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
 
 use super::super::chart::table::{Cell, Table};
+use super::checked::Checked;
 use super::{Identified, Tuned, gains};
 use crate::control::Law;
-use crate::tune::{Explanation, Verdict};
+use crate::tune::{Contender, Explanation, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
 /// The table of a tuning, what it was found on, the files.
-pub(super) fn text(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> String {
+pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> String {
     let mut table = Table::new(&[
         "law",
         "gains",
@@ -29,7 +30,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> String 
         let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
         table.rows.push(vec![
             row.name.into(),
-            gains::told(v.law).into(),
+            gains::told(v.contender).into(),
             settle,
             Cell::Number(v.overshoot, 3),
             Cell::Number(v.miss_share, 4),
@@ -42,7 +43,26 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> String 
         ]);
     }
     let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
-    format!("{}\n{}\nbest: {}\nfiles: {}\n", plant(on), table.text(), gains::told(tuned.best), files.join(", "))
+    format!(
+        "{}{}\n{}\nbest: {}\n{}files: {}\n",
+        plant(on),
+        elsewhere(tuned),
+        table.text(),
+        gains::told(tuned.best.into()),
+        checked.iter().map(Checked::told).collect::<String>(),
+        files.join(", ")
+    )
+}
+
+/// Said where the gains were judged on another machine, because what is in view leaves nothing to control on this one.
+fn elsewhere(tuned: &Tuned) -> String {
+    let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
+    if speed == 1.0 {
+        return String::new();
+    }
+    format!(
+        "  on this machine it rests at its finest and takes less than it may: judged on one {speed} times as fast\n"
+    )
 }
 
 /// What the plant is, in a few lines.
@@ -77,8 +97,7 @@ fn robust(v: &Verdict) -> String {
 
 /// What stands above the fragment.
 pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
-    let verdict = tuned.rows.iter().find(|row| row.verdict.law == tuned.best).map(|row| &row.verdict);
-    let worth = verdict.map_or_else(String::new, |v| {
+    let worth = tuned.verdict().map_or_else(String::new, |v| {
         let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
         format!(
             "\n{settle}, {:.2} % of frames late, gain margin {:.1}, delay margin {} frames",
@@ -90,20 +109,27 @@ pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
     format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
 }
 
-/// The same as JSON.
-pub(super) fn json(on: &Identified, tuned: &Tuned, files: &[PathBuf]) -> anyhow::Result<String> {
+/// The same as JSON: what was found at the top, everything else beside it.
+pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
     let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(row.name, &row.verdict)).collect();
     let tried: Vec<_> = tuned
         .found
         .iter()
         .flat_map(|(_, f)| {
-            f.tried.iter().map(|(law, objective)| json!({ "gains": law_json(*law), "objective": objective }))
+            f.tried.iter().map(|(contender, objective)| {
+                json!({ "law": law_name(*contender), "gains": gains_json(*contender), "objective": objective })
+            })
         })
         .collect();
-    let whole = json!({
+    let mut whole = tuned.verdict().map_or_else(|| json!({}), |v| row_json(law_name(v.contender), v));
+    let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
-        "best": law_json(tuned.best), "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
+        "checked": checked.iter().map(Checked::json).collect::<Vec<_>>(),
+        "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
     });
+    if let (Some(whole), Value::Object(rest)) = (whole.as_object_mut(), rest) {
+        whole.extend(rest);
+    }
     Ok(serde_json::to_string_pretty(&whole)? + "\n")
 }
 
@@ -119,47 +145,58 @@ fn plant_json(on: &Identified) -> Value {
 
 fn row_json(name: &str, v: &Verdict) -> Value {
     json!({
-        "law": name, "gains": law_json(v.law), "settle_s": v.settle_s, "overshoot": v.overshoot, "miss_share": v.miss_share,
-        "gain_margin": v.gain_margin, "delay_margin_frames": v.delay_margin, "reversals": v.reversals, "quality": v.quality,
-        "robust_to": v.robust_to, "asked": v.asked, "objective": v.objective,
+        "law": name, "gains": gains_json(v.contender), "settle_s": v.settle_s, "overshoot": v.overshoot,
+        "miss_share": v.miss_share, "gain_margin": v.gain_margin, "delay_margin_frames": v.delay_margin,
+        "reversals": v.reversals, "quality": v.quality, "robust_to": v.robust_to, "asked": v.asked, "at_speed": v.at_speed,
+        "objective": v.objective,
     })
 }
 
-fn law_json(law: Law) -> Value {
-    match law {
-        Law::Printed { alpha, beta } => json!({ "law": "printed", "alpha": alpha, "beta": beta }),
-        Law::Corrected { kappa, lead, margin } => {
-            json!({ "law": "corrected", "kappa": kappa, "lead": lead, "margin": margin })
+/// The law's name, as scenes and `--analyse` write it.
+fn law_name(contender: Contender) -> &'static str {
+    match contender {
+        Contender::Feedback(Law::Printed { .. }) => "printed",
+        Contender::Feedback(Law::Corrected { .. }) => "corrected",
+        Contender::Adaptive { .. } => "adaptive",
+    }
+}
+
+fn gains_json(contender: Contender) -> Value {
+    match contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) => json!({ "alpha": alpha, "beta": beta }),
+        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+            json!({ "kappa": kappa, "lead": lead, "margin": margin })
         }
+        Contender::Adaptive { margin } => json!({ "margin": margin }),
     }
 }
 
 /// Given gains, explained.
-pub(super) fn analysis(on: &Identified, law: Law, e: &Explanation, v: &Verdict) -> String {
+pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String {
     let near = e.near.map_or_else(String::new, |near| {
         format!(
-            "  near the set point a frame removes {:.1} % of an error; gain margin {:.2}, delay margin {} frames\n",
+            "  near the set point a frame removes {:.1} % of an error, and the loop swings past {:.1} %; with the machine's speed off as far \
+             as the target can be reached: gain margin {:.2}, delay margin {} frames\n",
             100.0 * near.gain,
+            100.0 * near.gain * near.gain_margin(),
             v.gain_margin,
             v.delay_margin
         )
     });
-    let rests: Vec<_> = e
-        .rests
-        .iter()
-        .map(|r| {
-            format!("ε̂ = {:.4} at {:.2} of its time{}", r.eps_hat, r.ratio, if r.clamped { " (a limit)" } else { "" })
-        })
-        .collect();
+    let rest = |eps: f64, ratio: f64, end: bool| {
+        format!("ε̂ = {eps:.4} at {ratio:.2} of its time{}", if end { " (a limit)" } else { "" })
+    };
+    let rests: Vec<_> = e.rests.iter().map(|r| rest(r.eps_hat, r.ratio, r.clamped)).collect();
     let cycle = e.cycle.map_or_else(String::new, |c| {
         format!("  it swings by {:.1} % of its time every {:.3} s\n", 100.0 * c.amplitude, c.period_s)
     });
     let settle = |k: usize| e.from[k].settle_s.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
     format!(
-        "{}  {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  rests: {}\n{cycle}  settles from 0.4 of the rate: {}, from \
-         2.5: {}; overshoot {:.2}, {:.2}; late {:.2} % of disturbed frames\n\n{}\n",
+        "{}  {}, {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  can rest: {}\n{cycle}  settles from 0.4 of the rate: \
+         {}, from 2.5: {}; overshoot {:.2}, {:.2}\n  n changes {:.3} times a frame at rest; late {:.2} % of disturbed frames\n\n{}\n",
         plant(on),
-        gains::told(law),
+        law_name(v.contender),
+        gains::told(v.contender),
         1e3 * e.set_s,
         100.0 * e.share,
         rests.join("; "),
@@ -167,20 +204,25 @@ pub(super) fn analysis(on: &Identified, law: Law, e: &Explanation, v: &Verdict) 
         settle(1),
         e.from[0].overshoot,
         e.from[1].overshoot,
+        e.chatter,
         100.0 * v.miss_share,
         e.sentences
     )
 }
 
 /// The same as JSON.
-pub(super) fn analysis_json(on: &Identified, law: Law, e: &Explanation, v: &Verdict) -> anyhow::Result<String> {
+pub(super) fn analysis_json(on: &Identified, e: &Explanation, v: &Verdict) -> anyhow::Result<String> {
     let rests: Vec<_> =
         e.rests.iter().map(|r| json!({ "eps": r.eps_hat, "ratio": r.ratio, "clamped": r.clamped })).collect();
-    let whole = json!({
+    let mut whole = row_json(law_name(v.contender), v);
+    let rest = json!({
         "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
-        "analysis": row_json("given", v), "given": law_json(law), "set_ms": 1e3 * e.set_s, "share": e.share,
-        "loop_gain": e.near.map(|n| n.gain), "rests": rests,
+        "set_ms": 1e3 * e.set_s, "share": e.share, "loop_gain": e.near.map(|n| n.gain),
+        "loop_gain_boundary": e.near.map(|n| n.gain * n.gain_margin()), "rests": rests, "chatter": e.chatter,
         "cycle": e.cycle.map(|c| json!({ "amplitude": c.amplitude, "period_s": c.period_s })), "sentences": e.sentences,
     });
+    if let (Some(whole), Value::Object(rest)) = (whole.as_object_mut(), rest) {
+        whole.extend(rest);
+    }
     Ok(serde_json::to_string_pretty(&whole)? + "\n")
 }

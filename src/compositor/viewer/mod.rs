@@ -27,7 +27,7 @@ pub use history::{FrameSummary, History};
 pub use shell::{WindowEnd, WindowError, WindowOptions, run_window};
 pub use show::{
     Action, AgentRow, AgentState, Bounds, CouplingRow, FrameTimes, Held, Law, Message, Shares, Show, Skip, Status,
-    ViewRequest, Weight,
+    Tuning, ViewRequest, Weight,
 };
 
 use super::{Colouring, Size, Style};

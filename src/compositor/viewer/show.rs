@@ -69,6 +69,10 @@ pub enum Action {
     Sliders(Sliders),
     /// Keep all levels as they are, or let them be chosen again.
     Freeze(bool),
+    /// Look for better gains of the feedback law on this scene and this machine, and take them.
+    Tune,
+    /// Stop looking and go on as before.
+    StopTuning,
     /// Take hold of an object with a spring.
     DragStart(Hit),
     /// Move the free end of that spring to this point, metres.
@@ -194,6 +198,8 @@ pub struct Status {
     pub frozen: bool,
     /// Where the time goes.
     pub shares: Shares,
+    /// How far the search for better gains is; `None` while nobody looks for any.
+    pub tuning: Option<Tuning>,
     /// Every law with its default gains; the scene's own where it gives them.
     pub laws: Vec<Law>,
     /// The loop's variable as its law keeps it, for the plots.
@@ -216,6 +222,15 @@ pub struct Status {
     pub couplings: Vec<CouplingRow>,
     /// What the user should know, oldest first.
     pub messages: Vec<Message>,
+}
+
+/// A search for better gains.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Tuning {
+    /// The share that is done, 0 … 1.
+    pub done: f64,
+    /// What it does now, or the best so far.
+    pub words: String,
 }
 
 /// Where the time goes, lately.

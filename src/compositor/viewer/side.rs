@@ -5,14 +5,17 @@
 use super::Looks;
 use super::history::{FrameSummary, History};
 use super::plots;
-use super::show::{Action, AgentRow, AgentState, Law, Status};
+use super::show::{Action, AgentRow, AgentState, Law, Status, Tuning};
 use super::text;
 use super::theme::{Palette, palette};
-use egui::{Align, ComboBox, Layout, RichText, Slider, SliderClamping, Ui};
+use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
 use metachron_budget::cost::benefit::Sliders;
 
 /// Wanted frame rates that the slider offers, per second.
 const TARGET_HZ: (f64, f64) = (5.0, 144.0);
+
+/// What the button does.
+const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
 
 /// Draws the panel.
 pub fn show(ui: &mut Ui, status: &Status, history: &History, looks: &mut Looks) -> Vec<Action> {
@@ -121,10 +124,28 @@ fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
         if ui.button("Copy as TOML").on_hover_text("Target rate and gains, for the scene file").clicked() {
             ui.ctx().copy_text(as_toml(status, &wanted));
         }
+        if status.tuning.is_none() && ui.button("Tune").on_hover_text(TUNE).clicked() {
+            out.push(Action::Tune);
+        }
     });
+    if let Some(tuning) = &status.tuning {
+        progress(ui, tuning, out);
+    }
     if wanted != law {
         out.push(Action::Law(wanted));
     }
+}
+
+/// How far the search for gains is, and a way out of it.
+fn progress(ui: &mut Ui, tuning: &Tuning, out: &mut Vec<Action>) {
+    ui.horizontal(|ui| {
+        if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay as they were").clicked() {
+            out.push(Action::StopTuning);
+        }
+        let bar = ProgressBar::new(tuning.done as f32).desired_height(14.0).show_percentage();
+        ui.add(bar).accessible_name("Tuning");
+    });
+    ui.label(RichText::new(&tuning.words).small().color(palette(ui).weak));
 }
 
 fn choose_law(ui: &mut Ui, law: &mut Law, laws: &[Law]) {

@@ -86,7 +86,7 @@ fn eventful_run(seed: u64) -> (u64, Vec<u64>) {
     let mut run = Box::new(Lockstep::start(spawns, noisy(seed)).unwrap());
     for frame in 1..=120_u64 {
         run.wait_until(Duration::from_nanos(frame * 16_666_667));
-        run.spend(run.machine().frame_time(4e-3, frame));
+        run.spend(run.machine().frame_time(4e-3, frame, Duration::ZERO));
         if frame == 60 {
             run.send(AgentId(1), Command::Retune(Resolution { eps_m: 0.02, n: 2 })).unwrap();
         }

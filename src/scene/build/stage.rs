@@ -14,6 +14,8 @@ const FRAME_DEFAULT_HZ: f64 = 60.0;
 const FOV_DEFAULT_DEG: f64 = 40.0;
 /// Most keyframes of a camera.
 const KEYFRAMES_MAX: usize = 10_000;
+/// Most entries of a machine's load.
+const LOADS_MAX: usize = 1000;
 /// Most probes.
 const PROBES_MAX: usize = 1000;
 /// The machines that a scene can name.
@@ -141,6 +143,7 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
     let shading = object_costs(c, &place.table("shading"), file);
+    let load = load(c, &place, file);
     Machine {
         preset,
         cores,
@@ -153,8 +156,29 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
         noise,
         wander,
         spikes,
+        load,
         seed,
     }
+}
+
+/// What else the machine has to do, as (seconds, factor).
+fn load(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(f64, f64)> {
+    if file.load.len() > LOADS_MAX {
+        let expected = format!("expected at most {LOADS_MAX}");
+        c.wrong(place, "load", format_args!("has {} entries", file.load.len()), expected);
+        return Vec::new();
+    }
+    let mut steps: Vec<(f64, f64)> = Vec::with_capacity(file.load.len());
+    for (i, entry) in file.load.iter().enumerate() {
+        let place = place.entry("load", i);
+        let at_s = c.number(&place, "at_s", entry.at_s, &TIME);
+        if let Some((before, _)) = steps.last().filter(|(before, _)| *before >= at_s) {
+            let expected = format!("expected a time after the entry before, {before} s");
+            c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
+        }
+        steps.push((at_s, c.number(&place, "factor", entry.factor, &allowed(0.01..=100.0, ""))));
+    }
+    steps
 }
 
 /// Costs of objects by their shading, in the order of control.

@@ -246,8 +246,22 @@ pub struct MachineFile {
     /// Share of frames that take half as long again, 0 … 1. Default 0.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub spikes: Option<f64>,
+    /// What else the machine has to do while frames are drawn, by rising time; at most 1000 entries.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub load: Vec<LoadFile>,
     /// Seed of the noise.
     pub seed: Option<u32>,
+}
+
+/// `[[machine.load]]`: from a time on every frame takes so many times what it is declared to.
+#[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct LoadFile {
+    /// Wall seconds after the start, 0 … 1e6; above that of the entry before.
+    pub at_s: f64,
+    /// The factor from then on, 0.01 … 100: 2.5 is a machine that draws 2.5 times as slowly, 0.4 one that draws 2.5 times as fast.
+    pub factor: f64,
 }
 
 /// `[machine.shading]`: what objects cost by the way the light on them is worked out.

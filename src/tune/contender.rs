@@ -1,0 +1,101 @@
+//! What may hold a picture at its time: a feedback law with its gains, or the policy that predicts.
+//!
+//! In: gains. Out: the controller that draws, ready for a plant, and its loop near the set point. Never here: a judgement.
+//! Theory: `docs/theory/control.md`, eq. 4, 8, 27 and 30; `docs/theory/budget.md`, eq. 34.
+
+use super::margins::Loop;
+use super::plant::Plant;
+use super::play::{Start, Trial, play};
+use crate::control::{Law, PictureControl, Policy, Prices, Stages};
+
+/// A controller that can be judged.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Contender {
+    /// Feedback from the measured time (GDC04), by this law.
+    Feedback(Law),
+    /// The policy `adaptive`: prices, and a Kalman filter on how much slower the machine is than they say.
+    Adaptive {
+        /// The least part of a frame that is left free, 0 … 0.5.
+        margin: f64,
+    },
+}
+
+/// How much κ may wander from one frame to the next, and the least deviation of a measurement, as (budget.md, eq. 34 … 36) have them.
+const WANDER: f64 = 2e-4;
+const SIGMA_LEAST: f64 = 0.01;
+
+impl From<Law> for Contender {
+    fn from(law: Law) -> Self {
+        Self::Feedback(law)
+    }
+}
+
+impl Contender {
+    /// The policy as scenes have it that say nothing of a margin.
+    pub const ADAPTIVE: Self = Self::Adaptive { margin: 0.02 };
+
+    /// The share of the frame's time that the work is to take: T_set/T.
+    #[must_use]
+    pub fn set_share(self) -> f64 {
+        match self {
+            Self::Feedback(law) => law.set_share(),
+            Self::Adaptive { margin } => 1.0 - margin,
+        }
+    }
+
+    /// The controller that draws; one that predicts is told what `plant` costs.
+    pub(super) fn control(self, plant: &Plant, target_hz: f64) -> PictureControl {
+        match self {
+            Self::Feedback(law) => PictureControl::new(Policy::Feedback, law, target_hz),
+            Self::Adaptive { margin } => {
+                let mut control = PictureControl::new(Policy::Adaptive, Law::CORRECTED, target_hz);
+                let object = Stages { setup: 0.0, polygon: plant.line.slope, vertex: 0.0, pixel: 0.0 };
+                control.set_prices(Prices {
+                    frame_s: plant.line.intercept.max(0.0),
+                    pixel_s: 0.0,
+                    shading: [object; 3],
+                });
+                control.set_margin(margin);
+                control
+            }
+        }
+    }
+
+    /// The loop near the set point on a machine `speed` times as fast; `None` where the picture cannot take that time.
+    #[must_use]
+    pub fn local_loop(self, plant: &Plant, target_hz: f64, speed: f64) -> Option<Loop> {
+        let set_s = self.set_share() / target_hz;
+        if !plant.reach(speed).holds(set_s) {
+            return None;
+        }
+        let share = plant.share(set_s, speed);
+        let (gain, lead) = match self {
+            Self::Feedback(Law::Corrected { kappa, lead, .. }) => (kappa * share, lead * share),
+            Self::Feedback(Law::Printed { alpha, .. }) => {
+                (alpha * share * target_hz / rest_of(self, plant, target_hz, speed), 0.0)
+            }
+            Self::Adaptive { .. } => (learning(plant, set_s, target_hz, speed), 0.0),
+        };
+        Some(Loop { gain, lead, dead_time: plant.dead_time })
+    }
+}
+
+/// The share of an error of κ that the Kalman filter removes in a frame once it has settled (control.md, eq. 30): g² R + g Q = Q, less
+/// what the fixed part of a frame, priced for another machine, puts back.
+fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
+    let fixed_s = plant.line.intercept.max(0.0);
+    let (chosen_s, table_s) = (set_s - fixed_s, speed * set_s - fixed_s);
+    if chosen_s <= 0.0 || table_s <= 0.0 {
+        return 0.0;
+    }
+    let sigma = (plant.line.scatter * set_s * target_hz).max(SIGMA_LEAST);
+    let ratio = WANDER * (table_s * target_hz / sigma) * (table_s * target_hz / sigma);
+    let filter = 0.5 * ((ratio * ratio + 4.0 * ratio).sqrt() - ratio);
+    filter * (set_s - fixed_s / speed) / chosen_s
+}
+
+/// ε̂ with which a law begins that is put where the frame takes its time.
+fn rest_of(contender: Contender, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
+    let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(contender, target_hz) };
+    play(plant, &trial).first().map_or(1.0, |beat| beat.eps_hat)
+}
