@@ -9,7 +9,7 @@ use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
     detail_colour, resolution_colour,
 };
-use super::skin::{ROPE_LEVEL, SkinRoom, curve_of_rope, drawn_radius_m};
+use super::skin::{ROPE_LEVEL, SkinRoom, SkinWish, curve_of_rope, drawn_radius_m};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
 use metachron_agents::shape::{Model, Primitive, Rounding, Rung, SkinFrame, Solid, ToolShape};
@@ -153,7 +153,7 @@ impl Stage {
             let (first, origin) = (picture.samples.len() as u32, picture.origin);
             picture.samples.extend(frames.iter().map(|f| sample(f, origin, texture_per_m as f32, paint)));
             let tissue = track.actor.look.material == Material::Tissue;
-            picture.tubes.push(TubeRun { first, intervals: last as u32, n, tissue, shown: track.seen });
+            picture.tubes.push(TubeRun { first, intervals: last as u32, n, tissue, shading, shown: track.seen });
             for end in [&frames[0], &frames[last]] {
                 let size = Rounding { extents: Vec3::ZERO, radius_m: end.radius_m as f32 };
                 let ball = instance(end.position - origin, DQuat::IDENTITY, size, paint);
@@ -175,7 +175,8 @@ impl Stage {
             let number = picture.instances.len() as u32;
             picture.instances.push(instance(DVec3::ZERO, DQuat::IDENTITY, size, paint));
             let Picture { skins, origin, style, .. } = picture;
-            skins.add(form, soft, (*origin, number, style.wireframe), room);
+            let wish = SkinWish { origin: *origin, instance: number, shading: at.shading, edges: style.wireframe };
+            skins.add(form, soft, wish, room);
         }
     }
 
@@ -368,7 +369,14 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
         };
         picture.samples.push(sample(&frame, picture.origin, 0.0, paint));
     }
-    picture.tubes.push(TubeRun { first, intervals: count as u32, n: 1, tissue: false, shown: true });
+    picture.tubes.push(TubeRun {
+        first,
+        intervals: count as u32,
+        n: 1,
+        tissue: false,
+        shading: Shading::PerPixel,
+        shown: true,
+    });
 }
 
 /// Sorts solids by shading and mesh and cuts them into runs.

@@ -106,8 +106,10 @@ pub struct TubeRun {
     pub intervals: u32,
     /// Level of the patch.
     pub n: u8,
-    /// Whether the skin is tissue, with a texture.
+    /// Whether the skin is tissue, with a texture where it is lit at every pixel.
     pub tissue: bool,
+    /// How it is shaded.
+    pub shading: Shading,
     /// Whether the camera sees it; what it does not see is drawn into the shadow only.
     pub shown: bool,
 }

@@ -3,6 +3,7 @@
 //! In: vertices as a snapshot shows them, and what joins them. Out: corners with smooth normals for one mesh of the frame; a framed
 //! curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
 
+use super::level::Shading;
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::{CurveState, SoftState};
@@ -32,6 +33,21 @@ pub struct SkinRun {
     pub triangles: (u32, u32),
     /// The instance of [`super::Picture::instances`] that tells its colour and how thick it is.
     pub instance: u32,
+    /// How it is shaded.
+    pub shading: Shading,
+}
+
+/// How one skin is added.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SkinWish {
+    /// What positions are relative to, metres.
+    pub origin: DVec3,
+    /// The instance of its colour.
+    pub instance: u32,
+    /// How it is shaded.
+    pub shading: Shading,
+    /// Whether its edges are drawn.
+    pub edges: bool,
 }
 
 /// Room to work in.
@@ -52,13 +68,8 @@ impl Skins {
     }
 
     /// Adds the skin of a body that is drawn by an instance, with its sides where edges are drawn.
-    pub(super) fn add(
-        &mut self,
-        form: &SurfaceForm,
-        soft: &SoftState,
-        (origin, instance, edges): (DVec3, u32, bool),
-        room: &mut SkinRoom,
-    ) {
+    pub(super) fn add(&mut self, form: &SurfaceForm, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
+        let SkinWish { origin, instance, shading, edges } = wish;
         room.find_normals(form, soft);
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         let corner = |x: &DVec3, n: DVec3| [(*x - origin).as_vec3().to_array(), n.as_vec3().to_array()];
@@ -78,7 +89,7 @@ impl Skins {
             let all = self.triangles[from as usize..].iter();
             self.sides.extend(all.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
         }
-        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance });
+        self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading });
     }
 }
 
@@ -160,8 +171,9 @@ mod tests {
     fn a_sheet_has_two_faces_and_a_rim_and_is_closed() {
         let (form, soft) = square();
         let (mut skins, mut room) = (Skins::default(), SkinRoom::default());
-        skins.add(&form, &soft, (DVec3::ZERO, 7, false), &mut room);
-        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7 }]);
+        let wish = SkinWish { origin: DVec3::ZERO, instance: 7, shading: Shading::Flat, edges: false };
+        skins.add(&form, &soft, wish, &mut room);
+        assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
         let thick = |i: u32| {
             let [x, n] = skins.corners[i as usize].map(glam::Vec3::from_array);
             (x + n * 0.01).as_dvec3()

@@ -3,11 +3,11 @@
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use metachron::compositor::{
-    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, Style,
+    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
 };
 use metachron::scene::{self, Scene, Source};
 use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
-use metachron_agents::{AgentId, Resolution};
+use metachron_agents::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -182,6 +182,32 @@ fn flat_shading_has_at_most_one_colour_a_triangle() {
     let flat = colours(Shading::Flat).len();
     assert!((10..=80).contains(&flat), "{flat}");
     assert!(colours(Shading::Gouraud).len() > 4 * flat);
+}
+
+#[test]
+fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
+    let Some(mut studio) = Studio::new(DVec3::new(0.5, -3.0, 1.0), DVec3::new(0.5, 0.0, 0.0)) else { return };
+    let look = Look { colour: [230, 60, 40], material: Material::Tissue };
+    let mut stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Tube, look }], vec![]);
+    let arc_m: Vec<f64> = (0..=20).map(|i| f64::from(i) * 0.05).collect();
+    let body = Body::Curve(CurveState {
+        positions: arc_m.iter().map(|&s| DVec3::new(s, 0.0, 0.2 * (5.0 * s).sin())).collect(),
+        velocities: vec![DVec3::ZERO; 21],
+        frames: vec![DQuat::from_rotation_arc(DVec3::Z, DVec3::X); 20],
+        radii_m: vec![0.1; 21],
+        arc_m,
+    });
+    stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+    stage.pose(SimTime::ZERO, States::Latest);
+    let at = Resolution { eps_m: 0.25, n: 2 };
+    let mut colours = |shading| {
+        let levels = [Level { shading, ..at.into() }];
+        studio.covered(&mut stage, &levels).into_iter().collect::<BTreeSet<_>>().len() as u64
+    };
+    let (flat, gouraud, fine) = (colours(Shading::Flat), colours(Shading::Gouraud), colours(Shading::PerPixel));
+    // 4 intervals of 48 triangles and two balls at the ends
+    let triangles = stage.compose(&studio.camera, &[at.into()], Style::default(), None).triangles();
+    assert!(flat > 20 && flat <= triangles && gouraud > 4 * flat && fine > 4 * flat, "{flat} {gouraud} {fine}");
 }
 
 #[test]

@@ -73,7 +73,7 @@ impl Targets {
         };
         Self {
             size,
-            depth: texture("depth", super::pipelines::DEPTH),
+            depth: texture("depth", super::bindings::DEPTH),
             samples: (samples > 1).then(|| texture("samples", format)),
         }
     }

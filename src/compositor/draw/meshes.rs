@@ -2,7 +2,7 @@
 //!
 //! In: levels that a picture uses. Out: vertex and index buffers. Never here: instances.
 
-use super::{MeshKey, Picture};
+use super::super::picture::{MeshKey, Picture};
 use glam::Vec3;
 use metachron_agents::N_MAX;
 use metachron_agents::shape::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
@@ -80,7 +80,7 @@ impl Meshes {
             self.given = Some(Arc::clone(&picture.meshes));
         }
         for tube in &picture.tubes {
-            for n in [tube.n, tube.n.min(super::SHADOW_LEVEL)] {
+            for n in [tube.n, tube.n.min(super::passes::SHADOW_LEVEL)] {
                 if let Some(slot @ None) = self.patches.get_mut(usize::from(n)) {
                     *slot = Some(patch_mesh(device, n));
                 }

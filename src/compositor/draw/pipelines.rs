@@ -1,165 +1,17 @@
-//! Pipelines and what they are bound to: shaders, layouts, the shadow map, the tissue texture.
+//! Pipelines: which shaders draw what, and how.
 //!
-//! In: a device and a format. Out: everything that does not change from frame to frame. Never here: a frame.
+//! In: a device and a format. Out: everything that is drawn with. Never here: a frame, what shaders are bound to.
 
+use super::super::level::Shading;
 use super::RendererOptions;
-use super::globals::Globals;
-use super::tissue;
-use wgpu::util::DeviceExt;
-use wgpu::{BindGroupLayout, Device, RenderPipeline, ShaderModule, TextureFormat, VertexBufferLayout};
-
-/// Format of depths.
-pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
+use super::bindings::{DEPTH, Layouts};
+use wgpu::{Device, RenderPipeline, ShaderModule, TextureFormat, VertexBufferLayout};
 
 const COMMON: &str = include_str!("shaders/common.wgsl");
 const SKIN: &str = include_str!("shaders/skin.wgsl");
 const SOLID: &str = include_str!("shaders/solid.wgsl");
 const STROKE: &str = include_str!("shaders/stroke.wgsl");
 const FLOOR: &str = include_str!("shaders/floor.wgsl");
-
-/// What passes may read: the light's pass the numbers only, the picture's pass the light's depths too.
-#[derive(Debug)]
-pub struct Layouts {
-    light: BindGroupLayout,
-    picture: BindGroupLayout,
-}
-
-impl Layouts {
-    /// The two layouts.
-    pub fn new(device: &Device) -> Self {
-        use wgpu::{BindingType, SamplerBindingType, TextureSampleType, TextureViewDimension};
-        let texture = |sample_type| BindingType::Texture {
-            sample_type,
-            view_dimension: TextureViewDimension::D2,
-            multisampled: false,
-        };
-        let block = BindingType::Buffer {
-            ty: wgpu::BufferBindingType::Uniform,
-            has_dynamic_offset: false,
-            min_binding_size: None,
-        };
-        let layout = |label, types: &[BindingType]| {
-            let entries: Vec<_> = (0..)
-                .zip(types)
-                .map(|(binding, &ty)| wgpu::BindGroupLayoutEntry {
-                    binding,
-                    visibility: wgpu::ShaderStages::VERTEX_FRAGMENT,
-                    ty,
-                    count: None,
-                })
-                .collect();
-            device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor { label: Some(label), entries: &entries })
-        };
-        Self {
-            light: layout("light", &[block]),
-            picture: layout(
-                "picture",
-                &[
-                    block,
-                    texture(TextureSampleType::Depth),
-                    BindingType::Sampler(SamplerBindingType::Comparison),
-                    texture(TextureSampleType::Float { filterable: true }),
-                    BindingType::Sampler(SamplerBindingType::Filtering),
-                    texture(TextureSampleType::Float { filterable: false }),
-                ],
-            ),
-        }
-    }
-}
-
-/// The things bound, and the views that passes draw into.
-#[derive(Debug)]
-pub struct Bindings {
-    /// The frame's numbers.
-    pub globals: wgpu::Buffer,
-    /// Bound while the light's depths are drawn.
-    pub light: wgpu::BindGroup,
-    /// Bound while the picture is drawn.
-    pub picture: wgpu::BindGroup,
-    /// The light's depths.
-    pub shadow: wgpu::TextureView,
-}
-
-impl Bindings {
-    /// Buffers and textures of a renderer.
-    pub fn new(device: &Device, queue: &wgpu::Queue, layouts: &Layouts, shadow_px: u32) -> Self {
-        let globals = device.create_buffer(&wgpu::BufferDescriptor {
-            label: Some("globals"),
-            size: size_of::<Globals>() as u64,
-            usage: wgpu::BufferUsages::UNIFORM | wgpu::BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
-        let shadow = shadow_map(device, shadow_px);
-        let tissue = tissue_map(device, queue);
-        let filter = wgpu::FilterMode::Linear;
-        let compare = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("shadow"),
-            mag_filter: filter,
-            min_filter: filter,
-            compare: Some(wgpu::CompareFunction::LessEqual),
-            ..Default::default()
-        });
-        let repeat = device.create_sampler(&wgpu::SamplerDescriptor {
-            label: Some("tissue"),
-            address_mode_u: wgpu::AddressMode::Repeat,
-            address_mode_v: wgpu::AddressMode::Repeat,
-            mag_filter: filter,
-            min_filter: filter,
-            ..Default::default()
-        });
-        let group = |label, layout, resources: Vec<wgpu::BindingResource<'_>>| {
-            let entries: Vec<_> =
-                (0..).zip(resources).map(|(binding, resource)| wgpu::BindGroupEntry { binding, resource }).collect();
-            device.create_bind_group(&wgpu::BindGroupDescriptor { label: Some(label), layout, entries: &entries })
-        };
-        use wgpu::BindingResource::{Sampler, TextureView};
-        let light = group("light", &layouts.light, vec![globals.as_entire_binding()]);
-        let all = vec![
-            globals.as_entire_binding(),
-            TextureView(&shadow),
-            Sampler(&compare),
-            TextureView(&tissue),
-            Sampler(&repeat),
-            TextureView(&shadow),
-        ];
-        let picture = group("picture", &layouts.picture, all);
-        Self { globals, light, picture, shadow }
-    }
-}
-
-fn extent(side: u32) -> wgpu::Extent3d {
-    wgpu::Extent3d { width: side, height: side, depth_or_array_layers: 1 }
-}
-
-fn shadow_map(device: &Device, side: u32) -> wgpu::TextureView {
-    let texture = device.create_texture(&wgpu::TextureDescriptor {
-        label: Some("shadow map"),
-        size: extent(side),
-        mip_level_count: 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: DEPTH,
-        usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    });
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
-
-fn tissue_map(device: &Device, queue: &wgpu::Queue) -> wgpu::TextureView {
-    let descriptor = wgpu::TextureDescriptor {
-        label: Some("tissue"),
-        size: extent(tissue::TEXELS),
-        mip_level_count: tissue::TEXELS.ilog2() + 1,
-        sample_count: 1,
-        dimension: wgpu::TextureDimension::D2,
-        format: TextureFormat::Rgba8Unorm,
-        usage: wgpu::TextureUsages::TEXTURE_BINDING,
-        view_formats: &[],
-    };
-    let order = wgpu::util::TextureDataOrder::MipMajor;
-    let texture = device.create_texture_with_data(queue, &descriptor, order, &tissue::levels());
-    texture.create_view(&wgpu::TextureViewDescriptor::default())
-}
 
 /// Every pipeline of a renderer.
 #[derive(Debug)]
@@ -168,6 +20,10 @@ pub struct Pipelines {
     pub tissue: RenderPipeline,
     /// Other tubes.
     pub skin: RenderPipeline,
+    /// Tubes of one colour a triangle.
+    pub skin_flat: RenderPipeline,
+    /// Tubes lit at the corners of their triangles.
+    pub skin_gouraud: RenderPipeline,
     /// Solids.
     pub solid: RenderPipeline,
     /// Solids of one colour a triangle.
@@ -254,15 +110,12 @@ impl Pipelines {
             layout(SAMPLE_STRIDE, instance, &end),
         ];
         let solids = [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &BODY)];
-        use wgpu::PrimitiveTopology::{LineList, TriangleList, TriangleStrip};
+        use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
         };
         let solid = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment, buffers: &solids, topology, module: &solid })
-        };
-        let plain = |label, vertex, fragment, topology| {
-            kitchen.cook(&Recipe { label, vertex, fragment: Some(fragment), buffers: &[], topology, module: &floor })
         };
         let [stroke, stroke_shadow] = kitchen.strokes(&module("stroke", &[SOLID, STROKE].concat()));
         let lean = |entry: [&'static str; 2]| entry[usize::from(options.lean)];
@@ -270,6 +123,8 @@ impl Pipelines {
         Self {
             tissue: tube("tissue", skin_vertex, Some(lean(["fs_tissue", "fs_tissue_lean"])), TriangleList),
             skin: tube("skin", skin_vertex, Some(lean(["fs_skin", "fs_skin_lean"])), TriangleList),
+            skin_flat: tube("flat skin", "vs_skin_flat", Some("fs_skin_flat"), TriangleList),
+            skin_gouraud: tube("gouraud skin", "vs_skin_gouraud", Some("fs_skin_gouraud"), TriangleList),
             skin_edges: tube("skin edges", "vs_skin", Some("fs_edge"), LineList),
             skin_shadow: tube("skin shadow", "vs_skin_shadow", None, TriangleList),
             solid: solid(
@@ -285,15 +140,29 @@ impl Pipelines {
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
             solid_edges: solid("solid edges", "vs_solid", Some("fs_solid_edge"), LineList),
             solid_shadow: solid("solid shadow", "vs_solid_shadow", None, TriangleList),
-            floor: if options.lean {
-                vec![
-                    (plain("floor patch", "vs_floor_patch", "fs_floor_patch", TriangleList), FLOOR_PATCH_CORNERS),
-                    (plain("floor rings", "vs_floor_rings", "fs_floor_rings", TriangleList), FLOOR_RING_CORNERS),
-                ]
-            } else {
-                vec![(plain("floor", "vs_floor", "fs_floor", TriangleStrip), 4)]
-            },
-            room: plain("room", "vs_room", "fs_room", TriangleList),
+            floor: kitchen.floor(&floor, options.lean),
+            room: kitchen.plain(&floor, ("vs_room", "fs_room"), TriangleList),
+        }
+    }
+}
+
+impl Pipelines {
+    /// What tubes of a shading are drawn with.
+    pub fn skin_of(&self, tissue: bool, shading: Shading) -> &RenderPipeline {
+        match shading {
+            Shading::Flat => &self.skin_flat,
+            Shading::Gouraud => &self.skin_gouraud,
+            Shading::PerPixel if tissue => &self.tissue,
+            Shading::PerPixel => &self.skin,
+        }
+    }
+
+    /// What solids and meshes of a shading are drawn with.
+    pub fn solid_of(&self, shading: Shading) -> &RenderPipeline {
+        match shading {
+            Shading::Flat => &self.solid_flat,
+            Shading::Gouraud => &self.solid_gouraud,
+            Shading::PerPixel => &self.solid,
         }
     }
 }
@@ -308,6 +177,28 @@ impl<'a> Kitchen<'a> {
             })
         });
         Self { device, layouts, format, samples: options.samples, shadow_taps: options.shadow_taps }
+    }
+
+    /// The floor in its parts, and how many corners each has.
+    fn floor(&self, module: &ShaderModule, lean: bool) -> Vec<(RenderPipeline, u32)> {
+        use wgpu::PrimitiveTopology::{TriangleList, TriangleStrip};
+        if !lean {
+            return vec![(self.plain(module, ("vs_floor", "fs_floor"), TriangleStrip), 4)];
+        }
+        vec![
+            (self.plain(module, ("vs_floor_patch", "fs_floor_patch"), TriangleList), FLOOR_PATCH_CORNERS),
+            (self.plain(module, ("vs_floor_rings", "fs_floor_rings"), TriangleList), FLOOR_RING_CORNERS),
+        ]
+    }
+
+    /// What needs no buffers.
+    fn plain(
+        &self,
+        module: &ShaderModule,
+        (vertex, fragment): (&str, &str),
+        topology: wgpu::PrimitiveTopology,
+    ) -> RenderPipeline {
+        self.cook(&Recipe { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
     }
 
     /// Points and lines, as the eye and as the light sees them.

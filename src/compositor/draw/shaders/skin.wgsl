@@ -128,6 +128,61 @@ fn fs_skin(in: Skin) -> @location(0) vec4f {
     return finish(shade(Surface(n, v, albedo, in.m, in.k, 1.0, in.uv.z), within, share));
 }
 
+// A skin lit at the corners of its triangles, in light and in shadow; a pixel chooses.
+struct Lit {
+    @builtin(position) clip: vec4f,
+    @location(0) at: vec3f, // in the shadow map
+    @location(1) light: vec3f,
+    @location(2) dark: vec3f,
+}
+
+// A skin with one colour a triangle: that of its first corner.
+struct Flat {
+    @builtin(position) clip: vec4f,
+    @location(0) @interpolate(flat) colour: vec3f,
+}
+
+// What its corners are made of; tissue without its texture has the texture's mean.
+fn surface_of(s: Skin, material: f32) -> Surface {
+    let v = normalize(g.eye.xyz - s.p);
+    let own = s.colour * select(1.0, 0.925, material < 0.001);
+    return Surface(s.n, v, mix(own, s.tint.rgb, s.tint.a), s.m, s.k, 1.0, s.uv.z);
+}
+
+@vertex
+fn vs_skin_gouraud(in: Patch) -> Lit {
+    let s = skin(in);
+    let within = pool(s.p);
+    var out: Lit;
+    out.clip = s.clip;
+    out.at = shadow_place(s.p, s.n);
+    let surface = surface_of(s, in.colour.a);
+    out.light = finish(shade(surface, within, within)).rgb;
+    out.dark = finish(shade(surface, within, 0.0)).rgb;
+    return out;
+}
+
+@fragment
+fn fs_skin_gouraud(in: Lit) -> @location(0) vec4f {
+    return vec4f(mix(in.dark, in.light, lit(in.at)), 1.0);
+}
+
+@vertex
+fn vs_skin_flat(in: Patch) -> Flat {
+    let s = skin(in);
+    let within = pool(s.p);
+    var out: Flat;
+    out.clip = s.clip;
+    let share = lit(shadow_place(s.p, s.n)) * within;
+    out.colour = finish(shade(surface_of(s, in.colour.a), within, share)).rgb;
+    return out;
+}
+
+@fragment
+fn fs_skin_flat(in: Flat) -> @location(0) vec4f {
+    return vec4f(in.colour, 1.0);
+}
+
 @fragment
 fn fs_edge(in: Skin) -> @location(0) vec4f {
     return finish(mix(vec3f(0.85, 0.95, 1.0), in.tint.rgb * 2.2, in.tint.a * 0.7));

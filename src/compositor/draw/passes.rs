@@ -1,0 +1,159 @@
+//! The passes of a frame: the light's depths, then the picture.
+//!
+//! In: a picture whose meshes and numbers are uploaded. Out: draws. Never here: uploads, pipelines, submission.
+
+use super::super::level::Shading;
+use super::super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
+use super::meshes::Mesh;
+use super::timing::Timing;
+use super::{Renderer, Target};
+
+/// Shadows need no finer patches than this: the shadow map's texels are coarser.
+pub(super) const SHADOW_LEVEL: u8 = 2;
+
+impl Renderer {
+    /// The depths of everything as the light sees it; the number of draws.
+    pub(super) fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, picture: &Picture) -> u32 {
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("shadow"),
+            depth_stencil_attachment: Some(depth(&self.bindings.shadow, 1.0, wgpu::StoreOp::Store)),
+            timestamp_writes: self.timing.as_ref().map(Timing::first_pass),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.bindings.light, &[]);
+        // the outermost texels stay empty: past the map there is light
+        let inner = self.options.shadow_px - 2;
+        pass.set_scissor_rect(1, 1, inner, inner);
+        let mut draws = 0;
+        pass.set_pipeline(&self.pipelines.skin_shadow);
+        for tube in &picture.tubes {
+            let mesh = self.meshes.patch(tube.n.min(SHADOW_LEVEL));
+            draws += self.draw_tube(&mut pass, tube, mesh, false);
+        }
+        for strokes in [false, true] {
+            pass.set_pipeline(if strokes { &self.pipelines.stroke_shadow } else { &self.pipelines.solid_shadow });
+            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.mesh) == strokes) {
+                draws += self.draw_solids(&mut pass, run, false);
+            }
+        }
+        draws + self.draw_skins(&mut pass, picture, (|_| &self.pipelines.solid_shadow, false))
+    }
+
+    /// The picture itself, nearest kinds first so that hidden pixels are not lit; the number of draws.
+    pub(super) fn draw_picture(
+        &self,
+        encoder: &mut wgpu::CommandEncoder,
+        picture: &Picture,
+        target: Target<'_>,
+        room: bool,
+    ) -> u32 {
+        let Some(targets) = &self.targets else { return 0 };
+        let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
+            label: Some("picture"),
+            color_attachments: &[Some(targets.colour(target.view))],
+            depth_stencil_attachment: Some(depth(&targets.depth, 0.0, wgpu::StoreOp::Discard)),
+            timestamp_writes: self.timing.as_ref().map(Timing::last_pass),
+            ..Default::default()
+        });
+        pass.set_bind_group(0, &self.bindings.picture, &[]);
+        let mut draws = 0;
+        for tissue in [true, false] {
+            for tube in picture.tubes.iter().filter(|t| t.tissue == tissue && t.shown) {
+                pass.set_pipeline(self.pipelines.skin_of(tissue, tube.shading));
+                draws += self.draw_tube(&mut pass, tube, self.meshes.patch(tube.n), false);
+            }
+        }
+        for slab in [false, true] {
+            for run in picture.solids.iter().filter(|run| matches!(run.mesh, MeshKey::Slab(_)) == slab) {
+                pass.set_pipeline(self.pipeline_of(run));
+                draws += self.draw_solids(&mut pass, run, false);
+            }
+        }
+        draws += self.draw_skins(&mut pass, picture, (|shading| self.pipelines.solid_of(shading), false));
+        if picture.style.wireframe {
+            draws += self.draw_edges(&mut pass, picture);
+        }
+        let floor: &[_] = if picture.floor.is_some() { &self.pipelines.floor } else { &[] };
+        for (part, corners) in floor {
+            pass.set_pipeline(part);
+            pass.draw(0..*corners, 0..1);
+            draws += 1;
+        }
+        if room {
+            pass.set_pipeline(&self.pipelines.room);
+            pass.draw(0..3, 0..1);
+            draws += 1;
+        }
+        draws
+    }
+
+    fn draw_edges(&self, pass: &mut wgpu::RenderPass<'_>, picture: &Picture) -> u32 {
+        let mut draws = 0;
+        pass.set_pipeline(&self.pipelines.skin_edges);
+        for tube in picture.tubes.iter().filter(|t| t.shown) {
+            draws += self.draw_tube(pass, tube, self.meshes.patch(tube.n), true);
+        }
+        pass.set_pipeline(&self.pipelines.solid_edges);
+        for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.mesh)) {
+            draws += self.draw_solids(pass, run, true);
+        }
+        draws + self.draw_skins(pass, picture, (|_| &self.pipelines.solid_edges, true))
+    }
+
+    /// The skins of soft bodies, each a mesh that is drawn once by the pipeline that its shading asks for.
+    fn draw_skins<'a>(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        picture: &Picture,
+        (pipeline, edges): (impl Fn(Shading) -> &'a wgpu::RenderPipeline, bool),
+    ) -> u32 {
+        let Some(instances) = self.instances.buffer() else { return 0 };
+        let stride = size_of::<SolidInstance>() as u64;
+        let drawn = picture.skins.runs.iter().map(|run| {
+            let from = u64::from(run.instance) * stride;
+            pass.set_pipeline(pipeline(run.shading));
+            pass.set_vertex_buffer(1, instances.slice(from..from + stride));
+            self.skins.draw(pass, run, edges)
+        });
+        drawn.sum()
+    }
+
+    /// What a run of solids is drawn with: points, lines and slabs are lit at their corners.
+    fn pipeline_of(&self, run: &SolidRun) -> &wgpu::RenderPipeline {
+        match (run.mesh, run.shading) {
+            (MeshKey::Slab(_), _) => &self.pipelines.slab,
+            _ if self.meshes.is_strokes(run.mesh) => &self.pipelines.stroke,
+            (_, shading) => self.pipelines.solid_of(shading),
+        }
+    }
+
+    /// One tube: the patch once an interval, between each sample and the next of the one buffer of all tubes.
+    fn draw_tube(&self, pass: &mut wgpu::RenderPass<'_>, tube: &TubeRun, mesh: Option<&Mesh>, edges: bool) -> u32 {
+        let (Some(mesh), Some(samples)) = (mesh, self.samples.buffer()) else { return 0 };
+        let stride = size_of::<SkinSample>() as u64;
+        let (from, count) = (u64::from(tube.first) * stride, u64::from(tube.intervals) * stride);
+        pass.set_vertex_buffer(1, samples.slice(from..from + count));
+        pass.set_vertex_buffer(2, samples.slice(from + stride..from + stride + count));
+        mesh.draw(pass, edges, tube.intervals)
+    }
+
+    fn draw_solids(&self, pass: &mut wgpu::RenderPass<'_>, run: &SolidRun, edges: bool) -> u32 {
+        let Some(instances) = self.instances.buffer() else { return 0 };
+        let stride = size_of::<SolidInstance>() as u64;
+        let from = u64::from(run.first) * stride;
+        pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
+        match run.mesh {
+            MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut), edges, run.count),
+            MeshKey::Part(model, rung, triangles) => {
+                let mesh = self.meshes.part(model, rung);
+                mesh.map_or(0, |mesh| mesh.draw_first(pass, (edges, triangles), run.count))
+            }
+            key => self.meshes.solid(key).map_or(0, |mesh| mesh.draw(pass, edges, run.count)),
+        }
+    }
+}
+
+fn depth(view: &wgpu::TextureView, clear: f32, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {
+    let ops = wgpu::Operations { load: wgpu::LoadOp::Clear(clear), store };
+    wgpu::RenderPassDepthStencilAttachment { view, depth_ops: Some(ops), stencil_ops: None }
+}
