@@ -4,6 +4,7 @@
 //! A tube that the camera does not see stays in the picture for its shadow.
 
 use super::gather::{Form, Look, Material, PropShape, Stage, Track};
+use super::glide::{Allowance, Glide};
 use super::level::{Level, Shading};
 use super::picture::{
     Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
@@ -30,6 +31,8 @@ const SPRING_SHARE: f64 = 0.011;
 const SPRING_TURNS: (usize, usize) = (9, 8);
 /// Force that colours a grasp fully red, newtons.
 const FORCE_RED_N: f64 = 2.0;
+/// Triangles beyond those asked for with which meshes may get coarser slowly, as a part of all that were asked for.
+const GLIDE_SHARE: f64 = 0.05;
 /// Past this multiple of the eye's distance an object no longer widens the light.
 const FOCUS_REACH: f64 = 4.0;
 
@@ -72,10 +75,14 @@ impl Stage {
         scratch.solids.clear();
         self.find_focus(camera, &mut picture);
         self.add_tubes(levels, &mut picture, &mut scratch);
+        let mut allowance = self.allowance(levels);
         for (number, track) in self.tracks.iter_mut().enumerate() {
             let at = level(levels, number);
+            if at.triangles == 0 || !track.seen {
+                track.glide = None;
+            }
             if at.triangles > 0 {
-                add_solid(track, at, &picture, &mut scratch.solids);
+                add_solid(track, at, &picture, (&mut scratch.solids, &mut allowance));
             }
         }
         self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
@@ -95,6 +102,26 @@ impl Stage {
     pub fn place(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
         let track = self.tracks.iter().find(|track| track.actor.id == id)?;
         track.pose.point(anchor).map(|(position, _)| position)
+    }
+
+    /// Lets meshes change their cut over so many frames from now on; 0 (as at the start) and 1 are at once.
+    ///
+    /// What gets coarser is then drawn with more triangles than asked for on its way, a twentieth of the meshes' at most.
+    pub const fn glide_over(&mut self, frames: u8) {
+        self.glide_frames = frames;
+    }
+
+    /// What gliding may cost in the next picture.
+    fn allowance(&self, levels: &[Level]) -> Allowance {
+        if self.glide_frames < 2 {
+            return Allowance { step: 1.0, triangles: 0.0 };
+        }
+        let asked = self.tracks.iter().enumerate().map(|(number, track)| match &track.actor.form {
+            Form::Scenery(Model::Mesh(tom), _) if track.seen => level(levels, number).triangles.min(tom.range().1),
+            _ => 0,
+        });
+        let triangles = GLIDE_SHARE * asked.map(f64::from).sum::<f64>();
+        Allowance { step: 1.0 / f32::from(self.glide_frames), triangles }
     }
 
     /// The ball that light is fitted to, and the box that shadow is: all that is near what the camera looks at.
@@ -253,7 +280,7 @@ fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: Paint) -> S
         position: position.as_vec3().to_array(),
         radius_m: size.radius_m,
         extents: size.extents.to_array(),
-        pad: 0.0,
+        glide: 0.0,
         colour: paint.packed(),
         tint: paint.tint,
         pad2: [0; 2],
@@ -268,10 +295,10 @@ fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Roundin
     Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
 }
 
-fn add_solid(track: &mut Track, at: Level, picture: &Picture, solids: &mut Solids) {
+fn add_solid(track: &mut Track, at: Level, picture: &Picture, (solids, allowance): (&mut Solids, &mut Allowance)) {
     let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
     if matches!(track.actor.form, Form::Scenery(..)) {
-        return add_scenery(track, at, (paint, picture.origin), solids);
+        return add_scenery(track, at, (paint, picture.origin), (solids, allowance));
     }
     match (&track.actor.form, &track.pose) {
         (Form::Solid(solid), Body::Rigid(rigid)) => {
@@ -285,28 +312,32 @@ fn add_solid(track: &mut Track, at: Level, picture: &Picture, solids: &mut Solid
 }
 
 /// Scenery that is seen: as much of its mesh as its level says.
-fn add_scenery(track: &mut Track, level: Level, (paint, origin): (Paint, DVec3), solids: &mut Solids) {
+fn add_scenery(
+    track: &mut Track,
+    level: Level,
+    (paint, origin): (Paint, DVec3),
+    (solids, allowance): (&mut Solids, &mut Allowance),
+) {
     let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.given, track.seen) else {
         return;
     };
-    let (mesh, growth) = match model {
+    let (mesh, growth, share) = match model {
         Model::Mesh(tom) => {
-            let cut = match track.cut {
-                Some((asked, cut)) if asked == level.triangles => cut,
-                _ => tom.cut(level.triangles),
-            };
-            track.cut = Some((level.triangles, cut));
-            (MeshKey::Cut(number, cut), 0.0)
+            let glide = track.glide.get_or_insert_with(|| Glide::at(tom, level.triangles));
+            glide.advance(tom, level.triangles, allowance);
+            let (mesh, share) = glide.drawn(number);
+            (mesh, 0.0, share)
         }
         Model::Foliage(foliage) => {
             let prefix = foliage.cut(level.triangles);
             // a mesh is not swept: only strokes grow
             let is_mesh = matches!(foliage.rungs().get(usize::from(prefix.rung)), Some(Rung::Mesh(_)));
-            (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth })
+            (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth }, 0.0)
         }
     };
     let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
-    solids.push(((level.shading, mesh), instance(at.position - origin, at.rotation, size, paint)));
+    let still = instance(at.position - origin, at.rotation, size, paint);
+    solids.push(((level.shading, mesh), SolidInstance { glide: share, ..still }));
 }
 
 fn add_tool(shape: &ToolShape, tool: &ToolState, (level, paint, origin): (Level, Paint, DVec3), solids: &mut Solids) {

@@ -3,12 +3,13 @@
 //! In: the newest snapshot of each agent and the frame's time. Out: one pose an object, at a time as near the frame's as the
 //! choice of [`States`] allows, and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
+use super::glide::Glide;
 use super::picture::Picture;
 use super::pose;
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::shape::{
-    Cut, Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
+    Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
 };
 use metachron_agents::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use std::sync::Arc;
@@ -97,6 +98,8 @@ pub struct Stage {
     pub(super) props: Vec<PropShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
+    /// Over how many frames meshes change their cut.
+    pub(super) glide_frames: u8,
 }
 
 /// One agent over time.
@@ -114,8 +117,8 @@ pub(super) struct Track {
     pub bounds: Bounds,
     pub seen: bool,
     pub skeleton: Skeleton,
-    /// The triangles last asked for of a mesh, and the cut that has them.
-    pub cut: Option<(u32, Cut)>,
+    /// The cut that a mesh is drawn at while it is seen.
+    pub glide: Option<Glide>,
     /// A rope as it is shown.
     pub rope: CurveState,
 }
@@ -159,7 +162,7 @@ impl Stage {
         let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
         let models = models.0.into_iter().map(|(model, _)| model).collect();
         let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
-        Self { tracks, props, picture, scratch: Default::default() }
+        Self { tracks, props, picture, scratch: Default::default(), glide_frames: 0 }
     }
 
     /// Takes the newest snapshot of an agent; `awake` tells whether it goes on stepping.
@@ -224,7 +227,7 @@ impl Track {
             bounds: Bounds::default(),
             seen: true,
             skeleton: Skeleton::default(),
-            cut: None,
+            glide: None,
             rope: CurveState::default(),
         };
         track.bounds = track.find_bounds();

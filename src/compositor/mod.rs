@@ -8,6 +8,7 @@ mod benchmark;
 mod compose;
 mod draw;
 mod gather;
+mod glide;
 mod level;
 mod offscreen;
 mod pick;

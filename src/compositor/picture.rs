@@ -72,8 +72,8 @@ pub struct SolidInstance {
     pub radius_m: f32,
     /// Half extents of the core, metres; of models their scale.
     pub extents: [f32; 3],
-    /// Free.
-    pub pad: f32,
+    /// Of [`MeshKey::Glide`] how far it lies on its way, 0 … 1; else 0.
+    pub glide: f32,
     /// Colour, sRGB, and material number.
     pub colour: [u8; 4],
     /// Tint laid over everything, and how much of it.
@@ -91,6 +91,8 @@ pub enum MeshKey {
     Given(u32),
     /// A cut of the mesh of this number in [`Picture::models`].
     Cut(u32, Cut),
+    /// The same on its way to the cut of so many vertices: model, cut, vertices.
+    Glide(u32, Cut, u32),
     /// So many triangles from the start of a rung of the foliage of this number in [`Picture::models`]: model, rung, triangles.
     Part(u32, u8, u32),
     /// A sharp box whose sides are cut into so many cells along x, y and z, each at least 1.
@@ -217,7 +219,7 @@ impl Picture {
                 let [x, y, z] = [x, y, z].map(u64::from);
                 4 * (x * y + y * z + z * x)
             }
-            MeshKey::Cut(_, cut) => u64::from(cut.triangles),
+            MeshKey::Cut(_, cut) | MeshKey::Glide(_, cut, _) => u64::from(cut.triangles),
             MeshKey::Part(_, _, triangles) => u64::from(triangles),
             MeshKey::Given(i) => self.meshes.get(i as usize).map_or(0, |mesh| mesh.triangles.len() as u64),
         }

@@ -76,6 +76,9 @@ struct Chosen {
 /// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
 const WARM_UP_FRAMES: u64 = 3;
 
+/// Frames over which meshes change their level.
+const GLIDE_FRAMES: u8 = 6;
+
 impl Session {
     /// Starts the agents of `scene`.
     ///
@@ -85,6 +88,8 @@ impl Session {
         scene.executor = cast::executor(&scene);
         let machine = cast::machine(&scene);
         let spawns = cast::spawns(&scene)?;
+        let mut stage = cast::stage(&scene);
+        stage.glide_over(GLIDE_FRAMES);
         let clock = || Arc::new(runtime::SystemClock::new());
         let run: Box<dyn Run> = match scene.executor {
             ExecutorKind::Threads => Box::new(Threads::start(spawns, clock())?),
@@ -94,7 +99,7 @@ impl Session {
         Ok(Self {
             control: cast::picture_control(&scene),
             reader: Reader::new(run.agents()),
-            stage: cast::stage(&scene),
+            stage,
             declared: cast::prices(&machine.draw),
             machine,
             run,

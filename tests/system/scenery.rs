@@ -210,6 +210,35 @@ fn a_tube_of_flat_shading_has_at_most_one_colour_a_triangle() {
     assert!(flat > 20 && flat <= triangles && gouraud > 4 * flat && fine > 4 * flat, "{flat} {gouraud} {fine}");
 }
 
+/// Mean absolute difference of two pictures over all channels of all pixels.
+fn difference(a: &RgbaImage, b: &RgbaImage) -> f64 {
+    let sum: u64 = a.as_raw().iter().zip(b.as_raw()).map(|(x, y)| u64::from(x.abs_diff(*y))).sum();
+    sum as f64 / a.as_raw().len() as f64
+}
+
+#[test]
+fn a_change_of_level_that_glides_is_seen_less_from_frame_to_frame_and_ends_at_the_plain_level() {
+    let Some(mut studio) = Studio::new(DVec3::new(0.5, -4.0, 1.0), DVec3::ZERO) else { return };
+    let bumps = Model::Mesh(Arc::new(Tom::new(&generate(Generator::Blob, 5, 4000)).expect("a blob")));
+    // a second mesh that stays: a twentieth of both is what the first may be drawn with beyond what was asked for
+    let crowd = Model::Mesh(Arc::new(Tom::new(&generate(Generator::Terrain, 5, 40_000)).expect("hills")));
+    let mut stage = stage(&[bumps, crowd], 0.9);
+    let levels = |triangles| [level(triangles, Shading::PerPixel), level(40_000, Shading::PerPixel)];
+    for (from, to) in [(120, 900), (900, 120)] {
+        let (before, after) = (studio.draw(&mut stage, &levels(from)), studio.draw(&mut stage, &levels(to)));
+        let jump = difference(&before, &after);
+        studio.draw(&mut stage, &levels(from));
+        stage.glide_over(6);
+        let mut frames = vec![before];
+        frames.extend((0..6).map(|_| studio.draw(&mut stage, &levels(to))));
+        stage.glide_over(0);
+        let steps: Vec<f64> = frames.windows(2).map(|pair| difference(&pair[0], &pair[1])).collect();
+        // six equal steps of the way, of which outlines and lights of a few pixels make more than a sixth
+        assert!(steps.iter().all(|step| *step < 0.5 * jump), "{from} to {to}: {steps:?} of {jump}");
+        assert_eq!(frames[6], after, "{from} to {to}");
+    }
+}
+
 #[test]
 fn shadings_agree_where_triangles_are_small() {
     let Some(mut studio) = Studio::new(DVec3::new(0.5, -4.0, 1.0), DVec3::ZERO) else { return };

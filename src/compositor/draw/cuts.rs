@@ -1,39 +1,67 @@
 //! Cuts of multiresolution meshes on the GPU: the vertices of each mesh once, the triangles of each cut in use.
 //!
 //! In: the cuts that a picture uses. Out: draws. Never here: which cut is right.
-//! Triangles of cuts stand one after another in one buffer. A new cut is found and appended; when the buffer is full, what the
-//! picture does not use is forgotten, and the rest is written anew.
+//! Triangles of cuts stand one after another in one buffer, and so do the ends of ways from one cut to another. A new one is found and
+//! appended; when the buffer is full, what the picture does not use is forgotten, and the rest is written anew.
 
 use super::super::picture::{MeshKey, Picture};
-use metachron_agents::shape::{Cut, Model, Tom};
+use metachron_agents::shape::{Cut, Model, PrimitiveVertex, Tom};
 use std::collections::HashMap;
+use std::hash::Hash;
 use std::ops::Range;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
-/// Bytes of an index.
-const INDEX: u64 = 4;
-/// Least size of the buffer, indices.
+/// Least size of a buffer, items.
 const ROOM_MIN: u64 = 1 << 14;
+
+/// Position and normal.
+type Corner = [[f32; 3]; 2];
 
 /// What was made of the models of a picture.
 #[derive(Debug, Default)]
 pub struct Cuts {
     models: Option<Arc<[Model]>>,
     vertices: HashMap<u32, wgpu::Buffer>,
-    triangles: Store,
-    edges: Store,
+    triangles: Store<CutKey>,
+    edges: Store<CutKey>,
+    /// Where the vertices of a cut are at the coarser end of their way.
+    ways: Store<WayKey>,
     corners: Vec<[u32; 3]>,
-    ends: Vec<[u32; 2]>,
+    sides: Vec<[u32; 2]>,
+    ends: Vec<Corner>,
 }
 
-/// One buffer of indices and who has which of them.
-#[derive(Debug, Default)]
-struct Store {
+/// A model and its cut.
+type CutKey = (u32, Cut);
+
+/// A model, vertices of the finer cut, vertices of the coarser one.
+type WayKey = (u32, u32, u32);
+
+/// One buffer of items and who has which of them.
+#[derive(Debug)]
+struct Store<K> {
     buffer: Option<wgpu::Buffer>,
     used: u64,
-    slots: HashMap<(u32, Cut), Range<u32>>,
+    slots: HashMap<K, Range<u32>>,
 }
+
+impl<K> Default for Store<K> {
+    fn default() -> Self {
+        Self { buffer: None, used: 0, slots: HashMap::new() }
+    }
+}
+
+/// What a store holds.
+#[derive(Debug, Clone, Copy)]
+struct Item {
+    label: &'static str,
+    bytes: u64,
+    usage: wgpu::BufferUsages,
+}
+
+const INDEX: Item = Item { label: "cuts", bytes: 4, usage: wgpu::BufferUsages::INDEX };
+const END: Item = Item { label: "ways", bytes: size_of::<Corner>() as u64, usage: wgpu::BufferUsages::VERTEX };
 
 impl Cuts {
     /// Makes what `picture` needs and is not there yet.
@@ -43,8 +71,7 @@ impl Cuts {
         }
         for (model, tom, _) in cuts(picture) {
             self.vertices.entry(model).or_insert_with(|| {
-                let vertices: Vec<[[f32; 3]; 2]> =
-                    tom.vertices().iter().map(|v| [v.core.to_array(), v.normal.to_array()]).collect();
+                let vertices: Vec<Corner> = tom.vertices().iter().map(corner).collect();
                 device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                     label: Some("model vertices"),
                     contents: bytemuck::cast_slice(&vertices),
@@ -52,39 +79,57 @@ impl Cuts {
                 })
             });
         }
-        self.triangles.make_room(device, picture, 3);
+        self.triangles.make_room(device, INDEX, cuts(picture).map(|(model, _, cut)| ((model, cut), 3 * cut.triangles)));
         for (model, tom, cut) in cuts(picture) {
             if self.triangles.slots.contains_key(&(model, cut)) {
                 continue;
             }
             self.corners.clear();
             tom.resolve(cut, &mut self.corners);
-            self.triangles.append(queue, (model, cut), bytemuck::cast_slice(&self.corners));
+            self.triangles.append(queue, INDEX, (model, cut), bytemuck::cast_slice(&self.corners));
         }
+        self.prepare_ways(device, queue, picture);
         if picture.style.wireframe {
             self.prepare_edges(device, queue, picture);
         }
     }
 
+    fn prepare_ways(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) {
+        self.ways.make_room(device, END, ways(picture).map(|(key, _)| (key, key.1)));
+        for (key, tom) in ways(picture) {
+            if self.ways.slots.contains_key(&key) {
+                continue;
+            }
+            self.ends.clear();
+            self.ends.extend((0..key.1).map(|vertex| corner(&tom.morphed(vertex, key.2, 1.0))));
+            self.ways.append(queue, END, key, bytemuck::cast_slice(&self.ends));
+        }
+    }
+
     fn prepare_edges(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) {
-        self.edges.make_room(device, picture, 6);
+        self.edges.make_room(device, INDEX, cuts(picture).map(|(model, _, cut)| ((model, cut), 6 * cut.triangles)));
         for (model, tom, cut) in cuts(picture) {
             if self.edges.slots.contains_key(&(model, cut)) {
                 continue;
             }
             self.corners.clear();
             tom.resolve(cut, &mut self.corners);
-            self.ends.clear();
-            self.ends.extend(self.corners.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
-            self.edges.append(queue, (model, cut), bytemuck::cast_slice(&self.ends));
+            self.sides.clear();
+            self.sides.extend(self.corners.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
+            self.edges.append(queue, INDEX, (model, cut), bytemuck::cast_slice(&self.sides));
         }
     }
 
-    /// Draws `count` instances of a cut, as triangles or as edges; the number of draws.
-    pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, key: (u32, Cut), edges: bool, count: u32) -> u32 {
+    /// Draws `count` instances of a cut, on its way to one of so many vertices if to any, as triangles or as edges; the number of draws.
+    pub fn draw(
+        &self,
+        pass: &mut wgpu::RenderPass<'_>,
+        (model, cut, coarser): (u32, Cut, Option<u32>),
+        (edges, count): (bool, u32),
+    ) -> u32 {
         let store = if edges { &self.edges } else { &self.triangles };
         let (Some(vertices), Some(indices), Some(slot)) =
-            (self.vertices.get(&key.0), &store.buffer, store.slots.get(&key))
+            (self.vertices.get(&model), &store.buffer, store.slots.get(&(model, cut)))
         else {
             return 0;
         };
@@ -92,52 +137,78 @@ impl Cuts {
             return 0;
         }
         pass.set_vertex_buffer(0, vertices.slice(..));
+        pass.set_vertex_buffer(
+            2,
+            coarser.and_then(|c| self.ways.part(END, &(model, cut.vertices, c))).unwrap_or(vertices.slice(..)),
+        );
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(slot.clone(), 0, 0..count);
         1
     }
 }
 
-impl Store {
-    /// Sees to it that every cut of `picture` fits, each triangle as so many indices; forgets all where it must.
-    fn make_room(&mut self, device: &wgpu::Device, picture: &Picture, each: u64) {
-        let indices = |cut: Cut| each * u64::from(cut.triangles);
-        let new = |(model, _, cut): &(u32, &Tom, Cut)| !self.slots.contains_key(&(*model, *cut));
-        let wanted: u64 = cuts(picture).filter(new).map(|(_, _, cut)| indices(cut)).sum();
-        let room = self.buffer.as_ref().map_or(0, |buffer| buffer.size() / INDEX);
+fn corner(vertex: &PrimitiveVertex) -> Corner {
+    [vertex.core.to_array(), vertex.normal.to_array()]
+}
+
+impl<K: Copy + Eq + Hash> Store<K> {
+    /// Sees to it that everything in `used` fits, each with its number of items; forgets all where it must.
+    fn make_room(&mut self, device: &wgpu::Device, item: Item, used: impl Iterator<Item = (K, u32)> + Clone) {
+        let sum = |some: &mut dyn Iterator<Item = (K, u32)>| some.map(|(_, items)| u64::from(items)).sum::<u64>();
+        let wanted = sum(&mut used.clone().filter(|(key, _)| !self.slots.contains_key(key)));
+        let room = self.buffer.as_ref().map_or(0, |buffer| buffer.size() / item.bytes);
         if self.used + wanted <= room {
             return;
         }
         self.slots.clear();
         self.used = 0;
         // twice what one picture needs, so that not every picture of a moving eye begins anew
-        let all: u64 = 2 * cuts(picture).map(|(_, _, cut)| indices(cut)).sum::<u64>();
+        let all = 2 * sum(&mut used.clone());
         if all > room {
             self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
-                label: Some("cuts"),
-                size: all.next_power_of_two().max(ROOM_MIN) * INDEX,
-                usage: wgpu::BufferUsages::INDEX | wgpu::BufferUsages::COPY_DST,
+                label: Some(item.label),
+                size: all.next_power_of_two().max(ROOM_MIN) * item.bytes,
+                usage: item.usage | wgpu::BufferUsages::COPY_DST,
                 mapped_at_creation: false,
             }));
         }
     }
 
-    fn append(&mut self, queue: &wgpu::Queue, key: (u32, Cut), indices: &[u32]) {
+    fn append(&mut self, queue: &wgpu::Queue, item: Item, key: K, bytes: &[u8]) {
         let Some(buffer) = &self.buffer else { return };
-        queue.write_buffer(buffer, self.used * INDEX, bytemuck::cast_slice(indices));
-        let end = self.used + indices.len() as u64;
+        queue.write_buffer(buffer, self.used * item.bytes, bytes);
+        let end = self.used + bytes.len() as u64 / item.bytes;
         self.slots.insert(key, self.used as u32..end as u32);
         self.used = end;
+    }
+
+    /// The part of the buffer that a key has.
+    fn part(&self, item: Item, key: &K) -> Option<wgpu::BufferSlice<'_>> {
+        let slot = self.slots.get(key)?;
+        let [from, to] = [slot.start, slot.end].map(|at| u64::from(at) * item.bytes);
+        Some(self.buffer.as_ref()?.slice(from..to))
     }
 }
 
 /// Every cut of a picture with its mesh; runs of one cut in two shadings name it twice.
-fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> {
+fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
     picture.solids.iter().filter_map(|run| match run.mesh {
-        MeshKey::Cut(model, cut) => match picture.models.get(model as usize) {
-            Some(Model::Mesh(tom)) => Some((model, &**tom, cut)),
-            _ => None,
-        },
+        MeshKey::Cut(model, cut) | MeshKey::Glide(model, cut, _) => Some((model, tom(picture, model)?, cut)),
         _ => None,
     })
+}
+
+/// Every way of a picture with its mesh.
+fn ways(picture: &Picture) -> impl Iterator<Item = (WayKey, &Tom)> + Clone {
+    picture.solids.iter().filter_map(|run| match run.mesh {
+        MeshKey::Glide(model, cut, coarser) => Some(((model, cut.vertices, coarser), tom(picture, model)?)),
+        _ => None,
+    })
+}
+
+fn tom(picture: &Picture, model: u32) -> Option<&Tom> {
+    match picture.models.get(model as usize)? {
+        Model::Mesh(tom) => Some(tom),
+        Model::Foliage(_) => None,
+    }
 }

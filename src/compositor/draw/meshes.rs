@@ -35,6 +35,11 @@ impl Mesh {
         }
     }
 
+    /// Its corners.
+    pub fn vertices(&self) -> wgpu::BufferSlice<'_> {
+        self.vertices.slice(..)
+    }
+
     /// Draws `count` instances, as triangles or as edges; the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, count: u32) -> u32 {
         self.draw_first(pass, (edges, u32::MAX), count)
@@ -92,7 +97,7 @@ impl Meshes {
         }
         for run in &picture.solids {
             match run.mesh {
-                MeshKey::Cut(..) => {}
+                MeshKey::Cut(..) | MeshKey::Glide(..) => {}
                 MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
                 key => {
                     self.solids.entry(key).or_insert_with(|| solid_mesh(device, key, &picture.meshes));
@@ -153,7 +158,7 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> M
             Some(mesh) => mesh,
             None => &PrimitiveMesh::default(),
         },
-        MeshKey::Cut(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
+        MeshKey::Cut(..) | MeshKey::Glide(..) | MeshKey::Part(..) => &PrimitiveMesh::default(),
     };
     primitive_mesh(device, mesh)
 }

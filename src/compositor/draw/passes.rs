@@ -143,14 +143,20 @@ impl Renderer {
         let from = u64::from(run.first) * stride;
         pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
         match run.mesh {
-            MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut), edges, run.count),
+            MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut, None), (edges, run.count)),
+            MeshKey::Glide(model, cut, to) => self.cuts.draw(pass, (model, cut, Some(to)), (edges, run.count)),
             MeshKey::Part(model, rung, triangles) => {
-                let mesh = self.meshes.part(model, rung);
-                mesh.map_or(0, |mesh| mesh.draw_first(pass, (edges, triangles), run.count))
+                self.meshes.part(model, rung).map_or(0, |mesh| draw_still(pass, mesh, (edges, triangles), run.count))
             }
-            key => self.meshes.solid(key).map_or(0, |mesh| mesh.draw(pass, edges, run.count)),
+            key => self.meshes.solid(key).map_or(0, |mesh| draw_still(pass, mesh, (edges, u32::MAX), run.count)),
         }
     }
+}
+
+/// A mesh that is on no way to another: both ends of it are itself.
+fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, (edges, triangles): (bool, u32), count: u32) -> u32 {
+    pass.set_vertex_buffer(2, mesh.vertices());
+    mesh.draw_first(pass, (edges, triangles), count)
 }
 
 fn depth(view: &wgpu::TextureView, clear: f32, store: wgpu::StoreOp) -> wgpu::RenderPassDepthStencilAttachment<'_> {

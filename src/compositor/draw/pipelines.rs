@@ -109,7 +109,9 @@ impl Pipelines {
             layout(SAMPLE_STRIDE, instance, &begin),
             layout(SAMPLE_STRIDE, instance, &end),
         ];
-        let solids = [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &BODY)];
+        let end_corner = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3];
+        let solids =
+            [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &BODY), layout(24, vertex, &end_corner)];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment, buffers: &tubes, topology, module: &skin })

@@ -39,6 +39,7 @@ impl SkinBuffers {
         let each = if edges { 6 } else { 3 };
         let (from, count) = run.triangles;
         pass.set_vertex_buffer(0, corners.slice(..));
+        pass.set_vertex_buffer(2, corners.slice(..));
         pass.set_index_buffer(indices.slice(..), wgpu::IndexFormat::Uint32);
         pass.draw_indexed(each * from..each * (from + count), 0, 0..1);
         1

@@ -8,6 +8,8 @@ struct Corner {
     @location(4) extents: vec4f,
     @location(5) colour: vec4f,
     @location(6) tint: vec4f,
+    @location(7) core_to: vec3f, // where it is at the end of its way, of which extents.w is behind it
+    @location(8) normal_to: vec3f,
 }
 
 struct Solid {
@@ -30,11 +32,23 @@ fn vs_solid(in: Corner) -> Solid {
     return solid(in);
 }
 
+// Its normal, on its way.
+fn normal_of(in: Corner) -> vec3f {
+    let n = mix(in.normal, in.normal_to, in.extents.w);
+    // a corner at rest keeps its bits
+    return select(n, n * inverseSqrt(max(dot(n, n), 1e-9)), in.extents.w > 0.0);
+}
+
+fn own_of(in: Corner, n: vec3f) -> vec3f {
+    return mix(in.core, in.core_to, in.extents.w) * in.extents.xyz + n * in.place.w;
+}
+
 fn solid(in: Corner) -> Solid {
-    let own = in.core * in.extents.xyz + in.normal * in.place.w;
+    let n = normal_of(in);
+    let own = own_of(in, n);
     var out: Solid;
     out.p = turned(in.rotation, own) + in.place.xyz;
-    out.n = turned(in.rotation, in.normal);
+    out.n = turned(in.rotation, n);
     out.clip = clip(out.p);
     out.own = own;
     let material = 2u * u32(round(in.colour.a * 255.0));
@@ -47,7 +61,7 @@ fn solid(in: Corner) -> Solid {
 
 @vertex
 fn vs_solid_shadow(in: Corner) -> @builtin(position) vec4f {
-    let own = in.core * in.extents.xyz + in.normal * in.place.w;
+    let own = own_of(in, normal_of(in));
     let at = g.light_projection * vec4f(turned(in.rotation, own) + in.place.xyz, 1.0);
     return vec4f(at.x * 2.0 - 1.0, 1.0 - at.y * 2.0, at.z, 1.0);
 }

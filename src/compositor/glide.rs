@@ -1,0 +1,151 @@
+//! How a mesh changes its cut: over a few frames, so that nobody sees it jump.
+//!
+//! In: the triangles asked for, frame by frame. Out: the cut that is drawn, and how far it lies on its way to a coarser one
+//! (a geomorph). Never here: which count is right, the GPU. Theory: `docs/theory/multiresolution.md`.
+//!
+//! What gets finer is drawn at once with all the triangles asked for, and begins where the coarser cut was. What gets coarser keeps
+//! its triangles on its way, more than were asked for: as long as the frame's allowance lasts, then it jumps.
+
+use super::picture::MeshKey;
+use metachron_agents::shape::{Cut, Tom};
+
+/// What gliding may cost in a frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Allowance {
+    /// The part of the way that one frame goes; 1 and more is at once.
+    pub step: f32,
+    /// Triangles that may be drawn beyond those asked for.
+    pub triangles: f64,
+}
+
+/// A mesh at a cut, or on its way from one to another.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Glide {
+    /// The triangles last asked for.
+    asked: u32,
+    /// Both ends of the way; alike at rest.
+    fine: Cut,
+    coarse: Cut,
+    /// How far it lies from the fine end towards the coarse one, 0 … 1.
+    share: f32,
+    /// Whether it is on its way to the fine end.
+    rising: bool,
+}
+
+impl Glide {
+    /// At rest at the cut for so many triangles.
+    pub fn at(tom: &Tom, triangles: u32) -> Self {
+        Self::resting(triangles, tom.cut(triangles))
+    }
+
+    fn resting(asked: u32, cut: Cut) -> Self {
+        Self { asked, fine: cut, coarse: cut, share: 0.0, rising: false }
+    }
+
+    /// Goes one frame towards the cut for so many triangles.
+    pub fn advance(&mut self, tom: &Tom, triangles: u32, allowance: &mut Allowance) {
+        if triangles != self.asked {
+            self.asked = triangles;
+            self.aim(tom.cut(triangles));
+        }
+        if self.fine == self.coarse {
+            return;
+        }
+        let (wanted, left) = if self.rising { (self.fine, self.share) } else { (self.coarse, 1.0 - self.share) };
+        let more = f64::from(self.fine.triangles - wanted.triangles);
+        if left <= allowance.step || more > allowance.triangles {
+            *self = Self::resting(self.asked, wanted);
+            return;
+        }
+        allowance.triangles -= more;
+        self.share += if self.rising { -allowance.step } else { allowance.step };
+    }
+
+    /// Puts the ends of the way so that the wanted cut is one of them, as near as may be to what was drawn last.
+    fn aim(&mut self, to: Cut) {
+        let rests = self.fine == self.coarse;
+        (self.fine, self.coarse, self.share, self.rising) = match () {
+            () if rests && to > self.fine => (to, self.coarse, 1.0, true),
+            () if rests => (self.fine, to, 0.0, false),
+            () if to >= self.fine || (self.rising && to > self.coarse) => (to, self.coarse, self.share, true),
+            // what it has not become yet it need not give up
+            () if self.rising => (self.coarse, to, 0.0, false),
+            () => (self.fine, to, self.share, false),
+        };
+    }
+
+    /// What of model number `model` is drawn, and how far it lies on the way to its coarse end.
+    pub fn drawn(&self, model: u32) -> (MeshKey, f32) {
+        if self.share > 0.0 {
+            (MeshKey::Glide(model, self.fine, self.coarse.vertices), self.share)
+        } else {
+            (MeshKey::Cut(model, self.fine), 0.0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_agents::shape::{Generator, generate};
+
+    fn tom() -> Tom {
+        Tom::new(&generate(Generator::Blob, 1, 2000)).unwrap()
+    }
+
+    fn drawn(glide: &Glide) -> (u32, f32) {
+        match glide.drawn(0) {
+            (MeshKey::Cut(_, cut) | MeshKey::Glide(_, cut, _), share) => (cut.triangles, share),
+            (key, _) => panic!("{key:?}"),
+        }
+    }
+
+    /// What is drawn while `asked` stays, frame by frame, with room for so many triangles a frame.
+    fn frames(glide: &mut Glide, tom: &Tom, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
+        let frame = |_| {
+            glide.advance(tom, asked, &mut Allowance { step: 0.25, triangles });
+            drawn(glide)
+        };
+        (0..6).map(frame).collect()
+    }
+
+    #[test]
+    fn finer_cuts_have_their_triangles_at_once_and_their_shape_after_the_way() {
+        let tom = tom();
+        let (coarse, fine) = (tom.cut(200).triangles, tom.cut(900).triangles);
+        let mut glide = Glide::at(&tom, 200);
+        assert_eq!(drawn(&glide), (coarse, 0.0));
+        let seen = frames(&mut glide, &tom, 900, 0.0);
+        assert_eq!(seen, [0.75, 0.5, 0.25, 0.0, 0.0, 0.0].map(|share| (fine, share)));
+    }
+
+    #[test]
+    fn coarser_cuts_keep_their_triangles_while_the_allowance_lasts() {
+        let tom = tom();
+        let (coarse, fine) = (tom.cut(200).triangles, tom.cut(900).triangles);
+        let mut glide = Glide::at(&tom, 900);
+        let mut jump = glide;
+        let seen = frames(&mut glide, &tom, 200, f64::from(fine - coarse));
+        assert_eq!(seen[..3], [0.25, 0.5, 0.75].map(|share| (fine, share)));
+        assert_eq!(seen[3..], [(coarse, 0.0); 3]);
+        assert_eq!(frames(&mut jump, &tom, 200, f64::from(fine - coarse - 1)), [(coarse, 0.0); 6]);
+    }
+
+    #[test]
+    fn whatever_is_asked_for_on_the_way_no_more_is_drawn_than_asked_for_and_allowed() {
+        let tom = tom();
+        let mut glide = Glide::at(&tom, 300);
+        let mut state = 1_u64;
+        for _ in 0..3000 {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            let asked = 40 + (state >> 40) as u32 % 1900;
+            let mut allowance = Allowance { step: 0.2, triangles: 150.0 };
+            glide.advance(&tom, asked, &mut allowance);
+            let (triangles, share) = drawn(&glide);
+            assert!(f64::from(triangles) <= f64::from(asked) + 150.0 - allowance.triangles, "{triangles} of {asked}");
+            assert!((0.0..=1.0).contains(&share) && allowance.triangles >= 0.0);
+        }
+        frames(&mut glide, &tom, 500, 0.0);
+        assert_eq!(drawn(&glide), (tom.cut(500).triangles, 0.0));
+    }
+}
