@@ -168,6 +168,23 @@ fn still_picture_on_a_steady_machine_never_changes() {
 }
 
 #[test]
+fn camera_that_stands_still_but_for_rounding_is_a_still_picture() {
+    let (mut adaptive, mut held) = (scene(200, Settings::default()), 0);
+    let weights: Vec<f64> = (0..200).map(|id| 50.0 + 7.0 * (id * 37 % 101) as f64).collect();
+    for frame in 0..100 {
+        let rounding = |id: usize| 1.0 + 1e-16 * 2.0_f64.powi((frame + id as u64) as i32 % 7);
+        weights.iter().enumerate().for_each(|(id, w)| assert!(adaptive.weigh(id as u64, w * rounding(id))));
+        let plan = adaptive.choose(frame, Time { target: T, fixed: 300.0 * rounding(frame as usize) });
+        held += usize::from(plan.held);
+        adaptive.observe(frame, 0, plan.predicted - 300.0);
+    }
+    assert_eq!(held, 99);
+    // what has moved is chosen anew
+    adaptive.weigh(3, 1.01 * weights[3]);
+    assert!(!adaptive.choose(100, Time { target: T, fixed: 300.0 }).held);
+}
+
+#[test]
 fn still_picture_on_a_trembling_machine_never_changes_once_it_knows_the_machine() {
     // 1 % up and down, without a pattern
     let tremble = |frame: u64| 1.0 + 0.01 * ((frame as f64 * 12.9898).sin() * 43_758.547).sin();

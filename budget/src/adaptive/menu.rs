@@ -6,7 +6,7 @@
 use alloc::vec::Vec;
 use core::ops::Range;
 
-use super::STAGES;
+use super::{ROUNDING, STAGES};
 
 /// One level of an object as it is offered.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -181,8 +181,12 @@ impl Menu {
     pub(crate) fn weigh(&mut self, id: u64, weight: f64) -> bool {
         let Ok(at) = self.objects.binary_search_by_key(&id, |o| o.id) else { return false };
         let sound = if weight > 0.0 { weight.min(f64::MAX) } else { 0.0 };
-        self.changes += u64::from(self.objects[at].weight.to_bits() != sound.to_bits());
-        self.objects[at].weight = sound;
+        let held = &mut self.objects[at].weight;
+        // what rounding makes of a camera that stands still is no change
+        if (sound - *held).abs() > ROUNDING * *held {
+            *held = sound;
+            self.changes += 1;
+        }
         true
     }
 

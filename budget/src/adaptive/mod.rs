@@ -39,6 +39,8 @@ pub const STAGES: usize = 4;
 const IN_FLIGHT: usize = 8;
 /// Frames after a start or a disturbance that teach nothing.
 const UNSETTLED: u8 = 3;
+/// What moved by no more than this part of itself has not moved: positions and times are rounded.
+const ROUNDING: f64 = 1e-9;
 /// The most by which κ falls in the plans of one frame to the next: late is mended at once, time to spare is taken up slowly.
 const EASING: f64 = 0.95;
 
@@ -275,7 +277,11 @@ impl Adaptive {
 
     /// Whether nothing has moved and the last choice still holds.
     fn may_keep(&mut self, time: Time, terms: &Terms, target: f64, fixed: f64) -> bool {
-        let still = self.chosen_for == Some((self.menu.changes, time)) && self.plan.feasible;
+        let is_same = |(changes, before): (u64, Time)| {
+            let fixed = (time.fixed - before.fixed).abs() <= ROUNDING * before.target;
+            changes == self.menu.changes && time.target == before.target && fixed
+        };
+        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
         let predicted = (self.cost(terms) + fixed) / target;
         let goal = (terms.budget + fixed) / target;
         self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
