@@ -8,8 +8,8 @@ use super::level::{Level, Shading};
 use super::offscreen::{Gpu, GpuError, Offscreen};
 use super::picture::Style;
 use super::view::{Camera, Size};
-use glam::DVec3;
-use metachron_agents::shape::{Primitive, Solid};
+use glam::{DQuat, DVec3};
+use metachron_agents::shape::{Generator, Model, Pattern, Placement, Primitive, Solid, Tom, generate};
 use metachron_agents::{AgentId, Body, Resolution, RigidState, SimTime, Snapshot};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -62,14 +62,15 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions) -> Result<Vec<Drawn>, GpuE
         drawn.push(Drawn { picture_px: size.pixels(), objects, polygons, pixels, shading: Shading::PerPixel, seconds });
     }
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
-    let mut stage = balls();
-    for shading in [Shading::Flat, Shading::Gouraud, Shading::PerPixel] {
+    let (mut plain, mut painted) = (balls(), painted_balls());
+    for shading in [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured] {
+        let stage = if shading == Shading::Textured { &mut painted } else { &mut plain };
         for n in LEVELS {
             for distance_m in DISTANCES_M {
                 if begun.elapsed() > LONGEST {
                     return Ok(drawn);
                 }
-                drawn.push(measure(&mut screen, &mut stage, (shading, n, distance_m))?);
+                drawn.push(measure(&mut screen, stage, (shading, n, distance_m))?);
             }
         }
     }
@@ -81,12 +82,13 @@ fn measure(
     stage: &mut Stage,
     (shading, n, distance_m): (Shading, u8, f64),
 ) -> Result<Drawn, GpuError> {
-    let level = Level { shading, ..Resolution { eps_m: 1.0, n }.into() };
+    let triangles = Primitive::Ball.triangles(n);
+    let level = Level { shading, triangles, ..Resolution { eps_m: 1.0, n }.into() };
     let seconds = least(screen, stage, distance_m, &[level; (SIDE * SIDE) as usize])?;
     let mut seen = Vec::new();
     stage.survey(&camera(distance_m), SIZE, &mut seen);
     let pixels = seen.iter().map(|seen| seen.pixels).sum::<f64>() / f64::from(SIDE * SIDE);
-    let polygons = f64::from(Primitive::Ball.triangles(n));
+    let polygons = f64::from(triangles);
     Ok(Drawn { picture_px: SIZE.pixels(), objects: SIDE * SIDE, polygons, pixels, shading, seconds })
 }
 
@@ -114,11 +116,31 @@ fn balls() -> Stage {
     let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
     let mut stage = Stage::new((0..SIDE * SIDE).map(actor).collect(), Vec::new());
     for id in 0..SIDE * SIDE {
-        let place = |i: u32| (f64::from(i) - 0.5 * f64::from(SIDE - 1)) * APART_M;
-        let position = DVec3::new(place(id % SIDE), 0.0, place(id / SIDE));
-        let body = Body::Rigid(RigidState { position, ..RigidState::default() });
+        let body = Body::Rigid(RigidState { position: place(id), ..RigidState::default() });
         stage.see(AgentId(id), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
     }
     stage.pose(SimTime::ZERO, States::Latest);
     stage
+}
+
+/// The same of meshes with a pattern on them.
+fn painted_balls() -> Stage {
+    let look = Look { colour: [200, 120, 100], material: Material::Plastic };
+    let most = LEVELS.map(|n| Primitive::Ball.triangles(n)).into_iter().max().unwrap_or_default();
+    let Ok(tom) = Tom::new(&generate(Generator::Sphere, 0, most)) else { return Stage::default() };
+    let model = Model::Mesh(Arc::new(tom));
+    let actor = |id| {
+        let at = Placement { position: place(id), rotation: DQuat::IDENTITY, scale: RADIUS_M };
+        Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look }
+    };
+    let mut stage = Stage::new((0..SIDE * SIDE).map(actor).collect(), Vec::new());
+    let texture = Arc::new(Pattern::Checker.texture(RADIUS_M as f32));
+    (0..SIDE * SIDE).for_each(|id| stage.paint(AgentId(id), &texture));
+    stage
+}
+
+/// Where a ball of the square is, metres.
+fn place(id: u32) -> DVec3 {
+    let along = |i: u32| (f64::from(i) - 0.5 * f64::from(SIDE - 1)) * APART_M;
+    DVec3::new(along(id % SIDE), 0.0, along(id / SIDE))
 }

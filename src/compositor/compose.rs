@@ -3,26 +3,20 @@
 //! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: which level is right, the GPU.
 //! A tube that the camera does not see stays in the picture for its shadow.
 
-use super::gather::{Form, Look, Material, PropShape, Stage, Track};
-use super::glide::{Allowance, Glide};
+use super::gather::{Form, Look, Material, Stage};
 use super::level::{Level, Shading};
 use super::picture::{
-    Colouring, FloorDraw, MeshKey, Picture, SkinSample, SolidInstance, SolidRun, Style, TubeRun, age_colour,
-    detail_colour, resolution_colour,
+    Colouring, MeshKey, Picture, SkinSample, SolidInstance, Style, TubeRun, age_colour, detail_colour,
+    resolution_colour,
 };
 use super::skin::{ROPE_LEVEL, SkinRoom, SkinWish, curve_of_rope, drawn_radius_m};
+use super::solids::{Solids, add_prop, add_solid, kind, sort_solids};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
-use metachron_agents::shape::{Model, Primitive, Rounding, Rung, SkinFrame, Solid, ToolShape};
-use metachron_agents::{AgentId, Anchor, Body, Resolution, ToolState};
+use metachron_agents::shape::{Primitive, Rounding, SkinFrame};
+use metachron_agents::{AgentId, Anchor, Body, Resolution};
 use std::f64::consts::TAU;
 
-/// Level at which fixed solids are drawn.
-const PROP_LEVEL: u8 = 4;
-/// Cells of a fixed box are at most this share of the light's radius long: light is close to linear across one.
-const CELL_SHARE: f64 = 0.125;
-/// Most cells along a side of a fixed box; a larger one is lit pixel by pixel everywhere.
-const CELLS_MAX: f64 = 24.0;
 /// Repeats of the skin's texture around a tube; the shader has the same number.
 const TEXTURE_AROUND: f64 = 2.0;
 /// Share of the distance to the target that the user's spring is thick.
@@ -31,8 +25,6 @@ const SPRING_SHARE: f64 = 0.011;
 const SPRING_TURNS: (usize, usize) = (9, 8);
 /// Force that colours a grasp fully red, newtons.
 const FORCE_RED_N: f64 = 2.0;
-/// Triangles beyond those asked for with which meshes may get coarser slowly, as a part of all that were asked for.
-const GLIDE_SHARE: f64 = 0.05;
 /// Past this multiple of the eye's distance an object no longer widens the light.
 const FOCUS_REACH: f64 = 4.0;
 
@@ -46,9 +38,6 @@ pub struct Hand {
     /// Where the other end is, metres.
     pub target: DVec3,
 }
-
-/// Solids by the way they are drawn, before they are put in order.
-type Solids = Vec<((Shading, MeshKey), SolidInstance)>;
 
 /// Lists that are filled anew every frame.
 #[derive(Debug, Default)]
@@ -102,26 +91,6 @@ impl Stage {
     pub fn place(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
         let track = self.tracks.iter().find(|track| track.actor.id == id)?;
         track.pose.point(anchor).map(|(position, _)| position)
-    }
-
-    /// Lets meshes change their cut over so many frames from now on; 0 (as at the start) and 1 are at once.
-    ///
-    /// What gets coarser is then drawn with more triangles than asked for on its way, a twentieth of the meshes' at most.
-    pub const fn glide_over(&mut self, frames: u8) {
-        self.glide_frames = frames;
-    }
-
-    /// What gliding may cost in the next picture.
-    fn allowance(&self, levels: &[Level]) -> Allowance {
-        if self.glide_frames < 2 {
-            return Allowance { step: 1.0, triangles: 0.0 };
-        }
-        let asked = self.tracks.iter().enumerate().map(|(number, track)| match &track.actor.form {
-            Form::Scenery(Model::Mesh(tom), _) if track.seen => level(levels, number).triangles.min(tom.range().1),
-            _ => 0,
-        });
-        let triangles = GLIDE_SHARE * asked.map(f64::from).sum::<f64>();
-        Allowance { step: 1.0 / f32::from(self.glide_frames), triangles }
     }
 
     /// The ball that light is fitted to, and the box that shadow is: all that is near what the camera looks at.
@@ -184,7 +153,7 @@ impl Stage {
             for end in [&frames[0], &frames[last]] {
                 let size = Rounding { extents: Vec3::ZERO, radius_m: end.radius_m as f32 };
                 let ball = instance(end.position - origin, DQuat::IDENTITY, size, paint);
-                scratch.solids.push(((shading, MeshKey::Primitive(Primitive::Ball, n)), ball));
+                scratch.solids.push((kind(shading, MeshKey::Primitive(Primitive::Ball, n)), ball));
             }
         }
     }
@@ -219,21 +188,21 @@ impl Stage {
             let size = Rounding { extents: Vec3::ZERO, radius_m: (0.9 * shape.shaft_radius_m) as f32 };
             let paint = Paint { colour, material: Material::Plastic, tint: [colour[0], colour[1], colour[2], 200] };
             let ball = instance(point - picture.origin, DQuat::IDENTITY, size, paint);
-            solids.push(((Shading::PerPixel, MeshKey::Primitive(Primitive::Ball, 2)), ball));
+            solids.push((kind(Shading::PerPixel, MeshKey::Primitive(Primitive::Ball, 2)), ball));
         }
     }
 }
 
 /// Colour, material and tint of an object.
 #[derive(Debug, Clone, Copy)]
-struct Paint {
-    colour: [u8; 3],
+pub(super) struct Paint {
+    pub colour: [u8; 3],
     material: Material,
     tint: [u8; 4],
 }
 
 impl Paint {
-    fn of(look: Look, tint: [u8; 4]) -> Self {
+    pub fn of(look: Look, tint: [u8; 4]) -> Self {
         Self { colour: look.colour, material: look.material, tint }
     }
 
@@ -244,12 +213,12 @@ impl Paint {
 }
 
 /// The level asked for an actor, made safe.
-fn level(levels: &[Level], number: usize) -> Level {
+pub(super) fn level(levels: &[Level], number: usize) -> Level {
     let usual = Resolution { eps_m: 0.01, n: 3 };
     levels.get(number).copied().unwrap_or_else(|| usual.into()).safe()
 }
 
-fn tint(style: Style, at: Level, age_s: f64) -> [u8; 4] {
+pub(super) fn tint(style: Style, at: Level, age_s: f64) -> [u8; 4] {
     let with = |[r, g, b]: [u8; 3], share: u8| [r, g, b, share];
     match style.colouring {
         Colouring::Material => [0; 4],
@@ -274,7 +243,7 @@ fn sample(f: &SkinFrame, origin: DVec3, texture_per_m: f32, paint: Paint) -> Ski
     }
 }
 
-fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: Paint) -> SolidInstance {
+pub(super) fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: Paint) -> SolidInstance {
     SolidInstance {
         rotation: rotation.as_quat().to_array(),
         position: position.as_vec3().to_array(),
@@ -283,94 +252,8 @@ fn instance(position: DVec3, rotation: DQuat, size: Rounding, paint: Paint) -> S
         glide: 0.0,
         colour: paint.packed(),
         tint: paint.tint,
-        pad2: [0; 2],
+        wrap: [0.0; 2],
     }
-}
-
-/// The mesh and size of a solid at level `n`; `None` for one that is not drawn so.
-fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Rounding)> {
-    if let Some(number) = given {
-        return Some((MeshKey::Given(number), Rounding { extents: Vec3::ONE, radius_m: 0.0 }));
-    }
-    Primitive::of(solid, n).map(|(primitive, size)| (MeshKey::Primitive(primitive, n), size))
-}
-
-fn add_solid(track: &mut Track, at: Level, picture: &Picture, (solids, allowance): (&mut Solids, &mut Allowance)) {
-    let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
-    if matches!(track.actor.form, Form::Scenery(..)) {
-        return add_scenery(track, at, (paint, picture.origin), (solids, allowance));
-    }
-    match (&track.actor.form, &track.pose) {
-        (Form::Solid(solid), Body::Rigid(rigid)) => {
-            let Some((mesh, size)) = mesh_of(solid, track.body.given, at.resolution.n) else { return };
-            let place = rigid.position - picture.origin;
-            solids.push(((at.shading, mesh), instance(place, rigid.rotation, size, paint)));
-        }
-        (Form::Tool(shape), Body::Tool(tool)) => add_tool(shape, tool, (at, paint, picture.origin), solids),
-        _ => {}
-    }
-}
-
-/// Scenery that is seen: as much of its mesh as its level says.
-fn add_scenery(
-    track: &mut Track,
-    level: Level,
-    (paint, origin): (Paint, DVec3),
-    (solids, allowance): (&mut Solids, &mut Allowance),
-) {
-    let (Form::Scenery(model, at), Some(number), true) = (&track.actor.form, track.body.given, track.seen) else {
-        return;
-    };
-    let (mesh, growth, share) = match model {
-        Model::Mesh(tom) => {
-            let glide = track.glide.get_or_insert_with(|| Glide::at(tom, level.triangles));
-            glide.advance(tom, level.triangles, allowance);
-            let (mesh, share) = glide.drawn(number);
-            (mesh, 0.0, share)
-        }
-        Model::Foliage(foliage) => {
-            let prefix = foliage.cut(level.triangles);
-            // a mesh is not swept: only strokes grow
-            let is_mesh = matches!(foliage.rungs().get(usize::from(prefix.rung)), Some(Rung::Mesh(_)));
-            (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth }, 0.0)
-        }
-    };
-    let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
-    let still = instance(at.position - origin, at.rotation, size, paint);
-    solids.push(((level.shading, mesh), SolidInstance { glide: share, ..still }));
-}
-
-fn add_tool(shape: &ToolShape, tool: &ToolState, (level, paint, origin): (Level, Paint, DVec3), solids: &mut Solids) {
-    let n = level.resolution.n;
-    for part in shape.parts(tool.jaw) {
-        let position = tool.tip + tool.rotation * part.position - origin;
-        let mesh = MeshKey::Primitive(part.primitive, n);
-        solids.push(((level.shading, mesh), instance(position, tool.rotation * part.rotation, part.size, paint)));
-    }
-}
-
-fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Solids) {
-    if matches!(prop.solid, Solid::Plane) {
-        let point = prop.position - picture.origin;
-        let floor = FloorDraw { point, normal: prop.rotation * DVec3::Z, colour: prop.look.colour };
-        picture.floor.get_or_insert(floor);
-        return;
-    }
-    let slab = slab_of(prop, picture.focus_radius_m);
-    let Some((mesh, size)) = slab.or_else(|| mesh_of(&prop.solid, prop.body.given, PROP_LEVEL)) else { return };
-    let paint = Paint::of(prop.look, [0; 4]);
-    let key = (Shading::PerPixel, mesh);
-    solids.push((key, instance(prop.position - picture.origin, prop.rotation, size, paint)));
-}
-
-/// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and cut into cells small enough to be lit at their
-/// corners. Brushed metal is not, nor is what is far larger than the light.
-fn slab_of(prop: &PropShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)> {
-    let Solid::Box { half_extents_m } = prop.solid else { return None };
-    let cells = (2.0 * half_extents_m / (CELL_SHARE * light_radius_m)).ceil().max(DVec3::ONE);
-    let fits = cells.max_element() <= CELLS_MAX && prop.look.material != Material::Metal;
-    let size = Rounding { extents: half_extents_m.as_vec3(), radius_m: 0.0 };
-    fits.then(|| (MeshKey::Slab(cells.to_array().map(|count| count as u8)), size))
 }
 
 /// The user's spring as a coil of wire between two points.
@@ -408,20 +291,6 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
         shading: Shading::PerPixel,
         shown: true,
     });
-}
-
-/// Sorts solids by shading and mesh and cuts them into runs.
-fn sort_solids(solids: &mut Solids, picture: &mut Picture) {
-    // the order among equals does not show, so the sort need not allocate to keep it
-    solids.sort_unstable_by_key(|(key, _)| *key);
-    for ((shading, mesh), solid) in solids.iter() {
-        let first = picture.instances.len() as u32;
-        picture.instances.push(*solid);
-        match picture.solids.last_mut() {
-            Some(run) if (run.shading, run.mesh) == (*shading, *mesh) => run.count += 1,
-            _ => picture.solids.push(SolidRun { mesh: *mesh, shading: *shading, first, count: 1 }),
-        }
-    }
 }
 
 #[cfg(test)]

@@ -4,6 +4,7 @@
 //! choice of [`States`] allows, and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
 use super::glide::Glide;
+use super::painting::Painting;
 use super::picture::Picture;
 use super::pose;
 use glam::{DQuat, DVec3};
@@ -121,6 +122,8 @@ pub(super) struct Track {
     pub glide: Option<Glide>,
     /// A rope as it is shown.
     pub rope: CurveState,
+    /// What is painted on scenery.
+    pub painting: Option<Painting>,
 }
 
 /// A fixed solid with what drawing needs to know of it.
@@ -229,6 +232,7 @@ impl Track {
             skeleton: Skeleton::default(),
             glide: None,
             rope: CurveState::default(),
+            painting: None,
         };
         track.bounds = track.find_bounds();
         track

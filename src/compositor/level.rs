@@ -14,6 +14,8 @@ pub enum Shading {
     /// Light at every pixel.
     #[default]
     PerPixel,
+    /// The same on what is painted on it; what nothing is painted on is drawn as [`Shading::PerPixel`].
+    Textured,
 }
 
 /// The level that an actor is drawn at.

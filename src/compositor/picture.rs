@@ -8,7 +8,7 @@ use super::skin::Skins;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 use metachron_agents::Resolution;
-use metachron_agents::shape::{Cut, Model, Primitive, PrimitiveMesh, patch};
+use metachron_agents::shape::{Cut, Model, Primitive, PrimitiveMesh, PrimitiveVertex, Texture, patch};
 use std::sync::Arc;
 
 /// What colours mean.
@@ -78,8 +78,26 @@ pub struct SolidInstance {
     pub colour: [u8; 4],
     /// Tint laid over everything, and how much of it.
     pub tint: [u8; 4],
-    /// Free.
-    pub pad2: [u32; 2],
+    /// Repeats a metre of a texture that lies on sides, 0 for one that lies as the corners say; and nothing.
+    pub wrap: [f32; 2],
+}
+
+/// One corner of a mesh, as the GPU reads it: 32 bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct MeshCorner {
+    /// Place on the core.
+    pub core: [f32; 3],
+    /// Unit normal.
+    pub normal: [f32; 3],
+    /// Place on a texture.
+    pub uv: [f32; 2],
+}
+
+impl From<&PrimitiveVertex> for MeshCorner {
+    fn from(v: &PrimitiveVertex) -> Self {
+        Self { core: v.core.to_array(), normal: v.normal.to_array(), uv: v.uv.to_array() }
+    }
 }
 
 /// Which mesh a run of solids uses.
@@ -116,13 +134,22 @@ pub struct TubeRun {
     pub shown: bool,
 }
 
-/// Solids of one mesh: instances `first .. first + count`.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct SolidRun {
-    /// Their mesh.
-    pub mesh: MeshKey,
+/// What solids of a run have in common: runs follow each other in this order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub struct SolidKind {
     /// How they are shaded.
     pub shading: Shading,
+    /// Of [`Shading::Textured`] the number of the texture in [`Picture::textures`]; else 0.
+    pub texture: u32,
+    /// Their mesh.
+    pub mesh: MeshKey,
+}
+
+/// Solids of one kind: instances `first .. first + count`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct SolidRun {
+    /// What they have in common.
+    pub kind: SolidKind,
     /// The first instance.
     pub first: u32,
     /// How many.
@@ -169,6 +196,8 @@ pub struct Picture {
     pub meshes: Arc<[PrimitiveMesh]>,
     /// What is drawn with any number of triangles.
     pub models: Arc<[Model]>,
+    /// What is painted on them.
+    pub textures: Arc<[Arc<Texture>]>,
 }
 
 impl Default for Picture {
@@ -187,6 +216,7 @@ impl Default for Picture {
             floor: None,
             meshes: Arc::default(),
             models: Arc::default(),
+            textures: Arc::default(),
         }
     }
 }
@@ -207,7 +237,7 @@ impl Picture {
     pub fn triangles(&self) -> u64 {
         let tubes =
             self.tubes.iter().filter(|t| t.shown).map(|t| u64::from(t.intervals) * u64::from(patch::triangles(t.n)));
-        let solids = self.solids.iter().map(|s| u64::from(s.count) * self.mesh_triangles(s.mesh));
+        let solids = self.solids.iter().map(|s| u64::from(s.count) * self.mesh_triangles(s.kind.mesh));
         let skins = self.skins.triangles.len() as u64;
         tubes.sum::<u64>() + solids.sum::<u64>() + skins + if self.floor.is_some() { 2 } else { 0 }
     }

@@ -4,6 +4,7 @@
 //! curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
 
 use super::level::Shading;
+use super::picture::MeshCorner;
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::{CurveState, SoftState};
@@ -16,8 +17,8 @@ const THIN_SHARE: f64 = 0.01;
 /// The corners and triangles of all skins of a frame.
 #[derive(Debug, Clone, Default)]
 pub struct Skins {
-    /// Position relative to the picture's origin, metres, and unit normal of each corner.
-    pub corners: Vec<[[f32; 3]; 2]>,
+    /// Corners, relative to the picture's origin, metres.
+    pub corners: Vec<MeshCorner>,
     /// Corners of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
     /// Their sides, three a triangle, where edges are drawn.
@@ -72,7 +73,11 @@ impl Skins {
         let SkinWish { origin, instance, shading, edges } = wish;
         room.find_normals(form, soft);
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
-        let corner = |x: &DVec3, n: DVec3| [(*x - origin).as_vec3().to_array(), n.as_vec3().to_array()];
+        let corner = |x: &DVec3, n: DVec3| MeshCorner {
+            core: (*x - origin).as_vec3().to_array(),
+            normal: n.as_vec3().to_array(),
+            uv: [0.0; 2],
+        };
         let both = || soft.positions.iter().zip(&room.normals);
         self.corners.extend(both().map(|(x, n)| corner(x, *n)));
         self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
@@ -175,8 +180,8 @@ mod tests {
         skins.add(&form, &soft, wish, &mut room);
         assert_eq!(skins.runs, [SkinRun { triangles: (0, 4 + 8), instance: 7, shading: Shading::Flat }]);
         let thick = |i: u32| {
-            let [x, n] = skins.corners[i as usize].map(glam::Vec3::from_array);
-            (x + n * 0.01).as_dvec3()
+            let MeshCorner { core, normal, .. } = skins.corners[i as usize];
+            (glam::Vec3::from(core) + glam::Vec3::from(normal) * 0.01).as_dvec3()
         };
         let volumes = skins.triangles.iter().map(|t| {
             let [a, b, c] = t.map(thick);

@@ -141,11 +141,10 @@ impl Ladder {
             let proxy = rung((closed, f64::from(proxy_triangles.max(1))), key.shading.1);
             return Self { key, version, rungs: Vec::new(), proxy: Some(proxy) };
         }
-        let shadings = [Shading::Flat, Shading::Gouraud, Shading::PerPixel];
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
         for cut in key.cuts(view, span) {
-            rungs.extend(shadings.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
+            rungs.extend(Shading::ALL.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
         }
         rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
         Self { key, version, rungs, proxy: None }
@@ -181,7 +180,7 @@ impl Key {
         (prices, sliders): (&Prices, &Sliders),
     ) -> Rung {
         let pixels = self.pixels();
-        let accuracy = worth::accuracy(&self.kind, polygons, shading, pixels);
+        let accuracy = worth::accuracy(&self.kind, polygons, (shading, self.shading.1), pixels);
         let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
         Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
     }

@@ -18,7 +18,7 @@ pub struct Prices {
     /// Each pixel of the picture, whatever covers it, ≥ 0.
     pub pixel_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
-    pub shading: [Stages; 3],
+    pub shading: [Stages; 4],
 }
 
 /// A measured picture of equal objects.
@@ -51,7 +51,7 @@ impl Default for Prices {
     /// Two cores with Mesa, as they were measured once: what to believe before anything better is known.
     fn default() -> Self {
         let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
-        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 3] }
+        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4] }
     }
 }
 
@@ -87,7 +87,8 @@ impl Prices {
             };
             fit(&of.map(sample).collect::<Vec<_>>()).map(|found| found.stages)
         };
-        let shading = [object(Shading::Flat)?, object(Shading::Gouraud)?, object(Shading::PerPixel)?];
+        let [flat, gouraud, per_pixel, textured] = Shading::ALL.map(object);
+        let shading = [flat?, gouraud?, per_pixel?, textured?];
         Some(Self { frame_s, pixel_s, shading })
     }
 
@@ -145,7 +146,7 @@ mod tests {
             state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             (state >> 11) as f64 / (1_u64 << 53) as f64
         };
-        for shading in [Shading::Flat, Shading::Gouraud, Shading::PerPixel] {
+        for shading in Shading::ALL {
             for k in 0..40 {
                 let objects = if k % 10 == 0 { 0.0 } else { 36.0 };
                 let (polygons, pixels) = (10.0 * 400.0_f64.powf(random()), 10.0 * 500.0_f64.powf(random()));
@@ -165,7 +166,7 @@ mod tests {
         let machine = Prices {
             frame_s: 1.4e-3,
             pixel_s: 6e-9,
-            shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9)],
+            shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9), stages(0.3e-6, 55e-9)],
         };
         let found = Prices::fitted(&pictures(1, &machine)).unwrap();
         // without the stalls of others: no model foresees an interruption
@@ -188,7 +189,7 @@ mod tests {
     #[test]
     fn the_slower_stage_counts() {
         let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5 };
-        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 3] };
+        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4] };
         // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 200.0), 101.0);

@@ -15,6 +15,13 @@ pub enum Shading {
     /// Light at every pixel.
     #[default]
     PerPixel,
+    /// The same on what is painted on it.
+    Textured,
+}
+
+impl Shading {
+    /// All of them, cheapest first.
+    pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
 }
 
 /// What is drawn.

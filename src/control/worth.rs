@@ -9,6 +9,9 @@ use metachron_budget::cost::benefit::{self, BASE_ERROR, Picture, Sliders};
 /// Triangles of the coarsest closed surface, a tetrahedron: half of what it covers is drawn wrong.
 const COARSEST: f64 = 4.0;
 
+/// What an object loses that is drawn without what is painted on it: a quarter of its pixels are taken to be wrong.
+const UNPAINTED: f64 = 0.25;
+
 /// No picture has more pixels: what covers more is no number.
 const PIXELS_MAX: f64 = 1e9;
 
@@ -35,8 +38,8 @@ pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f
 }
 
 /// The part of an object's pixels that a level draws right, 0 … 1: of its shape by the triangles, of its light by the shading
-/// (control.md, eq. 21 and 22).
-pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, pixels: f64) -> f64 {
+/// (control.md, eq. 21 and 22), against the best shading that the object may have.
+pub(super) fn accuracy(kind: &Kind, polygons: f64, (shading, best): (Shading, Shading), pixels: f64) -> f64 {
     let (pieces, coarsest) = match *kind {
         // as many balls in a row as make its length
         Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),
@@ -50,7 +53,8 @@ pub(super) fn accuracy(kind: &Kind, polygons: f64, shading: Shading, pixels: f64
     let light = match shading {
         Shading::Flat => benefit::accuracy(pixels, &picture(benefit::Shading::Flat)),
         Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
-        Shading::PerPixel => 1.0,
+        Shading::PerPixel | Shading::Textured => 1.0,
     };
-    shape * light
+    let painted = if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 };
+    shape * light * painted
 }

@@ -10,7 +10,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Another number wherever the benchmark or what it draws with changes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// A file of the cache.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -20,7 +20,7 @@ struct Kept {
     frame_s: f64,
     pixel_s: f64,
     /// Of each shading: setup, polygon, vertex, pixel.
-    shading: [[f64; 4]; 3],
+    shading: [[f64; 4]; 4],
 }
 
 /// Prices of the adapter of this name: from the cache, else measured on the device that `open` gives, and put there; `None` where
@@ -44,6 +44,7 @@ fn measured(drawn: &Drawn) -> Measured {
         compositor::Shading::Flat => Shading::Flat,
         compositor::Shading::Gouraud => Shading::Gouraud,
         compositor::Shading::PerPixel => Shading::PerPixel,
+        compositor::Shading::Textured => Shading::Textured,
     };
     let Drawn { picture_px, polygons, pixels, seconds, .. } = *drawn;
     Measured { picture_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }

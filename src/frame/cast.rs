@@ -146,7 +146,13 @@ pub(super) fn stage(scene: &Scene) -> Stage {
     let actors = agents.chain(still);
     let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
     let props = props.map(|(obstacle, wish)| Prop { obstacle: obstacle.clone(), look: look(wish) });
-    Stage::new(actors.collect(), props.collect())
+    let mut stage = Stage::new(actors.collect(), props.collect());
+    for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
+        if let Some(texture) = &it.texture {
+            stage.paint(AgentId(id), texture);
+        }
+    }
+    stage
 }
 
 /// All scenery in the order of its actors.
@@ -267,16 +273,21 @@ pub(super) fn views<'a>(seen: &'a [Seen], scene: &'a Scene) -> impl Iterator<Ite
 
 fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
     let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
-    view_of(seen, (kind, range), &it.look)
+    let view = view_of(seen, (kind, range), &it.look);
+    match (it.look.shading, &it.texture) {
+        (ShadingKind::Any, Some(_)) => ObjectView { shading: (view.shading.0, control::Shading::Textured), ..view },
+        _ => view,
+    }
 }
 
-/// The cheapest and the best shading that an object may have.
+/// The cheapest and the best shading that an object may have on which nothing is painted.
 const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
-    use control::Shading::{Flat, Gouraud, PerPixel};
+    use control::Shading::{Flat, Gouraud, PerPixel, Textured};
     match kind {
         ShadingKind::Flat => (Flat, Flat),
         ShadingKind::Gouraud => (Gouraud, Gouraud),
         ShadingKind::PerPixel => (PerPixel, PerPixel),
+        ShadingKind::Textured => (Textured, Textured),
         ShadingKind::Any => (Flat, PerPixel),
     }
 }
@@ -311,6 +322,7 @@ pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
         control::Shading::Flat => compositor::Shading::Flat,
         control::Shading::Gouraud => compositor::Shading::Gouraud,
         control::Shading::PerPixel => compositor::Shading::PerPixel,
+        control::Shading::Textured => compositor::Shading::Textured,
     };
     // a cast of floats saturates
     let detail = control::detail(view, demand) as f32;

@@ -45,8 +45,8 @@ pub struct DrawPrice {
     pub setup_ms: f64,
     /// Nanoseconds a pixel of the picture, whatever covers it, ≥ 0.
     pub pixel_ns: f64,
-    /// What objects cost by their shading: flat, Gouraud, light at every pixel.
-    pub objects: [ObjectPrice; 3],
+    /// What objects cost by their shading: flat, Gouraud, light at every pixel, textured.
+    pub objects: [ObjectPrice; 4],
 }
 
 /// What an object costs: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
@@ -93,7 +93,7 @@ impl Machine {
                 price("instrument", 0.0, 3.0),
                 price("synthetic", 0.0, 1.0),
             ],
-            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 3] },
+            draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 4] },
             noise_sd: 0.0,
             wander_sd: 0.0,
             spikes: 0.0,
@@ -112,7 +112,7 @@ impl Machine {
             draw: DrawPrice {
                 setup_ms: setup_ms / 20.0,
                 pixel_ns: pixel_ns / 20.0,
-                objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 3],
+                objects: [price_of_objects(5.0 / 20.0, 0.22 / 20.0); 4],
             },
             ..base
         }

@@ -9,7 +9,7 @@ use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
 use metachron_agents::rigid::{Joint, RigidSpec};
 use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::{Model, Obstacle, Placement};
+use metachron_agents::shape::{Model, Obstacle, Placement, Texture};
 use metachron_agents::soft::SoftSpec;
 use metachron_agents::synthetic::SyntheticSpec;
 use metachron_agents::{AgentId, Resolution, ResolutionRange, SimSpan};
@@ -134,8 +134,8 @@ pub struct Machine {
     pub draw_triangle_us: Option<f64>,
     /// Nanoseconds a pixel.
     pub draw_pixel_ns: Option<f64>,
-    /// What objects cost by their shading: flat, Gouraud, light at every pixel.
-    pub shading: [ObjectCost; 3],
+    /// What objects cost by their shading: flat, Gouraud, light at every pixel, textured.
+    pub shading: [ObjectCost; 4],
     /// Relative standard deviation of every cost, 0 … 1.
     pub noise: Option<f64>,
     /// Relative standard deviation of the factor on frames that wanders, 0 … 1.
@@ -197,6 +197,8 @@ pub struct Scenery {
     pub at: Placement,
     /// How it looks.
     pub look: Look,
+    /// What is painted on it.
+    pub texture: Option<Arc<Texture>>,
 }
 
 /// Scenery that may be drawn as one.

@@ -53,7 +53,7 @@ impl Contender {
                 control.set_prices(Prices {
                     frame_s: plant.line.intercept.max(0.0),
                     pixel_s: 0.0,
-                    shading: [object; 3],
+                    shading: [object; 4],
                 });
                 control.set_margin(margin);
                 control

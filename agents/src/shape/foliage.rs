@@ -210,7 +210,7 @@ fn bough_mesh(boughs: &[Bough], sides: u32) -> PrimitiveMesh {
             for side in 0..sides {
                 let angle = TAU * f64::from(side) / f64::from(sides);
                 let out = x * libm::cos(angle) + y * libm::sin(angle);
-                mesh.vertices.push(PrimitiveVertex { core: (centre + out * radius).as_vec3(), normal: out.as_vec3() });
+                mesh.vertices.push(PrimitiveVertex::bare((centre + out * radius).as_vec3(), out.as_vec3()));
             }
         }
         for side in 0..sides {
@@ -230,7 +230,7 @@ fn leaf_mesh(leaves: &[Leaf], side: f64) -> PrimitiveMesh {
         let y = leaf.normal.cross(x);
         for (u, v) in [(-0.5, -0.5), (0.5, -0.5), (0.5, 0.5), (-0.5, 0.5)] {
             let core = (leaf.at + (x * u + y * v) * side).as_vec3();
-            mesh.vertices.push(PrimitiveVertex { core, normal: leaf.normal.as_vec3() });
+            mesh.vertices.push(PrimitiveVertex::bare(core, leaf.normal.as_vec3()));
         }
         mesh.triangles.extend([[first, first + 1, first + 2], [first, first + 2, first + 3]]);
     }

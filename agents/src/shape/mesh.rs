@@ -1,10 +1,10 @@
 //! Meshes as they are given: normals for triangle meshes and convex hulls.
 //!
-//! In: points and triangles. Out: a [`PrimitiveMesh`] whose core is in metres (extents 1, radius 0).
+//! In: points and triangles, places on a texture. Out: a [`PrimitiveMesh`] whose core is in metres (extents 1, radius 0).
 //! Never here: levels; a mesh is drawn as it is.
 
 use super::{PrimitiveMesh, PrimitiveVertex};
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 use rapier3d::parry::transformation::try_convex_hull;
 use std::sync::Arc;
 
@@ -16,6 +16,12 @@ const CREASE_COS: f64 = 0.766;
 /// Triangles that name a missing point or have no area are left out.
 #[must_use]
 pub fn creased_mesh(points_m: &[DVec3], triangles: &[[u32; 3]]) -> PrimitiveMesh {
+    painted_mesh(points_m, &[], triangles)
+}
+
+/// The same with the place of each point on a texture; missing ones are 0, and so are those that are no number.
+#[must_use]
+pub fn painted_mesh(points_m: &[DVec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> PrimitiveMesh {
     let corner = |i: u32| points_m.get(i as usize).copied();
     let faces: Vec<([u32; 3], DVec3)> = triangles
         .iter()
@@ -37,7 +43,8 @@ pub fn creased_mesh(points_m: &[DVec3], triangles: &[[u32; 3]]) -> PrimitiveMesh
             let gentle = |&&other: &&usize| faces[other].1.normalize().dot(own) > CREASE_COS;
             let sum: DVec3 = around[i as usize].iter().filter(gentle).map(|&other| faces[other].1).sum();
             let normal = sum.try_normalize().unwrap_or(own).as_vec3();
-            mesh.vertices.push(PrimitiveVertex { core: points_m[i as usize].as_vec3(), normal });
+            let uv = uvs.get(i as usize).copied().filter(|uv| uv.is_finite()).unwrap_or_default();
+            mesh.vertices.push(PrimitiveVertex { core: points_m[i as usize].as_vec3(), normal, uv });
         }
         mesh.triangles.push([first, first + 1, first + 2]);
     }

@@ -14,6 +14,7 @@ pub mod patch;
 mod primitive;
 mod solid;
 pub(crate) mod strand;
+mod texture;
 mod tom;
 mod tool;
 
@@ -23,11 +24,12 @@ pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, inte
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
 pub(crate) use grid::Grid;
-pub use mesh::{creased_mesh, hull_mesh};
+pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
 pub use model::{Extent, Model, Placement, proxy};
 pub(crate) use near::{near_segments, near_triangle};
 pub use primitive::{Primitive, PrimitiveMesh, PrimitiveVertex, Rounding};
 pub use solid::{Obstacle, Solid};
+pub use texture::{Pattern, Texture, Wrap};
 pub use tom::{Cut, Tom, TomError};
 pub use tool::{ToolPart, ToolShape};
 

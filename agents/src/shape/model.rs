@@ -126,6 +126,7 @@ pub fn proxy(parts: &[(Model, Placement)], origin: DVec3, triangles: u32) -> Res
         mesh.vertices.extend(own.vertices.iter().map(|v| PrimitiveVertex {
             core: (at.place(v.core.as_dvec3()) - origin).as_vec3(),
             normal: (at.rotation * v.normal.as_dvec3()).as_vec3(),
+            uv: v.uv,
         }));
         mesh.triangles.extend(own.triangles.iter().map(|t| t.map(|i| first + i)));
     }

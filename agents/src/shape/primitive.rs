@@ -6,7 +6,7 @@
 
 use super::Solid;
 use super::patch::sides;
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 use std::f64::consts::FRAC_PI_4;
 
 /// A corner of a primitive before it has a size.
@@ -16,6 +16,16 @@ pub struct PrimitiveVertex {
     pub core: Vec3,
     /// Unit normal outward; the corner is [`Rounding::radius_m`] along it from the core.
     pub normal: Vec3,
+    /// Where it is on a texture: 0 … 1 across and down, repeating; 0 where there is none.
+    pub uv: Vec2,
+}
+
+impl PrimitiveVertex {
+    /// A corner that is nowhere on a texture.
+    #[must_use]
+    pub const fn bare(core: Vec3, normal: Vec3) -> Self {
+        Self { core, normal, uv: Vec2::ZERO }
+    }
 }
 
 /// A triangle mesh with normals; triangles are counter-clockwise seen from outside.
@@ -177,7 +187,7 @@ fn swept_box(knots: &[&[Knot]; 3]) -> PrimitiveMesh {
                     let (mut core, mut lean) = (Vec3::ZERO, glam::DVec3::ZERO);
                     (core[axis], core[i], core[j]) = (side, p.side, q.side);
                     (lean[axis], lean[i], lean[j]) = (f64::from(side), p.lean, q.lean);
-                    mesh.vertices.push(PrimitiveVertex { core, normal: lean.normalize().as_vec3() });
+                    mesh.vertices.push(PrimitiveVertex::bare(core, lean.normalize().as_vec3()));
                 }
             }
             grid(&mut mesh.triangles, first, knots[i].len() as u32, knots[j].len() as u32, side < 0.0);
@@ -208,7 +218,7 @@ fn cylinder(sides: u32, bevel: u32) -> PrimitiveMesh {
             let (sin, cos) = (libm::sin(angle), libm::cos(angle));
             let (out, up) = (libm::cos(tilt), libm::sin(tilt));
             let normal = glam::DVec3::new(cos * out, sin * out, up).as_vec3();
-            mesh.vertices.push(PrimitiveVertex { core: Vec3::new(cos as f32, sin as f32, z), normal });
+            mesh.vertices.push(PrimitiveVertex::bare(Vec3::new(cos as f32, sin as f32, z), normal));
         }
         first
     };
@@ -227,7 +237,7 @@ fn cylinder(sides: u32, bevel: u32) -> PrimitiveMesh {
     for z in [-1.0_f32, 1.0] {
         let rim = ring(&mut mesh, z, f64::from(z) * 2.0 * FRAC_PI_4);
         let middle = mesh.vertices.len() as u32;
-        mesh.vertices.push(PrimitiveVertex { core: Vec3::new(0.0, 0.0, z), normal: Vec3::new(0.0, 0.0, z) });
+        mesh.vertices.push(PrimitiveVertex::bare(Vec3::new(0.0, 0.0, z), Vec3::new(0.0, 0.0, z)));
         for side in 0..sides {
             let (a, b) = (rim + side, rim + (side + 1) % sides);
             mesh.triangles.push(if z > 0.0 { [middle, a, b] } else { [middle, b, a] });

@@ -10,15 +10,16 @@ use wgpu::{BindGroupLayout, Device, TextureFormat};
 /// Format of depths.
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 
-/// What passes may read: the light's pass the numbers only, the picture's pass the light's depths too.
+/// What passes may read: the light's pass the numbers only, the picture's pass the light's depths too, and what is painted on a mesh.
 #[derive(Debug)]
 pub struct Layouts {
     pub(super) light: BindGroupLayout,
     pub(super) picture: BindGroupLayout,
+    pub(super) texture: BindGroupLayout,
 }
 
 impl Layouts {
-    /// The two layouts.
+    /// The three layouts.
     pub fn new(device: &Device) -> Self {
         use wgpu::{BindingType, SamplerBindingType, TextureSampleType, TextureViewDimension};
         let texture = |sample_type| BindingType::Texture {
@@ -54,6 +55,13 @@ impl Layouts {
                     texture(TextureSampleType::Float { filterable: true }),
                     BindingType::Sampler(SamplerBindingType::Filtering),
                     texture(TextureSampleType::Float { filterable: false }),
+                ],
+            ),
+            texture: layout(
+                "texture",
+                &[
+                    texture(TextureSampleType::Float { filterable: true }),
+                    BindingType::Sampler(SamplerBindingType::Filtering),
                 ],
             ),
         }

@@ -4,8 +4,8 @@
 //! Triangles of cuts stand one after another in one buffer, and so do the ends of ways from one cut to another. A new one is found and
 //! appended; when the buffer is full, what the picture does not use is forgotten, and the rest is written anew.
 
-use super::super::picture::{MeshKey, Picture};
-use metachron_agents::shape::{Cut, Model, PrimitiveVertex, Tom};
+use super::super::picture::{MeshCorner, MeshKey, Picture};
+use metachron_agents::shape::{Cut, Model, Tom};
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::ops::Range;
@@ -14,9 +14,6 @@ use wgpu::util::DeviceExt;
 
 /// Least size of a buffer, items.
 const ROOM_MIN: u64 = 1 << 14;
-
-/// Position and normal.
-type Corner = [[f32; 3]; 2];
 
 /// What was made of the models of a picture.
 #[derive(Debug, Default)]
@@ -29,7 +26,7 @@ pub struct Cuts {
     ways: Store<WayKey>,
     corners: Vec<[u32; 3]>,
     sides: Vec<[u32; 2]>,
-    ends: Vec<Corner>,
+    ends: Vec<MeshCorner>,
 }
 
 /// A model and its cut.
@@ -61,7 +58,7 @@ struct Item {
 }
 
 const INDEX: Item = Item { label: "cuts", bytes: 4, usage: wgpu::BufferUsages::INDEX };
-const END: Item = Item { label: "ways", bytes: size_of::<Corner>() as u64, usage: wgpu::BufferUsages::VERTEX };
+const END: Item = Item { label: "ways", bytes: size_of::<MeshCorner>() as u64, usage: wgpu::BufferUsages::VERTEX };
 
 impl Cuts {
     /// Makes what `picture` needs and is not there yet.
@@ -71,7 +68,7 @@ impl Cuts {
         }
         for (model, tom, _) in cuts(picture) {
             self.vertices.entry(model).or_insert_with(|| {
-                let vertices: Vec<Corner> = tom.vertices().iter().map(corner).collect();
+                let vertices: Vec<MeshCorner> = tom.vertices().iter().map(MeshCorner::from).collect();
                 device.create_buffer_init(&wgpu::util::BufferInitDescriptor {
                     label: Some("model vertices"),
                     contents: bytemuck::cast_slice(&vertices),
@@ -101,7 +98,7 @@ impl Cuts {
                 continue;
             }
             self.ends.clear();
-            self.ends.extend((0..key.1).map(|vertex| corner(&tom.morphed(vertex, key.2, 1.0))));
+            self.ends.extend((0..key.1).map(|vertex| MeshCorner::from(&tom.morphed(vertex, key.2, 1.0))));
             self.ways.append(queue, END, key, bytemuck::cast_slice(&self.ends));
         }
     }
@@ -147,10 +144,6 @@ impl Cuts {
     }
 }
 
-fn corner(vertex: &PrimitiveVertex) -> Corner {
-    [vertex.core.to_array(), vertex.normal.to_array()]
-}
-
 impl<K: Copy + Eq + Hash> Store<K> {
     /// Sees to it that everything in `used` fits, each with its number of items; forgets all where it must.
     fn make_room(&mut self, device: &wgpu::Device, item: Item, used: impl Iterator<Item = (K, u32)> + Clone) {
@@ -192,7 +185,7 @@ impl<K: Copy + Eq + Hash> Store<K> {
 
 /// Every cut of a picture with its mesh; runs of one cut in two shadings name it twice.
 fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
-    picture.solids.iter().filter_map(|run| match run.mesh {
+    picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Cut(model, cut) | MeshKey::Glide(model, cut, _) => Some((model, tom(picture, model)?, cut)),
         _ => None,
     })
@@ -200,7 +193,7 @@ fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
 
 /// Every way of a picture with its mesh.
 fn ways(picture: &Picture) -> impl Iterator<Item = (WayKey, &Tom)> + Clone {
-    picture.solids.iter().filter_map(|run| match run.mesh {
+    picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Glide(model, cut, coarser) => Some(((model, cut.vertices, coarser), tom(picture, model)?)),
         _ => None,
     })

@@ -2,7 +2,7 @@
 //!
 //! In: levels that a picture uses. Out: vertex and index buffers. Never here: instances.
 
-use super::super::picture::{MeshKey, Picture};
+use super::super::picture::{MeshCorner, MeshKey, Picture};
 use glam::Vec3;
 use metachron_agents::N_MAX;
 use metachron_agents::shape::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
@@ -96,7 +96,7 @@ impl Meshes {
             self.models = Some(Arc::clone(&picture.models));
         }
         for run in &picture.solids {
-            match run.mesh {
+            match run.kind.mesh {
                 MeshKey::Cut(..) | MeshKey::Glide(..) => {}
                 MeshKey::Part(model, rung, _) => self.make_part(device, picture, (model, rung)),
                 key => {
@@ -178,7 +178,7 @@ fn strokes_mesh(device: &wgpu::Device, strokes: &[Stroke], (corners, faces): &(&
 }
 
 fn primitive_mesh(device: &wgpu::Device, mesh: &PrimitiveMesh) -> Mesh {
-    let vertices: Vec<[[f32; 3]; 2]> = mesh.vertices.iter().map(|v| [v.core.to_array(), v.normal.to_array()]).collect();
+    let vertices: Vec<MeshCorner> = mesh.vertices.iter().map(MeshCorner::from).collect();
     Mesh::new(device, bytemuck::cast_slice(&vertices), &mesh.triangles)
 }
 
@@ -204,7 +204,7 @@ fn add_face(mesh: &mut PrimitiveMesh, (axis, right, up): (usize, usize, usize), 
             let mut core = normal;
             core[right] = 2.0 * column as f32 / columns as f32 - 1.0;
             core[up] = 2.0 * row as f32 / rows as f32 - 1.0;
-            mesh.vertices.push(PrimitiveVertex { core, normal });
+            mesh.vertices.push(PrimitiveVertex::bare(core, normal));
         }
     }
     let at = |column: u32, row: u32| first + row * (columns + 1) + column;

@@ -11,6 +11,7 @@ mod meshes;
 mod passes;
 mod pipelines;
 mod skins;
+mod textures;
 mod timing;
 mod tissue;
 
@@ -25,6 +26,7 @@ use meshes::Meshes;
 use pipelines::Pipelines;
 use skins::SkinBuffers;
 use std::time::{Duration, Instant};
+use textures::Textures;
 use timing::Timing;
 
 /// How a renderer spends.
@@ -120,6 +122,7 @@ pub struct Renderer {
     samples: Growing,
     instances: Growing,
     skins: SkinBuffers,
+    textures: Textures,
     targets: Option<Targets>,
     timing: Option<Timing>,
 }
@@ -159,6 +162,7 @@ impl Renderer {
             samples: Growing::new("tube samples", size_of::<SkinSample>()),
             instances: Growing::new("solid instances", size_of::<SolidInstance>()),
             skins: SkinBuffers::default(),
+            textures: Textures::new(device, layouts.texture),
             targets: None,
             timing: Timing::new(device, queue),
         };
@@ -240,6 +244,7 @@ impl Renderer {
         self.skins.write(&self.device, &self.queue, &picture.skins);
         self.meshes.prepare(&self.device, picture);
         self.cuts.prepare(&self.device, &self.queue, picture);
+        self.textures.prepare(&self.device, &self.queue, picture);
         if self.targets.as_ref().is_none_or(|targets| targets.size != size) {
             self.targets = Some(Targets::new(&self.device, self.format, size, self.options.samples));
         }

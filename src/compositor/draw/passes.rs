@@ -32,7 +32,7 @@ impl Renderer {
         }
         for strokes in [false, true] {
             pass.set_pipeline(if strokes { &self.pipelines.stroke_shadow } else { &self.pipelines.solid_shadow });
-            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.mesh) == strokes) {
+            for run in picture.solids.iter().filter(|run| self.meshes.is_strokes(run.kind.mesh) == strokes) {
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
@@ -64,8 +64,11 @@ impl Renderer {
             }
         }
         for slab in [false, true] {
-            for run in picture.solids.iter().filter(|run| matches!(run.mesh, MeshKey::Slab(_)) == slab) {
+            for run in picture.solids.iter().filter(|run| matches!(run.kind.mesh, MeshKey::Slab(_)) == slab) {
                 pass.set_pipeline(self.pipeline_of(run));
+                if let (Shading::Textured, Some(texture)) = (run.kind.shading, self.textures.group(run.kind.texture)) {
+                    pass.set_bind_group(1, texture, &[]);
+                }
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
@@ -94,7 +97,7 @@ impl Renderer {
             draws += self.draw_tube(pass, tube, self.meshes.patch(tube.n), true);
         }
         pass.set_pipeline(&self.pipelines.solid_edges);
-        for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.mesh)) {
+        for run in picture.solids.iter().filter(|run| !self.meshes.is_strokes(run.kind.mesh)) {
             draws += self.draw_solids(pass, run, true);
         }
         draws + self.draw_skins(pass, picture, (|_| &self.pipelines.solid_edges, true))
@@ -120,9 +123,9 @@ impl Renderer {
 
     /// What a run of solids is drawn with: points, lines and slabs are lit at their corners.
     fn pipeline_of(&self, run: &SolidRun) -> &wgpu::RenderPipeline {
-        match (run.mesh, run.shading) {
+        match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
-            _ if self.meshes.is_strokes(run.mesh) => &self.pipelines.stroke,
+            _ if self.meshes.is_strokes(run.kind.mesh) => &self.pipelines.stroke,
             (_, shading) => self.pipelines.solid_of(shading),
         }
     }
@@ -142,7 +145,7 @@ impl Renderer {
         let stride = size_of::<SolidInstance>() as u64;
         let from = u64::from(run.first) * stride;
         pass.set_vertex_buffer(1, instances.slice(from..from + u64::from(run.count) * stride));
-        match run.mesh {
+        match run.kind.mesh {
             MeshKey::Cut(model, cut) => self.cuts.draw(pass, (model, cut, None), (edges, run.count)),
             MeshKey::Glide(model, cut, to) => self.cuts.draw(pass, (model, cut, Some(to)), (edges, run.count)),
             MeshKey::Part(model, rung, triangles) => {

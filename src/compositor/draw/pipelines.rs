@@ -10,6 +10,7 @@ use wgpu::{Device, RenderPipeline, ShaderModule, TextureFormat, VertexBufferLayo
 const COMMON: &str = include_str!("shaders/common.wgsl");
 const SKIN: &str = include_str!("shaders/skin.wgsl");
 const SOLID: &str = include_str!("shaders/solid.wgsl");
+const PAINTED: &str = include_str!("shaders/painted.wgsl");
 const STROKE: &str = include_str!("shaders/stroke.wgsl");
 const FLOOR: &str = include_str!("shaders/floor.wgsl");
 
@@ -30,6 +31,8 @@ pub struct Pipelines {
     pub solid_flat: RenderPipeline,
     /// Solids lit at their corners.
     pub solid_gouraud: RenderPipeline,
+    /// Solids with what is painted on them.
+    pub painted: RenderPipeline,
     /// Points and lines that turn to the eye.
     pub stroke: RenderPipeline,
     /// Points and lines as the light sees them.
@@ -65,12 +68,15 @@ struct Recipe<'a> {
 struct Kitchen<'a> {
     device: &'a Device,
     layouts: [wgpu::PipelineLayout; 2],
+    /// The picture's, and a texture beside it.
+    with_texture: wgpu::PipelineLayout,
     format: TextureFormat,
     samples: u32,
     shadow_taps: u32,
 }
 
 const SAMPLE_STRIDE: u64 = 64;
+const CORNER_STRIDE: u64 = 32;
 
 /// Cells along a side of the floor's shadowed patch, and rings around it; the shader has the same numbers.
 const FLOOR_CELLS: u32 = 8;
@@ -79,8 +85,7 @@ const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
 const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
 
 /// A solid's instance.
-const BODY: [wgpu::VertexAttribute; 5] =
-    wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4];
+const BODY: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4, 10 => Float32x2];
 
 fn layout(
     array_stride: u64,
@@ -102,16 +107,19 @@ impl Pipelines {
         let kitchen = Kitchen::new(device, layouts, format, options);
         let begin = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
         let end = wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
-        let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3];
+        let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 9 => Float32x2];
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
             layout(16, vertex, &wgpu::vertex_attr_array![0 => Float32x4]),
             layout(SAMPLE_STRIDE, instance, &begin),
             layout(SAMPLE_STRIDE, instance, &end),
         ];
-        let end_corner = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3];
-        let solids =
-            [layout(24, vertex, &corner), layout(SAMPLE_STRIDE, instance, &BODY), layout(24, vertex, &end_corner)];
+        let end_corner = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3, 11 => Float32x2];
+        let solids = [
+            layout(CORNER_STRIDE, vertex, &corner),
+            layout(SAMPLE_STRIDE, instance, &BODY),
+            layout(CORNER_STRIDE, vertex, &end_corner),
+        ];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
             kitchen.cook(&Recipe { label, vertex, fragment, buffers: &tubes, topology, module: &skin })
@@ -137,6 +145,7 @@ impl Pipelines {
             ),
             solid_flat: solid("flat solid", "vs_flat", Some("fs_flat"), TriangleList),
             solid_gouraud: solid("gouraud solid", "vs_slab", Some("fs_slab"), TriangleList),
+            painted: kitchen.painted(&solids, &module("painted", &[SOLID, PAINTED].concat())),
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
@@ -154,8 +163,8 @@ impl Pipelines {
         match shading {
             Shading::Flat => &self.skin_flat,
             Shading::Gouraud => &self.skin_gouraud,
-            Shading::PerPixel if tissue => &self.tissue,
-            Shading::PerPixel => &self.skin,
+            Shading::PerPixel | Shading::Textured if tissue => &self.tissue,
+            Shading::PerPixel | Shading::Textured => &self.skin,
         }
     }
 
@@ -165,20 +174,23 @@ impl Pipelines {
             Shading::Flat => &self.solid_flat,
             Shading::Gouraud => &self.solid_gouraud,
             Shading::PerPixel => &self.solid,
+            Shading::Textured => &self.painted,
         }
     }
 }
 
 impl<'a> Kitchen<'a> {
     fn new(device: &'a Device, layouts: &Layouts, format: TextureFormat, options: RendererOptions) -> Self {
-        let layouts = [&layouts.light, &layouts.picture].map(|group| {
+        let layout = |groups: &[Option<&wgpu::BindGroupLayout>]| {
             device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
                 label: None,
-                bind_group_layouts: &[Some(group)],
+                bind_group_layouts: groups,
                 immediate_size: 0,
             })
-        });
-        Self { device, layouts, format, samples: options.samples, shadow_taps: options.shadow_taps }
+        };
+        let with_texture = layout(&[Some(&layouts.picture), Some(&layouts.texture)]);
+        let layouts = [&layouts.light, &layouts.picture].map(|group| layout(&[Some(group)]));
+        Self { device, layouts, with_texture, format, samples: options.samples, shadow_taps: options.shadow_taps }
     }
 
     /// The floor in its parts, and how many corners each has.
@@ -216,7 +228,18 @@ impl<'a> Kitchen<'a> {
         })
     }
 
+    /// Solids with what is painted on them.
+    fn painted(&self, buffers: &[Option<VertexBufferLayout<'_>>], module: &ShaderModule) -> RenderPipeline {
+        let (vertex, fragment) = ("vs_painted", Some("fs_painted"));
+        let topology = wgpu::PrimitiveTopology::TriangleList;
+        self.cook_in(&Recipe { label: "painted", vertex, fragment, buffers, topology, module }, &self.with_texture)
+    }
+
     fn cook(&self, recipe: &Recipe<'_>) -> RenderPipeline {
+        self.cook_in(recipe, &self.layouts[usize::from(recipe.fragment.is_some())])
+    }
+
+    fn cook_in(&self, recipe: &Recipe<'_>, layout: &wgpu::PipelineLayout) -> RenderPipeline {
         let lines = recipe.topology == wgpu::PrimitiveTopology::LineList;
         let shadow = recipe.fragment.is_none();
         let flag = |on: bool| f64::from(u8::from(on));
@@ -230,7 +253,7 @@ impl<'a> Kitchen<'a> {
             [Some(wgpu::ColorTargetState { format: self.format, blend: None, write_mask: wgpu::ColorWrites::ALL })];
         self.device.create_render_pipeline(&wgpu::RenderPipelineDescriptor {
             label: Some(recipe.label),
-            layout: Some(&self.layouts[usize::from(!shadow)]),
+            layout: Some(layout),
             vertex: wgpu::VertexState {
                 module: recipe.module,
                 entry_point: Some(recipe.vertex),

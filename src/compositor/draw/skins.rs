@@ -2,6 +2,7 @@
 //!
 //! In: corners and triangles. Out: draws. Never here: pipelines, instances.
 
+use super::super::picture::MeshCorner;
 use super::super::skin::{SkinRun, Skins};
 use super::buffers::Growing;
 
@@ -16,7 +17,7 @@ pub struct SkinBuffers {
 impl Default for SkinBuffers {
     fn default() -> Self {
         Self {
-            corners: Growing::new("skin corners", size_of::<[[f32; 3]; 2]>()),
+            corners: Growing::new("skin corners", size_of::<MeshCorner>()),
             triangles: Growing::new("skin triangles", size_of::<[u32; 3]>()),
             sides: Growing::new("skin sides", size_of::<[u32; 2]>()),
         }

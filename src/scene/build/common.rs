@@ -2,7 +2,7 @@
 
 use crate::scene::cast::{Look, PaceWish};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{CommonFile, FaultsFile, Material, OneOrRange};
+use crate::scene::format::{CommonFile, FaultsFile, Material, OneOrRange, ShadingKind};
 use crate::scene::ties::Faults;
 use metachron_agents::{N_MAX, SimSpan};
 
@@ -101,8 +101,16 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
     N_DEFAULT
 }
 
-/// Colour and material; `default` is the material of the model.
+/// Colour and material of what nothing is painted on; `default` is the material of the model.
 pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
+    if file.shading == Some(ShadingKind::Textured) {
+        c.wrong(place, "shading", "has nothing to draw", "expected `texture` beside it, which only a mesh can have");
+    }
+    painted_look(c, place, file, default)
+}
+
+/// The same of what something may be painted on.
+pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
     let material = file.material.unwrap_or(default);
     let colour = match &file.colour {
         None => colour_of(material),

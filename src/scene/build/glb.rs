@@ -1,11 +1,11 @@
 //! glTF's binary form (.glb) as points and triangles.
 //!
-//! In: any bytes. Out: the triangles of every mesh that a node of the scene shows, placed as the nodes say, z up; or what is wrong
-//! with the file. Never here: materials, skins, files beside the file. Every number in it is doubted: it may be hostile
+//! In: any bytes. Out: the triangles of every mesh that a node of the scene shows, placed as the nodes say, z up, and the image that is
+//! painted on them; or what is wrong with the file. Never here: light, skins, files beside the file, what an image's bytes mean. Every number in it is doubted: it may be hostile
 //! (the crate `gltf` panics on a number of an accessor that is not there, so the few tables needed are read here).
 
-use super::mesh::TRIANGLES_MAX;
-use glam::{DMat4, DQuat, DVec3, DVec4};
+use super::mesh::{Parts, TRIANGLES_MAX};
+use glam::{DMat4, DQuat, DVec3, DVec4, Vec2};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
@@ -16,6 +16,8 @@ pub(super) const MAGIC: &[u8] = b"glTF";
 const NODES_MAX: usize = 100_000;
 /// Deepest nesting of nodes.
 const DEPTH_MAX: usize = 64;
+/// What is said of data that is not in the file.
+const OUTSIDE: &str = "its data lies outside the file: it is cut short, or kept in another";
 /// glTF has y up: it becomes z.
 const UPRIGHT: DMat4 = DMat4::from_cols(DVec4::X, DVec4::Z, DVec4::NEG_Y, DVec4::W);
 
@@ -30,6 +32,9 @@ struct Tables {
     accessors: Vec<Accessor>,
     buffer_views: Vec<View>,
     buffers: Vec<Buffer>,
+    materials: Vec<Material>,
+    textures: Vec<TextureEntry>,
+    images: Vec<Image>,
 }
 
 #[derive(Deserialize, Default)]
@@ -59,6 +64,38 @@ struct Primitive {
     attributes: BTreeMap<String, usize>,
     indices: Option<usize>,
     mode: Option<u32>,
+    material: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Material {
+    pbr_metallic_roughness: Roughness,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Roughness {
+    base_color_texture: Option<TextureUse>,
+}
+
+#[derive(Deserialize)]
+#[serde(rename_all = "camelCase")]
+struct TextureUse {
+    index: usize,
+    #[serde(default)]
+    tex_coord: usize,
+}
+
+#[derive(Deserialize)]
+struct TextureEntry {
+    source: Option<usize>,
+}
+
+#[derive(Deserialize, Default)]
+#[serde(rename_all = "camelCase", default)]
+struct Image {
+    buffer_view: Option<usize>,
 }
 
 #[derive(Deserialize)]
@@ -94,20 +131,36 @@ struct Reader<'d> {
     tables: Tables,
     data: &'d [u8],
     points: Vec<DVec3>,
+    uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
     nodes: usize,
 }
 
-/// Points and triangles of a file.
-pub(super) fn read(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
+/// Points, their places on the image of [`image`], and triangles of a file.
+pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     let (text, data) = parts(bytes)?;
     let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
     let roots = tables.scenes.get(tables.scene).ok_or("it has no scene")?.nodes.clone();
-    let mut reader = Reader { tables, data, points: Vec::new(), triangles: Vec::new(), nodes: 0 };
+    let mut reader = Reader { tables, data, points: Vec::new(), uvs: Vec::new(), triangles: Vec::new(), nodes: 0 };
     for node in roots {
         reader.node(node, UPRIGHT, 0)?;
     }
-    Ok((reader.points, reader.triangles))
+    Ok((reader.points, reader.uvs, reader.triangles))
+}
+
+/// The bytes of the one image that all base colours of a file come from; `None` where they come from none or several.
+pub(super) fn image(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
+    let (text, data) = parts(bytes)?;
+    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
+    let primitives = tables.meshes.iter().flat_map(|mesh| &mesh.primitives);
+    let painted = primitives.filter_map(|primitive| tables.painted(primitive));
+    let mut images: Vec<usize> = painted.map(|on| tables.source(on.index)).collect::<Result<_, _>>()?;
+    images.sort_unstable();
+    images.dedup();
+    let &[only] = &images[..] else { return Ok(None) };
+    let image = tables.images.get(only).ok_or_else(|| format!("it names image {only}, which is not there"))?;
+    let view = image.buffer_view.ok_or_else(|| format!("its image {only} is kept in another file"))?;
+    tables.bytes(view, data).map(Some)
 }
 
 /// The text and the data of a file; the data is empty where there is none.
@@ -131,6 +184,32 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
         at += 8 + size;
     }
     Ok((text.ok_or("it has no text")?, data))
+}
+
+impl Tables {
+    /// What the base colour of a primitive comes from, if from an image.
+    fn painted(&self, primitive: &Primitive) -> Option<&TextureUse> {
+        self.materials.get(primitive.material?)?.pbr_metallic_roughness.base_color_texture.as_ref()
+    }
+
+    /// The image of a texture.
+    fn source(&self, texture: usize) -> Result<usize, String> {
+        let entry =
+            self.textures.get(texture).ok_or_else(|| format!("it names texture {texture}, which is not there"))?;
+        entry.source.ok_or_else(|| format!("its texture {texture} has no image that is understood"))
+    }
+
+    /// The bytes of a view, checked to lie inside the file.
+    fn bytes<'d>(&self, view: usize, data: &'d [u8]) -> Result<&'d [u8], String> {
+        let outside = || OUTSIDE.to_owned();
+        let view = self.buffer_views.get(view).ok_or_else(outside)?;
+        // only the first buffer can be in the file
+        if view.buffer != 0 || self.buffers.first().is_none_or(|buffer| buffer.uri.is_some()) {
+            return Err(outside());
+        }
+        let end = view.byte_offset.checked_add(view.byte_length).ok_or_else(outside)?;
+        data.get(view.byte_offset..end).ok_or_else(outside)
+    }
 }
 
 impl Reader<'_> {
@@ -167,6 +246,12 @@ impl Reader<'_> {
                 return Err(format!("a face uses point {bad} of {count}"));
             }
             self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
+            let coordinates = self.tables.painted(primitive).map_or(0, |on| on.tex_coord);
+            if let Some(&accessor) = primitive.attributes.get(&format!("TEXCOORD_{coordinates}")) {
+                let uvs = uvs(&self.tables, accessor, self.data)?;
+                self.uvs.extend(uvs.into_iter().take(points.len()));
+            }
+            self.uvs.resize(self.points.len(), Vec2::ZERO);
             let turned = place.determinant() < 0.0;
             let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
             self.triangles.extend(triangles(&corners, mode).into_iter().map(|t| side(t).map(|i| i + first)));
@@ -212,6 +297,19 @@ fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<DVec3>, Str
     Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
 }
 
+/// Places on a texture: floats, or parts of the greatest whole number.
+fn uvs(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<Vec2>, String> {
+    let accessor = accessor(tables, number)?;
+    let (size, number): (usize, fn(&[u8]) -> f32) = match (accessor.component_type, accessor.kind.as_str()) {
+        (5126, "VEC2") => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
+        (5121, "VEC2") => (1, |b| f32::from(b[0]) / 255.0),
+        (5123, "VEC2") => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65_535.0),
+        _ => return Err("its places on a texture are not two numbers".to_owned()),
+    };
+    let items = items(tables, accessor, (data, 2 * size))?;
+    Ok(items.map(|bytes| Vec2::new(number(bytes), number(&bytes[size..]))).collect())
+}
+
 fn indices(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<u32>, String> {
     let accessor = accessor(tables, number)?;
     let (size, number): (usize, fn(&[u8]) -> u32) = match (accessor.component_type, accessor.kind.as_str()) {
@@ -233,22 +331,15 @@ fn items<'d>(
     accessor: &Accessor,
     (data, size): (&'d [u8], usize),
 ) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
-    let outside = || "its data lies outside the file: it is cut short, or kept in another".to_owned();
     let view = accessor.buffer_view.filter(|_| accessor.sparse.is_none());
     let view = view.ok_or("its data is sparse, which is not understood")?;
-    let view = tables.buffer_views.get(view).ok_or_else(outside)?;
-    // only the first buffer can be in the file
-    if view.buffer != 0 || tables.buffers.first().is_none_or(|buffer| buffer.uri.is_some()) {
-        return Err(outside());
-    }
-    let end = view.byte_offset.checked_add(view.byte_length).ok_or_else(outside)?;
-    let bytes = data.get(view.byte_offset..end).ok_or_else(outside)?;
+    let bytes = tables.bytes(view, data)?;
     let (start, count) = (accessor.byte_offset, accessor.count);
-    let stride = view.byte_stride.unwrap_or(size).max(size);
+    let stride = tables.buffer_views[view].byte_stride.unwrap_or(size).max(size);
     let last = count.checked_sub(1).ok_or("it has an empty list")?;
     let reach = last.checked_mul(stride).and_then(|n| n.checked_add(start)?.checked_add(size));
     if reach.is_none_or(|reach| reach > bytes.len()) {
-        return Err(outside());
+        return Err(OUTSIDE.to_owned());
     }
     Ok((0..count).map(move |i| &bytes[start + i * stride..start + i * stride + size]))
 }

@@ -113,14 +113,14 @@ fn proxy_of(
     let name = file.name.clone();
     if let Some(given) = &file.proxy {
         let (tom, at) = mesh_model(c, &place.table("proxy"), given, source)?;
-        return Some(Scenery { name, model: Model::Mesh(tom), at, look });
+        return Some(Scenery { name, model: Model::Mesh(tom), at, look, texture: None });
     }
     let origin = members.iter().map(|m| m.at.position).sum::<DVec3>() / members.len() as f64;
     let parts: Vec<(Model, Placement)> = members.iter().map(|m| (m.model.clone(), m.at)).collect();
     match proxy(&parts, origin, triangles) {
         Ok(tom) => {
             let at = Placement { position: origin, rotation: DQuat::IDENTITY, scale: 1.0 };
-            Some(Scenery { name, model: Model::Mesh(Arc::new(tom)), at, look })
+            Some(Scenery { name, model: Model::Mesh(Arc::new(tom)), at, look, texture: None })
         }
         Err(why) => {
             c.wrong(place, "members", format_args!("cannot be drawn as one: {why}"), "expected meshes with an area");

@@ -3,7 +3,7 @@
 //! In: any bytes. Out: a mesh with sound corner numbers, or what is wrong with the file. Never here: the file system.
 
 use super::glb;
-use glam::DVec3;
+use glam::{DVec3, Vec2};
 use std::io::Cursor;
 use std::sync::Arc;
 use tobj::{LoadError, LoadOptions};
@@ -15,19 +15,24 @@ pub(super) const TRIANGLES_MAX: usize = 1_000_000;
 #[derive(Debug)]
 pub(super) struct Mesh {
     pub(super) points_m: Arc<[DVec3]>,
+    /// The place of each point on the file's texture; empty where it has none.
+    pub(super) uvs: Vec<Vec2>,
     pub(super) triangles: Arc<[[u32; 3]]>,
 }
 
 /// Reads a file of either kind, told apart by its first bytes; coordinates are multiplied by `scale`.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
-    let (mut points, triangles) = if bytes.starts_with(glb::MAGIC) { glb::read(bytes)? } else { read_obj(bytes)? };
+    let (mut points, uvs, triangles) = if bytes.starts_with(glb::MAGIC) { glb::read(bytes)? } else { read_obj(bytes)? };
     points.iter_mut().for_each(|point| *point *= scale);
     check(&points, &triangles)?;
-    Ok(Mesh { points_m: points.into(), triangles: triangles.into() })
+    Ok(Mesh { points_m: points.into(), uvs, triangles: triangles.into() })
 }
 
+/// Points, their places on a texture (none, if empty) and triangles.
+pub(super) type Parts = (Vec<DVec3>, Vec<Vec2>, Vec<[u32; 3]>);
+
 /// Points and triangles of an OBJ file.
-fn read_obj(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
+fn read_obj(bytes: &[u8]) -> Result<Parts, String> {
     let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
     let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
     let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials).map_err(|e| e.to_string())?;
@@ -38,7 +43,7 @@ fn read_obj(bytes: &[u8]) -> Result<(Vec<DVec3>, Vec<[u32; 3]>), String> {
         points.extend(model.mesh.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from(p.map(f64::from))));
         triangles.extend(model.mesh.indices.as_chunks::<3>().0.iter().map(|t| t.map(|i| i.saturating_add(base))));
     }
-    Ok((points, triangles))
+    Ok((points, Vec::new(), triangles))
 }
 
 fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {

@@ -19,6 +19,7 @@ mod scenery;
 mod soft;
 mod stage;
 mod synthetic;
+mod texture;
 mod tube;
 
 pub(super) use common::world_faults;

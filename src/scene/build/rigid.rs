@@ -161,7 +161,7 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
             sound(c, place, Solid::Hull { points_m })?
         }
         Shape::Mesh => {
-            let Mesh { points_m, triangles } = from_file(c, place, file, source)?;
+            let Mesh { points_m, triangles, .. } = from_file(c, place, file, source)?;
             sound(c, place, Solid::Mesh { points_m, triangles })?
         }
     })

@@ -2,15 +2,16 @@
 //!
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
-use super::common::{levels, look, pace, parse_colour};
+use super::common::{levels, look, pace, painted_look, parse_colour};
 use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
 use super::rigid::{point_or_zero, rotation};
+use super::texture::{self, Textures};
 use super::{POSITION_MAX_M, mesh};
 use crate::scene::cast::{Look, Scenery};
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{GeneratorKind, Material, MeshFile, Point, TreeFile, TreeLod};
 use crate::scene::source::Source;
-use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, creased_mesh, generate, tree};
+use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, generate, painted_mesh, tree};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -31,11 +32,14 @@ type Made = BTreeMap<(String, u32, Option<u32>), Arc<Tom>>;
 
 /// Reads every mesh and tree.
 pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
-    let (mut scenery, mut made) = (Vec::new(), Made::new());
+    let (mut scenery, mut made, mut textures) = (Vec::new(), Made::new(), Textures::new());
     for entry in entries {
         let before = c.count();
         let parts = match &entry.model {
-            ModelFile::Mesh(file) => mesh_parts(c, entry, file, (source, &mut made)),
+            ModelFile::Mesh(file) => {
+                let parts = mesh_parts(c, entry, file, (source, &mut made));
+                texture::painted(c, entry, (file, parts), (source, &mut textures))
+            }
             ModelFile::Tree(file) => tree_parts(c, entry, file),
             _ => continue,
         };
@@ -117,7 +121,7 @@ fn mesh_of(
 
 fn from_file(name: &str, source: &Source) -> Result<Tom, String> {
     let mesh = mesh::read(&source.sibling(name)?, 1.0)?;
-    Tom::new(&creased_mesh(&mesh.points_m, &mesh.triangles)).map_err(|why| why.to_string())
+    Tom::new(&painted_mesh(&mesh.points_m, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
 }
 
 const fn generator(kind: GeneratorKind) -> Generator {
@@ -138,25 +142,26 @@ fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<P
 }
 
 /// One copy's parts, each with what its name ends in.
-type Parts = Vec<(&'static str, Scenery)>;
+pub(super) type Parts = Vec<(&'static str, Scenery)>;
 
-fn looks(c: &mut Checker<'_, '_>, entry: &Entry, material: Material) -> Look {
-    // read for their own sake: scenery has no steps, but a wrong rate is still wrong
+/// Reads what scenery has no use for, for its own sake: it has no steps, but a wrong rate is still wrong.
+fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
     pace(c, &entry.place, &entry.common);
     levels(c, &entry.place, &entry.common);
-    look(c, &entry.place, &entry.common, material)
 }
 
 fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&Source, &mut Made)) -> Parts {
-    let look = looks(c, entry, Material::Plastic);
+    read_besides(c, entry);
+    let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
     let found = mesh_of(c, &entry.place, file, from);
-    let part = |(tom, at)| ("", Scenery { name: String::new(), model: Model::Mesh(tom), at, look });
+    let part = |(tom, at)| ("", Scenery { name: String::new(), model: Model::Mesh(tom), at, look, texture: None });
     found.map(part).into_iter().collect()
 }
 
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
     let place = &entry.place;
-    let bark = looks(c, entry, Material::Skin);
+    read_besides(c, entry);
+    let bark = look(c, place, &entry.common, Material::Skin);
     let pieces = allowed(1.0..=PIECES_MAX, "");
     let mut count = |key: &str, given: Option<u32>, usual: u32| {
         c.number_or(place, key, (given.map(f64::from), f64::from(usual)), &pieces) as u32
@@ -180,6 +185,6 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let bark = Look { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
     let at = placement(c, place, (file.position_m, file.rotation_deg));
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
-    let part = |model, look| Scenery { name: String::new(), model, at, look };
+    let part = |model, look| Scenery { name: String::new(), model, at, look, texture: None };
     vec![("", part(trunk, bark)), (".leaves", part(crown, leaf))]
 }

@@ -182,9 +182,15 @@ fn load(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(f64,
 }
 
 /// Costs of objects by their shading, in the order of control.
-fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 3] {
+fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 4] {
     let Some(files) = &file.shading else { return Default::default() };
-    [("flat", files.flat), ("gouraud", files.gouraud), ("per-pixel", files.per_pixel)].map(|(name, file)| {
+    let all = [
+        ("flat", files.flat),
+        ("gouraud", files.gouraud),
+        ("per-pixel", files.per_pixel),
+        ("textured", files.textured),
+    ];
+    all.map(|(name, file)| {
         let (place, file) = (place.table(name), file.unwrap_or_default());
         let mut number =
             |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));

@@ -274,6 +274,8 @@ pub struct ShadingCostsFile {
     pub gouraud: Option<ShadingCostFile>,
     /// Light at every pixel.
     pub per_pixel: Option<ShadingCostFile>,
+    /// Light at every pixel on what is painted on it.
+    pub textured: Option<ShadingCostFile>,
 }
 
 /// What an object costs: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).

@@ -127,7 +127,7 @@ impl Tom {
         let from = self.vertices[vertex as usize];
         let to = self.vertices[self.standing(vertex, coarser) as usize];
         let normal = from.normal.lerp(to.normal, share).try_normalize().unwrap_or(to.normal);
-        PrimitiveVertex { core: from.core.lerp(to.core, share), normal }
+        PrimitiveVertex { core: from.core.lerp(to.core, share), normal, uv: from.uv.lerp(to.uv, share) }
     }
 
     /// How far the full mesh is from the cut of so many triangles, metres: the greatest distance of a sample of its vertices.

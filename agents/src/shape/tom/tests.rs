@@ -234,7 +234,7 @@ fn many_parts_go_one_by_one_down_to_the_last() {
 
 #[test]
 fn what_is_no_mesh_is_refused_with_its_reason() {
-    let vertex = |x: f32| PrimitiveVertex { core: Vec3::new(x, 0.0, 0.0), normal: Vec3::Z };
+    let vertex = |x: f32| PrimitiveVertex::bare(Vec3::new(x, 0.0, 0.0), Vec3::Z);
     let mesh = |vertices, triangles| PrimitiveMesh { vertices, triangles };
     assert_eq!(Tom::new(&PrimitiveMesh::default()), Err(TomError::Empty { triangles: 0 }));
     let far = mesh(vec![vertex(0.0), vertex(1.0)], vec![[0, 1, 7]]);
@@ -252,7 +252,7 @@ proptest! {
     #[test]
     fn any_heap_of_triangles_is_ordered(triangles in proptest::collection::vec([0..12_u32, 0..12, 0..12], 1..40)) {
         let place = |i: u32| Vec3::new((i % 3) as f32, (i / 3 % 2) as f32, (i / 6) as f32 + 0.1 * (i % 5) as f32);
-        let vertices = (0..12).map(|i| PrimitiveVertex { core: place(i), normal: Vec3::Z }).collect();
+        let vertices = (0..12).map(|i| PrimitiveVertex::bare(place(i), Vec3::Z)).collect();
         let mesh = PrimitiveMesh { vertices, triangles };
         if let Ok(tom) = Tom::new(&mesh) {
             for cut in all_counts(&tom) {

@@ -1,4 +1,4 @@
-//! A mesh with each position once: what can be collapsed is positions; the normals at one are its wedges.
+//! A mesh with each position once: what can be collapsed is positions; the normals and places on a texture at one are its wedges.
 //!
 //! In: a mesh as it is given. Out: positions, wedges, triangles with an area. Never here: order.
 
@@ -50,7 +50,7 @@ impl TomError {
 pub(super) struct Welded {
     /// Positions.
     pub places: Vec<Vec3>,
-    /// Every different pair of a position and a normal that a triangle uses.
+    /// Every different position with a normal and a place on a texture that a triangle uses.
     pub wedges: Vec<PrimitiveVertex>,
     /// The position of each wedge.
     pub place_of: Vec<u32>,
@@ -81,17 +81,18 @@ impl Welded {
         &mut self,
         vertex: PrimitiveVertex,
         places: &mut BTreeMap<[u32; 3], u32>,
-        wedges: &mut BTreeMap<[u32; 6], u32>,
+        wedges: &mut BTreeMap<[u32; 8], u32>,
     ) -> u32 {
         // adding zero makes one of the two zeros
         let core = vertex.core + Vec3::ZERO;
         let (p, n) = (core.to_array().map(f32::to_bits), (vertex.normal + Vec3::ZERO).to_array().map(f32::to_bits));
+        let uv = vertex.uv.to_array().map(f32::to_bits);
         let place = *places.entry(p).or_insert_with(|| {
             self.places.push(core);
             self.places.len() as u32 - 1
         });
-        *wedges.entry([p[0], p[1], p[2], n[0], n[1], n[2]]).or_insert_with(|| {
-            self.wedges.push(PrimitiveVertex { core, normal: vertex.normal });
+        *wedges.entry([p[0], p[1], p[2], n[0], n[1], n[2], uv[0], uv[1]]).or_insert_with(|| {
+            self.wedges.push(PrimitiveVertex { core, ..vertex });
             self.place_of.push(place);
             self.wedges.len() as u32 - 1
         })
