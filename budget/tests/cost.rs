@@ -1,6 +1,8 @@
 //! Costs and benefits against machines and values that are known.
 
-use metachron_budget::adaptive::joint::{Between, Choice, even_split, pairs, temporal_error_px};
+use metachron_budget::adaptive::joint::{
+    Between, Choice, Drawing, Market, Worker, even_split, pairs, price, taken, temporal_error_px,
+};
 use metachron_budget::adaptive::{Adaptive, Offer, Settings, Time};
 use metachron_budget::cost::benefit::{Picture, Shading, Sliders, View, accuracy, benefit};
 use metachron_budget::cost::curve::{self, Curve};
@@ -334,4 +336,64 @@ fn one_purse_for_simulation_and_drawing_is_better_than_two_halves() {
     let (joint, halves, even) = (joint_sum / n, halves_sum / n, even_sum / n);
     println!("of the bound's gain: one purse {joint:.4}, two halves {halves:.4}, two purses at one price {even:.4}");
     assert!(joint >= 0.99 && joint >= halves + 0.03 && even >= 0.99, "{joint} {halves} {even}");
+}
+
+/// Agents of many sizes, and what a picture gains by its logarithm: `worth` / ticks is its price.
+fn workers(dearer: f64) -> Vec<Worker> {
+    (1..=12)
+        .map(|k| Worker {
+            full: dearer * 300.0 * f64::from(k % 4 + 1),
+            least: 0.02,
+            loss: 40.0 * f64::from(k * 7 % 5 + 1),
+        })
+        .collect()
+}
+
+/// Plays the market with a picture worth `worth` ln(ticks) that wants `wants` ticks: price of the picture, of the agents, ticks of both.
+fn play_market(workers: &[Worker], (capacity, wants, worth): (f64, f64, f64)) -> Option<[f64; 4]> {
+    let (mut market, mut limit, mut last) = (Market::default(), wants, None);
+    for _ in 0..600 {
+        let lambda = if limit < wants { worth / limit.max(1.0) } else { 0.0 };
+        let settled = market.settle(workers, capacity, Drawing { wants, lambda });
+        limit = settled.map_or(wants, |(_, ticks)| ticks.min(wants));
+        last = settled.map(|(price, _)| [worth / limit, price, limit, taken(workers, price)]);
+    }
+    last
+}
+
+#[test]
+fn market_finds_the_split_at_which_one_more_tick_is_worth_the_same_to_both() {
+    let (capacity, wants, worth) = (8000.0, 6000.0, 900.0);
+    for dearer in [1.0, 2.0, 4.0, 8.0] {
+        let workers = workers(dearer);
+        let [drawing, agents, ticks, taken] = play_market(&workers, (capacity, wants, worth)).expect("short of time");
+        assert!((drawing / agents - 1.0).abs() < 0.02, "{dearer}: {drawing} and {agents}");
+        assert!((ticks + taken - capacity).abs() < 1e-6 * capacity);
+        // by halving, without frames
+        let wanted = even_split(capacity, |first, second| (price(&workers, first), worth / second));
+        assert!((taken / wanted - 1.0).abs() < 0.02, "{dearer}: {taken} and {wanted}");
+    }
+}
+
+#[test]
+fn market_is_closed_where_there_is_enough_for_all_and_takes_any_worker() {
+    let workers = workers(1.0);
+    let full = taken(&workers, 0.0);
+    assert_eq!(play_market(&workers, (full + 500.0, 500.0, 1.0)), None);
+    assert!(play_market(&workers, (full + 499.0, 500.0, 1.0)).is_some());
+    for (full, least, loss) in
+        [(f64::NAN, 0.1, 1.0), (9e9, f64::NAN, 1.0), (9e9, 0.0, 0.0), (9e9, 2.0, f64::NAN), (-1.0, 0.5, 1.0)]
+    {
+        let odd = [Worker { full, least, loss }, workers[0]];
+        for _ in 0..50 {
+            if let Some((lambda, ticks)) =
+                Market::default().settle(&odd, 1000.0, Drawing { wants: 900.0, lambda: f64::NAN })
+            {
+                assert!(
+                    lambda.is_finite() && ticks.is_finite() && ticks >= 0.0,
+                    "{full} {least} {loss}: {lambda} {ticks}"
+                );
+            }
+        }
+    }
 }

@@ -1,7 +1,7 @@
 //! Simulation and drawing under one budget: what a rate is worth on the screen, and how two purses share the cores.
 //!
-//! In: motion on the screen, rates, levels. Out: offers that [`super::Adaptive`] chooses among; a split where there are two purses.
-//! Never here: a step of anything. Theory: `docs/theory/budget.md`, eq. 54 … 57.
+//! In: motion on the screen, rates, levels. Out: offers that [`super::Adaptive`] chooses among; a split where there are two purses, at
+//! once or found while frames go by ([`Market`]). Never here: a step of anything. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 
 use alloc::vec::Vec;
 
@@ -85,4 +85,114 @@ pub fn even_split(total: f64, mut prices: impl FnMut(f64, f64) -> (f64, f64)) ->
         }
     }
     0.5 * (low + high)
+}
+
+/// What steps on the processor that draws, as the market sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worker {
+    /// Ticks of a frame's time that it takes at its finest, > 0.
+    pub full: f64,
+    /// The least part of that, 0 … 1: it cannot do with less.
+    pub least: f64,
+    /// Weighted gain that its error costs at its finest, ≥ 0; half the work doubles the error.
+    pub loss: f64,
+}
+
+impl Worker {
+    /// The part of its full work at which one more tick gains `lambda` (eq. 58): all where ticks are free.
+    #[must_use]
+    pub fn part(&self, lambda: f64) -> f64 {
+        let part = libm::sqrt(self.loss / (lambda * self.full));
+        let least = crate::within(self.least, (0.0, 1.0));
+        if part.is_nan() { 1.0 } else { part.min(1.0).max(least) }
+    }
+
+    fn taken(&self, lambda: f64) -> f64 {
+        if self.full > 0.0 { self.full * self.part(lambda) } else { 0.0 }
+    }
+}
+
+/// What `workers` take at a price, ticks.
+#[must_use]
+pub fn taken(workers: &[Worker], lambda: f64) -> f64 {
+    workers.iter().map(|worker| worker.taken(lambda)).sum()
+}
+
+/// The least and the greatest price that makes a difference to `workers`: below the one all of them do all, past the other none does
+/// more than its least.
+fn prices(workers: &[Worker]) -> (f64, f64) {
+    let sound = workers.iter().filter(|worker| worker.full > 0.0 && worker.loss > 0.0);
+    let of = |worker: &Worker, part: f64| worker.loss / (worker.full * part * part);
+    sound.fold((f64::MAX, f64::MIN_POSITIVE), |(low, high), worker| {
+        let least = crate::within(worker.least, (LEAST, 1.0));
+        (low.min(of(worker, 1.0)), high.max(of(worker, least)))
+    })
+}
+
+/// The price at which `workers` take no more than `ticks`; 0 where they do for nothing, the greatest that makes a difference where they
+/// never do.
+#[must_use]
+pub fn price(workers: &[Worker], ticks: f64) -> f64 {
+    if taken(workers, 0.0) <= ticks {
+        return 0.0;
+    }
+    let (low, high) = prices(workers);
+    let (mut low, mut high) = (libm::log(low.min(high)), libm::log(high));
+    for _ in 0..HALVINGS {
+        let middle = 0.5 * (low + high);
+        if taken(workers, libm::exp(middle)) > ticks {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    libm::exp(high)
+}
+
+/// Nobody can do with less than this part of its work, as far as prices are concerned.
+const LEAST: f64 = 1e-3;
+/// The part of the way to the drawing's price that one frame goes: agents answer within a quarter of a second, and must be waited for.
+const PACE: f64 = 0.05;
+/// The most of that way that is looked at, |Δ ln λ|: prices are steps.
+const FAR: f64 = 1.0;
+/// Where drawing has all that it wants the price falls by this much a frame, in proportion.
+const FALL: f64 = 0.02;
+
+/// How drawing stands in the market.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawing {
+    /// Ticks that a frame would take if nothing else wanted any.
+    pub wants: f64,
+    /// λ: gain of one more tick for the picture; 0 where it has all.
+    pub lambda: f64,
+}
+
+/// One price for simulation and drawing on shared cores, found while frames go by (eq. 59).
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Market {
+    lambda: Option<f64>,
+}
+
+impl Market {
+    /// The price of a tick in the next frame, and the ticks that drawing may take; `None` where `capacity` ticks are enough for all:
+    /// then nobody gives way.
+    pub fn settle(&mut self, workers: &[Worker], capacity: f64, drawing: Drawing) -> Option<(f64, f64)> {
+        let short = taken(workers, 0.0) + drawing.wants > capacity;
+        if !short {
+            self.lambda = None;
+            return None;
+        }
+        let lambda = match self.lambda {
+            // drawing has what it wants, but for half of all at most
+            None => price(workers, (capacity - drawing.wants).max(0.5 * capacity)),
+            Some(held) if drawing.lambda > 0.0 => {
+                held * libm::exp(PACE * crate::within(libm::log(drawing.lambda / held), (-FAR, FAR)))
+            }
+            Some(held) => held * (1.0 - FALL),
+        };
+        let (low, high) = prices(workers);
+        let lambda = lambda.max(low.min(high)).min(high);
+        self.lambda = Some(lambda);
+        Some((lambda, (capacity - taken(workers, lambda)).max(0.0)))
+    }
 }
