@@ -13,6 +13,7 @@ mod headless;
 mod oracle;
 mod outcome;
 mod panels;
+mod purse;
 mod push;
 mod session;
 mod ties;

@@ -16,6 +16,8 @@ pub enum Shading {
     PerPixel,
     /// The same on what is painted on it; what nothing is painted on is drawn as [`Shading::PerPixel`].
     Textured,
+    /// Better than anybody asks for: what is painted on it, shadows with soft rims, corners darker than what the sky reaches.
+    Shadowed,
 }
 
 /// The level that an actor is drawn at.

@@ -121,6 +121,12 @@ impl Gpu {
         Ok(Self { info, device, queue })
     }
 
+    /// Whether it is a processor that draws.
+    #[must_use]
+    pub fn is_processor(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
     /// The adapter in one line: name, backend and driver.
     #[must_use]
     pub fn describe(&self) -> String {

@@ -12,7 +12,7 @@ use std::sync::Arc;
 /// The texture of one actor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Painting {
-    /// Its number among the picture's.
+    /// Its number among the picture's, from 1.
     number: u32,
     /// Repeats a metre where it lies on sides, else 0.
     wrap: f32,
@@ -21,7 +21,7 @@ pub(super) struct Painting {
 }
 
 impl Stage {
-    /// Paints an actor that is scenery: [`Shading::Textured`] draws the texture times the actor's colour, every other shading its mean.
+    /// Paints an actor that is scenery: from [`Shading::Textured`] on the texture times the actor's colour is drawn, by cheaper shadings its mean.
     /// An actor that is not there is none the worse for it.
     pub fn paint(&mut self, id: AgentId, texture: &Arc<Texture>) {
         let known = &self.picture.textures;
@@ -34,7 +34,7 @@ impl Stage {
             Wrap::Sides(metres) => 1.0 / metres,
         };
         if let Some(track) = self.tracks.iter_mut().find(|track| track.actor.id == id) {
-            track.painting = Some(Painting { number: number as u32, wrap, mean: texture.mean() });
+            track.painting = Some(Painting { number: number as u32 + 1, wrap, mean: texture.mean() });
         }
     }
 }
@@ -42,7 +42,7 @@ impl Stage {
 impl Painting {
     /// The texture's number and its repeats a metre where the shading draws it; else the paint gets its mean.
     pub fn lies(&self, paint: &mut Paint, shading: Shading) -> Option<(u32, f32)> {
-        if shading == Shading::Textured {
+        if shading >= Shading::Textured {
             return Some((self.number, self.wrap));
         }
         let of = |(own, mean): (u8, u8)| (u16::from(own) * u16::from(mean) / 255) as u8;

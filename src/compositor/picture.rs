@@ -139,7 +139,7 @@ pub struct TubeRun {
 pub struct SolidKind {
     /// How they are shaded.
     pub shading: Shading,
-    /// Of [`Shading::Textured`] the number of the texture in [`Picture::textures`]; else 0.
+    /// Number of the texture that is drawn on them in [`Picture::textures`], from 1; 0 where none is.
     pub texture: u32,
     /// Their mesh.
     pub mesh: MeshKey,

@@ -47,7 +47,8 @@ impl Stage {
 
 /// What a mesh without a texture of its own is drawn as.
 pub(super) fn kind(shading: Shading, mesh: MeshKey) -> SolidKind {
-    SolidKind { shading: shading.min(Shading::PerPixel), texture: 0, mesh }
+    let shading = if shading == Shading::Textured { Shading::PerPixel } else { shading };
+    SolidKind { shading, texture: 0, mesh }
 }
 
 /// The mesh and size of a solid at level `n`; `None` for one that is not drawn so.
@@ -106,7 +107,7 @@ fn add_scenery(
     let size = Rounding { extents: Vec3::splat(at.scale as f32), radius_m: growth };
     let painted = track.painting.as_ref().map(|painting| painting.lies(&mut paint, level.shading));
     let (kind, wrap) = match painted.flatten() {
-        Some((texture, wrap)) => (SolidKind { shading: Shading::Textured, texture, mesh }, wrap),
+        Some((texture, wrap)) => (SolidKind { shading: level.shading, texture, mesh }, wrap),
         None => (kind(level.shading, mesh), 0.0),
     };
     let still = instance(at.position - origin, at.rotation, size, paint);

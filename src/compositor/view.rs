@@ -4,6 +4,7 @@
 //! Depth is reversed and without a far plane: near things get the bits.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
+use std::f64::consts::TAU;
 
 /// A picture's size in pixels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -58,6 +59,8 @@ pub struct Camera {
 
 /// How near and how far the eye may be from its target, metres.
 pub const DISTANCE_M: (f64, f64) = (0.01, 1e4);
+/// A camera that turned by more than this between two frames has jumped: an eighth of a turn, radians.
+const JUMP_RAD: f64 = TAU / 8.0;
 /// The steepest view: straight up or down has no horizon to keep level.
 pub const PITCH_MAX_RAD: f64 = 1.553;
 /// The nearest thing drawn, as a share of the distance to the target.
@@ -77,6 +80,28 @@ impl Camera {
             yaw_rad: arm.y.atan2(arm.x),
             pitch_rad: arm.z.asin().clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
             fov_y_rad: fov_y_rad.clamp(0.01, 3.0),
+        }
+    }
+
+    /// The camera after it has gone on as it went from `before` to here, by `times` that way: turning as it turned, about what it looks at.
+    /// One that jumped (by more than half its distance, or an eighth of a turn) stays.
+    #[must_use]
+    pub fn carried_on(&self, before: &Self, times: f64) -> Self {
+        let way = self.target_m - before.target_m;
+        let turned = libm::remainder(self.yaw_rad - before.yaw_rad, TAU);
+        let tilted = self.pitch_rad - before.pitch_rad;
+        let nearer = self.distance_m - before.distance_m;
+        let jumped =
+            way.length().max(nearer.abs()) > 0.5 * self.distance_m || turned.abs().max(tilted.abs()) > JUMP_RAD;
+        if jumped || !(times > 0.0 && times.is_finite()) {
+            return *self;
+        }
+        Self {
+            target_m: self.target_m + way * times,
+            distance_m: (self.distance_m + nearer * times).clamp(DISTANCE_M.0, DISTANCE_M.1),
+            yaw_rad: self.yaw_rad + turned * times,
+            pitch_rad: (self.pitch_rad + tilted * times).clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD),
+            fov_y_rad: self.fov_y_rad,
         }
     }
 
@@ -230,6 +255,24 @@ mod tests {
         let ray = camera.ray(camera.project(point, SIZE).unwrap().0, SIZE);
         let off = (point - ray.origin).cross(ray.direction).length();
         assert!(off < 1e-12, "{off}");
+    }
+
+    #[test]
+    fn a_camera_that_goes_on_as_it_went_is_carried_on_to_where_it_will_be() {
+        // once around in 7 s while it comes nearer and what it looks at drifts
+        let at = |s: f64| Camera {
+            target_m: DVec3::new(0.1 * s, 0.0, 1.0),
+            distance_m: 3.0 - 0.2 * s,
+            yaw_rad: libm::remainder(TAU * s / 7.0, TAU),
+            ..camera()
+        };
+        for s in [0.5, 3.49, 3.51, 6.0] {
+            let seen = at(s).carried_on(&at(s - 0.02), 1.5);
+            assert!((seen.eye() - at(s + 0.03).eye()).length() < 1e-9, "{s}");
+        }
+        let cut = Camera { yaw_rad: at(1.0).yaw_rad + 2.0, ..at(1.0) };
+        assert_eq!(cut.carried_on(&at(0.98), 1.5), cut);
+        assert_eq!(at(1.0).carried_on(&at(0.98), f64::NAN), at(1.0));
     }
 
     #[test]

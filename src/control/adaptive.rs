@@ -82,11 +82,11 @@ impl AdaptiveChoice {
         self.promise()
     }
 
-    /// Learns what the frame took: the drawing of what was chosen, and all of it; seconds.
-    pub fn observe(&mut self, drawn_s: f64, work_s: f64, target_s: f64) {
+    /// Learns what the frame took: the drawing of what was chosen, and all of it, and what was kept for others; seconds.
+    pub fn observe(&mut self, drawn_s: f64, (work_s, others_s): (f64, f64), target_s: f64) {
         self.law.observe(self.frame, DRAWING, TICKS * drawn_s);
         self.law.finished(self.frame, TICKS * work_s);
-        let missing = work_s / target_s - self.plan.predicted / (TICKS * target_s);
+        let missing = (work_s + others_s) / target_s - self.plan.predicted / (TICKS * target_s);
         self.status = match () {
             () if !self.plan.feasible => Status::Clamped(Bound::Coarsest),
             () if missing.abs() > ON_TARGET => Status::Moving,
@@ -108,6 +108,11 @@ impl AdaptiveChoice {
     /// κ as planned with: how much slower the machine is than its prices.
     fn kappa(&self) -> f64 {
         self.law.planned_kappa(DRAWING)
+    }
+
+    /// What one more second is worth, as the gains of what is on the menu are; 0 where everything is at its most.
+    pub fn lambda(&self) -> f64 {
+        TICKS * self.plan.lambda
     }
 
     /// The part of the target that is left free now.

@@ -30,6 +30,8 @@ pub(super) struct Ask<'a> {
     pub value: Value,
     /// What a frame may take, seconds, > 0.
     pub target_s: f64,
+    /// What choosing may take, seconds, where somebody says so.
+    pub choose_s: Option<f64>,
     /// The part of it that is left free at least, 0 … 0.9.
     pub margin: f64,
     /// What is taken whatever is chosen, seconds, ≥ 0.

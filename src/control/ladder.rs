@@ -3,12 +3,12 @@
 //! In: what objects are, prices. Out: a [`Ladder`] an object, made anew only where something it depends on has changed.
 //! Never here: a choice, or what an object is worth now ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
 
-use super::level::{Held, Span};
+use super::level::{Held, Span, polygons};
 use super::plan::Seen;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
 use super::worth;
-use metachron_agents::{AgentId, Resolution, ResolutionRange};
+use metachron_agents::{AgentId, N_MAX, Resolution, ResolutionRange};
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::hysteresis;
 
@@ -17,6 +17,9 @@ const STEPS: usize = 256;
 
 /// Fewest and most rungs an octave: past the most, a step is below a twentieth of an object.
 const STEPS_AN_OCTAVE: (usize, usize) = (2, 16);
+
+/// What each step beyond what an object asks for adds to its accuracy.
+const RAISED: f64 = 1e-12;
 
 /// Lengths and radii that differ by less than this factor make the same ladder: a tube that breathes keeps its own.
 const SAME: f64 = 1.1;
@@ -43,6 +46,8 @@ struct Key {
     /// Pixels that it covers, in half octaves.
     size: u8,
     steps: usize,
+    /// Whether it may be drawn better than it asks for.
+    raise: bool,
 }
 
 /// The levels of one object, cheapest first; none of a group, whose proxy is [`Ladder::proxy`].
@@ -52,6 +57,8 @@ pub(super) struct Ladder {
     /// Another number whenever the rungs are others.
     pub version: u64,
     pub rungs: Vec<Rung>,
+    /// How many of the rungs it asks for itself; those after them raise its quality further.
+    pub asked: usize,
     /// Of a group, what it is drawn as where it is not opened.
     pub proxy: Option<Rung>,
 }
@@ -65,12 +72,12 @@ pub(super) struct Ladders {
 
 impl Ladders {
     /// Brings the ladders of all objects in view up to date.
-    pub fn update(&mut self, views: &[Seen], prices: &Prices, sliders: &Sliders) {
+    pub fn update(&mut self, views: &[Seen], raise: bool, prices: &Prices, sliders: &Sliders) {
         let steps = steps_an_octave(views);
         self.all.truncate(views.len());
         for (at, (view, span)) in views.iter().enumerate() {
             let before = self.all.get(at).map(|ladder| ladder.key);
-            let key = Key::of(view, steps, before);
+            let key = Key::of(view, (steps, raise), before);
             if before.is_some_and(|before| before.id == key.id && (!view.visible || before.is_same(&key))) {
                 continue;
             }
@@ -88,6 +95,11 @@ impl Ladders {
         self.all.clear();
     }
 
+    /// The same, of any number.
+    pub fn get(&self, at: usize) -> Option<&Ladder> {
+        self.all.get(at)
+    }
+
     /// The ladder of the object given as number `at`.
     pub fn of(&self, at: usize) -> &Ladder {
         &self.all[at]
@@ -102,10 +114,10 @@ fn steps_an_octave(views: &[Seen]) -> usize {
 }
 
 impl Key {
-    fn of(view: &ObjectView, steps: usize, before: Option<Self>) -> Self {
+    fn of(view: &ObjectView, (steps, raise): (usize, bool), before: Option<Self>) -> Self {
         let held = before.filter(|before| before.id == view.id).map(|before| before.size);
         let size = hysteresis::floor(held, 2.0 * libm::log2(worth::pixels(view).max(1.0)));
-        Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps }
+        Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps, raise }
     }
 
     fn is_same(&self, other: &Self) -> bool {
@@ -119,8 +131,8 @@ impl Key {
             _ => false,
         };
         kinds
-            && (self.range, self.shading, self.size, self.steps)
-                == (other.range, other.shading, other.size, other.steps)
+            && (self.range, self.shading, self.size, self.steps, self.raise)
+                == (other.range, other.shading, other.size, other.steps, other.raise)
     }
 
     /// The middle of its half octave of pixels.
@@ -139,7 +151,7 @@ impl Ladder {
         if let Kind::Group { proxy_triangles, .. } = key.kind {
             let closed = Resolution { eps_m: key.range.eps_m.1, n: 0 };
             let proxy = rung((closed, f64::from(proxy_triangles.max(1))), key.shading.1);
-            return Self { key, version, rungs: Vec::new(), proxy: Some(proxy) };
+            return Self { key, version, rungs: Vec::new(), asked: 0, proxy: Some(proxy) };
         }
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
@@ -147,12 +159,17 @@ impl Ladder {
             rungs.extend(Shading::ALL.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
         }
         rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
-        Self { key, version, rungs, proxy: None }
+        let asked = rungs.len();
+        if key.raise {
+            key.raise(view, &mut rungs, rung);
+        }
+        Self { key, version, rungs, asked, proxy: None }
     }
 
     /// What its triangles are to the eye, pixels across, halfway up the ladder: by it the blur of motion is judged.
     pub fn polygon_px(&self) -> f64 {
-        let ends = self.rungs.first().zip(self.rungs.last()).map(|(a, b)| libm::sqrt(a.polygons * b.polygons));
+        let ends =
+            self.rungs.first().zip(self.rungs[..self.asked].last()).map(|(a, b)| libm::sqrt(a.polygons * b.polygons));
         libm::sqrt(self.key.pixels() / ends.unwrap_or(1.0).max(1.0)).max(1e-3)
     }
 }
@@ -170,6 +187,31 @@ impl Key {
         cuts.sort_by(|a, b| a.1.total_cmp(&b.1));
         cuts.dedup_by(|a, b| a.1 <= b.1);
         cuts
+    }
+
+    /// Adds what is better than the best that it asks for: a smoother shape, soft shadows, both. They are worth next to nothing, so that
+    /// nobody gets them while anything else can be had for the time.
+    fn raise(&self, view: &ObjectView, rungs: &mut Vec<Rung>, rung: impl Fn((Resolution, f64), Shading) -> Rung) {
+        let Some(full) = rungs.iter().copied().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy)) else { return };
+        let Resolution { eps_m, n } = full.resolution;
+        let finer = match self.kind {
+            Kind::Tube { .. } => Resolution { eps_m: 0.5 * eps_m, n },
+            _ => Resolution { eps_m, n: (n + 1).min(N_MAX) },
+        };
+        let polygons = match self.kind {
+            Kind::Counted { .. } | Kind::Group { .. } => full.polygons,
+            _ => polygons(view, finer),
+        };
+        let smoother = (polygons > full.polygons && polygons <= self.pixels()).then_some((finer, polygons));
+        let plain = (full.resolution, full.polygons);
+        let better = [
+            smoother.map(|cut| rung(cut, full.shading)),
+            Some(rung(plain, Shading::Shadowed)),
+            smoother.map(|cut| rung(cut, Shading::Shadowed)),
+        ];
+        for (k, rung) in better.into_iter().flatten().enumerate() {
+            rungs.push(Rung { accuracy: full.accuracy + RAISED * (k + 1) as f64, ..rung });
+        }
     }
 
     fn rung(

@@ -17,6 +17,7 @@ mod picture;
 mod plan;
 mod policy;
 mod price;
+mod raise;
 mod rate;
 mod select;
 mod status;

@@ -3,6 +3,8 @@
 //! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule.
 //! A frame is `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
 
+mod wishes;
+
 use super::adaptive::AdaptiveChoice;
 use super::ask::{Ask, Promise};
 use super::changes::Changes;
@@ -14,11 +16,14 @@ use super::level::{self, Span};
 use super::plan::{FrameWork, LevelDemand, Plan, Seen, in_view, steers};
 use super::policy::{Law, Policy};
 use super::price::{Backdrop, Prices};
+use super::raise::Raise;
 use super::select::Select;
 use super::status::Status;
 use super::view::{Kind, ObjectView};
+use super::worth;
 use metachron_agents::{AgentId, Resolution};
 use metachron_budget::cost::benefit::Sliders;
+use metachron_budget::cost::pipeline::Pipeline;
 use metachron_budget::cost::value::Value;
 
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
@@ -45,10 +50,20 @@ pub struct PictureControl {
     prices: Prices,
     backdrop: Backdrop,
     frozen: bool,
+    /// Where quality may be raised beyond what objects ask for: whether it is.
+    raise: Option<Raise>,
     /// What a frame takes besides drawing, seconds, smoothed.
     overhead_s: Option<f64>,
     /// What a frame takes whatever is chosen, seconds, as the last choice was made with.
     fixed_s: f64,
+    /// What others take of the frame's time, seconds.
+    reserve_s: f64,
+    /// The same, and what is kept for choosing, as the last choice was made with.
+    others_s: f64,
+    /// Where the lag is bounded: by how much, and how it is shared.
+    pipeline: Option<Pipeline>,
+    /// What culling took of the frame that is chosen for, seconds.
+    cull_s: f64,
     feedback: Feedback,
     select: Select,
     hierarchy: Hierarchy,
@@ -75,8 +90,13 @@ impl PictureControl {
             prices: Prices::default(),
             backdrop: Backdrop::default(),
             frozen: false,
+            raise: None,
             overhead_s: None,
             fixed_s: 0.0,
+            reserve_s: 0.0,
+            others_s: 0.0,
+            pipeline: None,
+            cull_s: 0.0,
             feedback: Feedback::new(law),
             select: Select::default(),
             hierarchy: Hierarchy::default(),
@@ -101,7 +121,7 @@ impl PictureControl {
         }
         let overhead_s = work_s - drawn_s;
         self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
-        let target_s = 1.0 / self.target_hz;
+        let target_s = self.target_s();
         if !steers(&self.views) {
             return;
         }
@@ -110,7 +130,7 @@ impl PictureControl {
             Policy::Threshold => self.select.observe(work_s, target_s),
             Policy::Adaptive => {
                 let chosen_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
-                self.adaptive.observe(chosen_s, work_s, target_s);
+                self.adaptive.observe(chosen_s, (work_s, self.others_s), target_s);
             }
             _ => {}
         }
@@ -144,10 +164,19 @@ impl PictureControl {
         Promise { feasible: true, ..Promise::default() }
     }
 
+    /// What a frame may take: its share of a second, or the lag where that is less.
+    fn target_s(&self) -> f64 {
+        self.pipeline.map_or(f64::INFINITY, |pipeline| pipeline.lag).min(1.0 / self.target_hz)
+    }
+
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
-        self.ladders.update(&self.views, &self.prices, &self.sliders);
+        self.ladders.update(&self.views, self.raise.is_some_and(|raise| raise.is_open()), &self.prices, &self.sliders);
         self.groups.update(&self.views);
-        let fixed_s = self.prices.backdrop_s(self.backdrop) + self.overhead_s.unwrap_or(0.0);
+        let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
+        let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
+        let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
+        self.others_s = self.reserve_s + kept_s;
+        let fixed_s = self.prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
         if (fixed_s - self.fixed_s).abs() * self.target_hz > FIXED_TREMBLE {
             self.fixed_s = fixed_s;
         }
@@ -156,17 +185,24 @@ impl PictureControl {
             ladders: &self.ladders,
             sliders: &self.sliders,
             value: self.value,
-            target_s: 1.0 / self.target_hz,
+            target_s,
+            choose_s: split.map(|split| split.choose),
             margin: self.margin.unwrap_or(MARGIN),
             fixed_s: self.fixed_s,
         };
-        match self.policy {
+        let mut promise = match self.policy {
             Policy::Adaptive => self.adaptive.choose(&ask, &self.groups, levels),
             Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
                 self.hierarchy.choose(self.policy, &ask, &self.groups, levels)
             }
             policy => self.select.choose(policy, &ask, levels),
+        };
+        if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
+            raise.observe(&ask, levels, &promise);
         }
+        // what is kept for others is not taken
+        promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
+        promise
     }
 
     /// What the last frame was to be drawn with.
@@ -209,107 +245,23 @@ impl PictureControl {
         }));
     }
 
-    /// Changes the policy. The loop goes on from the picture as it is.
-    pub fn set_policy(&mut self, policy: Policy) {
-        if policy != self.policy {
-            self.policy = policy;
-            self.take_over();
-        }
-    }
-
-    /// Changes the law or its gains. Another law goes on from the picture as it is.
-    pub fn set_law(&mut self, law: Law) {
-        let other = std::mem::discriminant(&law) != std::mem::discriminant(&self.feedback.law());
-        self.feedback.set_law(law);
-        if other {
-            self.take_over();
-        }
-    }
-
-    /// Changes the wanted frame rate: frames a second, finite, > 0. Anything else is ignored.
-    pub fn set_target_hz(&mut self, target_hz: f64) {
-        if target_hz.is_finite() && target_hz > 0.0 {
-            self.target_hz = target_hz;
-        }
-    }
-
-    /// Changes the part of a frame that policies with a prediction leave free, 0 … 0.9; feedback has its own in its law.
-    pub fn set_margin(&mut self, margin: f64) {
-        self.margin = margin.is_finite().then(|| margin.clamp(0.0, 0.9));
-    }
-
-    /// Changes how much each factor counts in what a level is worth.
-    pub fn set_sliders(&mut self, sliders: Sliders) {
-        if sliders != self.sliders {
-            self.sliders = sliders;
-            self.forget_ladders();
-        }
-    }
-
-    /// How much each factor counts in what a level is worth.
+    /// What the default would take of a frame if nobody else wanted any, seconds, and what one more second is worth to it, pixels: 0
+    /// where it has all. `None` of policies that know no price.
     #[must_use]
-    pub fn sliders(&self) -> Sliders {
-        self.sliders
-    }
-
-    /// Changes what an object is worth to Robin Hood.
-    pub fn set_value(&mut self, value: Value) {
-        self.value = value;
-    }
-
-    /// Changes what drawing is taken to cost.
-    pub fn set_prices(&mut self, prices: Prices) {
-        let prices = prices.sound();
-        if prices != self.prices {
-            self.prices = prices;
-            self.forget_ladders();
+    pub fn wants(&self) -> Option<(f64, f64)> {
+        if self.policy != Policy::Adaptive || self.plan.levels.is_empty() {
+            return None;
         }
+        let lambda = self.adaptive.lambda();
+        let all_s = (1.0 - self.adaptive.margin()) * self.target_s();
+        Some((if lambda > 0.0 { all_s } else { self.plan.promise.predicted_s }, lambda))
     }
 
-    /// What drawing is taken to cost.
+    /// What the object given as number `at` was worth to the last choice at an accuracy of 1, pixels; 0 where that is not known.
     #[must_use]
-    pub fn prices(&self) -> &Prices {
-        &self.prices
-    }
-
-    /// Says what is in the next picture whatever is chosen.
-    pub fn set_backdrop(&mut self, backdrop: Backdrop) {
-        self.backdrop = backdrop;
-    }
-
-    /// Keeps all levels as they are, or lets them be chosen again; objects that come or go are an exception.
-    pub fn freeze(&mut self, frozen: bool) {
-        self.frozen = frozen;
-    }
-
-    /// Whether levels are kept as they are.
-    #[must_use]
-    pub fn is_frozen(&self) -> bool {
-        self.frozen
-    }
-
-    fn forget_ladders(&mut self) {
-        self.ladders.clear();
-        self.adaptive.clear();
-    }
-
-    /// Puts the laws where the last plan is.
-    fn take_over(&mut self) {
-        self.feedback.take_over(&self.views, &self.plan.levels, self.plan.polygons);
-    }
-
-    /// Multiplies the scene's ε̂ by `factor` (finite, > 0; above 1 is coarser), as far as the ranges allow: another start, or a push.
-    /// Only feedback has such a state.
-    pub fn coarsen(&mut self, factor: f64) {
-        if factor.is_finite() && factor > 0.0 {
-            self.feedback.coarsen(factor);
-        }
-    }
-
-    /// Goes to a place in the range of what is in view: `share` 0 is its finest, 1 its coarsest, by ln ε̂ of the corrected law. For
-    /// experiments; before anything was in view it is the middle whatever was asked.
-    pub fn seek(&mut self, share: f64) {
-        self.feedback.seek(share);
+    pub fn weight(&self, at: usize) -> f64 {
+        let Some((view, _)) = self.views.get(at) else { return 0.0 };
+        self.ladders.get(at).map_or(0.0, |ladder| worth::weight(view, &self.sliders, ladder.polygon_px()))
     }
 
     /// What the controller is doing; its text is for the viewer and the report.

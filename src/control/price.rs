@@ -10,6 +10,9 @@ use metachron_budget::cost::stages::{Stages, Work};
 /// Vertices of a closed mesh for each of its triangles (Euler: half as many and two more).
 const VERTICES_A_TRIANGLE: f64 = 0.5;
 
+/// How many times as long a pixel in soft shadow takes: thirteen comparisons and four depths more.
+const SOFTER: f64 = 2.5;
+
 /// What drawing costs on one machine, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prices {
@@ -99,10 +102,16 @@ impl Prices {
         self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
     }
 
-    /// The coefficients of a shading.
+    /// The coefficients of a shading; of [`Shading::Shadowed`] those of textured light, whose pixels it takes [`SOFTER`] times as long for.
     #[must_use]
-    pub fn of(&self, shading: Shading) -> &Stages {
-        &self.shading[shading as usize]
+    pub fn of(&self, shading: Shading) -> Stages {
+        match shading {
+            Shading::Shadowed => {
+                let textured = self.of(Shading::Textured);
+                Stages { pixel: SOFTER * textured.pixel, ..textured }
+            }
+            asked => self.shading[asked as usize],
+        }
     }
 
     /// Seconds of an object with so many triangles that covers so many pixels.

@@ -85,6 +85,8 @@ pub struct RateControl {
     window: Window,
     /// Mean work of a turn in the last window.
     usual_s: Option<f64>,
+    /// What it would take of a core at its finest, by the last window.
+    full_load: Option<f64>,
     /// The loop variable at the last demand.
     asked: f64,
     calm: u32,
@@ -108,6 +110,7 @@ impl RateControl {
             landing,
             window: Window::default(),
             usual_s: None,
+            full_load: None,
             asked: start,
             calm: 0,
             patience: PATIENCE.0,
@@ -121,6 +124,32 @@ impl RateControl {
         self.law.range().1 > 0.0
     }
 
+    /// Changes the share of its period that the agent's work may take: 0.001 … 1; anything else is ignored.
+    pub fn set_share(&mut self, share: f64) {
+        if share > 0.0 {
+            self.limits.share = share.clamp(1e-3, 1.0);
+        }
+    }
+
+    /// The share of its period that the agent's work may take.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.limits.share
+    }
+
+    /// What the agent would take of a core at its finest ε and the rate that is wanted, from 0; `None` before anything was measured.
+    /// Work falls as 1/ε and as 1/dt.
+    #[must_use]
+    pub fn full_load(&self) -> Option<f64> {
+        self.full_load
+    }
+
+    /// The least part of that load that it can do with, 0 … 1: at its coarsest ε and longest dt.
+    #[must_use]
+    pub fn least_part(&self) -> f64 {
+        libm::exp(-self.law.range().1)
+    }
+
     /// Learns what a turn took; gives a demand when it is time for another dt or ε.
     pub fn after_turn(&mut self, turn: &TurnMeasure) -> Option<RateDemand> {
         if !self.steers() || !self.collect(turn) {
@@ -128,6 +157,8 @@ impl RateControl {
         }
         let window = std::mem::take(&mut self.window);
         self.usual_s = Some(window.work_s / f64::from(window.turns));
+        // on both stairs the load falls as e⁻ᶻ
+        self.full_load = Some(window.work_s / window.wanted_s * libm::exp(self.asked));
         self.learn(&window);
         self.demand_if_worth_it()
     }

@@ -18,6 +18,9 @@ use metachron_budget::select::threshold::{self, STATIC_PX};
 use metachron_budget::select::{Level, Mode, Problem, Selection};
 use std::collections::BTreeMap;
 
+/// What a Newton step of the interior point takes a mesh, seconds.
+const NEWTON_S: f64 = 60e-9;
+
 /// The interior point ends within a hundredth of the best and comes nearer the next time: what moves by less than this stays.
 const SAME_R: f64 = 0.02;
 
@@ -94,7 +97,7 @@ impl Select {
             let last = |at: &usize| self.last_r.get(&ask.views[*at].0.id).copied();
             // a warm start is one for all: a single newcomer has no resolution to start from
             let last: Option<Vec<_>> = objects.iter().map(last).collect();
-            interior_point(budget_s, setups, &meshes, &last.unwrap_or_default(), Limits::default())
+            interior_point(budget_s, setups, &meshes, &last.unwrap_or_default(), limits(ask, objects.len()))
         } else {
             closed_form(budget_s, setups, &meshes)
         };
@@ -112,6 +115,15 @@ impl Select {
         }
         convex_promise(ask, &found, spent_s)
     }
+}
+
+/// The optimiser's time limit as steps, of which each is linear in the number of meshes.
+fn limits(ask: &Ask<'_>, meshes: usize) -> Limits {
+    let usual = Limits::default();
+    let step_s = NEWTON_S * meshes.max(1) as f64;
+    // a cast of floats saturates
+    let steps = ask.choose_s.map_or(usual.steps, |choose_s| ((choose_s / step_s) as u32).clamp(1, usual.steps));
+    Limits { steps, ..usual }
 }
 
 fn id(ask: &Ask<'_>, at: usize) -> u64 {

@@ -17,10 +17,12 @@ pub enum Shading {
     PerPixel,
     /// The same on what is painted on it.
     Textured,
+    /// With soft shadows: better than an object asks for ([`super::PictureControl::set_raise`]).
+    Shadowed,
 }
 
 impl Shading {
-    /// All of them, cheapest first.
+    /// Those that objects ask for and prices are known of, cheapest first.
     pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
 }
 

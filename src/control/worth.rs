@@ -53,7 +53,7 @@ pub(super) fn accuracy(kind: &Kind, polygons: f64, (shading, best): (Shading, Sh
     let light = match shading {
         Shading::Flat => benefit::accuracy(pixels, &picture(benefit::Shading::Flat)),
         Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
-        Shading::PerPixel | Shading::Textured => 1.0,
+        Shading::PerPixel | Shading::Textured | Shading::Shadowed => 1.0,
     };
     let painted = if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 };
     shape * light * painted

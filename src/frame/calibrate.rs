@@ -44,7 +44,8 @@ fn measured(drawn: &Drawn) -> Measured {
         compositor::Shading::Flat => Shading::Flat,
         compositor::Shading::Gouraud => Shading::Gouraud,
         compositor::Shading::PerPixel => Shading::PerPixel,
-        compositor::Shading::Textured => Shading::Textured,
+        // nothing is measured in soft shadow
+        compositor::Shading::Textured | compositor::Shading::Shadowed => Shading::Textured,
     };
     let Drawn { picture_px, polygons, pixels, seconds, .. } = *drawn;
     Measured { picture_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }

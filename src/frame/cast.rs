@@ -5,6 +5,7 @@
 
 use super::error::SessionError;
 use super::governor::RateGovernor;
+use super::purse::{Purse, Tally};
 use super::ties::{Ties, faults};
 use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
 use crate::control::{
@@ -24,15 +25,19 @@ use metachron_agents::soft::{SoftBody, SoftShape, SoftSpec};
 use metachron_agents::synthetic::Synthetic;
 use metachron_agents::{Agent, AgentId, N_MAX, ResolutionRange};
 use std::borrow::Cow;
+use std::sync::Arc;
 
 /// The agents of `scene`, ready to run.
 ///
 /// # Errors
 /// [`SessionError::Build`] where a model refuses its object.
-pub(super) fn spawns(scene: &Scene) -> Result<Vec<AgentSpawn>, SessionError> {
+pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Purse), SessionError> {
     let share = fair_share(machine(scene).cores, scene.agents.len());
     let mut ties = Ties::of(scene);
-    scene.agents.iter().map(|member| spawn(scene, member, share, &mut ties)).collect()
+    let mut tallies = Vec::new();
+    let spawn = |member| spawn(scene, member, (share, &mut tallies), &mut ties);
+    let spawns: Result<_, _> = scene.agents.iter().map(spawn).collect();
+    Ok((spawns?, Purse::new(tallies)))
 }
 
 /// Who runs the agents of `scene`: where it leaves that open, by their number.
@@ -54,7 +59,12 @@ const ROOM: f64 = 0.75;
 /// Share of its period that an agent may take however many cores are idle: past it every hiccup makes it late.
 const SHARE_MAX: f64 = 0.6;
 
-fn spawn(scene: &Scene, member: &Member, share: f64, ties: &mut Ties) -> Result<AgentSpawn, SessionError> {
+fn spawn(
+    scene: &Scene,
+    member: &Member,
+    (share, tallies): (f64, &mut Vec<Arc<Tally>>),
+    ties: &mut Ties,
+) -> Result<AgentSpawn, SessionError> {
     let agent = build(member, scene.executor)
         .map_err(|reason| SessionError::Build { name: member.name.clone(), reason: reason.to_string() })?;
     let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
@@ -72,7 +82,7 @@ fn spawn(scene: &Scene, member: &Member, share: f64, ties: &mut Ties) -> Result<
         together: ties.together(member.id),
         faults: faults(member.faults),
         watches: watches.collect(),
-        governor: governor(member, share),
+        governor: governor(member, share, tallies),
     })
 }
 
@@ -91,7 +101,7 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
 }
 
 /// Who steers the agent's dt and ε; nobody where the scene fixes both.
-fn governor(member: &Member, share: f64) -> Option<Box<dyn Governor>> {
+fn governor(member: &Member, share: f64, tallies: &mut Vec<Arc<Tally>>) -> Option<Box<dyn Governor>> {
     let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
     let limits = RateLimits {
         dt_wanted_s: member.pace.dt.as_secs_f64(),
@@ -100,7 +110,13 @@ fn governor(member: &Member, share: f64) -> Option<Box<dyn Governor>> {
         share,
     };
     let control = RateControl::new(limits, meshed.then_some(member.start.eps_m));
-    control.steers().then(|| Box::new(RateGovernor(control)) as Box<dyn Governor>)
+    if !control.steers() {
+        return None;
+    }
+    let limits = (control.least_part(), control.share());
+    let tally = Arc::new(Tally::new(member.id, member.pace.rate_hz, limits));
+    tallies.push(Arc::clone(&tally));
+    Some(Box::new(RateGovernor(control, tally)))
 }
 
 /// The machine that `scene` declares.
@@ -197,6 +213,10 @@ pub(super) fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
     let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
     control.set_value(value(target.value));
+    control.set_raise(target.raise);
+    if let Some((lag_s, share)) = target.lag {
+        control.set_lag(lag_s, share);
+    }
     control.set_prices(prices(&machine(scene).draw));
     if let Some(margin) = target.gains.margin {
         control.set_margin(margin);
@@ -323,6 +343,7 @@ pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
         control::Shading::Gouraud => compositor::Shading::Gouraud,
         control::Shading::PerPixel => compositor::Shading::PerPixel,
         control::Shading::Textured => compositor::Shading::Textured,
+        control::Shading::Shadowed => compositor::Shading::Shadowed,
     };
     // a cast of floats saturates
     let detail = control::detail(view, demand) as f32;

@@ -2,22 +2,30 @@
 //!
 //! In: a turn's measure. Out: a demand on dt and on the simulation's ε. Never here: the law.
 
+use super::purse::Tally;
 use crate::control::{self, RateControl};
 use crate::runtime::{Demand, Governor, TurnMeasure};
 use metachron_agents::{Resolution, SimSpan};
+use std::sync::Arc;
 
-/// An agent's own rate control as the runtime wants it.
-pub(super) struct RateGovernor(pub RateControl);
+/// An agent's own rate control as the runtime wants it, and what it and the frame loop tell each other.
+pub(super) struct RateGovernor(pub RateControl, pub Arc<Tally>);
 
 impl Governor for RateGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
+        let Self(control, tally) = self;
+        control.set_share(tally.share());
         let turn = control::TurnMeasure {
             work_s: measure.work_s,
             wanted_period_s: measure.wanted_period_s,
             real_period_s: measure.real_period_s,
             dt_s: measure.dt.as_secs_f64(),
         };
-        let Some(demand) = self.0.after_turn(&turn) else { return Demand::default() };
+        let demand = control.after_turn(&turn);
+        if let Some(load) = control.full_load() {
+            tally.tell(load);
+        }
+        let Some(demand) = demand else { return Demand::default() };
         let level = measure.resolution.map_or(0, |held| held.n);
         Demand {
             dt: SimSpan::from_secs_f64(demand.dt_s),

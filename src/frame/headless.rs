@@ -57,7 +57,8 @@ pub fn play_headless(
     if let Drawing::Every(screen) = &plan.drawing {
         // nothing happens before it can be drawn
         session.drive(Drive::Pause);
-        session.calibrate(&screen.gpu().describe(), || Some(screen.gpu().clone()));
+        let gpu = screen.gpu();
+        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
         session.drive(Drive::Run);
     }
     let period = session.period();
@@ -97,6 +98,7 @@ pub(super) fn one_frame(
 ) -> Result<FrameRecord, SessionError> {
     let started = session.now();
     let camera = session.scene_camera();
+    let camera = session.ahead(camera);
     session.compose(&camera, size, style, None);
     let composed = session.now();
     let gpu = match drawing {

@@ -3,20 +3,22 @@
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
 
+mod record;
+
 use super::calibrate;
 use super::cast;
 use super::couplings::{Coupling, Couplings};
 use super::error::SessionError;
-use super::outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
+use super::outcome::{AgentOutcome, FrameRecord, Outcome};
+use super::purse::Purse;
 use super::trace::Trace;
 use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Seen, Size, Stage, States, Style};
-use crate::control::{
-    Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Shading, Status,
-};
+use crate::control::{Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Status};
 use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
+use crate::scene::Scene;
 use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
-use crate::scene::{Probe, Scene};
 use metachron_agents::{AgentId, Body, Pull, SimTime};
+use metachron_budget::adaptive::joint::Drawing;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -29,6 +31,9 @@ pub struct Session {
     run: Box<dyn Run>,
     stage: Stage,
     control: PictureControl,
+    /// Whether pictures are drawn on the processor that agents step on.
+    shares_processor: bool,
+    purse: Purse,
     reader: Reader,
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
@@ -38,6 +43,10 @@ pub struct Session {
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
+    /// Where the camera was when it was last read, and when.
+    lens: Option<(Duration, Camera)>,
+    /// From reading the camera to the finished picture, seconds, smoothed.
+    lag_s: f64,
     warm_up: usize,
     finished: u64,
     keep: usize,
@@ -76,6 +85,9 @@ struct Chosen {
 /// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
 const WARM_UP_FRAMES: u64 = 3;
 
+/// The share of a new measurement in the smoothed lag.
+const LAG_NEWS: f64 = 0.2;
+
 /// Frames over which meshes change their level.
 const GLIDE_FRAMES: u8 = 6;
 
@@ -87,7 +99,7 @@ impl Session {
     pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
         scene.executor = cast::executor(&scene);
         let machine = cast::machine(&scene);
-        let spawns = cast::spawns(&scene)?;
+        let (spawns, purse) = cast::spawns(&scene)?;
         let mut stage = cast::stage(&scene);
         stage.glide_over(GLIDE_FRAMES);
         let clock = || Arc::new(runtime::SystemClock::new());
@@ -98,6 +110,8 @@ impl Session {
         };
         Ok(Self {
             control: cast::picture_control(&scene),
+            shares_processor: scene.executor == ExecutorKind::Lockstep,
+            purse,
             reader: Reader::new(run.agents()),
             stage,
             declared: cast::prices(&machine.draw),
@@ -111,6 +125,8 @@ impl Session {
             records: Vec::new(),
             chosen: Chosen::default(),
             last_start: None,
+            lens: None,
+            lag_s: 0.0,
             warm_up: 0,
             finished: 0,
             keep: usize::MAX,
@@ -182,7 +198,9 @@ impl Session {
     }
 
     /// Takes the prices of the adapter that draws, where they are known or can be measured; declared costs stay as they are.
-    pub(super) fn calibrate(&mut self, adapter: &str, open: impl FnOnce() -> Option<Gpu>) {
+    /// `on_processor`: it is a processor that draws.
+    pub(super) fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
+        self.shares_processor |= on_processor;
         if self.control.policy().predicts()
             && !self.is_virtual()
             && let Some(prices) = calibrate::prices(adapter, open)
@@ -261,6 +279,19 @@ impl Session {
         cast::camera(&self.scene, &self.stage, self.sim_now().as_secs_f64())
     }
 
+    /// Where a camera that is read now will be when the picture begun now is finished; where the scene asks for no lag, where it is.
+    pub fn ahead(&mut self, camera: Camera) -> Camera {
+        let now = self.now();
+        let before = self.lens.replace((now, camera));
+        match (self.scene.target.lag, before) {
+            (Some((most_s, _)), Some((then, before))) => {
+                let passed_s = now.saturating_sub(then).as_secs_f64();
+                camera.carried_on(&before, self.lag_s.min(most_s) / passed_s)
+            }
+            _ => camera,
+        }
+    }
+
     /// Waits until the wall time `until`, the agents going on meanwhile.
     pub fn wait_until(&mut self, until: Duration) {
         self.run.wait_until(until);
@@ -282,12 +313,12 @@ impl Session {
         self.gather();
         self.stage.survey(camera, size, &mut self.seen);
         let culled = self.now();
+        self.chosen.cull = culled.saturating_sub(started);
         self.choose(size);
         let chosen = self.now();
         let picture = self.stage.compose(camera, &self.levels, style, hand);
         self.chosen.triangles = picture.triangles();
         self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
-        self.chosen.cull = culled.saturating_sub(started);
         self.chosen.select = chosen.saturating_sub(culled);
         self.chosen.build = self.run.now().saturating_sub(chosen);
         self.stage.picture()
@@ -311,6 +342,8 @@ impl Session {
         let Finished { work, skip, .. } = finished;
         let draw = finished.draw + self.chosen.build;
         let record = self.record(started, finished);
+        let lag_s = 1e-3 * record.lag_ms;
+        self.lag_s = if self.finished == 0 { lag_s } else { self.lag_s + LAG_NEWS * (lag_s - self.lag_s) };
         self.finished += 1;
         self.last_start = Some(started);
         let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
@@ -359,7 +392,7 @@ impl Session {
             wall_s,
             cpu_s: stats.iter().map(|s| s.cpu_s).fold(0.0, |sum, s| sum + s), // an empty sum() is -0
             state_hash: runtime::state_hash(&handles),
-            probes: probes(&self.scene, &handles),
+            probes: record::probes(&self.scene, &handles),
             agents: stats
                 .into_iter()
                 .enumerate()
@@ -407,6 +440,8 @@ impl Session {
         self.views.extend(cast::views(&self.seen, &self.scene));
         // what is in the picture besides hardly changes from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
+        self.buy();
+        self.control.set_cull(self.chosen.cull);
         let plan = self.control.plan(&self.views);
         self.levels.clear();
         self.levels.extend(self.views.iter().zip(&plan.levels).map(cast::level));
@@ -414,46 +449,19 @@ impl Session {
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
     }
 
-    fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
-        let Chosen { sim, triangles, more_triangles, objects, cull, select, build, .. } = self.chosen;
-        let ms = |time: Duration| time.as_secs_f64() * 1e3;
-        let plan = self.control.last_plan();
-        let promise = plan.promise;
-        let frame_ms = ms(finished.work);
-        let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
-        FrameRecord {
-            frame: self.frames(),
-            sim_s: sim.as_secs_f64(),
-            frame_ms,
-            gpu_ms: finished.gpu.map(ms),
-            interval_ms: ms(interval),
-            full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
-            triangles,
-            objects,
-            cull_ms: ms(cull),
-            select_ms: ms(select),
-            draw_ms: ms(build + finished.draw),
-            lag_ms: ms(cull + select + build + finished.draw),
-            predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
-            value_over_bound: promise.value_over_bound(),
-            changes: plan.changes,
-            reversals: plan.reversals,
-            holes: promise.holes,
-            eps: self.control.eps_hat(),
-            n: self.mean_level(),
-        }
-    }
-
-    /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
-    fn mean_level(&self) -> f64 {
-        let mean = |tubes_only: bool| {
-            let drawn =
-                self.seen.iter().zip(&self.levels).filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
-            let (sum, count) =
-                drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
-            (count > 0.0).then(|| sum / count)
+    /// Shares the processor out between agents and the picture, where it draws as well.
+    fn buy(&mut self) {
+        let wants = self.control.wants().filter(|_| self.shares_processor);
+        let Some((wants, lambda)) = wants else {
+            self.purse.close();
+            return self.control.set_reserve(0.0);
         };
-        mean(true).or_else(|| mean(false)).unwrap_or(0.0)
+        let period_s = 1.0 / self.control.target_hz();
+        let drawing = Drawing { wants, lambda };
+        let (cores, control) = (self.cores(), &self.control);
+        let limit_s = self.purse.settle((cores, period_s), drawing, &self.views, |at| control.weight(at));
+        let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
+        self.control.set_reserve(reserve_s);
     }
 }
 
@@ -463,20 +471,4 @@ const fn states(kind: StatesKind) -> States {
         StatesKind::Extrapolate => States::Extrapolate,
         StatesKind::Latest => States::Latest,
     }
-}
-
-/// Where every probe's point is in the final states.
-fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
-    // an agent's watches are its probes with a period, in the scene's order
-    let watch = |at: usize| {
-        let probe = &scene.probes[at];
-        scene.probes[..at].iter().filter(|p| p.agent == probe.agent && p.every.is_some()).count()
-    };
-    let point = |(at, probe): (usize, &Probe)| {
-        let agent = &handles[probe.agent.0 as usize];
-        let (position, velocity) = agent.latest().body.probe(probe.at)?;
-        let samples = probe.every.map(|_| agent.samples(watch(at)));
-        Some(ProbeOutcome { object: probe.object.clone(), at: probe.at, position, velocity, samples })
-    };
-    scene.probes.iter().enumerate().filter_map(point).collect()
 }

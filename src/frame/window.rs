@@ -396,10 +396,14 @@ impl Show for WindowShow<'_> {
         &self.status
     }
 
-    fn drawn_by(&mut self, adapter: &str) {
+    fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
         self.adapter = Some(adapter.to_owned());
         // the same adapter without a window: the benchmark needs a device that nobody else draws with
-        self.session.calibrate(adapter, || Gpu::headless().ok());
+        self.session.calibrate(adapter, on_processor, || Gpu::headless().ok());
+    }
+
+    fn ahead(&mut self, camera: Camera) -> Camera {
+        self.session.ahead(camera)
     }
 
     fn scene_camera(&self) -> Camera {

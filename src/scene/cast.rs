@@ -68,6 +68,11 @@ pub struct Target {
     pub law: LawKind,
     /// Gains of the laws.
     pub gains: Gains,
+    /// The greatest lag from reading the camera to the finished picture, seconds, and the part of what culling leaves of it that is kept
+    /// for choosing; `None` where the scene asks for none.
+    pub lag: Option<(f64, f64)>,
+    /// Whether time that is left at the finest of everything goes into better than that.
+    pub raise: bool,
 }
 
 /// Gains of the feedback laws; what is `None` is the law's own default.

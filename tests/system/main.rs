@@ -13,6 +13,7 @@ mod scenery;
 mod scenes;
 mod scenes_coupled;
 mod scenes_soft;
+mod shares;
 mod throughput;
 mod tune;
 mod viewer;

@@ -66,13 +66,13 @@ impl Renderer {
         for slab in [false, true] {
             for run in picture.solids.iter().filter(|run| matches!(run.kind.mesh, MeshKey::Slab(_)) == slab) {
                 pass.set_pipeline(self.pipeline_of(run));
-                if let (Shading::Textured, Some(texture)) = (run.kind.shading, self.textures.group(run.kind.texture)) {
+                if let Some(texture) = self.textures.group(run.kind.texture) {
                     pass.set_bind_group(1, texture, &[]);
                 }
                 draws += self.draw_solids(&mut pass, run, false);
             }
         }
-        draws += self.draw_skins(&mut pass, picture, (|shading| self.pipelines.solid_of(shading), false));
+        draws += self.draw_skins(&mut pass, picture, (|shading| self.pipelines.solid_of(shading, false), false));
         if picture.style.wireframe {
             draws += self.draw_edges(&mut pass, picture);
         }
@@ -126,7 +126,7 @@ impl Renderer {
         match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
             _ if self.meshes.is_strokes(run.kind.mesh) => &self.pipelines.stroke,
-            (_, shading) => self.pipelines.solid_of(shading),
+            (_, shading) => self.pipelines.solid_of(shading, run.kind.texture > 0),
         }
     }
 

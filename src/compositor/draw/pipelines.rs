@@ -33,6 +33,10 @@ pub struct Pipelines {
     pub solid_gouraud: RenderPipeline,
     /// Solids with what is painted on them.
     pub painted: RenderPipeline,
+    /// Tubes in soft shadow: of anything else, of tissue.
+    pub skins_shadowed: [RenderPipeline; 2],
+    /// Solids in soft shadow: plain, and with what is painted on them.
+    pub solids_shadowed: [RenderPipeline; 2],
     /// Points and lines that turn to the eye.
     pub stroke: RenderPipeline,
     /// Points and lines as the light sees them.
@@ -84,6 +88,15 @@ const FLOOR_RINGS: u32 = 8;
 const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
 const FLOOR_RING_CORNERS: u32 = 6 * 4 * FLOOR_CELLS * FLOOR_RINGS;
 
+/// The sample at which an interval of a tube begins.
+const BEGIN: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
+/// The one at which it ends.
+const END: [wgpu::VertexAttribute; 4] =
+    wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
+/// A mesh's corner.
+const CORNER: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 9 => Float32x2];
+/// Where that is at the end of its way.
+const CORNER_TO: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3, 11 => Float32x2];
 /// A solid's instance.
 const BODY: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4, 10 => Float32x2];
 
@@ -104,21 +117,18 @@ impl Pipelines {
             device.create_shader_module(wgpu::ShaderModuleDescriptor { label: Some(label), source })
         };
         let (skin, solid, floor) = (module("skin", SKIN), module("solid", SOLID), module("floor", FLOOR));
+        let painted = module("painted", &[SOLID, PAINTED].concat());
         let kitchen = Kitchen::new(device, layouts, format, options);
-        let begin = wgpu::vertex_attr_array![1 => Float32x4, 2 => Float32x4, 3 => Float32x4, 4 => Float32x2, 5 => Unorm8x4, 6 => Unorm8x4];
-        let end = wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
-        let corner = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 9 => Float32x2];
         let (vertex, instance) = (wgpu::VertexStepMode::Vertex, wgpu::VertexStepMode::Instance);
         let tubes = [
             layout(16, vertex, &wgpu::vertex_attr_array![0 => Float32x4]),
-            layout(SAMPLE_STRIDE, instance, &begin),
-            layout(SAMPLE_STRIDE, instance, &end),
+            layout(SAMPLE_STRIDE, instance, &BEGIN),
+            layout(SAMPLE_STRIDE, instance, &END),
         ];
-        let end_corner = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3, 11 => Float32x2];
         let solids = [
-            layout(CORNER_STRIDE, vertex, &corner),
+            layout(CORNER_STRIDE, vertex, &CORNER),
             layout(SAMPLE_STRIDE, instance, &BODY),
-            layout(CORNER_STRIDE, vertex, &end_corner),
+            layout(CORNER_STRIDE, vertex, &CORNER_TO),
         ];
         use wgpu::PrimitiveTopology::{LineList, TriangleList};
         let tube = |label, vertex, fragment, topology| {
@@ -145,7 +155,13 @@ impl Pipelines {
             ),
             solid_flat: solid("flat solid", "vs_flat", Some("fs_flat"), TriangleList),
             solid_gouraud: solid("gouraud solid", "vs_slab", Some("fs_slab"), TriangleList),
-            painted: kitchen.painted(&solids, &module("painted", &[SOLID, PAINTED].concat())),
+            painted: kitchen.painted(&solids, (&painted, "fs_painted")),
+            skins_shadowed: ["fs_skin_shadowed", "fs_tissue_shadowed"]
+                .map(|fragment| tube("shadowed skin", "vs_skin", Some(fragment), TriangleList)),
+            solids_shadowed: [
+                solid("shadowed solid", "vs_solid", Some("fs_solid_shadowed"), TriangleList),
+                kitchen.painted(&solids, (&painted, "fs_painted_shadowed")),
+            ],
             stroke,
             stroke_shadow,
             slab: solid("slab", lean(["vs_solid", "vs_slab"]), Some(lean(["fs_solid", "fs_slab"])), TriangleList),
@@ -163,18 +179,21 @@ impl Pipelines {
         match shading {
             Shading::Flat => &self.skin_flat,
             Shading::Gouraud => &self.skin_gouraud,
+            Shading::Shadowed => &self.skins_shadowed[usize::from(tissue)],
             Shading::PerPixel | Shading::Textured if tissue => &self.tissue,
             Shading::PerPixel | Shading::Textured => &self.skin,
         }
     }
 
-    /// What solids and meshes of a shading are drawn with.
-    pub fn solid_of(&self, shading: Shading) -> &RenderPipeline {
+    /// What solids and meshes of a shading are drawn with, with a texture or without.
+    pub fn solid_of(&self, shading: Shading, texture: bool) -> &RenderPipeline {
         match shading {
             Shading::Flat => &self.solid_flat,
             Shading::Gouraud => &self.solid_gouraud,
             Shading::PerPixel => &self.solid,
-            Shading::Textured => &self.painted,
+            Shading::Textured if texture => &self.painted,
+            Shading::Textured => &self.solid,
+            Shading::Shadowed => &self.solids_shadowed[usize::from(texture)],
         }
     }
 }
@@ -229,8 +248,12 @@ impl<'a> Kitchen<'a> {
     }
 
     /// Solids with what is painted on them.
-    fn painted(&self, buffers: &[Option<VertexBufferLayout<'_>>], module: &ShaderModule) -> RenderPipeline {
-        let (vertex, fragment) = ("vs_painted", Some("fs_painted"));
+    fn painted(
+        &self,
+        buffers: &[Option<VertexBufferLayout<'_>>],
+        (module, fragment): (&ShaderModule, &str),
+    ) -> RenderPipeline {
+        let (vertex, fragment) = ("vs_painted", Some(fragment));
         let topology = wgpu::PrimitiveTopology::TriangleList;
         self.cook_in(&Recipe { label: "painted", vertex, fragment, buffers, topology, module }, &self.with_texture)
     }

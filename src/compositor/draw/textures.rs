@@ -43,9 +43,9 @@ impl Textures {
         self.groups = self.known.iter().map(|texture| self.group_of(device, queue, texture)).collect();
     }
 
-    /// The texture of this number.
+    /// What a run with this [`SolidKind::texture`](super::super::picture::SolidKind::texture) is bound to.
     pub fn group(&self, number: u32) -> Option<&wgpu::BindGroup> {
-        self.groups.get(number as usize)
+        self.groups.get(number.checked_sub(1)? as usize)
     }
 
     fn group_of(&self, device: &wgpu::Device, queue: &wgpu::Queue, texture: &Texture) -> wgpu::BindGroup {

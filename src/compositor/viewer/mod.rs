@@ -240,7 +240,8 @@ impl Viewer {
         }
         let size = mouse::size_of(rect, ui.ctx().pixels_per_point());
         self.size = size;
-        let view = ViewRequest { size, camera: self.hand.camera(show), style: self.layout.looks.style() };
+        let camera = self.hand.camera(show);
+        let view = ViewRequest { size, camera: show.ahead(camera), style: self.layout.looks.style() };
         let start = Instant::now();
         let shape = screen.draw(show, &view, rect);
         let drawing = start.elapsed();

@@ -134,7 +134,7 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
         let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
         let screen = GpuScreen::new(state, options.lose_device_after)?;
         let _ = watched.set(screen.lost().clone());
-        show.drawn_by(screen.adapter());
+        show.drawn_by(screen.adapter(), screen.is_software());
         Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));

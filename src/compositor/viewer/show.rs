@@ -35,8 +35,13 @@ pub trait Show {
     /// A ball around one object, or around every movable object; `None` where there is nothing to see.
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds>;
 
+    /// Where a camera will be when the picture that is drawn next is finished.
+    fn ahead(&mut self, camera: Camera) -> Camera {
+        camera
+    }
+
     /// Told who draws, each time a device is made.
-    fn drawn_by(&mut self, _adapter: &str) {}
+    fn drawn_by(&mut self, _adapter: &str, _on_processor: bool) {}
 
     /// Whether the run has ended and the window should close by itself; asked many times a second, hidden or not.
     fn wants_close(&mut self) -> bool {

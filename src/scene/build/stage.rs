@@ -8,6 +8,8 @@ use crate::scene::problem::{Problem, did_you_mean};
 use glam::DVec3;
 use metachron_agents::SimSpan;
 
+/// The part of the lag that is kept for choosing where a scene does not say: what (GB99) needed at most.
+const OPTIMISER_SHARE: f64 = 0.05;
 /// Frames per second where a scene does not say.
 const FRAME_DEFAULT_HZ: f64 = 60.0;
 /// Vertical angle of view where a scene does not say, degrees.
@@ -39,12 +41,27 @@ pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile
         margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
     });
     Target {
+        lag: lag(c, &place, file),
         frame_hz: c.number_or(&place, "frame_hz", (frame_hz, FRAME_DEFAULT_HZ), &allowed(1.0..=1000.0, "Hz")),
         policy: file.and_then(|f| f.policy).unwrap_or_default(),
         value: file.and_then(|f| f.value).unwrap_or_default(),
         law: file.and_then(|f| f.law).unwrap_or_default(),
         gains,
+        raise: file.and_then(|f| f.raise).unwrap_or_default(),
     }
+}
+
+/// The greatest lag in seconds and the optimiser's share of it.
+fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Option<(f64, f64)> {
+    let share = file.and_then(|f| f.optimiser_share);
+    let part = c.number_or(place, "optimiser_share", (share, OPTIMISER_SHARE), &allowed(1e-3..=0.5, ""));
+    let Some(lag_ms) = file.and_then(|f| f.lag_ms) else {
+        if share.is_some() {
+            c.wrong(place, "optimiser_share", "has nothing to act on", "expected `lag_ms` beside it");
+        }
+        return None;
+    };
+    Some((c.number(place, "lag_ms", lag_ms, &allowed(1.0..=1000.0, "ms")) * 1e-3, part))
 }
 
 /// From where the scene is seen.

@@ -85,6 +85,14 @@ pub struct TargetFile {
     pub lead: Option<f64>,
     /// Share of the frame that is left free, 0 … 0.9. Default: of feedback its law's own, of policies that predict 0.02.
     pub margin: Option<f64>,
+    /// The greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and
+    /// the camera is drawn where it will be by then. Default: none is asked for, and the camera is drawn where it was read.
+    pub lag_ms: Option<f64>,
+    /// The part of what culling leaves of `lag_ms` that is kept for choosing levels, 0.001 … 0.5. Default 0.05.
+    pub optimiser_share: Option<f64>,
+    /// Whether `adaptive` and `robin-hood` spend time that is left when everything is at its finest on still smoother shapes and softer
+    /// shadows. Default false.
+    pub raise: Option<bool>,
 }
 
 /// How agents are run.

@@ -48,12 +48,24 @@ fn on_side(p: vec3f, side: vec3f) -> vec2f {
     return select(across, vec2f(p.x, -p.y), a.z > max(a.x, a.y));
 }
 
-@fragment
-fn fs_painted(in: Painted) -> @location(0) vec4f {
+// What is painted on it at a pixel, under its tint.
+fn painted(in: Painted) -> vec3f {
     let place = select(in.uv.xy, on_side(in.own, in.side), in.colour.a > 0.5);
     let own = textureSample(painting, painting_sampler, place).rgb * in.colour.rgb;
-    let albedo = mix(own, in.tint.rgb, in.tint.a);
+    return mix(own, in.tint.rgb, in.tint.a);
+}
+
+@fragment
+fn fs_painted(in: Painted) -> @location(0) vec4f {
     let within = in.uv.z;
-    let s = Surface(normalize(in.n), normalize(in.v), albedo, in.m, in.k, 1.0, 1.0);
+    let s = Surface(normalize(in.n), normalize(in.v), painted(in), in.m, in.k, 1.0, 1.0);
     return finish(shade(s, within, lit(in.at) * within));
+}
+
+@fragment
+fn fs_painted_shadowed(in: Painted) -> @location(0) vec4f {
+    let within = in.uv.z;
+    let n = normalize(in.n);
+    let s = Surface(n, normalize(in.v), painted(in), in.m, in.k, 1.0, openness(g.eye.xyz - in.v, n));
+    return finish(shade(s, within, lit_softly(in.at) * within));
 }

@@ -128,6 +128,26 @@ fn fs_skin(in: Skin) -> @location(0) vec4f {
     return finish(shade(Surface(n, v, albedo, in.m, in.k, 1.0, in.uv.z), within, share));
 }
 
+@fragment
+fn fs_tissue_shadowed(in: Skin) -> @location(0) vec4f {
+    let n0 = normalize(in.n);
+    let f = flesh(in.uv.xy, n0, in.t, in.colour, in.tint);
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit_softly(shadow_place(in.p, n0)) * within;
+    return finish(shade(Surface(f.n, v, f.albedo, in.m, in.k, f.gloss, openness(in.p, n0)), within, share));
+}
+
+@fragment
+fn fs_skin_shadowed(in: Skin) -> @location(0) vec4f {
+    let n = normalize(in.n);
+    let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit_softly(shadow_place(in.p, n)) * within;
+    return finish(shade(Surface(n, v, albedo, in.m, in.k, 1.0, openness(in.p, n)), within, share));
+}
+
 // A skin lit at the corners of its triangles, in light and in shadow; a pixel chooses.
 struct Lit {
     @builtin(position) clip: vec4f,

@@ -83,6 +83,17 @@ fn fs_solid(in: Solid) -> @location(0) vec4f {
     return finish(shade(Surface(brushed(n0, in.own, in.k.w), v, albedo, in.m, in.k, 1.0, 1.0), within, share));
 }
 
+@fragment
+fn fs_solid_shadowed(in: Solid) -> @location(0) vec4f {
+    let n0 = normalize(in.n);
+    let albedo = mix(in.colour, in.tint.rgb, in.tint.a);
+    let within = pool(in.p);
+    let v = normalize(g.eye.xyz - in.p);
+    let share = lit_softly(shadow_place(in.p, n0)) * within;
+    let s = Surface(brushed(n0, in.own, in.k.w), v, albedo, in.m, in.k, 1.0, openness(in.p, n0));
+    return finish(shade(s, within, share));
+}
+
 // A solid, lean: the pool of light and the place in the shadow map come from its corners.
 struct Lean {
     @builtin(position) clip: vec4f,

@@ -341,7 +341,7 @@ proptest! {
         let mut control = control(policy, 30.0);
         let at = |i: usize| numbers[i % numbers.len()];
         let stages = metachron_budget::cost::stages::Stages { setup: at(0), polygon: at(1), vertex: at(2), pixel: at(3) };
-        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), shading: [stages, *prices().of(Shading::Flat), stages, stages] });
+        control.set_prices(Prices { frame_s: at(4), pixel_s: at(5), shading: [stages, prices().of(Shading::Flat), stages, stages] });
         let mut views: Vec<_> = (0..8).map(|i| if i % 2 == 0 { tube(i as u32) } else { mesh(i as u32, 1e3, 5000) }).collect();
         let members = Kind::Group { radius_m: 1.0, members: (1, 3), proxy_triangles: 0 };
         views[6].kind = members;
@@ -361,5 +361,57 @@ proptest! {
             let work = Duration::try_from_secs_f64(work).unwrap_or(Duration::ZERO);
             control.observe(frame_work(work, skip));
         }
+    }
+}
+
+/// Six meshes near by on a machine whose pixels cost, at so many frames a second, with time that is left to be used or not.
+fn near_by(target_hz: f64, raise: bool) -> (PictureControl, Vec<ObjectView>) {
+    let stages = metachron_budget::cost::stages::Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 60e-9 };
+    let mut control = control(Policy::Adaptive, target_hz);
+    control.set_prices(Prices { shading: [stages; 4], ..prices() });
+    control.set_raise(raise);
+    (control, (0..6).map(|i| mesh(i, 1e5, 2000)).collect())
+}
+
+/// Draws a frame on a machine that is `times` as slow as its prices: its work over the target, objects in soft shadow, and whether all
+/// have at least what they ask for.
+fn frame_near_by(control: &mut PictureControl, views: &[ObjectView], times: f64) -> (f64, usize, bool) {
+    let plan = control.plan(views).clone();
+    let prices = *control.prices();
+    let object_s =
+        |(view, level): (&ObjectView, &LevelDemand)| prices.object_s(level.shading, level.polygons, view.pixels);
+    let backdrop_s = prices.backdrop_s(Backdrop { pixels: PICTURE_PX, triangles: 0.0 });
+    let work_s = backdrop_s + times * views.iter().zip(&plan.levels).map(object_s).sum::<f64>();
+    control.observe(frame_work(Duration::from_secs_f64(work_s), false));
+    let soft = plan.levels.iter().filter(|level| level.shading == Shading::Shadowed).count();
+    let all = plan.levels.iter().all(|level| level.polygons >= 2000.0 && level.shading >= Shading::PerPixel);
+    (work_s * control.target_hz(), soft, all)
+}
+
+#[test]
+fn time_left_at_the_finest_of_everything_raises_quality_and_is_given_back_first() {
+    let (mut control, views) = near_by(15.0, true);
+    let plain = near_by(15.0, false);
+    let frames = |control: &mut PictureControl, count: usize, times: f64| -> Vec<_> {
+        (0..count).map(|_| frame_near_by(control, &views, times)).collect()
+    };
+    let at_first = frames(&mut control, 90, 1.0);
+    let (work, soft, all) = at_first[89];
+    // 7 ms and six times 6.4 ms of 66.7 ms: two of six have 9 ms more each
+    assert!(soft == 2 && all && work <= 1.0, "{work} {soft}");
+    assert!(at_first[..20].iter().all(|(_, soft, _)| *soft == 0), "not before all had all for a while");
+    assert!(frames(&mut { plain.0 }, 90, 1.0).iter().all(|(work, soft, _)| *soft == 0 && *work < 0.75));
+    // half as slow again: all fits, and nothing more; twice as slow is late whatever is chosen
+    let slower = frames(&mut control, 120, 1.45);
+    assert_eq!((slower[119].1, slower[119].2), (0, true), "{:?}", slower[119]);
+    assert!(frames(&mut control, 60, 2.0).iter().all(|(_, soft, _)| *soft == 0));
+}
+
+#[test]
+fn where_no_time_is_left_raising_changes_nothing() {
+    let ((mut with, views), (mut without, _)) = (near_by(30.0, true), near_by(30.0, false));
+    for _ in 0..120 {
+        assert_eq!(frame_near_by(&mut with, &views, 1.0), frame_near_by(&mut without, &views, 1.0));
+        assert_eq!(with.last_plan().levels, without.last_plan().levels);
     }
 }

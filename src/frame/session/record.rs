@@ -1,0 +1,70 @@
+//! What is written down of a frame, and of the points that a scene watches.
+//!
+//! In: a session after a frame. Out: a [`FrameRecord`], [`ProbeOutcome`]s. Never here: a choice, what becomes of them.
+
+use super::super::outcome::{FrameRecord, ProbeOutcome};
+use super::{Chosen, Finished, Session};
+use crate::control::Shading;
+use crate::runtime::AgentHandle;
+use crate::scene::{Probe, Scene};
+use std::time::Duration;
+
+impl Session {
+    pub(super) fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
+        let Chosen { sim, triangles, more_triangles, objects, cull, select, build, .. } = self.chosen;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let plan = self.control.last_plan();
+        let promise = plan.promise;
+        let frame_ms = ms(finished.work);
+        let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
+        FrameRecord {
+            frame: self.frames(),
+            sim_s: sim.as_secs_f64(),
+            frame_ms,
+            gpu_ms: finished.gpu.map(ms),
+            interval_ms: ms(interval),
+            full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
+            triangles,
+            objects,
+            cull_ms: ms(cull),
+            select_ms: ms(select),
+            draw_ms: ms(build + finished.draw),
+            lag_ms: ms(cull + select + build + finished.draw),
+            predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
+            value_over_bound: promise.value_over_bound(),
+            changes: plan.changes,
+            reversals: plan.reversals,
+            holes: promise.holes,
+            eps: self.control.eps_hat(),
+            n: self.mean_level(),
+        }
+    }
+
+    /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
+    fn mean_level(&self) -> f64 {
+        let mean = |tubes_only: bool| {
+            let drawn =
+                self.seen.iter().zip(&self.levels).filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
+            let (sum, count) =
+                drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
+            (count > 0.0).then(|| sum / count)
+        };
+        mean(true).or_else(|| mean(false)).unwrap_or(0.0)
+    }
+}
+
+/// Where every probe's point is in the final states.
+pub(super) fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
+    // an agent's watches are its probes with a period, in the scene's order
+    let watch = |at: usize| {
+        let probe = &scene.probes[at];
+        scene.probes[..at].iter().filter(|p| p.agent == probe.agent && p.every.is_some()).count()
+    };
+    let point = |(at, probe): (usize, &Probe)| {
+        let agent = &handles[probe.agent.0 as usize];
+        let (position, velocity) = agent.latest().body.probe(probe.at)?;
+        let samples = probe.every.map(|_| agent.samples(watch(at)));
+        Some(ProbeOutcome { object: probe.object.clone(), at: probe.at, position, velocity, samples })
+    };
+    scene.probes.iter().enumerate().filter_map(point).collect()
+}

@@ -1,0 +1,134 @@
+//! What the time of a frame is shared among: steps and levels at one price, a bounded lag, quality beyond the finest.
+
+use crate::play::Folder;
+use metachron::compositor::{Camera, Size, Style};
+use metachron::frame::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
+use metachron::scene::{self, Source};
+use std::fmt::Write;
+
+const SIZE: Size = Size { width: 640, height: 360 };
+
+fn session(text: &str) -> Session {
+    let folder = Folder::with(&format!("executor = \"lockstep\"\n{text}"));
+    let source = Source::open(folder.scene()).expect("the file just written");
+    let scene = scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
+    Session::open(scene).expect("agents that can run")
+}
+
+fn play(text: &str, frames: u64) -> Outcome {
+    let plan = Headless {
+        end: End::Frames(frames),
+        size: SIZE,
+        style: Style::default(),
+        drawing: Drawing::Nothing,
+        png: None,
+    };
+    play_headless(session(text), plan, &mut |_, _| true).expect("nothing that can fail")
+}
+
+/// Tubes that swing between two nails before a camera, on a machine of so many cores that takes `unit_us` a segment and substep.
+fn strands(tubes: u32, cores: u32, unit_us: f64) -> String {
+    let mut text = format!(
+        "[target]\nframe_hz = 60.0\npolicy = \"adaptive\"\n[camera]\neye_m = [0, -1.6, 0.3]\nlook_at_m = [0, 0, 0.2]\n\
+         [machine]\ncores = {cores}\ndraw_triangle_us = 3.0\n[machine.step.tube]\nunit_us = {unit_us}\n"
+    );
+    for k in 0..tubes {
+        let z = 0.1 * f64::from(k);
+        let _ = write!(
+            text,
+            "[[object]]\nname = \"strand {k}\"\nmodel = \"tube\"\npath_m = [[-0.5, 0, {z}], [0, 0.05, {z}], [0.5, 0, {z}]]\n\
+             radius_m = 0.012\nwall_m = 0.003\nyoung_pa = 5.0e4\ndensity_kg_m3 = 1050.0\nself_contact = false\nsleep = false\n\
+             pin = [\"start\", \"end\"]\nrate_hz = 100.0\ndt_ms = [10, 40]\neps_m = [0.005, 0.2]\npicture_eps_m = [0.002, 0.2]\n\
+             n = [0, 2]\n"
+        );
+    }
+    text
+}
+
+/// Mean ε of the agents at the end, metres, and mean triangles of the last second.
+fn came_to(outcome: &Outcome) -> (f64, f64) {
+    let eps = outcome.agents.iter().filter_map(|agent| agent.stats.resolution.map(|at| at.eps_m));
+    let last = &outcome.frames[outcome.frames.len() - 60..];
+    let triangles = last.iter().map(|row| row.triangles as f64).sum::<f64>() / 60.0;
+    (eps.sum::<f64>() / outcome.agents.len() as f64, triangles)
+}
+
+#[test]
+fn steps_that_get_four_times_as_dear_are_paid_for_by_steps_and_by_the_picture() {
+    // next to nothing; one core; four: of two that draw as well
+    let [light, dear, dearest] = [0.05, 25.0, 100.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us), 480)));
+    let told = format!("{light:?} {dear:?} {dearest:?}");
+    assert!((light.0 / 0.005 - 1.0).abs() < 0.01, "{told}");
+    assert!(dearest.0 > 1.3 * dear.0 && dear.0 > 1.05 * light.0, "steps: {told}");
+    assert!(dearest.1 < 0.95 * dear.1 && dear.1 < 0.98 * light.1, "picture: {told}");
+    // neither bears it alone: steps could be forty times as coarse, and the picture gone
+    assert!(dearest.0 < 20.0 * light.0 && dearest.1 > 0.2 * light.1, "{told}");
+}
+
+#[test]
+fn where_there_is_time_for_all_nothing_is_shared_out() {
+    let [few, many] = [4, 64].map(|cores| play(&strands(2, cores, 0.25), 120));
+    assert_eq!(few.state_hash, many.state_hash);
+    let picture = |outcome: &Outcome| outcome.frames.iter().map(|row| (row.triangles, row.changes)).collect::<Vec<_>>();
+    assert_eq!(picture(&few), picture(&many));
+}
+
+/// Meshes around which a camera turns once in 4 s, with more in the target's table.
+fn turning(target: &str) -> String {
+    format!(
+        "[target]\nframe_hz = 20.0\npolicy = \"adaptive\"\n{target}\n[camera]\neye_m = [0, -6, 2]\nperiod_s = 4.0\n\
+         [machine]\ndraw_pixel_ns = 20.0\n[[object]]\nname = \"ball\"\nmodel = \"mesh\"\ngenerate = \"blob\"\ntriangles = 40000\n\
+         grid = [3, 3, 1]\nspacing_m = [2, 2, 0]\n"
+    )
+}
+
+#[test]
+fn a_lag_that_is_bounded_is_kept() {
+    let slowest =
+        |target: &str| play(&turning(target), 60).frames[5..].iter().map(|row| row.lag_ms).fold(0.0, f64::max);
+    let (free, bounded) = (slowest(""), slowest("lag_ms = 12.0"));
+    assert!(free > 24.0 && bounded <= 12.0 && bounded > 8.0, "{free} {bounded}");
+}
+
+/// How far the eye of the picture is from where the eye is when the picture is finished, metres, in the mean.
+fn eye_error_m(target: &str) -> f64 {
+    let mut session = session(&turning(target));
+    let (mut sum, mut due) = (0.0, std::time::Duration::ZERO);
+    for frame in 0..40 {
+        session.wait_until(due);
+        let started = session.now();
+        let read: Camera = session.scene_camera();
+        let camera = session.ahead(read);
+        session.compose(&camera, SIZE, Style::default(), None);
+        session.spend_declared(SIZE);
+        let done = session.now() - started;
+        if frame >= 10 {
+            sum += camera.eye().distance(session.scene_camera().eye()) / 30.0;
+        }
+        session.finish(started, Finished { work: done, draw: done, gpu: None, skip: false });
+        due = (due + session.period()).max(session.now());
+    }
+    sum
+}
+
+#[test]
+fn a_camera_is_drawn_where_it_will_be_when_the_picture_is_finished() {
+    let (read, ahead) = (eye_error_m(""), eye_error_m("lag_ms = 1000.0"));
+    // 6 m about the vertical in 4 s: 9 m/s for as long as a frame takes; the lag is that of the frames before, which differs by a tenth
+    assert!(read > 0.1 && ahead < 0.1 * read, "{read} {ahead}");
+}
+
+#[test]
+fn time_that_stays_unspent_goes_into_quality_where_the_scene_says_so() {
+    let [plain, raised] = ["", "raise = true"].map(|target| {
+        let text = format!(
+            "[target]\nframe_hz = 30.0\npolicy = \"adaptive\"\n{target}\n[camera]\neye_m = [0, -4, 1]\n[machine.shading]\n\
+             per-pixel.pixel_ns = 100.0\ntextured.pixel_ns = 100.0\n[[object]]\nname = \"ball\"\nmodel = \"mesh\"\n\
+             generate = \"sphere\"\ntriangles = 2000\n"
+        );
+        play(&text, 90)
+    });
+    let ends = [&plain, &raised].map(|outcome| outcome.frames[89].frame_ms);
+    assert!(ends[1] > 1.2 * ends[0] && ends[1] <= plain.target_ms, "{ends:?}");
+    assert_eq!(plain.frames[10].frame_ms, raised.frames[10].frame_ms, "not at once");
+}
