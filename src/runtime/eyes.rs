@@ -134,7 +134,8 @@ impl Eyes {
         }
     }
 
-    /// Gathers whom it must see: who is near, who has called, and who is neither but has an account to settle.
+    /// Gathers whom it must see: who is near, who has called, who is neither but has an account to settle, and who gives to
+    /// somebody that it gives to.
     fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &[AgentId]) {
         let Self { neighbours, links, sight, wanted, looks } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
@@ -157,6 +158,10 @@ impl Eyes {
                 wanted.push(caller);
             }
         });
+        for neighbour in linked.iter().chain(&*near_once) {
+            let givers = others_who_give(id, &neighbour.snapshot);
+            wanted.extend(givers.filter(|id| !is_linked(*id) && fellows.binary_search(id).is_err()));
+        }
         if wanted.len() > near {
             wanted.sort_unstable();
             wanted.dedup();
@@ -197,6 +202,12 @@ fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
     let taken = mine.taken.iter().find(|ledger| ledger.with == other.id);
     given.is_none_or(|ledger| ledger.is_settled(acknowledged(other, me)))
         && received.is_none_or(|ledger| ledger.is_settled(taken))
+}
+
+/// Who else gives to one that `me` gives to: what they give it has to be expected of it.
+fn others_who_give(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentId> + '_ {
+    let mine = other.taken.iter().any(|ledger| ledger.with == me);
+    other.taken.iter().map(|ledger| ledger.with).filter(move |with| mine && *with != me)
 }
 
 /// The state that was written last, published or not.

@@ -91,6 +91,10 @@ struct Owned {
     state: PairState,
     /// Linear impulse given in this step, N·s.
     step_impulse: DVec3,
+    /// What a body as a whole was given in this step, and when.
+    parts: Vec<(f64, Impulse)>,
+    /// What it was given a second at the end of the step before, N and N·m.
+    force: Impulse,
     /// When it last did something.
     active: SimTime,
 }
@@ -105,6 +109,10 @@ pub struct Exchange {
     now: SimTime,
 }
 
+/// The end of a step, seconds: the last part of a slow tube's (docs/theory/coupling.md, section 3).
+const END_S: f64 = 1.0 / 60.0;
+/// A part begins so much earlier or later than its share of the step.
+const END_SLACK: f64 = 0.01;
 /// How long a coupling that does nothing is still published, seconds.
 const LINGER_S: f64 = 1.0;
 
@@ -117,6 +125,7 @@ impl Exchange {
             let taken = other.and_then(|n| acknowledged(n, around.me));
             owned.ledger.turn(taken, around.time);
             owned.step_impulse = DVec3::ZERO;
+            owned.parts.clear();
             (owned.state.contacts, owned.state.penetration_m) = (0, 0.0);
         }
     }
@@ -173,6 +182,9 @@ impl Exchange {
         let owned = self.owned_mut(to);
         owned.ledger.give(site, now, after_s, impulse);
         owned.step_impulse += impulse.linear;
+        if site == Site::Whole {
+            owned.parts.push((after_s, impulse));
+        }
         owned.state.impulse_n_s += impulse.linear.length();
         owned.active = now;
     }
@@ -205,6 +217,7 @@ impl Exchange {
             if !matches!(owned.state.kind, PairKind::Penalty | PairKind::Tlm) {
                 owned.state.force_n = owned.step_impulse.length() / dt_s;
             }
+            owned.go_on(dt_s);
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
             let mut on_its_way = DVec3::ZERO;
             // who is not looked at any more has settled
@@ -235,10 +248,29 @@ impl Exchange {
         let at = self.owned.iter().position(|o| o.ledger.with == to).unwrap_or_else(|| {
             let state = PairState::new(to, PairKind::default());
             let active = self.now;
-            self.owned.push(Owned { ledger: Ledger::new(to), state, step_impulse: DVec3::ZERO, active });
+            self.owned.push(Owned {
+                ledger: Ledger::new(to),
+                state,
+                step_impulse: DVec3::ZERO,
+                parts: Vec::new(),
+                force: Impulse::ZERO,
+                active,
+            });
             self.owned.len() - 1
         });
         &mut self.owned[at]
+    }
+}
+
+impl Owned {
+    /// Notes what a body was given a second at the end of a step of `dt_s` seconds. It is expected to go on where the step
+    /// before ended with as much: a blow does not.
+    fn go_on(&mut self, dt_s: f64) {
+        let late = self.parts.iter().filter(|(after_s, _)| *after_s >= dt_s - END_S * (1.0 + END_SLACK));
+        let now = late.fold(Impulse::ZERO, |sum, (_, part)| sum + *part) * dt_s.min(END_S).recip();
+        let before = std::mem::replace(&mut self.force, now);
+        let weaker = before.linear.length_squared() < now.linear.length_squared();
+        self.ledger.force = if weaker { before } else { now };
     }
 }
 

@@ -97,6 +97,8 @@ pub struct Ledger {
     pub coming: Vec<Coming>,
     /// In a copy: what was taken beyond it.
     pub ahead: Option<Ahead>,
+    /// Of the owner: what it gives to a body as a whole a second and is expected to go on giving, N and N·m.
+    pub force: Impulse,
 }
 
 /// How long a page is written on, seconds.
@@ -196,7 +198,7 @@ impl Ledger {
     /// An empty ledger with the agent `with`.
     #[must_use]
     pub const fn new(with: AgentId) -> Self {
-        Self { with, revision: 0, pages: Vec::new(), coming: Vec::new(), ahead: None }
+        Self { with, revision: 0, pages: Vec::new(), coming: Vec::new(), ahead: None, force: Impulse::ZERO }
     }
 
     /// Books an impulse that acted `after_s` seconds after `time`.
@@ -292,7 +294,8 @@ impl Ledger {
     /// Whether every number is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        self.pages.iter().flat_map(|p| &p.entries).all(|e| e.sum.is_finite() && e.moment.is_finite())
+        let entries = self.pages.iter().flat_map(|p| &p.entries);
+        entries.map(|e| [e.sum, e.moment]).chain([[self.force; 2]]).flatten().all(|i| i.is_finite())
     }
 
     /// Copies `given` into the storage of this one, but for what acts at `until` or later.
@@ -308,6 +311,7 @@ impl Ledger {
     /// Copies `other` into the storage of this one.
     pub(super) fn copy_from(&mut self, other: &Self) {
         (self.with, self.revision, self.ahead) = (other.with, other.revision, other.ahead);
+        self.force = other.force;
         self.pages.truncate(other.pages.len());
         let kept = self.pages.len();
         for (mine, theirs) in self.pages.iter_mut().zip(&other.pages) {

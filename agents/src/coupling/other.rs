@@ -28,6 +28,10 @@ pub struct Other {
     carried: Vec<DVec3>,
     age_s: f64,
     held: bool,
+    /// What other owners have announced for a rigid body: in how many seconds it acts.
+    coming: Vec<(f64, Twist)>,
+    /// What is expected of them after that: in how many seconds it begins, N and N·m.
+    lasting: Vec<(f64, Twist)>,
 }
 
 /// A body at rest is immovable until something comes at it faster than this, m/s: what is laid down gently is not noticed.
@@ -57,7 +61,7 @@ impl Other {
             self.age_s = at.secs_after(neighbour.snapshot.time);
             self.foresee(self.age_s);
             self.go_on(self.age_s);
-            self.deliver(neighbour, around.me, exchange, at);
+            self.deliver(neighbour, around, exchange, at);
         }
         known
     }
@@ -68,6 +72,8 @@ impl Other {
         self.neighbour = Some(neighbour.clone());
         self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
         (self.age_s, self.lean) = (0.0, None);
+        self.coming.clear();
+        self.lasting.clear();
         self.positions.clear();
         self.velocities.clear();
         match &snapshot.body {
@@ -144,6 +150,12 @@ impl Other {
         self.held
     }
 
+    /// Whether springs hold it, as its owner knows.
+    #[must_use]
+    pub const fn is_sprung(&self) -> bool {
+        self.lean.is_some()
+    }
+
     /// Wakes a body that rests: from now on impulses move it.
     pub fn wake(&mut self) {
         self.held = self.neighbour.as_ref().is_none_or(|n| matches!(n.snapshot.inertia, Inertia::Immovable));
@@ -153,7 +165,7 @@ impl Other {
     pub fn stir(&mut self, around: &Surroundings<'_>, exchange: &Exchange) {
         let Some(neighbour) = self.neighbour.clone().filter(|n| self.held && n.snapshot.at_rest) else { return };
         self.wake();
-        self.deliver(&neighbour, around.me, exchange, around.time);
+        self.deliver(&neighbour, around, exchange, around.time);
         let moves = self.velocities.iter().step_by(self.stride()).any(|v| v.length_squared() > WAKE_M_S * WAKE_M_S);
         self.held = self.held || !moves;
     }
@@ -174,7 +186,7 @@ impl Other {
     pub fn acceleration(&self) -> DVec3 {
         match (&self.neighbour, &self.lean) {
             (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
-            (Some(neighbour), None) if !self.held => neighbour.snapshot.acceleration,
+            (Some(neighbour), None) if !self.held => neighbour.snapshot.acceleration + self.carried_by_others()[0],
             _ => DVec3::ZERO,
         }
     }
@@ -185,7 +197,7 @@ impl Other {
     pub fn gain(&self, h: f64) -> Twist {
         match &self.lean {
             Some(lean) => lean.acceleration(h).map(|a| a * h),
-            None => [self.acceleration() * (0.5 * h), DVec3::ZERO],
+            None => [self.acceleration() * (0.5 * h), self.carried_by_others()[1] * (0.5 * h)],
         }
     }
 
@@ -364,11 +376,13 @@ impl Other {
             return;
         }
         if self.positions.is_empty() {
-            let a = self.acceleration();
+            let (a, [_, turning]) = (self.acceleration(), self.carried_by_others());
             let Pose { centre, rotation } = &mut self.pose;
             *centre += self.velocities[0] * h + a * (0.5 * h * h);
-            *rotation = turned(*rotation, self.velocities[1] * h);
+            *rotation = turned(*rotation, self.velocities[1] * h + turning * (0.5 * h * h));
             self.velocities[0] += a * h;
+            self.velocities[1] += turning * h;
+            self.receive(h);
             return;
         }
         let stride = self.stride();

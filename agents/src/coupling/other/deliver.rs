@@ -1,31 +1,44 @@
 //! What is on its way to another agent.
 //!
-//! In: the ledger of what it was given and its own copy. Out: it, with the difference in its velocities and its place. Never
-//! here: who gave, what it does next. Theory: docs/theory/coupling.md, eq. 5 and 6.
+//! In: the ledger of what it was given and its own copy; ledgers of others who give to it too. Out: it, with the difference in
+//! its velocities and its place, and what those others will give it. Never here: what it does next.
+//! Theory: docs/theory/coupling.md, eq. 5–6b.
 
 use super::Other;
-use crate::coupling::{Exchange, Impulse, Site};
-use crate::{AgentId, Body, Neighbour, SimTime};
+use crate::coupling::{Exchange, Impulse, Ledger, Site, Twist, acknowledged};
+use crate::{AgentId, Body, DT_MAX_S, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
+
+/// What begins within so many seconds has begun: clocks count whole nanoseconds.
+const SOON_S: f64 = 1e-6;
+
+/// What has been given and not yet taken, in slots.
+struct Flight<'a> {
+    to: &'a Neighbour,
+    slots: usize,
+    /// J − J_ack, and how far that has carried.
+    sums: Vec<DVec3>,
+    carried: Vec<DVec3>,
+}
 
 impl Other {
     /// Adds what is on its way: W (J − J_ack) to the velocities, W ((J − J_ack) t − (S − S_ack)) to the positions.
-    pub(super) fn deliver(&mut self, neighbour: &Neighbour, me: AgentId, exchange: &Exchange, at: SimTime) {
-        let slots = self.velocities.len();
-        let (mut sums, mut carried) = (std::mem::take(&mut self.answer), std::mem::take(&mut self.carried));
+    pub(super) fn deliver(
+        &mut self,
+        neighbour: &Neighbour,
+        around: &Surroundings<'_>,
+        exchange: &Exchange,
+        at: SimTime,
+    ) {
+        let [mut sums, mut carried] = [&mut self.answer, &mut self.carried].map(std::mem::take);
         sums.clear();
         carried.clear();
-        exchange.in_flight(me, neighbour, at, |site, sum, moved| {
-            if sums.is_empty() {
-                sums.resize(slots, DVec3::ZERO);
-                carried.resize(slots, DVec3::ZERO);
-            }
-            spread(neighbour, site, |slot, share, angular| {
-                let of = |impulse: Impulse| if angular { impulse.angular } else { impulse.linear } * share;
-                sums[slot] += of(sum);
-                carried[slot] += of(moved);
-            });
-        });
+        let mut flight = Flight { to: neighbour, slots: self.velocities.len(), sums, carried };
+        exchange.in_flight(around.me, neighbour, at, |site, sum, moved| flight.add(site, sum, moved));
+        if matches!(neighbour.snapshot.body, Body::Rigid(_)) && self.lean.is_none() {
+            self.share(&mut flight, around, at);
+        }
+        let Flight { mut sums, mut carried, .. } = flight;
         if !sums.is_empty() {
             self.respond(&mut sums);
             self.respond(&mut carried);
@@ -36,6 +49,89 @@ impl Other {
             self.shift(&carried);
         }
         (self.answer, self.carried) = (sums, carried);
+    }
+
+    /// Adds what other owners have given a rigid body by the time `at`, and notes what they will give (eq. 6b); nothing of who
+    /// is awake and has not been heard of for longer than any step lasts.
+    fn share(&mut self, flight: &mut Flight<'_>, around: &Surroundings<'_>, at: SimTime) {
+        let to = flight.to;
+        self.coming.clear();
+        self.lasting.clear();
+        for giver in around.neighbours.iter().filter(|giver| giver.id != to.id) {
+            let Some(ledger) = given(giver, to.id) else { continue };
+            let taken = acknowledged(to, giver.id);
+            if taken.is_none_or(|taken| ledger.is_beyond(taken)) {
+                ledger.since(taken, at, |site, sum, moved| flight.add(site, sum, moved));
+                self.put_off(flight, (ledger, taken), at);
+            }
+            let from_s = giver.snapshot.time.secs_after(at);
+            if ledger.force != Impulse::ZERO && (from_s > -DT_MAX_S || giver.snapshot.at_rest) {
+                self.lasting.push((from_s, [ledger.force.linear, ledger.force.angular]));
+            }
+        }
+    }
+
+    /// Takes what acts only after `at` out of what has been given, and lists it.
+    fn put_off(&mut self, flight: &mut Flight<'_>, (ledger, taken): (&Ledger, Option<&Ledger>), at: SimTime) {
+        let Some(page) = ledger.pages.last() else { return };
+        let same = taken.filter(|taken| taken.revision == ledger.revision);
+        let t = at.secs_after(page.origin);
+        for coming in same.unwrap_or(ledger).coming.iter().filter(|coming| coming.due > at) {
+            let entry = &coming.entry;
+            flight.add(entry.site, -entry.sum, entry.moment - entry.sum * t);
+            self.coming.push((coming.due.secs_after(at), [entry.sum.linear, entry.sum.angular]));
+        }
+    }
+
+    /// Takes what other owners have announced for the last `h` seconds, which have passed already.
+    pub(super) fn receive(&mut self, h: f64) {
+        let mut coming = std::mem::take(&mut self.coming);
+        coming.retain_mut(|(after_s, impulse)| {
+            *after_s -= h;
+            let due = *after_s <= 0.0;
+            if due {
+                let mut change = *impulse;
+                self.respond(&mut change);
+                self.velocities[0] += change[0];
+                self.velocities[1] += change[1];
+                self.shift(&change.map(|change| change * -*after_s));
+            }
+            !due
+        });
+        self.coming = coming;
+        self.lasting.iter_mut().for_each(|(from_s, _)| *from_s -= h);
+    }
+
+    /// How what other owners go on giving accelerates a rigid body, m/s² and rad/s².
+    pub(super) fn carried_by_others(&self) -> Twist {
+        let mut sum = [DVec3::ZERO; 2];
+        for (_, force) in self.lasting.iter().filter(|(from_s, _)| *from_s <= SOON_S) {
+            sum = [sum[0] + force[0], sum[1] + force[1]];
+        }
+        if !self.lasting.is_empty() {
+            self.respond(&mut sum);
+        }
+        sum
+    }
+}
+
+/// What `giver` has given to `to`.
+fn given(giver: &Neighbour, to: AgentId) -> Option<&Ledger> {
+    giver.snapshot.given.iter().find(|ledger| ledger.with == to).filter(|ledger| ledger.is_finite())
+}
+
+impl Flight<'_> {
+    fn add(&mut self, site: Site, sum: Impulse, moved: Impulse) {
+        let Self { to, slots, sums, carried } = self;
+        if sums.is_empty() {
+            sums.resize(*slots, DVec3::ZERO);
+            carried.resize(*slots, DVec3::ZERO);
+        }
+        spread(to, site, |slot, share, angular| {
+            let of = |impulse: Impulse| if angular { impulse.angular } else { impulse.linear } * share;
+            sums[slot] += of(sum);
+            carried[slot] += of(moved);
+        });
     }
 }
 
