@@ -99,6 +99,7 @@ impl RigidBody {
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
         self.stand = if seen { self.feet() } else { None };
+        self.bear();
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received != DVec3::ZERO;
         let stands = self.stand.is_some() || self.touching;
@@ -111,8 +112,13 @@ impl RigidBody {
     /// the ground.
     pub(super) fn put_down(&mut self) {
         self.stand = self.feet();
+        self.bear();
+    }
+
+    /// What it stands on lets it fall no further, also where it has only just come down on it.
+    fn bear(&mut self) {
         if let Some(Stand { normal, .. }) = self.stand {
-            self.acceleration -= normal * self.gravity.dot(normal).min(0.0);
+            self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
         }
     }
 

@@ -17,7 +17,9 @@ const BODY: AgentId = AgentId(1);
 /// Half the height of every body here, metres.
 const HALF_M: f64 = 0.02;
 /// Rates of the tube and of the body, Hz.
-const RATES: [(f64, f64); 10] = [
+const RATES: [(f64, f64); 12] = [
+    (10.0, 10.0),
+    (20.0, 10.0),
     (10.0, 1000.0),
     (20.0, 1000.0),
     (30.0, 60.0),
