@@ -172,6 +172,11 @@ impl Company {
         self.count = 0;
     }
 
+    /// What acts from now on will last for `h` seconds.
+    pub(super) fn foresee_springs(&mut self, h: f64) {
+        self.guests[..self.count].iter_mut().for_each(|guest| guest.other.foresee(h));
+    }
+
     /// Whether everybody that is touched moves slower than `calm_m_s`.
     pub(super) fn is_calm(&self, calm_m_s: f64) -> bool {
         let touched = |guest: &&Guest| guest.id().is_some_and(|id| self.pairs.touched().any(|with| with == id));

@@ -100,6 +100,7 @@ impl Meeting {
         (fixed, scope): (&Obstacles, Scope),
         (h, gravity): (f64, DVec3),
     ) -> Option<Pressed> {
+        company.foresee_springs(h);
         self.lay_out(me, company, (h, gravity));
         self.find_presses(me, company, (h, gravity), scope.solids);
         if self.found.is_empty() {
@@ -110,7 +111,7 @@ impl Meeting {
         }
         self.wake(company);
         self.solve(company, h, false);
-        let pressed = self.sum_up(company);
+        let pressed = self.sum_up(company, h);
         self.give(me, company, h);
         me.motion.velocity += gravity * h;
         Some(pressed)
@@ -138,7 +139,7 @@ impl Meeting {
         self.velocities.clone_from(&self.before);
         self.velocities[0] += gravity * h;
         for (guest, &base) in company.guests().iter().zip(&self.bases).filter(|(guest, _)| guest.touchable) {
-            let gained = guest.other.acceleration() * h;
+            let gained = if guest.other.is_sprung() { guest.other.gain(h)[0] } else { guest.other.acceleration() * h };
             let count = guest.other.velocities().len();
             let slots = &mut self.velocities[base as usize..base as usize + count];
             if guest.is_chain() {
@@ -206,13 +207,18 @@ impl Meeting {
     }
 
     /// What fixed solids gave, and how what was pressed on accelerates.
-    fn sum_up(&self, company: &Company) -> Pressed {
+    fn sum_up(&self, company: &Company, h: f64) -> Pressed {
         let mut pressed = Pressed::default();
         let mut weight = 0.0;
+        let accelerates = |i: usize| {
+            let (other, base) = (&company.guests()[i].other, self.bases[i] as usize);
+            // what lasts bends the way of a body on springs too, a blow at the start of the part does not
+            if other.is_sprung() { (self.velocities[base] - self.before[base]) / h } else { other.acceleration() }
+        };
         for (found, impulse) in self.found.iter().zip(self.press.impulses()) {
             weight += impulse.length();
             match found.guest {
-                Some(i) => pressed.carried += company.guests()[i].other.acceleration() * impulse.length(),
+                Some(i) => pressed.carried += accelerates(i) * impulse.length(),
                 None => pressed.fixed += *impulse,
             }
         }
