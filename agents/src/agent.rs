@@ -28,6 +28,10 @@ pub trait Agent: Send {
     /// its last snapshot stands.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError>;
 
+    /// Looks around before its first step, which will be one of `dt`: what it publishes then is what others may expect of it
+    /// from the start. No time passes.
+    fn look(&mut self, _dt: SimSpan, _around: &Surroundings<'_>) {}
+
     /// The resolution the simulation holds; `None` for a model that has none.
     fn resolution(&self) -> Option<Resolution>;
 

@@ -163,6 +163,7 @@ pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<Company, RunError>
     let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
     let mut actors: Vec<_> = actors.collect();
     actors.iter_mut().for_each(Actor::introduce);
+    actors.iter_mut().for_each(Actor::look);
     let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
     Ok(Company { actors: assign(actors, &together), handles, board })
 }

@@ -131,6 +131,27 @@ impl Actor {
         self.diary.pace(&self.shared.gauges, &self.pace);
     }
 
+    /// Looks around before the first step and publishes what that shows, where anybody is linked to it; comes after everybody's
+    /// [`Self::introduce`].
+    pub fn look(&mut self) {
+        if self.links.is_empty() || self.is_parked() {
+            return;
+        }
+        let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
+        self.eyes.look(&self.peers, &self.writer, (me, time, dt), &[]);
+        let neighbours = self.eyes.neighbours();
+        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let agent = &mut self.agent;
+        let looked = contained(|| {
+            agent.look(dt, &around);
+            Ok(())
+        });
+        match looked {
+            Ok(()) => self.introduce(),
+            Err(reason) => self.park(reason),
+        }
+    }
+
     /// Steps at wall time `wall`, with all it leads: what that took, or `None` if it failed and is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
         self.shared.board.heed(self.id());

@@ -8,6 +8,8 @@
 //! Exact for rigid bodies whose acceleration is constant meanwhile. Of tubes the state counts as it was published, with the
 //! change of velocities: what a shift of positions does to the elastic energy is left out, of second order in the impulse.
 
+mod acted;
+
 use super::other::turned;
 use super::{Impulse, Ledger, Site};
 use crate::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
@@ -81,20 +83,20 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     else {
         return None;
     };
-    let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
-    on_their_way(member, members, |_, _, dj, way| {
-        given += dj;
-        carried += way;
-    });
     let h = at.secs_after(member.snapshot.time);
     if let Some(sprung) = &member.snapshot.sprung {
         let inertia = (*inverse_mass, *inverse_inertia);
-        let way = [given, carried].map(|impulse| [impulse.linear, impulse.angular]);
+        let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
         let [gone, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);
         (state.position, state.rotation) = (state.position + gone[0], turned(state.rotation, gone[1]));
         [state.velocity, state.spin] = velocity;
         return Some(state);
     }
+    let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
+    on_their_way(member, members, |_, _, dj, way| {
+        given += dj;
+        carried += way;
+    });
     if let Some(stand) = member.snapshot.stand.filter(|stand| stand.bears(state.position, given)) {
         (given, carried) = (stand.leaves(given), stand.leaves(carried));
     }

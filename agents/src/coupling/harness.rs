@@ -27,6 +27,7 @@ pub(crate) struct Stage {
     laws: Vec<(AgentId, AgentId, Law)>,
     faults: Faults,
     noise: u64,
+    looked: bool,
 }
 
 struct Actor {
@@ -62,7 +63,7 @@ impl Settled {
 impl Stage {
     pub(crate) fn new(faults: Faults) -> Self {
         let noise = faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        Self { actors: vec![], laws: vec![], faults, noise }
+        Self { actors: vec![], laws: vec![], faults, noise, looked: false }
     }
 
     /// Adds an agent that steps `rate_hz` times a second.
@@ -113,6 +114,7 @@ impl Stage {
 
     /// Steps everybody up to `seconds`, and looks at the stage after every step.
     pub(crate) fn run(&mut self, seconds: f64, mut look: impl FnMut(&Self)) {
+        self.look();
         loop {
             let next = (0..self.actors.len()).min_by_key(|&i| self.actors[i].time).expect("an agent");
             if self.actors[next].time.as_secs_f64() >= seconds {
@@ -120,6 +122,24 @@ impl Stage {
             }
             self.step(next);
             look(self);
+        }
+    }
+
+    /// Everybody looks around, before the first step.
+    fn look(&mut self) {
+        if std::mem::replace(&mut self.looked, true) {
+            return;
+        }
+        for i in 0..self.actors.len() {
+            let me = AgentId(i as u32);
+            let dt = SimSpan::from_secs_f64(1.0 / self.actors[i].rate_hz).expect("a rate");
+            let neighbours: Vec<_> =
+                (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(me, AgentId(j as u32))).collect();
+            let Actor { agent, time, hands, links, published, .. } = &mut self.actors[i];
+            agent.look(dt, &Surroundings { me, time: *time, neighbours: &neighbours, hands, links });
+            let mut snapshot = Snapshot::default();
+            agent.write_snapshot(&mut snapshot);
+            published.push(Arc::new(snapshot));
         }
     }
 

@@ -182,6 +182,12 @@ impl RigidBody {
         if free { 1 } else { (dt / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32 }
     }
 
+    /// Whether a joint of the scene holds the body, which is agent `me`.
+    fn is_jointed(&mut self, me: AgentId) -> bool {
+        let joints = &self.scenery.1;
+        *self.jointed.get_or_insert_with(|| joints.iter().any(|joint| joint.holds(me)))
+    }
+
     /// Counts calm time, and brings a body that has been calm long enough to a stop.
     fn rest(&mut self, dt: f64) -> bool {
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
@@ -207,13 +213,15 @@ impl Agent for RigidBody {
     /// Advances the body by `dt`: parts of at most 1/240 s where something touches or pulls, one part in free flight.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        let joints = &self.scenery.1;
-        if *self.jointed.get_or_insert_with(|| joints.iter().any(|joint| joint.holds(around.me))) {
+        if self.is_jointed(around.me) {
             return island::lead(self, dt, around, &mut [], &mut Vec::new());
         }
         (self.island, self.sunk_m) = (None, 0.0);
         let (before, touching) = (self.motion, self.touching);
         self.begin(around, &[], dt_s);
+        if !self.hold.is_known() {
+            self.tell(around, dt_s);
+        }
         let leans = self.hold.is_known() && !self.ties.is_empty();
         let parts = if leans { 1 } else { self.parts(dt_s) };
         for _ in 0..parts {
@@ -230,6 +238,16 @@ impl Agent for RigidBody {
         self.tell(around, dt_s);
         self.settle(around, dt_s);
         Ok(StepReport { work: 1.0, substeps: parts, at_rest })
+    }
+
+    /// Tells how springs hold it before it has moved.
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
+            self.company.gather(around, &self.world.mover, &[]);
+            self.ties.gather(around, &self.company);
+            self.tell(around, dt_s);
+            self.company.dismiss();
+        }
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -177,6 +177,11 @@ impl Company {
         self.guests[..self.count].iter_mut().for_each(|guest| guest.other.foresee(h));
     }
 
+    /// There is nobody until the next step.
+    pub(super) const fn dismiss(&mut self) {
+        self.count = 0;
+    }
+
     /// Whether everybody that is touched moves slower than `calm_m_s`.
     pub(super) fn is_calm(&self, calm_m_s: f64) -> bool {
         let touched = |guest: &&Guest| guest.id().is_some_and(|id| self.pairs.touched().any(|with| with == id));

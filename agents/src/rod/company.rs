@@ -192,7 +192,7 @@ impl Company {
         let here = Placed { form, view: View::Chain { positions: skin.positions, radii_m: skin.radii_m } };
         let (first, speed) = (contacts.len(), skin.speed());
         for mate in &mut mates[..*count] {
-            let reach_m = slack_m + (speed + mate.speed()) * skin.h_s;
+            let reach_m = slack_m + (speed + mate.speed(skin.slots)) * skin.h_s;
             let Some(there) = mate.to_touch() else { continue };
             touches(&here, &there, reach_m, &mut room.0, list);
             mate.add_contacts(list, (skin.h_s, slack_m), skin.slots, contacts);

@@ -147,9 +147,9 @@ impl Mate {
         &mut all[self.slots.0..self.end()]
     }
 
-    /// The fastest of its points, m/s.
-    pub fn speed(&self) -> f64 {
-        let list = self.other.velocities();
+    /// The fastest of its points through a substep for which all slots have these velocities, m/s.
+    pub fn speed(&self, all: &[DVec3]) -> f64 {
+        let list = &all[self.slots.0..self.end()];
         let spin = match self.other.form().map(|form| &form.kind) {
             Some(FormKind::Solid(solid)) => list[1].length() * solid.radius_m,
             _ => 0.0,

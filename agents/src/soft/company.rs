@@ -104,7 +104,7 @@ impl Company {
         (room, contacts): (&mut TouchRoom, &mut Vec<Contact>),
     ) {
         for mate in &mut self.mates[..self.count] {
-            let reach_m = slack_m + (speed + mate.speed()) * h;
+            let reach_m = slack_m + (speed + mate.speed(velocities)) * h;
             let Some(there) = mate.to_touch() else { continue };
             touches(here, &there, reach_m, room, &mut self.touches);
             mate.add_contacts(&self.touches, (h, slack_m), velocities, contacts);

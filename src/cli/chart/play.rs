@@ -60,6 +60,7 @@ impl Play {
 
     /// Plays up to `seconds`, and looks after every step: who stepped; `false` ends it. What an agent refuses ends it too.
     pub(super) fn run(mut self, seconds: f64, mut look: impl FnMut(&Self, AgentId) -> bool) -> Self {
+        self.stage.look();
         while let Some(who) = self.stage.next(seconds) {
             if self.stage.step(who).is_err() || !look(&self, who) {
                 break;

@@ -119,6 +119,21 @@ impl Stage {
         first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
     }
 
+    /// Everybody looks around before the first step.
+    pub(super) fn look(&mut self) {
+        for i in 0..self.actors.len() {
+            let me = AgentId(i as u32);
+            let neighbours = self.sights(i);
+            let actor = &mut self.actors[i];
+            let dt = SimSpan::from_secs_f64(1.0 / actor.rate_hz).unwrap_or(SimSpan::ZERO);
+            let (time, hands, links) = (actor.own.time, &actor.hands, &actor.links);
+            actor.agent.look(dt, &Surroundings { me, time, neighbours: &neighbours, hands, links });
+            actor.agent.write_snapshot(&mut actor.own);
+            let shown = Arc::new(actor.own.clone());
+            actor.shown = [Arc::clone(&shown), shown];
+        }
+    }
+
     /// Makes a step of an agent.
     ///
     /// # Errors
@@ -127,7 +142,7 @@ impl Stage {
         let i = me.0 as usize;
         let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
         let lost = self.random() < self.faults.loss;
-        let neighbours: Vec<Neighbour> = (0..self.actors.len()).filter(|&j| j != i).map(|j| self.sight(i, j)).collect();
+        let neighbours = self.sights(i);
         let actor = &mut self.actors[i];
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
@@ -141,6 +156,11 @@ impl Stage {
             actor.shown[0] = Arc::new(actor.own.clone());
         }
         Ok(())
+    }
+
+    /// How one agent sees all others.
+    fn sights(&self, me: usize) -> Vec<Neighbour> {
+        (0..self.actors.len()).filter(|&other| other != me).map(|other| self.sight(me, other)).collect()
     }
 
     /// How one agent sees another.

@@ -11,6 +11,7 @@ mod gripper;
 mod meetings;
 mod rates;
 mod received;
+mod snap;
 mod tools;
 
 use crate::coupling::{Exchange, Form, FormKind, SolidForm};
