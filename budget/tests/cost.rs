@@ -381,6 +381,8 @@ fn market_is_closed_where_there_is_enough_for_all_and_takes_any_worker() {
     let full = taken(&workers, 0.0);
     assert_eq!(play_market(&workers, (full + 500.0, 500.0, 1.0)), None);
     assert!(play_market(&workers, (full + 499.0, 500.0, 1.0)).is_some());
+    // a picture that wants more than there is, and nobody who could give it any
+    assert_eq!(play_market(&[], (900.0, 1000.0, 1.0)), None);
     for (full, least, loss) in
         [(f64::NAN, 0.1, 1.0), (9e9, f64::NAN, 1.0), (9e9, 0.0, 0.0), (9e9, 2.0, f64::NAN), (-1.0, 0.5, 1.0)]
     {

@@ -177,7 +177,9 @@ impl Market {
     /// The price of a tick in the next frame, and the ticks that drawing may take; `None` where `capacity` ticks are enough for all:
     /// then nobody gives way.
     pub fn settle(&mut self, workers: &[Worker], capacity: f64, drawing: Drawing) -> Option<(f64, f64)> {
-        let short = taken(workers, 0.0) + drawing.wants > capacity;
+        let full = taken(workers, 0.0);
+        // who takes nothing has nothing to give
+        let short = full > 0.0 && full + drawing.wants > capacity;
         if !short {
             self.lambda = None;
             return None;
