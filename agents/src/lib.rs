@@ -8,6 +8,7 @@ pub mod conformance;
 pub mod coupling;
 mod envelope;
 pub mod instrument;
+mod rare;
 mod resolution;
 pub mod rigid;
 pub mod rod;
@@ -20,6 +21,7 @@ mod time;
 pub use agent::{
     Agent, AgentId, Companion, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span,
 };
+pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
     Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, SoftState, Stand,

@@ -6,7 +6,7 @@
 use crate::coupling::{Impulse, Ledger, PairState, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
-use crate::{AgentId, Resolution, SimTime};
+use crate::{AgentId, Rare, Resolution, SimTime};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -36,8 +36,8 @@ pub struct Snapshot {
     pub inertia: Inertia,
     /// How it stands on something fixed; `None` where it does not, or not on one level.
     pub stand: Option<Stand>,
-    /// How springs on led points hold it; `None` where none do, or where nobody would have to know.
-    pub sprung: Option<Sprung>,
+    /// How springs on led points hold it; none where none do, or where nobody would have to know.
+    pub sprung: Rare<Sprung>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -358,7 +358,8 @@ impl Snapshot {
         self.touches.clear();
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
-        (self.stand, self.sprung) = (None, None);
+        self.stand = None;
+        self.sprung.set(None);
         self.pairs.clear();
         self.bonds.clear();
     }
@@ -368,7 +369,7 @@ impl Snapshot {
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()
             && self.acceleration.is_finite()
-            && self.sprung.as_ref().is_none_or(Sprung::is_finite)
+            && self.sprung.get().is_none_or(Sprung::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

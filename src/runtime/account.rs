@@ -24,9 +24,9 @@ pub enum AgentState {
 /// Two percentiles and the largest of some times, seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// Half of them are at most this, to 1 %.
+    /// Half of them are at most this, to 2 %.
     pub p50_s: f64,
-    /// 99 in 100 are at most this, to 1 %.
+    /// 99 in 100 are at most this, to 2 %.
     pub p99_s: f64,
     /// None is above this; 16.8 s stands for all that is longer.
     pub max_s: f64,

@@ -2,13 +2,18 @@
 //!
 //! In: summons from any thread. Out: the agents that were summoned, once, to the first worker that looks.
 //! Nobody waits for anybody, and a summons is never lost: who rings marks the agent first and looks for sleepers after; who
-//! goes to sleep says so first and looks at the marks after. In one total order (SeqCst) at least one of the two sees the other.
+//! goes to sleep says so first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
 //! Never here: what a worker does for those it finds, how long it sleeps.
 
+use super::sync::Mutex;
+use super::sync::atomic::{
+    AtomicBool, AtomicU64,
+    Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
+    fence,
+};
+use super::sync::thread::{self, Thread};
 use metachron_agents::AgentId;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
-use std::sync::{Mutex, PoisonError};
-use std::thread::{self, Thread};
+use std::sync::PoisonError;
 use std::time::Duration;
 
 /// The marks of all agents and the beds of all workers.
@@ -40,7 +45,7 @@ impl Bell {
     /// Worker `at` runs on this thread.
     pub fn enter(&self, at: usize) {
         if let Some(bed) = self.beds.get(at) {
-            bed.asleep.store(false, SeqCst);
+            bed.asleep.store(false, Relaxed);
             *bed.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current());
         }
     }
@@ -48,14 +53,15 @@ impl Bell {
     /// Summons `id`: a worker that is awake sees it before its next turn, else one is woken.
     pub fn ring(&self, id: AgentId) {
         let Some(word) = self.marks.get(id.0 as usize / 64) else { return };
-        word.fetch_or(1 << (id.0 % 64), SeqCst);
-        self.rung.store(true, SeqCst);
+        word.fetch_or(1 << (id.0 % 64), Release);
+        self.rung.store(true, Release);
+        fence(SeqCst);
         self.rouse();
     }
 
     /// Wakes one worker that sleeps, if any does.
     pub fn rouse(&self) {
-        if let Some(bed) = self.beds.iter().find(|bed| bed.asleep.load(SeqCst) && bed.asleep.swap(false, SeqCst)) {
+        if let Some(bed) = self.beds.iter().find(|bed| bed.asleep.load(Relaxed) && bed.asleep.swap(false, AcqRel)) {
             bed.wake();
         }
     }
@@ -67,17 +73,17 @@ impl Bell {
 
     /// Whether somebody was summoned since the last [`Self::answer`].
     pub fn has_rung(&self) -> bool {
-        self.rung.load(SeqCst)
+        self.rung.load(Acquire)
     }
 
     /// Visits those who were summoned since the last call, by rising numbers; says how many they were.
     pub fn answer(&self, mut visit: impl FnMut(AgentId)) -> usize {
-        if !self.rung.swap(false, SeqCst) {
+        if !self.rung.swap(false, AcqRel) {
             return 0;
         }
         let mut count = 0;
-        for (at, word) in self.marks.iter().enumerate().filter(|(_, word)| word.load(SeqCst) != 0) {
-            let mut bits = word.swap(0, SeqCst);
+        for (at, word) in self.marks.iter().enumerate().filter(|(_, word)| word.load(Relaxed) != 0) {
+            let mut bits = word.swap(0, AcqRel);
             while bits != 0 {
                 visit(AgentId(at as u32 * 64 + bits.trailing_zeros()));
                 bits &= bits - 1;
@@ -90,14 +96,15 @@ impl Bell {
     /// Sleeps as worker `at` for `span` (`None`: without end), but not if somebody was summoned. It may wake early.
     pub fn sleep(&self, at: usize, span: Option<Duration>) {
         let Some(bed) = self.beds.get(at) else { return };
-        bed.asleep.store(true, SeqCst);
+        bed.asleep.store(true, Relaxed);
+        fence(SeqCst);
         if !self.has_rung() {
             match span {
                 Some(span) => thread::park_timeout(span),
                 None => thread::park(),
             }
         }
-        bed.asleep.store(false, SeqCst);
+        bed.asleep.store(false, Relaxed);
     }
 }
 

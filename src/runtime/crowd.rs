@@ -11,7 +11,7 @@ mod sight;
 
 pub(super) use sight::Sight;
 
-use berth::{Berth, Reach};
+use berth::{Berth, Reach, Seen};
 use metachron_agents::{AgentId, Bounds, SimTime};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
@@ -72,6 +72,11 @@ impl Crowd {
             self.note(id);
         }
         speed_m_s
+    }
+
+    /// Where `id` was said to be last.
+    fn seen(&self, id: AgentId) -> Seen {
+        self.berths.get(id.0 as usize).map_or(Seen::Nowhere, Berth::read)
     }
 
     /// `id` stays where it is until it stands somewhere again.

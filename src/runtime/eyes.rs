@@ -35,7 +35,8 @@ pub(super) struct Eyes {
     looks: Vec<Look>,
     /// The first so many neighbours are links.
     links: usize,
-    sight: Option<Sight>,
+    /// Only in a crowd.
+    sight: Option<Box<Sight>>,
     /// Whom it wants to see besides its links.
     wanted: Vec<AgentId>,
 }
@@ -87,9 +88,9 @@ impl Peers {
         self.all.get(id.0 as usize)
     }
 
-    /// The eyes of `me`, who is linked to `links` and could touch `others`.
-    pub fn eyes(&self, me: AgentId, links: &[AgentId], others: impl Iterator<Item = AgentId>) -> Eyes {
-        let sight = self.crowd.is_some().then(|| Sight::new(me, others));
+    /// The eyes of `me`, who is linked to `links`.
+    pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Eyes {
+        let sight = self.crowd.is_some().then(|| Box::new(Sight::new(me)));
         let mut eyes = Eyes { sight, ..Eyes::default() };
         links.iter().for_each(|id| eyes.list(self, me, *id));
         eyes.links = eyes.neighbours.len();
@@ -120,7 +121,8 @@ impl Eyes {
         fellows: &[AgentId],
     ) {
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
-            sight.look(crowd, now, dt);
+            let mine = peers.get(id);
+            sight.look(crowd, (now, dt), |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
             self.want(crowd, me, id, fellows);
             self.list_wanted(peers, id);
         }

@@ -11,7 +11,7 @@ use super::times::Times;
 use super::watch::{Sample, Trace};
 use metachron_agents::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::Ordering::Relaxed;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
 /// What an agent and those who watch it share.
@@ -29,8 +29,8 @@ pub(super) struct Shared {
     pub seating: Option<Seating>,
     /// Only readers touch it: the agent never waits for this lock.
     pub ages: Mutex<Times>,
-    /// Empty for most agents. The agent alone writes, so that it never waits while it runs; readers look at the end.
-    pub traces: Mutex<Vec<Trace>>,
+    /// None for most agents. The agent alone writes, so that it never waits while it runs; readers look at the end.
+    pub traces: Vec<Mutex<Trace>>,
 }
 
 /// A running agent, seen from outside. Copies show the same agent; they outlive the run and then show its end.
@@ -74,13 +74,24 @@ impl AgentHandle {
 
     /// Counts the age of a state that was used, seconds ([`Self::age_s`]); what is no age is not counted.
     pub fn record_age(&self, age_s: f64) {
-        self.record_ages(std::iter::once(age_s));
+        if let Ok(age) = Duration::try_from_secs_f64(age_s) {
+            self.ages().record(age);
+        }
     }
 
-    /// As [`Self::record_age`], for several.
-    pub(super) fn record_ages(&self, ages_s: impl Iterator<Item = f64>) {
-        let mut ages = self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner);
-        ages_s.filter_map(|age_s| Duration::try_from_secs_f64(age_s).ok()).for_each(|age| ages.record(age));
+    /// Counts several ages.
+    pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
+        let mut counted = self.ages();
+        ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
+    }
+
+    /// Counts a state that covered the present in so many frames.
+    pub(super) fn record_no_age(&self, frames: usize) {
+        self.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+    }
+
+    fn ages(&self) -> MutexGuard<'_, Times> {
+        self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// In whose world it steps now; `None` where it keeps its own.
@@ -115,8 +126,8 @@ impl AgentHandle {
     /// ended: until then it may hold up the agent.
     #[must_use]
     pub fn samples(&self, watch: usize) -> Vec<Sample> {
-        let traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-        traces.get(watch).map_or_else(Vec::new, |trace| trace.samples().to_vec())
+        let trace = self.shared.traces.get(watch).map(|trace| trace.lock().unwrap_or_else(PoisonError::into_inner));
+        trace.map_or_else(Vec::new, |trace| trace.samples().to_vec())
     }
 
     /// Steps it has taken.
@@ -143,7 +154,7 @@ impl AgentHandle {
             resolution: newest.resolution,
             work_s: gauges.work_s.get(),
             cpu_s: self.cpu_s(),
-            age: self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner).spread(),
+            age: self.ages().spread(),
             late: gauges.late(),
             misses: gauges.misses.load(Relaxed),
             dropped: span(&gauges.dropped),

@@ -8,7 +8,7 @@ use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},
 };
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Mutex, OnceLock, PoisonError};
 
 /// What an agent can be told.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -40,7 +40,8 @@ pub enum SendError {
 pub(super) struct Mailbox {
     /// Whether there is anything: an agent to whom nobody writes looks at this alone.
     full: AtomicBool,
-    letters: Mutex<Letters>,
+    /// There from the first letter on: most agents never get one.
+    letters: OnceLock<Box<Mutex<Letters>>>,
 }
 
 /// What lies in a mailbox.
@@ -63,12 +64,16 @@ impl Mailbox {
         if !is_sound(&command) {
             return Err(SendError::BadNumber(command));
         }
-        let mut letters = self.letters.lock().unwrap_or_else(PoisonError::into_inner);
+        if command == Command::Wake {
+            return Ok(());
+        }
+        let letters = self.letters.get_or_init(Box::default);
+        let mut letters = letters.lock().unwrap_or_else(PoisonError::into_inner);
         match command {
             Command::Retune(resolution) => letters.retune = Some(resolution),
             Command::SetDt(dt) => letters.dt = Some(dt),
             Command::Hand(pull) => letters.hand = Some(pull),
-            Command::Wake => return Ok(()),
+            Command::Wake => {}
         }
         self.full.store(true, Release);
         Ok(())
@@ -79,7 +84,9 @@ impl Mailbox {
         if !self.full.load(Acquire) {
             return Letters::default();
         }
-        let Ok(mut letters) = self.letters.try_lock() else { return Letters::default() };
+        let Some(Ok(mut letters)) = self.letters.get().map(|letters| letters.try_lock()) else {
+            return Letters::default();
+        };
         self.full.store(false, Release);
         std::mem::take(&mut *letters)
     }
@@ -140,7 +147,7 @@ mod tests {
     fn who_finds_somebody_writing_finds_it_the_next_time() {
         let mail = Mailbox::default();
         mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
-        let writing = mail.letters.lock().unwrap();
+        let writing = mail.letters.get().unwrap().lock().unwrap();
         assert_eq!(mail.take().dt, None);
         drop(writing);
         assert_eq!(mail.take().dt, Some(SimSpan::from_nanos(5)));

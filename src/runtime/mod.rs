@@ -29,6 +29,7 @@ mod show;
 mod slot;
 mod spawn;
 mod switchboard;
+mod sync;
 #[cfg(test)]
 mod testing;
 mod threads;

@@ -3,9 +3,9 @@
 //! In: numbers of agents, from whoever makes their turns. Out: each of them once. A reader finds a hundred thousand agents of
 //! which none has news in as little time as one that has. Never here: the states themselves.
 
+use super::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::utils::CachePadded;
 use metachron_agents::AgentId;
-use std::sync::atomic::{AtomicU64, Ordering::AcqRel};
 
 /// A bit an agent. Words lie far apart: agents of one word mostly share a worker, and workers must not disturb each other.
 #[derive(Debug)]
@@ -20,7 +20,7 @@ impl News {
     pub fn tell(&self, id: AgentId) {
         if let Some(word) = self.0.get(id.0 as usize / 64) {
             // always written, even where the bit is set: else the reader might take the bit and miss what this one has published
-            word.fetch_or(1 << (id.0 % 64), AcqRel);
+            word.fetch_or(1 << (id.0 % 64), Ordering::AcqRel);
         }
     }
 
@@ -28,10 +28,10 @@ impl News {
     pub fn take(&self, mut visit: impl FnMut(AgentId)) {
         for (at, word) in self.0.iter().enumerate() {
             // an idle word is only read; a bit that comes now is found the next time
-            if word.load(std::sync::atomic::Ordering::Relaxed) == 0 {
+            if word.load(Ordering::Relaxed) == 0 {
                 continue;
             }
-            let mut bits = word.swap(0, AcqRel);
+            let mut bits = word.swap(0, Ordering::AcqRel);
             while bits != 0 {
                 visit(AgentId(at as u32 * 64 + bits.trailing_zeros()));
                 bits &= bits - 1;
@@ -66,14 +66,14 @@ mod tests {
         std::thread::scope(|scope| {
             scope.spawn(|| {
                 for k in 1..=last {
-                    value.store(k, std::sync::atomic::Ordering::Release);
+                    value.store(k, Ordering::Release);
                     news.tell(AgentId(0));
                 }
             });
             // a reader that looks only when told comes to the last value
             let mut seen = 0;
             while seen < last {
-                news.take(|_| seen = value.load(std::sync::atomic::Ordering::Acquire));
+                news.take(|_| seen = value.load(Ordering::Acquire));
                 std::thread::yield_now();
             }
         });

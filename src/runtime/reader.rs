@@ -85,8 +85,11 @@ impl Reader {
         let look = &mut self.looks[at];
         let frames = (self.read - look.counted) as usize;
         let first = self.frames.len().saturating_sub(frames);
-        let age_s = |now: &SimTime| if look.rests { 0.0 } else { now.since(look.time).as_secs_f64() };
-        agent.record_ages(self.frames.iter().skip(first).map(age_s));
+        if look.rests {
+            agent.record_no_age(self.frames.len() - first);
+        } else {
+            agent.record_ages(self.frames.iter().skip(first).map(|now| now.since(look.time)));
+        }
         look.counted = self.read;
     }
 

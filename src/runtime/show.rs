@@ -5,8 +5,9 @@
 
 use super::account::Entry;
 use super::turn::{Actor, Open};
+use super::watch::Trace;
 use metachron_agents::SimTime;
-use std::sync::PoisonError;
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 impl Actor {
     /// Accounts for a step that has been made and shows it; whether its state can be seen.
@@ -16,10 +17,13 @@ impl Actor {
         // first the account: who sees a state finds it accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
         self.withheld = self.faults.loses(self.id(), self.diary.steps());
+        let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
         let published = !self.withheld && self.writer.publish();
         if published {
             self.tell();
-            self.announce(now);
+            if concerns {
+                self.announce(now);
+            }
         }
         published
     }
@@ -37,8 +41,7 @@ impl Actor {
         let model = self.shared.model;
         if let (true, Some(state)) = (finite, self.writer.filled()) {
             self.eyes.stand(&self.peers, state);
-            let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-            traces.iter_mut().for_each(|trace| trace.look(state));
+            self.shared.traces.iter().for_each(|trace| locked(trace).look(state));
             Ok(())
         } else {
             Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
@@ -59,9 +62,11 @@ impl Actor {
 
     /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.
     pub fn hold_watched(&self, now: SimTime) {
+        if self.shared.traces.is_empty() {
+            return;
+        }
         let state = self.shared.slot.latest();
-        let mut traces = self.shared.traces.lock().unwrap_or_else(PoisonError::into_inner);
-        traces.iter_mut().for_each(|trace| trace.hold(&state, now));
+        self.shared.traces.iter().for_each(|trace| locked(trace).hold(&state, now));
     }
 
     /// Tells those this agent acts on, once they can see how.
@@ -87,4 +92,9 @@ impl Actor {
             }
         }
     }
+}
+
+/// Nobody waits here while the agent runs: others read at the end.
+fn locked(trace: &Mutex<Trace>) -> MutexGuard<'_, Trace> {
+    trace.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -9,8 +9,8 @@
 //! the cells' locks, so that a thread that is stopped in the middle stops nobody.
 //! (arc-swap does this for readers, but its writer visits every thread that ever read: 60 µs a publication with 1000 agents.)
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Arc, RwLock};
+use super::sync::atomic::{AtomicUsize, Ordering};
+use super::sync::{Arc, RwLock};
 
 /// How many cells. The writer needs one that is not the newest and not just being read;
 /// three readers of one slot must be stopped inside a read (20 ns) of old values before it finds none.

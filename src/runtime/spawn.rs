@@ -261,7 +261,7 @@ fn shared(
         board: Arc::clone(board),
         seating: seated.then(Seating::default),
         ages: Mutex::new(Times::default()),
-        traces: Mutex::new(spawn.watches.drain(..).map(Trace::new).collect()),
+        traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
     }
 }
 
@@ -273,7 +273,6 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
             links.push(link);
         }
     }
-    let others = peers.all.iter().filter(|other| other.shared.id != id && me.touches(other));
     Actor {
         shared: Arc::clone(&me.shared),
         peers: Arc::clone(peers),
@@ -284,7 +283,7 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         governor: spawn.governor,
         faults: spawn.faults,
         writer,
-        eyes: peers.eyes(id, &links, others.map(|other| other.shared.id)),
+        eyes: peers.eyes(id, &links),
         links: spawn.attached,
         hands: Vec::with_capacity(1),
         company: Led::default(),

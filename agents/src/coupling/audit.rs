@@ -84,7 +84,7 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
         return None;
     };
     let h = at.secs_after(member.snapshot.time);
-    if let Some(sprung) = &member.snapshot.sprung {
+    if let Some(sprung) = member.snapshot.sprung.get() {
         let inertia = (*inverse_mass, *inverse_inertia);
         let way = acted::acted(member, members, at).map(|impulse| [impulse.linear, impulse.angular]);
         let [gone, velocity] = sprung.settled(inertia, [state.velocity, state.spin], way, h);

@@ -81,7 +81,7 @@ impl Other {
             Body::Rigid(body) => {
                 self.pose = Pose { centre: body.position, rotation: body.rotation };
                 self.velocities.extend([body.velocity, body.spin]);
-                self.lean = self.lean_of(snapshot.sprung, [body.velocity, body.spin]);
+                self.lean = self.lean_of(snapshot.sprung.get().copied(), [body.velocity, body.spin]);
                 true
             }
             Body::Tool(ToolState { tip, rotation, velocity, .. }) => {

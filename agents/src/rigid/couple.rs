@@ -189,7 +189,7 @@ impl RigidBody {
             speed_m_s: self.motion.velocity.length() + swing,
         });
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
-        into.sprung = self.hold.published();
+        into.sprung.set(self.hold.published());
         self.company.exchange.write(into);
         into.touches.clear();
         into.bonds.clear();

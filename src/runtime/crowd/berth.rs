@@ -4,9 +4,9 @@
 //! the reader must think the worst then. A version before and after the numbers tells (a seqlock in atomic words).
 //! Never here: who is near whom.
 
+use super::super::sync::atomic::{AtomicU64, Ordering, fence};
 use glam::DVec3;
 use metachron_agents::{Bounds, SimTime};
-use std::sync::atomic::{AtomicU64, Ordering, fence};
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction since and before.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -2,9 +2,11 @@
 //!
 //! In: the agent's own box and time, the crowd. Out: the others near enough, by rising numbers.
 //! Each other has an appointment: the time before which the two cannot be near, from their distance and the speeds that are
-//! said of them (the kinetic form of a Verlet list). Nobody is looked at before. Never here: why they are listed.
+//! said of them (the kinetic form of a Verlet list). Nobody is looked at before. The few whose appointments come first are
+//! remembered one by one; all others share one, the earliest of theirs, at which everybody is looked at: what an agent
+//! remembers does not grow with the crowd. Never here: why they are listed.
 
-use super::berth::{Berth, Reach, Seen};
+use super::berth::{Reach, Seen};
 use super::{Crowd, SPEED_LEAST_M_S};
 use metachron_agents::{AgentId, Bounds, SimSpan, SimTime};
 
@@ -15,9 +17,14 @@ pub(in super::super) struct Sight {
     mine: Option<Reach>,
     /// The speed at the end of the step before, m/s: the way to the newest state may have begun with it.
     speed_before_m_s: f64,
-    others: Vec<Other>,
-    /// No appointment is earlier.
+    /// Those with appointments before the common one, by rising numbers.
+    listed: Vec<Other>,
+    /// No appointment in the list is earlier.
     soonest: SimTime,
+    /// The appointment with all who are not listed.
+    everybody: SimTime,
+    /// The step that appointments were made for.
+    dt: SimSpan,
     /// The first note of the log that has not been read.
     unread: u64,
     near: Vec<AgentId>,
@@ -43,15 +50,26 @@ const NEAR_STEPS: f64 = 2.0;
 /// Who is near stays so until he could not touch within so many.
 const FAR_STEPS: f64 = 4.0;
 
+/// So many are remembered besides those who are near.
+const LISTED: usize = 8;
+
 /// An appointment that is never due: both stand still, apart.
 const NEVER: SimTime = SimTime::from_nanos(u64::MAX);
 
 impl Sight {
-    /// The sight of `me`, who could touch `others`, by rising numbers.
-    pub fn new(me: AgentId, others: impl Iterator<Item = AgentId>) -> Self {
-        let others: Vec<_> = others.map(|id| Other { id, at: SimTime::ZERO, near: false }).collect();
-        let near = Vec::with_capacity(others.len().min(16));
-        Self { me, mine: None, speed_before_m_s: 0.0, others, soonest: SimTime::ZERO, unread: 0, near }
+    /// The sight of `me`.
+    pub fn new(me: AgentId) -> Self {
+        Self {
+            me,
+            mine: None,
+            speed_before_m_s: 0.0,
+            listed: Vec::new(),
+            soonest: SimTime::ZERO,
+            everybody: SimTime::ZERO,
+            dt: SimSpan::ZERO,
+            unread: 0,
+            near: Vec::new(),
+        }
     }
 
     /// Those who were near when it last looked, by rising numbers.
@@ -69,49 +87,108 @@ impl Sight {
         });
         self.speed_before_m_s = bounds.map_or(0.0, |b| b.speed_m_s);
         if self.mine.is_some_and(|mine| mine.speed_m_s > said) {
-            self.look_at_all();
+            self.everybody = SimTime::ZERO;
         }
     }
 
-    /// Looks at those whose appointment has come, before a step of `dt` from `now`; says how many that were.
-    pub fn look(&mut self, crowd: &Crowd, now: SimTime, dt: SimSpan) -> usize {
+    /// Looks at those whose appointment has come, before a step of `dt` from `now`; says how many that were. Only those that
+    /// it `may_touch` are near.
+    pub fn look(&mut self, crowd: &Crowd, (now, dt): (SimTime, SimSpan), may_touch: impl Fn(AgentId) -> bool) -> usize {
         self.read_notes(crowd);
-        if self.soonest > now {
+        // appointments leave time for two steps
+        if dt.as_nanos() > 2 * self.dt.as_nanos() {
+            self.everybody = SimTime::ZERO;
+        }
+        if self.soonest.min(self.everybody) > now {
             return 0;
         }
         let Some(mine) = self.mine else { return 0 };
-        let (mut looks, mut soonest) = (0, NEVER);
-        for other in &mut self.others {
-            if other.at <= now {
-                looks += 1;
-                let seen = crowd.berths.get(other.id.0 as usize).map_or(Seen::Nowhere, Berth::read);
-                (other.at, other.near) = appointment(&mine, seen, other.near, (now, dt));
-            }
-            soonest = soonest.min(other.at);
-        }
-        self.soonest = soonest;
+        let looks = if self.everybody <= now {
+            self.dt = dt;
+            self.survey(crowd, &mine, now, may_touch)
+        } else {
+            self.keep_appointments(crowd, &mine, now, may_touch)
+        };
+        self.soonest = self.listed.iter().map(|other| other.at).min().unwrap_or(NEVER);
         self.near.clear();
-        self.near.extend(self.others.iter().filter(|other| other.near).map(|other| other.id));
+        self.near.extend(self.listed.iter().filter(|other| other.near).map(|other| other.id));
         looks
     }
 
+    /// Looks at those in the list whose time has come; who is out of the way again is left to the common appointment.
+    fn keep_appointments(
+        &mut self,
+        crowd: &Crowd,
+        mine: &Reach,
+        now: SimTime,
+        may_touch: impl Fn(AgentId) -> bool,
+    ) -> usize {
+        let (mut looks, dt, everybody) = (0, self.dt, self.everybody);
+        self.listed.retain_mut(|other| {
+            let is_new = other.at == SimTime::ZERO;
+            if other.at <= now {
+                looks += 1;
+                (other.at, other.near) = appointment(mine, crowd.seen(other.id), other.near, (now, dt));
+            }
+            (other.near || other.at < everybody) && (!is_new || may_touch(other.id))
+        });
+        looks
+    }
+
+    /// Looks at everybody, and lists those whose appointments come first.
+    fn survey(&mut self, crowd: &Crowd, mine: &Reach, now: SimTime, may_touch: impl Fn(AgentId) -> bool) -> usize {
+        let (mut room, mut looks) = (2 * LISTED, 0);
+        self.everybody = NEVER;
+        self.listed.clear();
+        let me = self.me;
+        for (id, berth) in (0..).map(AgentId).zip(&crowd.berths).filter(|(id, _)| *id != me) {
+            let was_near = self.near.binary_search(&id).is_ok();
+            let (at, near) = appointment(mine, berth.read(), was_near, (now, self.dt));
+            looks += 1;
+            if (!near && at >= self.everybody) || !may_touch(id) {
+                continue;
+            }
+            self.listed.push(Other { id, at, near });
+            if self.listed.len() == room {
+                room = self.shorten();
+            }
+        }
+        self.shorten();
+        self.listed.sort_unstable_by_key(|other| other.id);
+        looks
+    }
+
+    /// Leaves all but the first appointments, and those who are near, to the common one; says at how many to do so again.
+    fn shorten(&mut self) -> usize {
+        let kept = LISTED + 2 * self.listed.iter().filter(|other| other.near).count();
+        if self.listed.len() > kept {
+            let rank = |other: &Other| (!other.near, other.at, other.id);
+            let (_, first_left, _) = self.listed.select_nth_unstable_by_key(kept, rank);
+            self.everybody = first_left.at;
+            self.listed.truncate(kept);
+        }
+        kept + LISTED
+    }
+
+    /// Makes new appointments with those who have become faster than they had said.
     fn read_notes(&mut self, crowd: &Crowd) {
-        let (others, soonest) = (&mut self.others, &mut self.soonest);
+        let Self { me, listed, soonest, everybody, near, .. } = self;
+        let most = 2 * (LISTED + near.len());
         let (next, whole) = crowd.notes(self.unread, |id| {
-            if let Ok(at) = others.binary_search_by_key(&id, |other| other.id) {
-                others[at].at = SimTime::ZERO;
-                *soonest = SimTime::ZERO;
+            if id == *me || *everybody == SimTime::ZERO {
+                return;
+            }
+            *soonest = SimTime::ZERO;
+            match listed.binary_search_by_key(&id, |other| other.id) {
+                Ok(at) => listed[at].at = SimTime::ZERO,
+                Err(at) if listed.len() < most => listed.insert(at, Other { id, at: SimTime::ZERO, near: false }),
+                Err(_) => *everybody = SimTime::ZERO,
             }
         });
         self.unread = next;
         if whole.is_none() {
-            self.look_at_all();
+            self.everybody = SimTime::ZERO;
         }
-    }
-
-    fn look_at_all(&mut self) {
-        self.others.iter_mut().for_each(|other| other.at = SimTime::ZERO);
-        self.soonest = SimTime::ZERO;
     }
 }
 

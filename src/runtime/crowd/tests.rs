@@ -42,13 +42,13 @@ impl Flyer {
 fn fly(flyers: &mut [Flyer], until: SimTime, mut check: impl FnMut(usize, &[Flyer], &Sight)) {
     let crowd = Crowd::new(flyers.len());
     let ids = || (0..flyers.len() as u32).map(AgentId);
-    let mut sights: Vec<_> = ids().map(|me| Sight::new(me, ids().filter(move |id| *id != me))).collect();
+    let mut sights: Vec<_> = ids().map(Sight::new).collect();
     for (flyer, sight) in flyers.iter().zip(&mut sights) {
         sight.stand(&crowd, Some(&flyer.bounds()), flyer.time);
     }
     let mut turn = 0;
     while let Some(who) = (0..flyers.len()).min_by_key(|k| flyers[*k].time).filter(|k| flyers[*k].time < until) {
-        sights[who].look(&crowd, flyers[who].time, flyers[who].dt);
+        sights[who].look(&crowd, (flyers[who].time, flyers[who].dt), |_| true);
         check(who, flyers, &sights[who]);
         let flyer = &mut flyers[who];
         flyer.at = flyer.position_at(flyer.time + flyer.dt);
@@ -79,23 +79,76 @@ fn flyer() -> impl Strategy<Value = Flyer> {
     })
 }
 
+/// Lets `flyers` fly for a while, each looking at the others as one does, and looks at all pairs beside it.
+fn nobody_is_missed(mut flyers: Vec<Flyer>) {
+    let mut seen = 0;
+    fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
+        let me = &all[who];
+        for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != who) {
+            let times = (0..=4).map(|q| me.time + SimSpan::from_nanos(me.dt.as_nanos() * q / 4));
+            let near = times.clone().any(|time| me.gap_m(other, time) <= 0.0);
+            let listed = sight.near().contains(&AgentId(k as u32));
+            assert!(listed || !near, "{who} misses {k} at {:?}", me.time);
+            seen += u32::from(listed);
+        }
+        assert!(sight.near().is_sorted());
+    });
+}
+
 proptest! {
     #[test]
     fn nobody_who_could_be_touched_within_a_step_is_missed(flyers in prop::collection::vec(flyer(), 2..9)) {
-        let mut flyers = flyers;
-        let mut seen = 0;
-        fly(&mut flyers, SimTime::from_nanos(400_000_000), |who, all, sight| {
-            let me = &all[who];
-            for (k, other) in all.iter().enumerate().filter(|(k, _)| *k != who) {
-                let times = (0..=4).map(|q| me.time + SimSpan::from_nanos(me.dt.as_nanos() * q / 4));
-                let near = times.clone().any(|time| me.gap_m(other, time) <= 0.0);
-                let listed = sight.near().contains(&AgentId(k as u32));
-                assert!(listed || !near, "{who} misses {k} at {:?}", me.time);
-                seen += u32::from(listed);
-            }
-            assert!(sight.near().is_sorted());
-        });
+        nobody_is_missed(flyers);
     }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(8))]
+    #[test]
+    fn nobody_is_missed_among_more_than_one_remembers(flyers in prop::collection::vec(flyer(), 50..70)) {
+        nobody_is_missed(flyers);
+    }
+}
+
+#[test]
+fn what_an_agent_remembers_does_not_grow_with_the_crowd() {
+    let dt = SimSpan::from_nanos(4_000_000);
+    let held = |count: u32| {
+        let crowd = Crowd::new(count as usize);
+        let mut sights: Vec<_> = (0..count).map(AgentId).map(Sight::new).collect();
+        let measured = allocation_counter::measure(|| {
+            for turn in 0..3_u64 {
+                let now = SimTime::from_nanos(turn * dt.as_nanos());
+                for (k, sight) in sights.iter_mut().enumerate() {
+                    // a square of balls that fly at different speeds, six of them near each
+                    let at = DVec3::new((k % 40) as f64, (k / 40) as f64, 0.0);
+                    let speed_m_s = 1.0 + (k % 7) as f64;
+                    sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.99, speed_m_s }), now);
+                }
+                for sight in &mut sights {
+                    sight.look(&crowd, (now, dt), |_| true);
+                }
+            }
+        });
+        assert!(sights.iter().all(|sight| (3..=8).contains(&sight.near().len())));
+        measured.bytes_current / i64::from(count)
+    };
+    let [few, many] = [200, 1600].map(held);
+    assert!(many <= 1024 && many <= few + 64, "{few} and {many} bytes an agent");
+}
+
+#[test]
+fn a_longer_step_is_looked_ahead_for_at_once() {
+    let crowd = Crowd::new(2);
+    let ball = |x: f64| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s: 1.0 };
+    let mut sight = Sight::new(AgentId(0));
+    sight.stand(&crowd, Some(&ball(0.0)), SimTime::ZERO);
+    crowd.stand(AgentId(1), &ball(2.0), SimTime::ZERO);
+    // a metre at 2 · 2 m/s: a quarter of a second
+    sight.look(&crowd, (SimTime::ZERO, SimSpan::from_nanos(4_000_000)), |_| true);
+    assert!(sight.near().is_empty());
+    sight.look(&crowd, (SimTime::from_nanos(4_000_000), SimSpan::from_nanos(250_000_000)), |_| true);
+    assert_eq!(sight.near(), [AgentId(1)]);
 }
 
 #[test]
@@ -105,13 +158,13 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
     let crowd = Crowd::new(count);
     let ids = || (0..count as u32).map(AgentId);
     let bounds = |at: DVec3, speed_m_s| Bounds { low: at - DVec3::ONE, high: at + DVec3::ONE, speed_m_s };
-    let mut sights: Vec<_> = ids().map(|me| Sight::new(me, ids().filter(move |id| *id != me))).collect();
+    let mut sights: Vec<_> = ids().map(Sight::new).collect();
     let dt = SimSpan::from_nanos(4_000_000);
     for (k, sight) in sights.iter_mut().enumerate() {
         sight.stand(&crowd, Some(&bounds(lattice(k as u32), 0.04)), SimTime::ZERO);
     }
     let looks = |sights: &mut [Sight], now: SimTime| -> usize {
-        sights.iter_mut().map(|sight| sight.look(&crowd, now, dt)).sum()
+        sights.iter_mut().map(|sight| sight.look(&crowd, (now, dt), |_| true)).sum()
     };
     assert_eq!(looks(&mut sights, SimTime::ZERO), count * (count - 1), "the first time, at everybody");
     // 8 m at 2 · 0.0625 m/s is a minute
@@ -132,19 +185,19 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
 #[test]
 fn a_log_that_has_run_over_means_everybody() {
     let crowd = Crowd::new(3);
-    let mut sight = Sight::new(AgentId(0), [AgentId(1), AgentId(2)].into_iter());
+    let mut sight = Sight::new(AgentId(0));
     let at = |x: f64, speed_m_s| Bounds { low: DVec3::X * x, high: DVec3::X * (x + 1.0), speed_m_s };
     let dt = SimSpan::from_nanos(1_000_000);
     sight.stand(&crowd, Some(&at(0.0, 0.0)), SimTime::ZERO);
     crowd.stand(AgentId(1), &at(50.0, 0.0), SimTime::ZERO);
-    sight.look(&crowd, SimTime::ZERO, dt);
+    sight.look(&crowd, (SimTime::ZERO, dt), |_| true);
     assert!(sight.near().is_empty());
     crowd.stand(AgentId(1), &at(1.0, 1.0), SimTime::ZERO);
     for round in 0..LOG_LENGTH {
         // faster and slower again, more than the log holds
         crowd.stand(AgentId(2), &at(90.0, if round % 2 == 0 { 64.0 } else { 0.0 }), SimTime::ZERO);
     }
-    sight.look(&crowd, SimTime::ZERO, dt);
+    sight.look(&crowd, (SimTime::ZERO, dt), |_| true);
     assert_eq!(sight.near(), [AgentId(1)]);
 }
 

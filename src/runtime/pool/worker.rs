@@ -72,13 +72,13 @@ impl Worker {
             self.given_up = true;
             return None;
         }
-        let ended = self.hall.clock.now();
-        let next = match begun {
-            None => Next::Parked,
-            Some(_) => actor.finish(timeline, ended, ended.saturating_sub(began).as_secs_f64()),
-        };
+        // the clock is read once a turn: what follows the step counts for the next one
         self.now = self.hall.clock.now();
         let wall = self.now.saturating_sub(began);
+        let next = match begun {
+            None => Next::Parked,
+            Some(_) => actor.finish(timeline, self.now, wall.as_secs_f64()),
+        };
         actor.count(wall);
         actor.settle(self.cpu.count(wall));
         match next {
@@ -155,6 +155,53 @@ mod tests {
         let hall = Arc::new(Hall::new(clock, board, handles, actors, 1));
         hall.timeline.drive(Duration::ZERO, Drive::Run);
         Worker::new(hall, 0, Arc::default())
+    }
+
+    /// How much of the heap is taken that was free before.
+    fn held<T>(make: impl FnOnce() -> T) -> (T, i64) {
+        let mut made = None;
+        let measured = allocation_counter::measure(|| made = Some(make()));
+        (made.unwrap(), measured.bytes_current)
+    }
+
+    #[test]
+    fn an_agent_takes_two_kilobytes_beyond_its_physics_and_its_states() {
+        const COUNT: u32 = 2000;
+        let clock = Arc::new(ManualClock::new());
+        // one that can be touched also remembers who comes near
+        for (radius_m, most) in [(None, 2048), (Some(0.1), 2560)] {
+            let dummy = |k: u32| Dummy { ball: radius_m.map(|r| (r, 0.0)), z: f64::from(k), ..Dummy::new(1.0) };
+            let (_physics, own) = held(|| (0..COUNT).map(|k| Box::new(dummy(k))).collect::<Vec<_>>());
+            let (_states, state) =
+                held(|| (0..COUNT).map(|_| Arc::new(metachron_agents::Snapshot::default())).collect::<Vec<_>>());
+            let (_worker, all) = held(|| {
+                let mut worker = worker((0..COUNT).map(|k| dummy(k).at(100.0)).collect(), &clock);
+                for _ in 0..5 * COUNT {
+                    clock.advance(Duration::from_micros(5));
+                    worker.now = clock.now();
+                    worker.round();
+                }
+                worker
+            });
+            // one state is seen, one is written
+            let each = (all - own - 2 * state) / i64::from(COUNT);
+            assert!(each <= most, "{each} bytes, and {} a state", state / i64::from(COUNT));
+        }
+    }
+
+    #[test]
+    fn a_worker_of_sleepers_has_nothing_to_wake_for() {
+        let clock = Arc::new(ManualClock::new());
+        let sleepy = |_| Dummy { rest_from: Some(1), ..Dummy::new(1.0) }.at(100.0);
+        let mut worker = worker((0..1000).map(sleepy).collect(), &clock);
+        for _ in 0..1000 {
+            let timeline = worker.hall.timeline.read();
+            let actor = worker.hall.exchange(0, worker.last.take(), &timeline, worker.now).unwrap();
+            worker.last = worker.turn(actor, &timeline);
+        }
+        assert!(worker.last.is_none());
+        assert_eq!(worker.hall.pause(0, worker.now), None, "nobody is due");
+        assert!(worker.hall.handles.iter().all(|agent| agent.state() == super::super::super::AgentState::Resting));
     }
 
     #[test]

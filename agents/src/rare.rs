@@ -1,0 +1,54 @@
+//! A value that most states do not have, in storage of its own.
+//!
+//! In: values that come and go. Out: the newest, or none; the storage stays, so that nothing is allocated when it comes again.
+//! Never here: what the values mean.
+
+/// A value or none. Without one it takes two words, however large the value would be.
+#[derive(Debug, Clone)]
+pub struct Rare<T> {
+    storage: Option<Box<T>>,
+    is_there: bool,
+}
+
+impl<T> Default for Rare<T> {
+    fn default() -> Self {
+        Self { storage: None, is_there: false }
+    }
+}
+
+impl<T> Rare<T> {
+    /// The value, if there is one.
+    #[must_use]
+    pub fn get(&self) -> Option<&T> {
+        self.storage.as_deref().filter(|_| self.is_there)
+    }
+
+    /// Has `value` from now on.
+    pub fn set(&mut self, value: Option<T>) {
+        self.is_there = value.is_some();
+        let Some(value) = value else { return };
+        match &mut self.storage {
+            Some(storage) => **storage = value,
+            None => self.storage = Some(Box::new(value)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_comes_again_lies_where_it_lay() {
+        let mut rare = Rare::default();
+        assert_eq!(rare.get(), None);
+        rare.set(Some([1.0; 90]));
+        let coming_and_going = allocation_counter::measure(|| {
+            rare.set(None);
+            assert_eq!(rare.get(), None);
+            rare.set(Some([2.0; 90]));
+        });
+        assert_eq!(coming_and_going.count_total, 0);
+        assert_eq!(rare.get(), Some(&[2.0; 90]));
+    }
+}
