@@ -39,6 +39,7 @@ const BENCH_EXAMPLES: &str = "\
 Examples:
   metachron bench agents --quick                       a minute, into the folder bench/
   metachron bench agents --executor pool --agents 1000
+  metachron bench pile --quick
   metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
 
 CPU times are the measure: on a machine that does other things too, wall times tell of those.";
@@ -281,16 +282,16 @@ pub struct BenchArgs {
     /// Fewer cases, each for a second
     #[arg(long)]
     pub quick: bool,
-    /// Only this executor; may be repeated
+    /// Of agents, only this executor; may be repeated
     #[arg(long, value_parser = PossibleValuesParser::new(["threads", "pool", "lockstep"]))]
     pub executor: Vec<String>,
-    /// Only this model; may be repeated
-    #[arg(long, value_parser = PossibleValuesParser::new(["synthetic", "rod", "rigid"]))]
+    /// Of agents, only this model; may be repeated
+    #[arg(long, value_parser = PossibleValuesParser::new(["synthetic", "asleep", "rod", "rigid"]))]
     pub model: Vec<String>,
-    /// Only cases of up to so many agents
+    /// Of agents, only cases of up to so many
     #[arg(long, value_name = "N")]
     pub agents: Option<usize>,
-    /// How long each case runs
+    /// How long each case runs; of a pile, simulated seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Print the rows as JSON on standard output and nothing else there
@@ -306,6 +307,14 @@ pub struct BenchArgs {
 pub enum BenchSubject {
     /// Agents on threads, in a pool and in lockstep: CPU a step against the bare loop, lateness, ages, memory
     Agents,
+    /// A tube's step by its segments, with and without the search for contact with itself
+    Rod,
+    /// How long choosing a level for everything takes, by policy and number of objects
+    Select,
+    /// A thousand boxes as agents that share worlds while they touch, beside one rapier3d world of the same boxes
+    Pile,
+    /// Pictures on this machine's adapter, by triangles, pixels and shading
+    Render,
 }
 
 /// A subject of `chart`.

@@ -1,6 +1,8 @@
 //! Where words go: data to standard output, messages to standard error.
 
 use super::Exit;
+use crate::runtime::Priority;
+use crate::scene::format::{ExecutorKind, PriorityKind};
 use crate::scene::{Scene, SceneError};
 use std::io::{ErrorKind, Write};
 
@@ -30,6 +32,14 @@ pub(super) fn tell_overlaps(scene: &Scene) {
     }
     if overlaps.len() > OVERLAPS_TOLD {
         message(&format!("note: {} more pairs overlap at the start", overlaps.len() - OVERLAPS_TOLD));
+    }
+}
+
+/// Tells that the system refuses the priority a scene asks for; the run goes on without.
+pub(super) fn tell_priority(scene: &Scene) {
+    let asked = scene.priority == PriorityKind::Realtime && scene.executor != ExecutorKind::Lockstep;
+    if asked && let Err(refused) = Priority::Realtime.ask() {
+        message(&format!("note: {refused}"));
     }
 }
 

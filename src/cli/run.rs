@@ -5,7 +5,7 @@
 
 use super::Exit;
 use super::args::{RunArgs, StyleWord};
-use super::output::{BadInput, data, message, tell_overlaps};
+use super::output::{BadInput, data, message, tell_overlaps, tell_priority};
 use super::play::play;
 use super::progress::Bar;
 use super::report::{Report, Verdict};
@@ -99,6 +99,7 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     let request = request(args, matches)?;
     if !args.quiet {
         tell_overlaps(&request.scene);
+        tell_priority(&request.scene);
     }
     let bar = Bar::new(&request.scene.name, args.quiet);
     let stopped = Arc::new(AtomicBool::new(false));

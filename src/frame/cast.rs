@@ -12,8 +12,10 @@ use crate::control::{
     self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
     RateLimits, Stages, Value,
 };
-use crate::runtime::{AUTO_THREADS_MAX, AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, StepPrice, Watch};
-use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, ShadingKind, ValueKind};
+use crate::runtime::{
+    AUTO_THREADS_MAX, AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, Priority, StepPrice, Watch,
+};
+use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, PriorityKind, ShadingKind, ValueKind};
 use crate::scene::{self, Member, Scene, Scenery, Spec};
 use glam::DVec3;
 use metachron_agents::coupling::FormKind;
@@ -46,6 +48,14 @@ pub(super) fn executor(scene: &Scene) -> ExecutorKind {
         ExecutorKind::Auto if scene.agents.len() <= AUTO_THREADS_MAX => ExecutorKind::Threads,
         ExecutorKind::Auto => ExecutorKind::Pool,
         asked => asked,
+    }
+}
+
+/// How the system is to rank the threads of agents.
+pub(super) const fn priority(scene: &Scene) -> Priority {
+    match scene.priority {
+        PriorityKind::Normal => Priority::Normal,
+        PriorityKind::Realtime => Priority::Realtime,
     }
 }
 

@@ -104,8 +104,8 @@ impl Session {
         stage.glide_over(GLIDE_FRAMES);
         let clock = || Arc::new(runtime::SystemClock::new());
         let run: Box<dyn Run> = match scene.executor {
-            ExecutorKind::Threads => Box::new(Threads::start(spawns, clock())?),
-            ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock())?),
+            ExecutorKind::Threads => Box::new(Threads::start(spawns, clock(), cast::priority(&scene))?),
+            ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock(), cast::priority(&scene))?),
             ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, machine.clone())?),
         };
         Ok(Self {

@@ -24,6 +24,7 @@ mod mailbox;
 mod news;
 mod pace;
 mod pool;
+mod priority;
 mod reader;
 mod show;
 mod slot;
@@ -47,6 +48,7 @@ pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepP
 pub use mailbox::{Command, SendError};
 pub use pace::{Drive, LAG_CAP, Pace, SPEED_RANGE, SharedTimeline, Start, Timeline};
 pub use pool::Pool;
+pub use priority::{Priority, PriorityRefused};
 pub use reader::Reader;
 pub use slot::{LatestSlot, SlotWriter};
 pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};

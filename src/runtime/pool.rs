@@ -16,6 +16,7 @@ use super::account::AgentStats;
 use super::clock::Clock;
 use super::handle::AgentHandle;
 use super::pace::{Drive, Timeline};
+use super::priority::Priority;
 use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use hall::Hall;
 use staff::{Note, Staff};
@@ -36,13 +37,14 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Starts a worker for each core the system gives; simulated time begins when all are there.
+    /// Starts a worker for each core the system gives; simulated time begins when all are there. Where the system refuses
+    /// `priority` ([`Priority::ask`]) workers have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked, and where the system gives no thread.
-    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>) -> Result<Self, RunError> {
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         let workers = thread::available_parallelism().map_or(1, NonZero::get);
-        Self::with_workers(spawns, clock, workers, PATIENCE)
+        Self::with_workers(spawns, clock, workers, (PATIENCE, priority))
     }
 
     /// Starts `workers` workers, at least one, who are given up after `patience` in one step.
@@ -50,7 +52,7 @@ impl Pool {
         spawns: Vec<AgentSpawn>,
         clock: Arc<dyn Clock>,
         workers: usize,
-        patience: Duration,
+        (patience, priority): (Duration, Priority),
     ) -> Result<Self, RunError> {
         let Company { actors, handles, board } = assemble(spawns)?;
         let workers = workers.clamp(1, handles.len().max(1));
@@ -58,7 +60,7 @@ impl Pool {
         let hall = Arc::new(Hall::new(clock, board, handles, actors, workers));
         hall.timeline.drive(Duration::ZERO, Drive::Pause);
         let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
-        let staff = Staff::hire(Arc::clone(&hall), workers, patience).map_err(no_thread)?;
+        let staff = Staff::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
         let notes = staff.notes();
         let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
             hall.board.stop();

@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
-use super::{Clock, Run, SystemClock, Threads};
+use super::{Clock, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site};
 use metachron_agents::{
@@ -18,14 +18,14 @@ pub(super) type Start = fn(Vec<AgentSpawn>, Arc<dyn Clock>) -> Box<dyn Run>;
 
 /// Every executor that keeps real time; pools with fewer and with more workers than a small machine has cores.
 const LIVE: [(&str, Start); 4] = [
-    ("threads", |spawns, clock| Box::new(Threads::start(spawns, clock).unwrap())),
+    ("threads", |spawns, clock| Box::new(Threads::start(spawns, clock, Priority::Normal).unwrap())),
     ("pool of one", |spawns, clock| pool(spawns, clock, 1)),
     ("pool of two", |spawns, clock| pool(spawns, clock, 2)),
     ("pool of five", |spawns, clock| pool(spawns, clock, 5)),
 ];
 
 fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
-    Box::new(Pool::with_workers(spawns, clock, workers, Duration::from_secs(60)).unwrap())
+    Box::new(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
 }
 
 /// Holds a claim against every executor that keeps real time.

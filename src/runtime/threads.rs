@@ -12,6 +12,7 @@ use super::cpu::CpuBatch;
 use super::handle::{AgentHandle, Shared};
 use super::island::{Seating, empty_rooms, move_in};
 use super::pace::{Drive, SharedTimeline, Timeline};
+use super::priority::Priority;
 use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use super::switchboard::Switchboard;
 use super::turn::{Actor, Next};
@@ -39,14 +40,16 @@ pub struct Threads {
     handles: Vec<AgentHandle>,
     threads: Vec<Option<JoinHandle<()>>>,
     ended: Receiver<AgentId>,
+    priority: Priority,
 }
 
 impl Threads {
-    /// Gives every agent its thread; simulated time begins when all are there.
+    /// Gives every agent its thread; simulated time begins when all are there. Where the system refuses `priority`
+    /// ([`Priority::ask`]) they have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as asked, and where the system gives no thread.
-    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>) -> Result<Self, RunError> {
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
         }
@@ -54,7 +57,7 @@ impl Threads {
         let timeline = Arc::new(SharedTimeline::new());
         timeline.drive(Duration::ZERO, Drive::Pause);
         let (sender, ended) = channel();
-        let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended };
+        let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended, priority };
         for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
             // on an error the run so far is dropped, which ends its threads
             let shared = Arc::clone(&run.handles[id.0 as usize].shared);
@@ -77,8 +80,11 @@ impl Threads {
             Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
         let farewell = Farewell { id: shared.id, ended };
         let builder = thread::Builder::new().name(name.clone());
+        let priority = self.priority;
         let body = move || {
             let _farewell = farewell;
+            // who asked for it has been told whether it is granted
+            drop(priority.take());
             stage.live(actor, &shared);
         };
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })

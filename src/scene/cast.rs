@@ -3,7 +3,7 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
-use super::format::{ExecutorKind, LawKind, Material, PolicyKind, ShadingKind, StatesKind, ValueKind};
+use super::format::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
 use super::ties::{Coupling, Faults};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
@@ -25,6 +25,8 @@ pub struct Scene {
     pub description: String,
     /// How agents are run.
     pub executor: ExecutorKind,
+    /// How the system ranks the threads of agents.
+    pub priority: PriorityKind,
     /// At which time states are drawn.
     pub states: StatesKind,
     /// Gravity, m/s².

@@ -112,6 +112,7 @@ fn assemble(
         name: source.name().to_owned(),
         description: file.description.unwrap_or_default(),
         executor: file.executor.unwrap_or_default(),
+        priority: file.priority.unwrap_or_default(),
         states: file.states.unwrap_or_default(),
         gravity,
         target: build::target(c, file.target.as_ref()),

@@ -1,6 +1,6 @@
 //! What a pool of workers promises of thousands of agents: counts and ratios, whatever the machine does meanwhile.
 
-use metachron::runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Run, SystemClock};
+use metachron::runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Priority, Run, SystemClock};
 use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
 use metachron_agents::{N_MAX, Resolution, ResolutionRange, SimSpan};
 use std::sync::Arc;
@@ -15,7 +15,7 @@ fn agent(cost_us: f64, rate_hz: f64) -> AgentSpawn {
 }
 
 fn pool(spawns: Vec<AgentSpawn>) -> Box<Pool> {
-    Box::new(Pool::start(spawns, Arc::new(SystemClock::new())).unwrap())
+    Box::new(Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap())
 }
 
 /// Goes on until everybody has made so many steps, a frame at a time; a minute only ends a test that hangs.

@@ -6,7 +6,7 @@
 use super::bare;
 use super::cast::{Model, agent, spawn};
 use super::machine::{others_cpu, own_cpu, resident_bytes, switches};
-use crate::runtime::{AgentStats, Lockstep, Machine, Pool, Reader, Run, SystemClock, Threads};
+use crate::runtime::{AgentStats, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -26,6 +26,7 @@ pub(super) struct Case {
     pub executor: Executor,
     pub model: Model,
     pub agents: usize,
+    pub priority: Priority,
     /// Mean rate of an agent; far above what the machine can do where no pace is meant to be kept.
     pub rate_hz: f64,
 }
@@ -35,10 +36,13 @@ pub(super) struct Case {
 pub(super) struct Row {
     pub executor: Executor,
     pub model: Model,
+    pub realtime: bool,
     pub agents: usize,
     pub rate_hz: f64,
-    /// CPU time of all threads but the reader's, a step.
+    /// CPU time of all threads but the reader's, a step; no number where nobody steps.
     pub cpu_us_per_step: f64,
+    /// The same, a second.
+    pub cores: f64,
     /// The ceiling: the same steps in a loop.
     pub bare_us_per_step: f64,
     /// The same steps in a loop that sleeps to the same due times.
@@ -66,29 +70,41 @@ pub(super) struct Row {
 /// A rate that no machine keeps.
 pub(super) const UNPACED_HZ: f64 = 1e5;
 
+/// A rate at which one agent in ten has something new in each of the reader's frames.
+pub(super) const TENTH_HZ: f64 = 6.0;
+
+/// The first turns of all agents take no longer.
+const WARM_UP: Duration = Duration::from_secs(20);
+
 const FRAME: Duration = Duration::from_micros(16_667);
 
 /// The cases of the benchmark.
 pub(super) fn cases(quick: bool) -> Vec<Case> {
     use Executor::{Lockstep, Pool, Threads};
-    use Model::{Rigid, Rod, Synthetic};
+    use Model::{Asleep, Rigid, Rod, Synthetic};
     let counts: &[(usize, f64)] = if quick {
         &[(10, 198.0), (100, 198.0), (1000, 198.0), (10_000, 9.9), (100_000, 1.98)]
     } else {
         &[(1, 198.0), (10, 198.0), (30, 198.0), (100, 198.0), (300, 198.0), (1000, 198.0), (3000, 33.0), (10_000, 9.9)]
     };
     let more: &[(usize, f64)] = if quick { &[] } else { &[(30_000, 3.3), (100_000, 1.98)] };
-    let case = |executor, model, (agents, rate_hz)| Case { executor, model, agents, rate_hz };
+    let case =
+        |executor, model, (agents, rate_hz)| Case { executor, model, priority: Priority::Normal, agents, rate_hz };
     let mut cases = Vec::new();
     for &of in counts.iter().chain(more) {
         let executors: &[Executor] = if of.0 <= 1000 { &[Threads, Pool, Lockstep] } else { &[Pool, Lockstep] };
         cases.extend(executors.iter().map(|executor| case(*executor, Synthetic, of)));
     }
-    cases.push(case(Pool, Synthetic, (10_000, UNPACED_HZ)));
-    cases.extend([Threads, Pool].map(|executor| case(executor, Synthetic, (64, 1000.0))));
+    cases.extend([1000, 10_000, 100_000].map(|agents| case(Pool, Synthetic, (agents, UNPACED_HZ))));
+    cases.push(case(Pool, Synthetic, (10_000, TENTH_HZ)));
+    cases.push(case(Pool, Asleep, (100_000, 1.98)));
+    for executor in [Threads, Pool] {
+        let thousand = case(executor, Synthetic, (64, 1000.0));
+        cases.extend([thousand, Case { priority: Priority::Realtime, ..thousand }]);
+    }
     for model in [Rod, Rigid] {
         cases.extend([Threads, Pool, Lockstep].map(|executor| case(executor, model, (100, 60.0))));
-        cases.push(case(Pool, model, (1000, 6.0)));
+        cases.extend([6.0, UNPACED_HZ].map(|rate_hz| case(Pool, model, (1000, rate_hz))));
     }
     cases
 }
@@ -98,11 +114,12 @@ pub(super) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
     let spawns = (0..case.agents).map(|k| anyhow::Ok(spawn(agent(case.model, k)?, k, case.rate_hz)));
     let spawns = spawns.collect::<Result<Vec<_>, _>>()?;
+    let clock = Arc::new(SystemClock::new());
     let before = resident_bytes();
     let started = Instant::now();
     let mut run: Box<dyn Run> = match case.executor {
-        Executor::Threads => Box::new(Threads::start(spawns, Arc::new(SystemClock::new()))?),
-        Executor::Pool => Box::new(Pool::start(spawns, Arc::new(SystemClock::new()))?),
+        Executor::Threads => Box::new(Threads::start(spawns, clock, case.priority)?),
+        Executor::Pool => Box::new(Pool::start(spawns, clock, case.priority)?),
         Executor::Lockstep => Box::new(Lockstep::start(spawns, Machine::default())?),
     };
     let start_ms = millis(started.elapsed());
@@ -111,13 +128,14 @@ pub(super) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let started = Instant::now();
     let stats = run.shutdown();
     let shutdown_ms = millis(started.elapsed());
-    let steps = watched.steps.max(1.0);
     Ok(Row {
         executor: case.executor,
         model: case.model,
+        realtime: case.priority == Priority::Realtime,
         agents: case.agents,
         rate_hz: case.rate_hz,
-        cpu_us_per_step: watched.cpu.as_secs_f64() * 1e6 / steps,
+        cpu_us_per_step: watched.per_step(watched.cpu.as_secs_f64() * 1e6),
+        cores: watched.cpu.as_secs_f64() / watched.wall.as_secs_f64(),
         bare_us_per_step: bare.free_us,
         sleeping_us_per_step: bare.paced_us,
         steps_per_s: watched.steps / watched.wall.as_secs_f64(),
@@ -128,7 +146,7 @@ pub(super) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
         late_ms_p99: 1e3 * among(&stats, 0.99, |s| s.late.p99_s),
         dropped_ms: 1e3 * stats.iter().map(|s| s.dropped.as_secs_f64()).sum::<f64>() / stats.len().max(1) as f64,
         bytes_per_agent: before.zip(after).map(|(from, to)| (to - from).max(0.0) / case.agents as f64),
-        switches_per_step: watched.switches.map(|count| count / steps),
+        switches_per_step: watched.switches.map(|count| watched.per_step(count)),
         frame_late_ms_p99: 1e3 * share(watched.late_s, 0.99),
         read_ns_per_agent: 1e9 * share(watched.read_s, 0.5) / case.agents as f64,
         start_ms,
@@ -146,12 +164,22 @@ struct Watched {
     read_s: Vec<f64>,
 }
 
+impl Watched {
+    fn per_step(&self, total: f64) -> f64 {
+        if self.steps > 0.0 { total / self.steps } else { f64::NAN }
+    }
+}
+
 /// Lets `run` go on for `span` and reads all states at 60 Hz; a run in virtual time is made by this thread itself.
 fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
     let cpu = || if is_virtual { own_cpu() } else { others_cpu() };
-    // a warm-up: the first turns of everybody
     let mut reader = Reader::new(run.agents());
     read(run, &mut reader, is_virtual, span / 4);
+    // a warm-up: the first turns of everybody, as long as there is patience
+    let began = Instant::now();
+    while run.agents().iter().any(|agent| agent.steps() == 0) && began.elapsed() < WARM_UP {
+        read(run, &mut reader, is_virtual, FRAME);
+    }
     let (from_cpu, from_steps, from_switches, from) = (cpu(), steps(run), switches(), Instant::now());
     let (late_s, read_s) = read(run, &mut reader, is_virtual, span);
     let reading = if is_virtual { Duration::from_secs_f64(read_s.iter().sum()) } else { Duration::ZERO };

@@ -59,7 +59,8 @@ fn paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> an
     Ok(micros(own_cpu() - cpu) / steps.max(1) as f64)
 }
 
-fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
+/// A step of somebody who meets nobody.
+pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
     let around = Surroundings { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
     agent.step(dt, &around)?;
     Ok(())

@@ -8,7 +8,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// One question, asked of many cases.
-pub(super) trait Experiment: Sync {
+pub(in crate::cli) trait Experiment: Sync {
     /// What tells one row from another: rows of the same case are the same measurement.
     type Case: PartialEq + Sync;
     /// A case with what was measured of it; its fields are the columns of the CSV file.
@@ -40,7 +40,7 @@ pub(super) trait Experiment: Sync {
 
 /// A claim held against the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(super) struct Finding {
+pub(in crate::cli) struct Finding {
     /// The claim, as a sentence with its limit.
     pub(super) claim: String,
     /// What was measured.

@@ -20,13 +20,16 @@ use super::args::{ChartArgs, Subject};
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
 use anyhow::Context;
-use experiment::{Experiment, Finding};
+use experiment::Finding;
 use rows::RowFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use table::{Cell, Table};
+
+pub(super) use experiment::Experiment;
+pub(super) use policies::selection::Selection;
 
 /// What a command's experiments share.
 struct Setting<'a> {

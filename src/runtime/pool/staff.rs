@@ -4,6 +4,7 @@
 //! the agent is parked with the reason, and another worker takes the place. Never here: turns.
 
 use super::super::island::{empty_door, empty_rooms};
+use super::super::priority::Priority;
 use super::desk::{Desk, Sitting};
 use super::hall::Hall;
 use super::worker::Worker;
@@ -26,6 +27,7 @@ pub(super) struct Staff {
     posts: Vec<Post>,
     hired: u32,
     patience: Duration,
+    priority: Priority,
     sender: Sender<Note>,
     notes: Receiver<Note>,
 }
@@ -62,9 +64,9 @@ impl Drop for Farewell {
 
 impl Staff {
     /// Hires a worker for each of `places`; a step that takes longer than `patience` is given up.
-    pub fn hire(hall: Arc<Hall>, places: usize, patience: Duration) -> io::Result<Self> {
+    pub fn hire(hall: Arc<Hall>, places: usize, patience: Duration, priority: Priority) -> io::Result<Self> {
         let (sender, notes) = channel();
-        let mut staff = Self { hall, posts: Vec::new(), hired: 0, patience, sender, notes };
+        let mut staff = Self { hall, posts: Vec::new(), hired: 0, patience, priority, sender, notes };
         for at in 0..places {
             match staff.post(at) {
                 Ok(post) => staff.posts.push(post),
@@ -100,9 +102,11 @@ impl Staff {
         self.hired += 1;
         let (hall, farewell) = (Arc::clone(&self.hall), Farewell { number, sender: self.sender.clone() });
         let body = {
-            let desk = Arc::clone(&desk);
+            let (desk, priority) = (Arc::clone(&desk), self.priority);
             move || {
                 let _farewell = farewell;
+                // who asked for it has been told whether it is granted
+                drop(priority.take());
                 Worker::new(hall, at, desk).work();
             }
         };

@@ -7,13 +7,13 @@ use super::*;
 #[test]
 fn too_many_agents_for_threads_are_refused() {
     let spawns = (0..=THREADS_MAX).map(|_| Dummy::new(1.0).at(1.0)).collect();
-    let Err(error) = Threads::start(spawns, Arc::new(SystemClock::new())) else { panic!("accepted") };
+    let Err(error) = Threads::start(spawns, Arc::new(SystemClock::new()), Priority::Normal) else { panic!("accepted") };
     assert!(matches!(error, RunError::TooMany { agents: 1001, most: 1000 }), "{error}");
 }
 
 #[test]
 fn threads_carry_the_names_of_their_agents() {
-    let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new())).unwrap();
+    let run = Threads::start(vec![Dummy::new(1.0).at(60.0)], Arc::new(SystemClock::new()), Priority::Normal).unwrap();
     let names: Vec<_> = run.threads.iter().flatten().filter_map(|t| t.thread().name()).collect();
     assert_eq!(names, ["agent:dummy at 60"]);
 }

@@ -18,6 +18,8 @@ pub struct SceneFile {
     /// How agents are run. Default `auto`: `threads` for a few, `pool` for many.
     /// `lockstep` runs them on one thread in virtual time, with declared costs.
     pub executor: Option<ExecutorKind>,
+    /// How the system ranks the threads of agents. Default `normal`.
+    pub priority: Option<PriorityKind>,
     /// At which time states are drawn. Default `interpolate`.
     pub states: Option<StatesKind>,
     /// What surrounds the objects.
@@ -108,6 +110,18 @@ pub enum ExecutorKind {
     Pool,
     /// One thread, virtual time, declared costs: bit-identical on every run.
     Lockstep,
+}
+
+/// How the system ranks the threads of agents.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum PriorityKind {
+    /// As all threads.
+    #[default]
+    Normal,
+    /// Before all threads of ordinary priority, the frame loop included, where the system grants that; where it does not, a
+    /// note says so and agents run at ordinary priority. Agents that want all cores leave nothing for pictures then.
+    Realtime,
 }
 
 /// Who chooses levels.

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// The experiment.
-pub(in super::super) struct Selection;
+pub(in crate::cli) struct Selection;
 
 const OBJECTS: [usize; 7] = [100, 300, 1000, 3000, 10_000, 30_000, 100_000];
 const QUICK_OBJECTS: [usize; 2] = [100, 1000];
@@ -37,14 +37,14 @@ const POLICIES: [(&str, Time1); 4] = [
 
 /// How many objects, and a policy.
 #[derive(Debug, Clone, PartialEq)]
-pub(in super::super) struct Case {
+pub(in crate::cli) struct Case {
     objects: usize,
     policy: String,
 }
 
 /// Wall time of a choice.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in super::super) struct Row {
+pub(in crate::cli) struct Row {
     objects: usize,
     policy: String,
     median_ms: f64,

@@ -1,0 +1,192 @@
+//! `bench pile`: a thousand boxes as agents that share worlds while they touch, beside one rapier3d world of the same boxes.
+//!
+//! In: the built-in scene `pile`. Out: rows of whole steps (every box by 1/240 s) a second of CPU time, each over the same
+//! simulated seconds: boxes that fall into a bin, and lie. What was published of others for a thousand boxes stands beside.
+//! Never here: how agents find together.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::chart::table::Table;
+use super::super::progress::Bar;
+use super::machine::{others_cpu, own_cpu};
+use super::subject::Subject;
+use crate::compositor::{Size, Style};
+use crate::frame::{Drawing, End, Headless, Session, play_headless};
+use crate::scene::format::ExecutorKind;
+use crate::scene::{Scene, Source, Spec, load};
+use anyhow::{Context, bail};
+use glam::{DQuat, DVec3};
+use metachron_agents::rigid::RigidSpec;
+use metachron_agents::shape::Solid;
+use rapier3d::dynamics::RigidBodyBuilder;
+use rapier3d::geometry::{ColliderBuilder, SharedShape};
+use rapier3d::parry::math::{Pose, Rotation, Vec3};
+use rapier3d::pipeline::PhysicsWorld;
+use serde::{Deserialize, Serialize};
+
+/// The subject.
+pub(super) struct Pile;
+
+/// Simulated seconds: the boxes lie after two.
+const SECONDS: [f64; 2] = [5.0, 2.0];
+
+/// Steps a simulated second, of the scene and of the plain world.
+const STEP_HZ: f64 = 240.0;
+
+/// What others need for 1000 boxes in columns at 240 Hz, whole steps a second of CPU time on a core of an AMD EPYC.
+const OTHERS: [(&str, f64); 3] =
+    [("MuJoCo 4.0.0, Newton", 277.6), ("MuJoCo 4.0.0, CG", 216.8), ("PyBullet 3.2.7, 50 iterations", 74.0)];
+
+/// Somebody's whole steps.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Row {
+    pub who: String,
+    /// Whether it was measured now; else it was measured elsewhere, boxes in columns.
+    pub here: bool,
+    pub boxes: usize,
+    pub sim_s: f64,
+    /// Simulated time given up, mean over the boxes.
+    pub dropped_s: f64,
+    pub cpu_s: f64,
+    pub steps_per_cpu_s: f64,
+    /// Of the plain world's.
+    pub share: f64,
+}
+
+impl Subject for Pile {
+    type Row = Row;
+    const NAME: &'static str = "pile";
+
+    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
+        let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
+        let scene = load(&Source::open("pile")?, &[])?;
+        bar.tell(0.0, "one rapier3d world".to_owned());
+        let plain = plain(&scene, sim_s)?;
+        bar.tell(0.3, "agents in virtual time".to_owned());
+        let lockstep = agents(&scene, ExecutorKind::Lockstep, sim_s)?;
+        bar.tell(0.6, "agents in a pool".to_owned());
+        let pool = agents(&scene, ExecutorKind::Pool, sim_s)?;
+        let whole = plain.steps_per_cpu_s;
+        let others = OTHERS.map(|(who, steps)| Row {
+            who: who.to_owned(),
+            here: false,
+            steps_per_cpu_s: steps,
+            ..plain.clone()
+        });
+        let rows = [plain, lockstep, pool].into_iter().chain(others);
+        Ok(rows.map(|row| Row { share: row.steps_per_cpu_s / whole, ..row }).collect())
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table =
+            Table::new(&["who", "here", "boxes", "sim_s", "dropped_s", "cpu_s", "steps_per_cpu_s", "share"]);
+        table.rows.extend(rows.iter().map(|row| {
+            let number = |value: f64, digits| if row.here { (value, digits) } else { (f64::NAN, digits) };
+            vec![
+                row.who.clone().into(),
+                if row.here { "yes" } else { "no" }.into(),
+                (row.boxes as f64, 0).into(),
+                number(row.sim_s, 1).into(),
+                number(row.dropped_s, 2).into(),
+                number(row.cpu_s, 2).into(),
+                (row.steps_per_cpu_s, 1).into(),
+                (row.share, 2).into(),
+            ]
+        }));
+        table
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let most = rows.iter().map(|row| row.steps_per_cpu_s).fold(1.0, f64::max);
+        let bar = |(at, row): (usize, &Row)| Layer {
+            label: row.who.clone(),
+            colour: if row.here { Colour::LINES[at % Colour::LINES.len()] } else { Colour::Grey },
+            mark: Mark::Cells(vec![[at as f64 + 0.1, at as f64 + 0.9, 0.0, row.steps_per_cpu_s]]),
+        };
+        let panel = Panel {
+            title: String::new(),
+            x: Axis::linear("", 0.0, rows.len().max(1) as f64),
+            y: Axis::linear("whole steps a second of CPU time", 0.0, 1.1 * most),
+            layers: rows.iter().enumerate().map(bar).collect(),
+        };
+        Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+/// The scene's boxes as agents.
+fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result<Row> {
+    let session = Session::open(Scene { executor, ..scene.clone() })?;
+    let plan = Headless {
+        end: End::Seconds(seconds),
+        size: Size { width: 640, height: 360 },
+        style: Style::default(),
+        drawing: Drawing::Nothing,
+        png: None,
+    };
+    let from = own_cpu() + others_cpu();
+    let outcome = play_headless(session, plan, &mut |_, _| true)?;
+    let cpu_s = (own_cpu() + others_cpu()).saturating_sub(from).as_secs_f64();
+    let boxes = outcome.agents.len();
+    let dropped_s = outcome.agents.iter().map(|a| a.stats.dropped.as_secs_f64()).sum::<f64>() / boxes.max(1) as f64;
+    let who = format!("agents, {}", executor.name());
+    let steps_per_cpu_s = (outcome.sim_s - dropped_s) * STEP_HZ / cpu_s;
+    Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })
+}
+
+/// The same boxes in one world, with its own settings.
+fn plain(scene: &Scene, seconds: f64) -> anyhow::Result<Row> {
+    let mut world = PhysicsWorld { gravity: scene.gravity.as_vec3(), ..PhysicsWorld::default() };
+    world.integration_parameters.dt = (1.0 / STEP_HZ) as f32;
+    for solid in scene.obstacles.iter() {
+        let shape = shape(&solid.solid)?.friction(solid.friction as f32).restitution(solid.restitution as f32);
+        world.colliders.insert(shape.position(pose(solid.position, solid.rotation)));
+    }
+    let mut boxes = 0;
+    for member in &scene.agents {
+        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is no rigid body", member.name) };
+        insert(&mut world, spec)?;
+        boxes += 1;
+    }
+    let steps = (seconds * STEP_HZ).round();
+    let from = own_cpu();
+    (0..steps as u64).for_each(|_| world.step());
+    let cpu_s = (own_cpu() - from).as_secs_f64();
+    let (who, sim_s, steps_per_cpu_s) = ("one rapier3d world".to_owned(), steps / STEP_HZ, steps / cpu_s);
+    Ok(Row { who, here: true, boxes, sim_s, dropped_s: 0.0, cpu_s, steps_per_cpu_s, share: f64::NAN })
+}
+
+fn insert(world: &mut PhysicsWorld, spec: &RigidSpec) -> anyhow::Result<()> {
+    let body = RigidBodyBuilder::dynamic()
+        .pose(pose(spec.position, spec.rotation))
+        .linvel(spec.velocity.as_vec3())
+        .angvel(spec.spin.as_vec3());
+    let shape = shape(&spec.solid)?.mass(spec.mass_kg as f32);
+    world.insert(body, shape.friction(spec.friction as f32).restitution(spec.restitution as f32));
+    Ok(())
+}
+
+fn shape(solid: &Solid) -> anyhow::Result<ColliderBuilder> {
+    match solid {
+        Solid::Box { half_extents_m: half } => Ok(ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)),
+        Solid::Plane => Ok(ColliderBuilder::new(SharedShape::halfspace(Vec3::Z))),
+        _ => None.context("the plain world knows boxes and planes alone"),
+    }
+}
+
+fn pose(position: DVec3, rotation: DQuat) -> Pose {
+    let turned = rotation.as_quat();
+    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(turned.x, turned.y, turned.z, turned.w))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plain_world_holds_the_boxes_of_the_scene_and_they_fall() {
+        let scene = load(&Source::open("pile").unwrap(), &[]).unwrap();
+        let row = plain(&scene, 0.02).unwrap();
+        assert_eq!((row.boxes, row.here), (1000, true));
+        assert!(row.steps_per_cpu_s > 0.0 && (row.sim_s - 5.0 / STEP_HZ).abs() < 1e-12);
+    }
+}

@@ -1,0 +1,36 @@
+//! `bench select`: how long it takes to choose a level for everything that is seen, by policy and number of objects.
+//!
+//! In: the experiment of `chart policies --only selection`. Out: its rows in the form of a benchmark. Never here: a policy.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::Figure;
+use super::super::chart::table::Table;
+use super::super::chart::{Experiment, Selection};
+use super::super::progress::Bar;
+use super::subject::Subject;
+
+/// The subject.
+pub(super) struct Select;
+
+impl Subject for Select {
+    type Row = <Selection as Experiment>::Row;
+    const NAME: &'static str = "select";
+
+    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Self::Row>> {
+        let cases = Selection::cases(args.quick);
+        let total = cases.len() as f64;
+        let told = cases.iter().enumerate().map(|(at, case)| {
+            bar.tell(at as f64 / total, String::new());
+            Selection::measure(case)
+        });
+        Ok(told.collect())
+    }
+
+    fn table(rows: &[Self::Row]) -> Table {
+        Selection::table(rows)
+    }
+
+    fn figure(rows: &[Self::Row]) -> Figure {
+        Selection::figure(rows)
+    }
+}
