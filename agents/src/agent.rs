@@ -122,6 +122,22 @@ pub enum StepError {
         /// The quantity that was lost first, and where.
         what: String,
     },
+    /// The substeps are too long for the integrator. State: untouched.
+    #[error(
+        "a substep of {substep_s:.2e} s is too long for {integrator}, which carries at most {limit_s:.2e} s with the {segments} segments of this {model}: give it more substeps or a shorter step, fewer segments, or an implicit integrator"
+    )]
+    Unstable {
+        /// The model's name.
+        model: &'static str,
+        /// The integrator's name.
+        integrator: &'static str,
+        /// How finely the body is divided.
+        segments: usize,
+        /// The substep that the step would have, in seconds.
+        substep_s: f64,
+        /// The longest that the integrator carries, in seconds.
+        limit_s: f64,
+    },
     /// The model cannot step others in its world. State: untouched.
     #[error("a {model} has no world that others could share")]
     Alone {

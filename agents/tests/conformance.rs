@@ -4,7 +4,7 @@ use glam::{DQuat, DVec3};
 use metachron_agents::conformance::{Suite, check, fall_deviation};
 use metachron_agents::instrument::{Instrument, Keyframe, ToolSpec};
 use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
+use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
 use metachron_agents::shape::{Obstacle, Solid};
 use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
 use metachron_agents::{Agent, AgentId, Anchor, Neighbour, Pull, Resolution, ResolutionRange, SimSpan, Snapshot};
@@ -61,12 +61,18 @@ fn floor() -> Obstacle {
 }
 
 fn tube(clamp: bool, damping_per_s: f64) -> Box<dyn Agent> {
+    tube_by(Integrator::ImplicitEuler, 1, (clamp, damping_per_s))
+}
+
+fn tube_by(integrator: Integrator, substeps: u32, (clamp, damping_per_s): (bool, f64)) -> Box<dyn Agent> {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let section = Section::hollow(0.015, 0.002, material);
     let spec = TubeSpec {
         resolution: Resolution { eps_m: 1.0 / 16.0, n: 3 },
         range: ResolutionRange { eps_m: (1e-3, 1.0), n: (0, 5) },
         segments: None,
+        integrator,
+        substeps,
         damping_per_s,
         clamp: [clamp, false],
         friction: 0.3,
@@ -119,6 +125,38 @@ fn a_falling_tube_keeps_every_promise() {
         ..Suite::new(&make, DT)
     };
     assert_eq!(check(&suite), []);
+}
+
+/// The other integrators, each with the substeps that twice [`DT`] needs at 64 segments.
+const OTHERS: [(Integrator, u32); 4] =
+    [(Integrator::SymplecticEuler, 40), (Integrator::Xpbd, 64), (Integrator::Bdf2, 1), (Integrator::EnergyMomentum, 1)];
+
+#[test]
+fn a_falling_tube_keeps_every_promise_by_every_integrator() {
+    for (integrator, substeps) in OTHERS {
+        let make = || tube_by(integrator, substeps, (false, 0.0));
+        let hanging = || tube_by(integrator, substeps, (true, 12.0));
+        let suite = Suite {
+            closed_form: Some((&falls, 1e-9)), // as for implicit Euler
+            pull: Some(hand(Anchor::Arc(0.3), DVec3::new(0.3, 0.2, 0.1))),
+            absurd: absurd(Anchor::Arc(0.3)),
+            resolutions: segments(&[8, 16, 32, 64]),
+            converging: Some((&hanging, 500)),
+            ..Suite::new(&make, DT)
+        };
+        assert_eq!(check(&suite), [], "{}", integrator.name());
+    }
+}
+
+#[test]
+fn a_tube_of_one_size_allocates_nothing_once_warm_by_any_integrator() {
+    for (integrator, substeps) in OTHERS {
+        let make = || tube_by(integrator, substeps, (true, 0.0));
+        for pull in [None, Some(hand(Anchor::Arc(0.7), DVec3::new(0.6, 0.2, 0.1)))] {
+            let suite = Suite { pull, allocations: Some((&count, 0.0)), ..Suite::new(&make, DT) };
+            assert_eq!(check(&suite), [], "{}", integrator.name());
+        }
+    }
 }
 
 #[test]

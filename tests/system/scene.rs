@@ -160,7 +160,13 @@ fn an_end_is_clamped_or_pinned_not_both() {
 
 #[test]
 fn an_integrator_that_does_not_exist_names_those_that_do() {
-    refused("importance = 1.0", "integrator = \"bdf2\"", "\"bdf2\"", &["`implicit-euler`"]);
+    refused("importance = 1.0", "integrator = \"bdf\"", "\"bdf\"", &["did you mean `bdf2`?"]);
+}
+
+#[test]
+fn an_integrator_that_cannot_carry_the_step_says_how_long_a_one_it_can() {
+    let words = &["carries substeps of", "`substeps = ", "segments"];
+    refused("importance = 1.0", "integrator = \"symplectic-euler\"", "\"symplectic-euler\"", words);
 }
 
 #[test]

@@ -81,6 +81,17 @@ impl Config {
         self.force.resize(2 * segments + 1, DVec3::ZERO);
     }
 
+    /// Takes over another state but for its forces, into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.x.clone_from(&other.x);
+        self.q.clone_from(&other.q);
+        self.u.clone_from(&other.u);
+        self.t.clone_from(&other.t);
+        self.e.clone_from(&other.e);
+        let Self { elastic_j, gravity_j, kinetic_j, stretch, .. } = *other;
+        (self.elastic_j, self.gravity_j, self.kinetic_j, self.stretch) = (elastic_j, gravity_j, kinetic_j, stretch);
+    }
+
     /// Whether every position, frame and velocity is finite. Needs [`Config::strain`].
     pub fn is_finite(&self) -> bool {
         // energies hold every position, velocity and frame in squares or products: they are finite only if all are

@@ -1,5 +1,6 @@
 //! What a tube is made of and how it is held: the numbers a scene gives.
 
+use super::Integrator;
 use crate::shape::Obstacle;
 use crate::{Resolution, ResolutionRange};
 use glam::DVec3;
@@ -21,6 +22,8 @@ pub struct TubeSpec {
     pub range: ResolutionRange,
     /// Number of segments at first where a scene fixes it; else ⌈L/ε⌉.
     pub segments: Option<usize>,
+    /// How it is integrated in time.
+    pub integrator: Integrator,
     /// The least number of substeps in a step, ≥ 1.
     pub substeps: u32,
     /// Mass-proportional damping in 1/s, ≥ 0: dv/dt = … − damping·v.
@@ -123,6 +126,7 @@ impl TubeSpec {
             resolution,
             range: ResolutionRange::fixed(resolution),
             segments: Some(segments),
+            integrator: Integrator::ImplicitEuler,
             substeps: 1,
             damping_per_s: 0.0,
             clamp: [false; 2],

@@ -10,6 +10,9 @@ use super::config::{Config, Matter};
 use super::contact::{Solved, TubeContacts};
 use super::division::Division;
 use super::holds::{NodeSpring, Tie};
+use super::method::Integrator;
+use super::past::Past;
+use super::project::Projector;
 use super::system::{Iterate, Scene, assemble};
 use super::turn::{exp, unit};
 use glam::{DMat3, DVec3};
@@ -39,6 +42,8 @@ pub struct Setting<'a> {
     pub dt: f64,
     /// The least number of substeps.
     pub substeps: u32,
+    /// How it is integrated.
+    pub integrator: Integrator,
 }
 
 /// The state stopped being finite: which slot gave out.
@@ -51,10 +56,14 @@ pub struct Lost {
 /// Room for the linear system and the next state; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
 pub struct Stepper {
-    rows: Vec<Row>,
-    factor: Factor,
-    rhs: Vec<DVec3>,
-    next: Config,
+    pub(super) rows: Vec<Row>,
+    pub(super) factor: Factor,
+    pub(super) rhs: Vec<DVec3>,
+    pub(super) next: Config,
+    /// What the substep before changed, and a state to start from where that is not the last one.
+    pub(super) past: Past,
+    pub(super) ahead: Config,
+    pub(super) projector: Projector,
     /// What the skin touches.
     pub contacts: TubeContacts,
     /// Who else is near.
@@ -67,7 +76,7 @@ pub struct Stepper {
 
 /// What became of a trial substep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Verdict {
+pub enum Verdict {
     /// The next state stands.
     Good,
     /// Something turned too far, or energy rose: smaller substeps are wanted.
@@ -93,12 +102,14 @@ impl Stepper {
                 ties,
                 h: span.1,
                 until: tick * (gone + size) as f64,
+                integrator: setting.integrator,
             };
             if self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
                 size /= 2;
                 continue;
             }
             self.accept(now, ties, span);
+            self.remember(now, (setting.integrator, ties.is_empty()), span.1);
             (gone, taken) = (gone + size, taken + 1);
             // twice as long again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
@@ -136,10 +147,15 @@ impl Stepper {
         if self.factor.slots() == now.u.len() {
             return Ok(());
         }
-        let Setting { matter, division, springs, dt, substeps } = *setting;
+        let Setting { matter, division, springs, dt, substeps, integrator } = *setting;
         let h = dt / f64::from(substeps);
-        let scene = Scene { matter, division, springs, ties: &[], h, until: h };
-        assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs);
+        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        match integrator {
+            Integrator::SymplecticEuler | Integrator::Xpbd => {
+                self.assemble_light(now, &scene, integrator == Integrator::Xpbd);
+            }
+            _ => assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
+        }
         self.factor.factor(&self.rows).map_err(|slot| {
             self.factor.forget();
             Lost { slot: Some(slot) }
@@ -150,6 +166,7 @@ impl Stepper {
     pub fn forget(&mut self) {
         self.factor.forget();
         self.contacts.forget();
+        self.past.forget();
     }
 
     /// The factor of the substep that ended last; without slots where the division has changed since.
@@ -179,8 +196,23 @@ impl Stepper {
         Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
-    /// One trial substep, from `now` into `next` (eq. 11–20); `bound` if turns are, `divide` if it can be smaller.
-    fn attempt(&mut self, now: &Config, scene: &Scene<'_>, (bound, divide): (bool, bool)) -> Result<Verdict, Lost> {
+    /// One trial substep, from `now` into `next`; `bound` if turns are, `divide` if it can be smaller.
+    fn attempt(&mut self, now: &Config, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
+        match scene.integrator {
+            Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
+            Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
+            Integrator::ImplicitEuler => self.attempt_euler(now, scene, smaller),
+            Integrator::Bdf2 | Integrator::EnergyMomentum => self.glide(now, scene, smaller),
+        }
+    }
+
+    /// The same by implicit Euler (eq. 11–20).
+    pub(super) fn attempt_euler(
+        &mut self,
+        now: &Config,
+        scene: &Scene<'_>,
+        (bound, divide): (bool, bool),
+    ) -> Result<Verdict, Lost> {
         if let Err(lost) = self.solve(now, scene, true) {
             return if divide { Ok(Verdict::TooFar) } else { Err(lost) };
         }
@@ -218,7 +250,7 @@ impl Stepper {
     }
 
     /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
-    fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+    pub(super) fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
         let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
         // contact is a law of whole velocities, not of what an iteration changes of them
@@ -234,7 +266,7 @@ impl Stepper {
     }
 
     /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
-    fn advance(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+    pub(super) fn advance(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
         let Self { next, rhs, .. } = self;
         let (h, count) = (scene.h, now.q.len());
         next.resize(count);
@@ -253,7 +285,7 @@ impl Stepper {
     }
 
     /// By how much the energy of `next` exceeds what `now` had and the pulls gave, less the rounding, J (eq. 27).
-    fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
+    pub(super) fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
         let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
         // what friction takes is no licence to make as much elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
@@ -273,13 +305,27 @@ impl Stepper {
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
+    /// Keeps what methods of second order need of the substep that ended at `now`, where nothing made velocities jump.
+    fn remember(&mut self, now: &Config, (integrator, untied): (Integrator, bool), h: f64) {
+        if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
+            return;
+        }
+        if untied && self.company.is_empty() && !self.contacts.is_touching() {
+            self.past.learn(&self.next, now, h);
+        } else {
+            self.past.forget();
+        }
+    }
+
     /// Makes `next` the state and books what pulls and contacts gave.
     fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
         for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
-            let point = (tie.mix(now.x[a], now.x[b]), tie.mix(now.u[2 * a], now.u[2 * b]));
+            // constraints act after the tie did: what it gave is what it was solved with
+            let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
+            let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
             tie.book(point, (h, start + h));
         }
         self.company.accept(self.contacts.impulses(), ties, (now.u.len(), start, h));

@@ -7,6 +7,7 @@ use super::band::Row;
 use super::config::{Config, Matter};
 use super::division::Division;
 use super::holds::{NodeSpring, Tie};
+use super::method::Integrator;
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 
@@ -25,6 +26,8 @@ pub struct Scene<'a> {
     pub h: f64,
     /// Seconds from the start of the step to the end of this substep.
     pub until: f64,
+    /// How it is integrated.
+    pub integrator: Integrator,
 }
 
 /// Where Newton's iteration stands: the iterate and the velocities that led to it from the start of the substep.
@@ -46,15 +49,19 @@ impl Iterate<'_> {
 
 /// Fills `rows` and `rhs` (eq. 11–15, 19–24).
 pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
-    let slots = iterate.at.u.len();
-    rows.resize(slots, Row::ZERO);
-    rhs.resize(slots, DVec3::ZERO);
-    fill_segments(scene, iterate.at, rows);
-    fill_joints(scene, iterate.at, rows);
+    fill_matrix(scene, iterate.at, rows, rhs);
     fill_right_side(scene, iterate, rhs);
     add_springs(scene, iterate, rows, rhs);
     add_ties(scene, iterate, rows, rhs);
     hold_ends(scene.matter, rows, rhs);
+}
+
+/// Fills `rows` with what elasticity and mass make of them about `at`, and makes room in `rhs` (eq. 12–15).
+pub fn fill_matrix(scene: &Scene<'_>, at: &Config, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+    rows.resize(at.u.len(), Row::ZERO);
+    rhs.resize(at.u.len(), DVec3::ZERO);
+    fill_segments(scene, at, rows);
+    fill_joints(scene, at, rows);
 }
 
 /// Mass, stretch and shear: D = (GA − b) I + (EA − GA) t tᵀ is the clamped stiffness (eq. 12, 13).
@@ -136,14 +143,14 @@ fn fill_right_side(scene: &Scene<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) 
 
 /// Turns a spin as its gyroscopic torque does in `h`: about t by t·ω h, without a change of energy (eq. 19).
 #[inline]
-fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
+pub fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
     let a = 0.5 * h * t.dot(w);
     let side = t.cross(w);
     w + (side + t.cross(side) * a) * (2.0 * a / (1.0 + a * a))
 }
 
 /// Attachments, linearised where the point is bound for so that a slack one is caught in time (eq. 21–23).
-fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
     let h = scene.h;
     for spring in scene.springs {
         let slot = 2 * spring.node;
@@ -156,7 +163,7 @@ fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: 
 }
 
 /// Pulls, shared between the two nodes of their segment (eq. 24).
-fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
     for tie in scene.ties {
         let (left, right) = (2 * tie.segment, 2 * tie.segment + 2);
         let point = tie.mix(iterate.at.x[tie.segment], iterate.at.x[tie.segment + 1]);
@@ -172,7 +179,7 @@ fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mu
 }
 
 /// Takes the positions of held ends out of the system: their velocity is zero, whatever acts.
-fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
+pub fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
     let last = rows.len() - 1;
     if matter.held[0] {
         rows[0].diag = Sym3::identity(1.0);

@@ -117,7 +117,8 @@ impl Tube {
     ) -> T {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
         let substeps = self.spec.substeps.max(stepper.company.parts(dt));
-        act(stepper, now, &Setting { matter, division, springs, dt, substeps }, ties)
+        let integrator = self.spec.integrator;
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator }, ties)
     }
 
     /// The numbers it was built from.
@@ -286,6 +287,7 @@ impl Agent for Tube {
     /// rest     whether it could sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
+        self.check_substep(dt_s)?;
         self.meet(around, dt)?;
         self.take_pulls(around);
         self.widen(around.time + dt);

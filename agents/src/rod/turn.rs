@@ -57,6 +57,12 @@ pub fn director(q: DQuat) -> DVec3 {
     DVec3::new(2.0 * (q.x * q.z + q.w * q.y), 2.0 * (q.y * q.z - q.w * q.x), 1.0 - 2.0 * (q.x * q.x + q.y * q.y))
 }
 
+/// The rotation vector of Cayley's map: 2 tan(θ/2) along the axis of `q`; R − 1 = [c]ₓ (R + 1)/2.
+#[inline]
+pub fn cayley(q: DQuat) -> DVec3 {
+    DVec3::new(q.x, q.y, q.z) * (2.0 / q.w)
+}
+
 /// `q` brought back to unit length; exact to rounding for a length within 1e-8 of one.
 #[inline]
 pub fn unit(q: DQuat) -> DQuat {
@@ -90,6 +96,12 @@ mod tests {
             // one ulp of the angle for each of about four roundings
             assert!((log(exp(phi)) - phi).length() <= 4.0 * f64::EPSILON * angle.max(1e-300), "{angle}");
         }
+    }
+
+    #[test]
+    fn cayleys_vector_turns_the_mean_into_the_difference() {
+        let (q, v) = (exp(DVec3::new(0.5, -0.3, 0.4)), DVec3::new(0.2, 0.9, -0.4));
+        assert!((q * v - v - cayley(q).cross(q * v + v) * 0.5).length() < 1e-15); // a few roundings of 1
     }
 
     #[test]

@@ -2,6 +2,7 @@
 //!
 //! In: which subject, which folder. Out: files, a table, findings. Never here: what is measured (each experiment is a file).
 
+mod accuracy;
 mod company;
 mod coupling;
 mod experiment;
@@ -19,6 +20,7 @@ use super::Exit;
 use super::args::{ChartArgs, Subject};
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
+use accuracy::diagram::Diagram;
 use anyhow::Context;
 use experiment::Finding;
 use rows::RowFile;
@@ -74,6 +76,15 @@ const STABILITY: &[Entry] = &[
     entry::<stability::impact::Impact>(),
 ];
 
+const ACCURACY: &[Entry] = &[
+    entry::<Diagram<accuracy::cantilever::Cantilever>>(),
+    entry::<Diagram<accuracy::elastica::Elastica>>(),
+    entry::<Diagram<accuracy::catenary::Catenary>>(),
+    entry::<Diagram<accuracy::four_point::FourPoint>>(),
+    entry::<Diagram<accuracy::frequencies::Frequencies>>(),
+    entry::<Diagram<accuracy::swing::Swing>>(),
+];
+
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
 
 const POLICIES: &[Entry] = &[
@@ -92,6 +103,7 @@ const POLICIES: &[Entry] = &[
 /// Runs the experiments of a subject.
 pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     let (subject, all) = match args.subject {
+        Subject::Accuracy => ("accuracy", ACCURACY),
         Subject::Stability => ("stability", STABILITY),
         Subject::Coupling => ("coupling", COUPLING),
         Subject::Policies => ("policies", POLICIES),

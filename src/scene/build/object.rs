@@ -352,7 +352,11 @@ fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
                 let what = format_args!("turns back on itself at point {index}, by {degrees:.0}°");
                 return c.wrong(place, &format!("path_m.{index}"), what, "expected a turn of at most 170°");
             }
-            other => other.map(drop).map_err(|e| e.to_string()),
+            Ok(built) => {
+                tube::check_step(c, place, &built, member.pace.dt_range.1.as_secs_f64());
+                Ok(())
+            }
+            Err(e) => Err(e.to_string()),
         },
         Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
         Spec::Soft(spec) => SoftBody::new(spec).map(drop).map_err(|e| e.to_string()),

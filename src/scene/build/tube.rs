@@ -3,9 +3,9 @@
 use super::POSITION_MAX_M;
 use super::object::Given;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{AttachFile, End, PeristalsisFile, TubeFile};
+use crate::scene::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
 use glam::DVec3;
-use metachron_agents::rod::{Attachment, Material, Peristalsis, Section, TubeSpec};
+use metachron_agents::rod::{Attachment, Integrator, Material, Peristalsis, SUBSTEPS_MAX, Section, Tube, TubeSpec};
 use metachron_agents::{Resolution, ResolutionRange};
 use std::sync::Arc;
 
@@ -50,6 +50,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
         resolution,
         range,
         segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
+        integrator: file.integrator.map_or_else(Default::default, integrator),
         substeps: c.number_or(place, "substeps", (file.substeps.map(f64::from), 1.0), &allowed(1.0..=1000.0, ""))
             as u32,
         damping_per_s: c.number_or(place, "damping_per_s", (file.damping_per_s, 0.0), &allowed(0.0..=1e4, "1/s")),
@@ -65,6 +66,38 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
         sleep: given.sleep,
     };
     BuiltTube { spec, picture }
+}
+
+const fn integrator(file: Method) -> Integrator {
+    match file {
+        Method::SymplecticEuler => Integrator::SymplecticEuler,
+        Method::Xpbd => Integrator::Xpbd,
+        Method::ImplicitEuler => Integrator::ImplicitEuler,
+        Method::Bdf2 => Integrator::Bdf2,
+        Method::EnergyMomentum => Integrator::EnergyMomentum,
+    }
+}
+
+/// Tells where the longest step of a tube is too long for its integrator (docs/theory/rod.md, 13).
+pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, longest_s: f64) {
+    let TubeSpec { integrator, substeps, .. } = tube.spec();
+    let Some(limit_s) = tube.longest_substep_s() else { return };
+    if longest_s <= limit_s * f64::from(*substeps) {
+        return;
+    }
+    let (name, segments) = (integrator.name(), tube.segments());
+    let wanted = (longest_s / limit_s).ceil();
+    let what = format!(
+        "is `{name}`, which carries substeps of {:.3} ms here, not of {:.3} ms",
+        limit_s * 1e3,
+        longest_s * 1e3 / f64::from(*substeps)
+    );
+    let more = if wanted <= f64::from(SUBSTEPS_MAX) { format!("`substeps = {wanted}`, ") } else { String::new() };
+    let expected = format!(
+        "expected {more}a step of at most {:.3} ms, fewer than {segments} segments, or an implicit integrator",
+        limit_s * 1e3 * f64::from(*substeps)
+    );
+    c.wrong(place, "integrator", what, expected);
 }
 
 fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec3> {

@@ -79,8 +79,16 @@ pub enum End {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
+    /// Explicit, first order: for soft, coarse tubes in short substeps; refused where they are too long for it.
+    SymplecticEuler,
+    /// Compliant constraints, projected one by one: for comparison; refused where substeps are too long to bend as stiffly.
+    Xpbd,
     /// Linearly implicit Euler with one Newton step: stable at large steps, damps fast motion.
     ImplicitEuler,
+    /// Backward differences of second order: damps motion little; implicit Euler wherever the tube touches or is held.
+    Bdf2,
+    /// Keeps energy and momentum of a tube that nobody touches; implicit Euler wherever it touches or is held.
+    EnergyMomentum,
 }
 
 /// Springs along a stretch of a tube.

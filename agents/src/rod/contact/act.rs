@@ -95,6 +95,29 @@ impl TubeContacts {
         work
     }
 
+    /// Whether the skin comes near itself or a fixed solid in a substep that starts at `positions` and goes by `velocities`.
+    pub fn would_touch(&mut self, positions: &[DVec3], velocities: &[DVec3], solved: &Solved<'_>) -> bool {
+        if self.is_idle() {
+            self.contacts.clear();
+            return false;
+        }
+        let radii_m = std::mem::take(&mut self.radii_m);
+        let skin = Skin {
+            positions,
+            slots: velocities,
+            radii_m: &radii_m,
+            arc_m: &solved.division.arc_m,
+            held: solved.matter.held,
+            h_s: solved.h,
+        };
+        let found = self.find(&skin) > 0;
+        self.radii_m = radii_m;
+        if !found {
+            self.solver.forget();
+        }
+        found
+    }
+
     /// The size of each slot's inverse mass (eq. 22): a node's from its own mass, a segment's from the matrix, because what
     /// it is joined to by shear resists its turning far more than its own inertia.
     fn scale(&mut self, solved: &Solved<'_>) {

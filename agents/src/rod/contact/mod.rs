@@ -128,6 +128,11 @@ impl TubeContacts {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
+    /// Whether the last search found any contact.
+    pub fn is_touching(&self) -> bool {
+        !self.contacts.is_empty()
+    }
+
     /// Whether the tube has nothing of its own to touch.
     fn is_idle(&self) -> bool {
         self.pairs.is_none() && self.walls.is_empty()

@@ -1,6 +1,7 @@
 //! What the tube promises, against independent answers (`tests/reference/`).
 
 mod coupling;
+mod methods;
 mod motion;
 mod remesh;
 mod statics;
@@ -25,6 +26,18 @@ pub fn reference_spec(young_pa: f64, segments: usize) -> TubeSpec {
 /// The reference tube in no field, held nowhere.
 pub fn free_tube(segments: usize) -> Tube {
     Tube::new(reference_spec(1e6, segments)).unwrap()
+}
+
+/// The same by this integrator, with as many substeps as steps of `dt_ms` need, stretched three times.
+pub fn free_tube_by(integrator: Integrator, segments: usize, dt_ms: f64) -> Tube {
+    let spec = TubeSpec { integrator, ..reference_spec(1e6, segments) };
+    Tube::new(carried(spec, 3.0 * dt_ms)).unwrap()
+}
+
+/// The spec with as many substeps as steps of `dt_ms` need.
+pub fn carried(spec: TubeSpec, dt_ms: f64) -> TubeSpec {
+    let limit_s = Tube::new(spec.clone()).unwrap().longest_substep_s();
+    TubeSpec { substeps: limit_s.map_or(spec.substeps, |limit_s| (dt_ms * 1e-3 / limit_s).ceil() as u32), ..spec }
 }
 
 /// A state of `tube` moved and turned at random (a fixed sequence), strains up to date.

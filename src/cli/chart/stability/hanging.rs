@@ -5,17 +5,17 @@
 
 /// What the shape depends on.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Hanging {
+pub(in super::super) struct Hanging {
     /// Length at rest, metres.
-    pub(super) length_m: f64,
+    pub(in super::super) length_m: f64,
     /// Weight per length, N/m.
-    pub(super) weight_n_m: f64,
+    pub(in super::super) weight_n_m: f64,
     /// Stiffness of stretch, N.
-    pub(super) ea_n: f64,
+    pub(in super::super) ea_n: f64,
     /// Stiffness of shear, N.
-    pub(super) ga_n: f64,
+    pub(in super::super) ga_n: f64,
     /// Stiffness of bend, N·m².
-    pub(super) ei_n_m2: f64,
+    pub(in super::super) ei_n_m2: f64,
 }
 
 /// Steps of the integration along the tube: the shape's error is below 1e-9 of the length.
@@ -28,7 +28,7 @@ type State = [f64; 4];
 
 impl Hanging {
     /// The tip: how far to the side, and how far down, metres.
-    pub(super) fn tip_m(&self) -> (f64, f64) {
+    pub(in super::super) fn tip_m(&self) -> (f64, f64) {
         // the angle at the tip is tiny for a soft tube: its logarithm is sought
         let (mut low, mut high) = (-200.0_f64, libm::log(std::f64::consts::FRAC_PI_2));
         for _ in 0..HALVINGS {

@@ -5,7 +5,7 @@ pub(super) mod closed;
 pub(super) mod common;
 pub(super) mod drop;
 mod five;
-mod hanging;
+pub(super) mod hanging;
 pub(super) mod heavy;
 pub(super) mod impact;
 pub(super) mod incline;

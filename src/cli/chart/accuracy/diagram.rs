@@ -1,0 +1,205 @@
+//! A work-precision diagram: error against CPU time of every method of a benchmark, other engines behind, the front drawn.
+//!
+//! In: a [`Benchmark`]. Out: an experiment. Never here: what a benchmark is.
+
+use super::super::experiment::{Experiment, Finding};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::table::{Cell, Table};
+use super::front::{front, order};
+use super::peers;
+use super::play::Play;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// A question with an answer that was found in another way.
+pub(in super::super) trait Benchmark: Send + Sync + 'static {
+    /// As [`Experiment::NAME`].
+    const NAME: &'static str;
+    /// As [`Experiment::TITLE`].
+    const TITLE: &'static str;
+    /// What the error is, for the axis.
+    const ERROR: &'static str;
+
+    /// What is asked of every method.
+    fn cases(quick: bool) -> Vec<Case>;
+
+    /// Plays a case: the error, none where the tube was lost.
+    fn play(case: &Case) -> Option<(Play, f64)>;
+
+    /// Error and CPU time to reach, a line each.
+    fn goals() -> Vec<Goal>;
+}
+
+/// One run of a benchmark.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    /// Which problem of the benchmark.
+    pub(super) case: String,
+    /// Which integrator.
+    pub(super) method: String,
+    pub(super) segments: u32,
+    pub(super) dt_ms: f64,
+    /// The least number of substeps.
+    pub(super) substeps: u32,
+}
+
+/// What a method should reach.
+pub(in super::super) struct Goal {
+    pub(super) case: &'static str,
+    /// Only with so many segments; with any where it is zero.
+    pub(super) segments: u32,
+    pub(super) error: f64,
+    /// CPU milliseconds a simulated second.
+    pub(super) cpu_ms_per_s: f64,
+}
+
+/// A run with what came out.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    case: String,
+    method: String,
+    segments: u32,
+    dt_ms: f64,
+    substeps: u32,
+    substeps_per_step: f64,
+    /// Empty where the tube was lost.
+    error: Option<f64>,
+    cpu_ms_per_s: f64,
+}
+
+/// The diagram of a benchmark.
+pub(in super::super) struct Diagram<B>(PhantomData<B>);
+
+impl<B: Benchmark> Experiment for Diagram<B> {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = B::NAME;
+    const TITLE: &'static str = B::TITLE;
+
+    fn cases(quick: bool) -> Vec<Case> {
+        B::cases(quick)
+    }
+
+    fn measure(case: &Case) -> Row {
+        let played = B::play(case);
+        let cpu_ms_per_s = played.as_ref().map_or(0.0, |(play, _)| play.cpu_ms_per_s());
+        let substeps_per_step = played.as_ref().map_or(0.0, |(play, _)| play.substeps_per_step());
+        let error = played.map(|(_, error)| error).filter(|error| error.is_finite());
+        let Case { case, method, segments, dt_ms, substeps } = case.clone();
+        Row { case, method, segments, dt_ms, substeps, substeps_per_step, error, cpu_ms_per_s }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        let Row { case, method, segments, dt_ms, substeps, .. } = row.clone();
+        Case { case, method, segments, dt_ms, substeps }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let panels: Vec<Panel> = names(rows, |r| &r.case).into_iter().map(|case| panel::<B>(case, rows)).collect();
+        let columns = panels.len().clamp(1, 3);
+        Figure { title: B::TITLE.to_owned(), panels, columns }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let columns =
+            ["case", "method", "order in dt", "order in segments", "best error", "ms/s to 1e-3", "ms/s to 1e-4"];
+        let mut table = Table::new(&columns);
+        for case in names(rows, |r| &r.case) {
+            for method in names(rows, |r| &r.method) {
+                let here: Vec<&Row> = rows.iter().filter(|r| r.case == case && r.method == method).collect();
+                if here.is_empty() {
+                    continue;
+                }
+                let best = here.iter().filter_map(|r| r.error).fold(f64::INFINITY, f64::min);
+                table.rows.push(vec![
+                    case.into(),
+                    method.into(),
+                    told(dt_order(&here), 2),
+                    told(segment_order(&here), 2),
+                    (best, 6).into(),
+                    told(cheapest(here.iter().copied(), 1e-3), 3),
+                    told(cheapest(here.iter().copied(), 1e-4), 3),
+                ]);
+            }
+        }
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let finding = |goal: Goal| {
+            let Goal { case, segments, error, cpu_ms_per_s } = goal;
+            let asked = rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
+            let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
+            let claim = format!("{case}{size}: CPU ms a simulated second for an error of at most {error:e}");
+            Finding::at_most(claim, cheapest(asked, error).unwrap_or(f64::NAN), cpu_ms_per_s)
+        };
+        B::goals().into_iter().map(finding).collect()
+    }
+}
+
+/// A number in a cell, or that there is none.
+fn told(value: Option<f64>, digits: usize) -> Cell {
+    value.map_or_else(|| "–".into(), |value| (value, digits).into())
+}
+
+/// The different values of a column, in the order of the rows.
+fn names(rows: &[Row], of: fn(&Row) -> &String) -> Vec<&str> {
+    let mut list: Vec<&str> = Vec::new();
+    for row in rows {
+        if !list.contains(&of(row).as_str()) {
+            list.push(of(row));
+        }
+    }
+    list
+}
+
+/// The least cost of a run that errs by no more than `error`.
+fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64) -> Option<f64> {
+    rows.filter(|r| r.error.is_some_and(|e| e <= error)).map(|r| r.cpu_ms_per_s).min_by(f64::total_cmp)
+}
+
+/// By which power of the substep errors fall, with the most segments.
+fn dt_order(rows: &[&Row]) -> Option<f64> {
+    let most = rows.iter().map(|r| r.segments).max()?;
+    let points = rows.iter().filter(|r| r.segments == most && r.substeps_per_step > 0.0);
+    order(&points.filter_map(|r| Some((r.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
+}
+
+/// By which power of their length errors fall with segments, with the shortest substeps.
+fn segment_order(rows: &[&Row]) -> Option<f64> {
+    let least = |r: &&&Row| r.dt_ms / f64::from(r.substeps);
+    let shortest = rows.iter().map(|r| least(&r)).min_by(f64::total_cmp)?;
+    let points = rows.iter().filter(|r| least(r) == shortest);
+    order(&points.filter_map(|r| Some((1.0 / f64::from(r.segments), r.error?))).collect::<Vec<_>>())
+}
+
+/// One problem of the benchmark: methods as lines, other engines as dots, the front of all as a broken line.
+fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
+    let here = || rows.iter().filter(|r| r.case == case);
+    let ours = |method: &str| {
+        let of = here().filter(|r| r.method == method);
+        front(of.filter_map(|r| Some((r.cpu_ms_per_s, r.error?))))
+    };
+    let others: Vec<_> = peers::of(B::NAME).into_iter().filter(|peer| peer.case == case).collect();
+    let theirs = || others.iter().map(|peer| (peer.cpu_ms_per_s, peer.error));
+    let all = || here().filter_map(|r| Some((r.cpu_ms_per_s, r.error?))).chain(theirs());
+    let mut engines: Vec<&str> = others.iter().map(|peer| peer.peer.as_str()).collect();
+    engines.dedup();
+    let dots = engines.iter().enumerate().map(|(k, engine)| Layer {
+        label: (*engine).to_owned(),
+        colour: if k == 0 { Colour::Grey } else { Colour::LINES[Colour::LINES.len() - k.min(Colour::LINES.len())] },
+        mark: Mark::Dots(
+            others.iter().filter(|peer| peer.peer == *engine).map(|peer| (peer.cpu_ms_per_s, peer.error)).collect(),
+        ),
+    });
+    let lines = names(rows, |r| &r.method).into_iter().zip(Colour::LINES).map(|(method, colour)| Layer {
+        label: method.to_owned(),
+        colour,
+        mark: Mark::Line(ours(method)),
+    });
+    let best = Layer { label: "front".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(front(all())) };
+    let layers = dots.chain(lines).chain([best]).collect();
+    let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
+    let (x, y) = (Axis::log("CPU ms per simulated second", left, right), Axis::log(B::ERROR, low, high));
+    Panel { title: case.to_owned(), x, y, layers }
+}

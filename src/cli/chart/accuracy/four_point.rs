@@ -1,0 +1,53 @@
+//! Four-point bending: a beam on two supports with two loads between them, against beam theory with shear.
+
+use super::super::stability::common::dead_load;
+use super::diagram::{Benchmark, Case, Goal};
+use super::play::{Play, reference_tube};
+use glam::DVec3;
+use metachron_agents::rod::{Integrator, TubeSpec};
+
+/// The benchmark.
+pub(in super::super) struct FourPoint;
+
+/// How far the loads are from the supports, metres of 1 m.
+const PLACES: [(&str, f64); 2] = [("a = L/4", 0.25), ("a = L/8", 0.125)];
+/// Deflection in the middle, metres: what theory leaves out is its square over that of the radius, 1e-7.
+const DEFLECTION_M: f64 = 1e-5;
+const SECONDS: f64 = 4.0;
+
+impl Benchmark for FourPoint {
+    const NAME: &'static str = "four-point";
+    const TITLE: &'static str = "Four-point bending, at rest after 4 s";
+    const ERROR: &'static str = "error of the deflection / deflection";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let mut list = Vec::new();
+        for (case, _) in PLACES {
+            // while it is pulled a tube moves by implicit Euler, whichever method of second order it has
+            let method = Integrator::ImplicitEuler.name();
+            for &segments in if quick { &[8, 16][..] } else { &[8, 16, 32, 64, 128] } {
+                let (case, method) = (case.to_owned(), method.to_owned());
+                list.push(Case { case, method, segments, dt_ms: 10.0, substeps: 1 });
+            }
+        }
+        list
+    }
+
+    fn play(case: &Case) -> Option<(Play, f64)> {
+        let (_, a) = PLACES.into_iter().find(|(name, _)| *name == case.case)?;
+        let spec =
+            TubeSpec { damping_per_s: 12.0, pin: [true, true], ..reference_tube(1e7, vec![DVec3::ZERO, DVec3::X]) };
+        // P a (3 L² − 4 a²)/24 EI, and P a/GA of shear
+        let softness = a * (3.0 - 4.0 * a * a) / (24.0 * spec.section.ei_n_m2) + a / spec.section.ga_n;
+        let load = DVec3::NEG_Z * (DEFLECTION_M / softness);
+        let hands = [dead_load(a, load), dead_load(1.0 - a, load)];
+        let mut play = Play::new(spec, case)?;
+        let sound = play.run(SECONDS, &hands);
+        let error = (-play.point(0.5).z / DEFLECTION_M - 1.0).abs();
+        sound.then_some((play, error))
+    }
+
+    fn goals() -> Vec<Goal> {
+        vec![]
+    }
+}

@@ -1,0 +1,40 @@
+//! What other engines reach in the same benchmarks, measured once and kept as a table.
+//!
+//! Out: points with engine, version and variant. Measured on two cores of a shared virtual AMD EPYC, no GPU, CPU seconds;
+//! rest shapes against the reference of the same law (docs/accuracy.md). Never here: our own rows.
+
+use serde::Deserialize;
+
+const TABLE: &str = include_str!("peers.csv");
+
+/// A run of another engine.
+#[derive(Debug, Clone, Deserialize)]
+pub(super) struct Peer {
+    benchmark: String,
+    /// Which case of the benchmark.
+    pub(super) case: String,
+    /// Engine and version.
+    pub(super) peer: String,
+    /// CPU milliseconds a simulated second.
+    pub(super) cpu_ms_per_s: f64,
+    /// In the benchmark's own measure.
+    pub(super) error: f64,
+}
+
+/// The runs of a benchmark.
+pub(super) fn of(benchmark: &str) -> Vec<Peer> {
+    let rows = csv::Reader::from_reader(TABLE.as_bytes()).into_deserialize::<Peer>();
+    rows.flatten().filter(|peer| peer.benchmark == benchmark).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_row_of_the_table_is_a_point() {
+        let known = of("cantilever").len() + of("swing").len();
+        assert_eq!(known, TABLE.lines().count() - 1);
+        assert!(of("swing").iter().all(|peer| peer.cpu_ms_per_s > 0.0 && peer.error > 0.0));
+    }
+}

@@ -1,0 +1,83 @@
+//! Runs a tube alone and counts what that costs.
+//!
+//! In: a tube's numbers, its method, a step. Out: CPU time of its steps, and whatever is asked of the tube on the way.
+//! Never here: answers, errors, what is drawn.
+
+use super::diagram::Case;
+use cpu_time::ThreadTime;
+use glam::DVec3;
+use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
+use metachron_agents::{Agent, AgentId, Pull, SimSpan, SimTime, Snapshot, Surroundings};
+
+/// The tube of the references: 1 m along `path_m`, 15 mm radius, 2 mm wall.
+pub(super) fn reference_tube(young_pa: f64, path_m: Vec<DVec3>) -> TubeSpec {
+    let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
+    TubeSpec { section, mass_per_length_kg_m, ..super::super::stability::common::plain_tube(path_m, 0.015, 16) }
+}
+
+/// A tube and how it is stepped.
+pub(in super::super) struct Play {
+    pub(super) tube: Tube,
+    dt: SimSpan,
+    time: SimTime,
+    cpu_s: f64,
+    substeps: u64,
+    steps: u64,
+}
+
+impl Play {
+    /// The tube of a case; methods that cannot carry its steps whole get the substeps that they need. None where it cannot be.
+    pub(super) fn new(spec: TubeSpec, case: &Case) -> Option<Self> {
+        let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.method)?;
+        let segments = Some(case.segments as usize);
+        let mut spec = TubeSpec { integrator, segments, substeps: case.substeps, ..spec };
+        let dt = SimSpan::from_secs_f64(case.dt_ms * 1e-3)?;
+        // a tenth to spare: limits shrink with the stretch
+        let needed = |limit_s: f64| libm::ceil(1.1 * dt.as_secs_f64() / limit_s) as u32;
+        let limit_s = Tube::new(spec.clone()).ok()?.longest_substep_s();
+        spec.substeps = spec.substeps.max(limit_s.map_or(1, needed));
+        let tube = Tube::new(spec).ok()?;
+        Some(Self { tube, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps: 0, steps: 0 })
+    }
+
+    /// Goes on for `seconds` under `hands`; whether every step could be made.
+    pub(super) fn run(&mut self, seconds: f64, hands: &[Pull]) -> bool {
+        let until = self.time.as_secs_f64() + seconds - 0.5 * self.dt.as_secs_f64();
+        let start = ThreadTime::now();
+        let mut sound = true;
+        while sound && self.time.as_secs_f64() < until {
+            let around = Surroundings { hands, ..Surroundings::alone(AgentId(0), self.time) };
+            match self.tube.step(self.dt, &around) {
+                Ok(report) => self.substeps += u64::from(report.substeps),
+                Err(_) => sound = false,
+            }
+            self.time += self.dt;
+            self.steps += 1;
+        }
+        self.cpu_s += start.elapsed().as_secs_f64();
+        sound
+    }
+
+    /// The point of the tube at a share of its length, metres.
+    pub(super) fn point(&self, share: f64) -> DVec3 {
+        let mut seen = Snapshot::default();
+        self.tube.write_snapshot(&mut seen);
+        seen.body.probe(share).map_or(DVec3::NAN, |(point, _)| point)
+    }
+
+    /// CPU milliseconds a simulated second, so far.
+    pub(super) fn cpu_ms_per_s(&self) -> f64 {
+        self.cpu_s * 1e3 / self.time.as_secs_f64()
+    }
+
+    /// Substeps a step, so far.
+    pub(super) fn substeps_per_step(&self) -> f64 {
+        self.substeps as f64 / self.steps.max(1) as f64
+    }
+
+    /// How long it has gone, simulated seconds.
+    pub(super) fn time_s(&self) -> f64 {
+        self.time.as_secs_f64()
+    }
+}

@@ -1,0 +1,66 @@
+//! A cable pinned at one end and let go from the horizontal, undamped, against the trajectory that rigid links extrapolate to
+//! (tests/reference/swing_cable.json).
+
+use super::super::stability::common::GRAVITY;
+use super::diagram::{Benchmark, Case, Goal};
+use super::play::{Play, reference_tube};
+use glam::DVec3;
+use metachron_agents::rod::{Integrator, TubeSpec};
+use serde::Deserialize;
+
+/// The benchmark.
+pub(in super::super) struct Swing;
+
+/// The reference.
+#[derive(Deserialize)]
+struct Trajectory {
+    tip_xz_every_10ms: Vec<[f64; 2]>,
+}
+
+const REFERENCE: &str = include_str!("../../../../tests/reference/swing_cable.json");
+/// Stretch and shear are this much stiffer than the soft tube's: the reference has neither.
+const STIFFER: f64 = 1e3;
+/// How often the tip is compared, in the first second, every 10 ms.
+const LOOKS: usize = 100;
+
+impl Benchmark for Swing {
+    const NAME: &'static str = "swing";
+    const TITLE: &'static str = "Cable let go from the horizontal, steps of 10 ms";
+    const ERROR: &'static str = "RMS of the tip in the first second, m";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let mut list = Vec::new();
+        for integrator in [Integrator::ImplicitEuler, Integrator::Bdf2, Integrator::EnergyMomentum] {
+            for &segments in if quick { &[16][..] } else { &[16, 32, 64] } {
+                for &substeps in if quick { &[1, 4][..] } else { &[1, 2, 4, 5, 8, 16, 32] } {
+                    let (case, method) = ("cable".to_owned(), integrator.name().to_owned());
+                    list.push(Case { case, method, segments, dt_ms: 10.0, substeps });
+                }
+            }
+        }
+        list
+    }
+
+    fn play(case: &Case) -> Option<(Play, f64)> {
+        let tips = serde_json::from_str::<Trajectory>(REFERENCE).ok()?.tip_xz_every_10ms;
+        let mut spec = TubeSpec {
+            pin: [true, false],
+            gravity: DVec3::NEG_Z * GRAVITY,
+            ..reference_tube(1e6, vec![DVec3::ZERO, DVec3::X])
+        };
+        (spec.section.ea_n, spec.section.ga_n) = (spec.section.ea_n * STIFFER, spec.section.ga_n * STIFFER);
+        let mut play = Play::new(spec, case)?;
+        let mut sum = 0.0;
+        for [x, z] in tips.into_iter().skip(1).take(LOOKS) {
+            if !play.run(0.01, &[]) {
+                return None;
+            }
+            sum += play.point(1.0).distance_squared(DVec3::new(x, 0.0, z));
+        }
+        Some((play, (sum / LOOKS as f64).sqrt()))
+    }
+
+    fn goals() -> Vec<Goal> {
+        vec![Goal { case: "cable", segments: 32, error: 5e-4, cpu_ms_per_s: 6.0 }]
+    }
+}
