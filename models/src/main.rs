@@ -1,0 +1,128 @@
+//! Every order of steps of threads that meet in the runtime without waiting, and everything they may see of each other.
+//!
+//! In: the runtime's own files, over loom's primitives instead of the standard library's. Out: a line for each claim that
+//! holds; a claim that does not ends the program with the steps that break it. Never here: other copies of what is checked.
+
+extern crate self as metachron_agents;
+
+/// What the files know as the runtime's `sync`.
+mod sync {
+    pub use loom::sync::{Arc, Mutex, RwLock, atomic};
+
+    pub mod thread {
+        pub use loom::thread::{Thread, current, park};
+
+        /// A sleep that may end at any moment.
+        pub fn park_timeout(_span: std::time::Duration) {
+            loom::thread::yield_now();
+        }
+    }
+}
+
+#[path = "../../src/runtime/bell.rs"]
+#[expect(dead_code, reason = "a model uses what it needs")]
+mod bell;
+#[path = "../../src/runtime/news.rs"]
+mod news;
+#[path = "../../src/runtime/slot.rs"]
+#[expect(dead_code, reason = "a model uses what it needs")]
+mod slot;
+
+use bell::Bell;
+use loom::sync::Arc;
+use loom::sync::atomic::{AtomicU32, Ordering};
+use loom::thread;
+use news::News;
+use slot::SlotWriter;
+
+/// Stands for the agents' own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct AgentId(pub u32);
+
+fn main() {
+    check("a reader sees whole states that only rise, and the newest that was published before", slot_is_read_whole);
+    check("a state that a reader keeps is never written to", slot_keeps_what_is_held);
+    check("who takes the news of a state sees it, and no news is lost", news_come_after_the_state);
+    check("nobody sleeps through a summons", nobody_sleeps_through_a_summons);
+}
+
+/// Holds a claim against every run in which threads are stopped in the middle at most twice.
+fn check(claim: &str, model: fn()) {
+    let mut checked = loom::model::Builder::new();
+    checked.preemption_bound = Some(2);
+    checked.check(model);
+    println!("holds: {claim}");
+}
+
+/// Publishes two numbers, both the same: a torn state would have two.
+fn publish(writer: &mut SlotWriter<[u32; 2]>, value: u32) {
+    writer.fill(|state| *state = [value; 2]);
+    assert!(writer.publish(), "a cell is free");
+}
+
+fn slot_is_read_whole() {
+    let mut writer = SlotWriter::new([0; 2]);
+    let slot = writer.slot();
+    let writing = thread::spawn(move || {
+        // more than there are cells: the last ones lie where the first ones lay
+        (1..=5).for_each(|value| publish(&mut writer, value));
+    });
+    let [first, second] = [(); 2].map(|()| {
+        let [a, b] = *slot.latest();
+        assert_eq!(a, b, "torn");
+        a
+    });
+    assert!(second >= first, "{second} after {first}: a state was seen before it was published");
+    writing.join().unwrap();
+    assert_eq!(slot.latest()[0], 5);
+}
+
+fn slot_keeps_what_is_held() {
+    let mut writer = SlotWriter::new([0; 2]);
+    let slot = writer.slot();
+    let reader = thread::spawn(move || {
+        let held = slot.latest();
+        let before = *held;
+        thread::yield_now();
+        assert_eq!(*held, before);
+    });
+    (1..=3).for_each(|value| publish(&mut writer, value));
+    reader.join().unwrap();
+}
+
+fn news_come_after_the_state() {
+    let (news, state) = (Arc::new(News::new(2)), Arc::new(AtomicU32::new(0)));
+    let teller = {
+        let (news, state) = (Arc::clone(&news), Arc::clone(&state));
+        thread::spawn(move || {
+            for value in 1..=2 {
+                state.store(value, Ordering::Relaxed);
+                news.tell(AgentId(1));
+            }
+        })
+    };
+    let mut seen = 0;
+    news.take(|_| seen = state.load(Ordering::Relaxed));
+    teller.join().unwrap();
+    // whatever was missed is there now
+    news.take(|_| seen = state.load(Ordering::Relaxed));
+    assert_eq!(seen, 2);
+}
+
+fn nobody_sleeps_through_a_summons() {
+    let bell = Arc::new(Bell::new(1, 1));
+    let worker = {
+        let bell = Arc::clone(&bell);
+        thread::spawn(move || {
+            bell.enter(0);
+            let mut answered = 0;
+            while answered == 0 {
+                // without end: a summons that is lost leaves it asleep, which the checker finds
+                bell.sleep(0, None);
+                answered += bell.answer(|_| ());
+            }
+        })
+    };
+    bell.ring(AgentId(0));
+    worker.join().unwrap();
+}
