@@ -247,16 +247,14 @@ impl Island {
             // the springs' solution has the gravity of this part in its velocity already
             member.gravity = if pulled { DVec3::ZERO } else { body.gravity };
         }
-        match &mut self.solver {
-            Solver::Few(direct) => {
-                direct.advance((&mut self.members, &self.ground), &self.held, h)?;
-                if direct.is_overrun() {
-                    self.go_many();
-                }
-                Ok(())
+        if let Solver::Few(direct) = &mut self.solver {
+            if direct.advance((&mut self.members, &self.ground), &self.held, h)? {
+                return Ok(());
             }
-            Solver::Many(pile) => pile.advance((&mut self.members, &self.ground), self.gravity, h),
+            self.go_many();
         }
+        let Solver::Many(pile) = &mut self.solver else { return Ok(()) };
+        pile.advance((&mut self.members, &self.ground), self.gravity, h)
     }
 
     /// Everybody is as before the step.

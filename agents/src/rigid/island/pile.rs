@@ -52,6 +52,8 @@ const ORIGIN_MAX_M: f64 = 64.0;
 const STIFFNESS_HZ: f32 = 300.0;
 /// Damping ratio of a contact, rapier's own.
 const DAMPING_RATIO: f32 = 10.0;
+/// Contacts are foreseen over no more than this share of a body's size.
+const REACH_SHARE: f64 = 2.0;
 /// Two bodies that are nearer than this share of their size touch.
 const MARGIN_SHARE: f64 = 2e-3;
 
@@ -81,6 +83,8 @@ impl Pile {
             .can_sleep(false)
             .allow_fast_rotation(true)
             .gyroscopic_forces_enabled(true)
+            // contacts are looked for as far as a pair comes within the part: found late they are found deep
+            .soft_ccd_prediction((REACH_SHARE * member.radius_m) as f32)
             .pose(pose_about(self.origin, member.motion.position, member.motion.rotation))
             .linvel(member.motion.velocity.as_vec3())
             .angvel(member.motion.spin(&member.spread).as_vec3());

@@ -82,11 +82,6 @@ impl Direct {
         self.known.clear();
     }
 
-    /// Whether the last part had more contacts, or bodies more entangled, than this solve is for.
-    pub(super) fn is_overrun(&self) -> bool {
-        reach::is_overrun(self.near.contacts.len(), self.newton.work())
-    }
-
     /// The longest part that jointed bodies take, seconds: none turns far, and none trembles between the forces that its
     /// joints bear faster than a part can follow. Such a force F on an arm r is a stiffness F r against turning.
     pub(super) fn span_s(&self, members: &[Member]) -> f64 {
@@ -105,15 +100,19 @@ impl Direct {
         span
     }
 
-    /// Advances all members by `h` seconds.
+    /// Advances all members by `h` seconds; `false`, and nothing has moved, where there are more contacts, or bodies more
+    /// entangled, than this solve is for.
     pub(super) fn advance(
         &mut self,
         (members, ground): (&mut [Member], &[Ground]),
         held: &[Held],
         h: f64,
-    ) -> Result<(), &'static str> {
+    ) -> Result<bool, &'static str> {
         self.near.find(members, ground, h);
         joints::rows(members, held, &mut self.joints);
+        if !self.link(members.len()) {
+            return Ok(false);
+        }
         self.note_approach(members);
         self.kick(members, 0, h);
         self.travel(members, held, h);
@@ -122,7 +121,15 @@ impl Direct {
         self.arrive(members, h);
         self.note_touches(members);
         let sane = members.iter().all(|m| m.motion.is_sane(&m.spread));
-        if sane { Ok(()) } else { Err("the direct solve lost a body") }
+        if sane { Ok(true) } else { Err("the direct solve lost a body") }
+    }
+
+    /// Learns who acts on whom in this part; whether that is not too much.
+    fn link(&mut self, members: usize) -> bool {
+        let touching = self.near.contacts.iter().map(|contact| (contact.a, contact.b));
+        let jointed = self.joints.iter().map(|joint| (joint.row.a, joint.row.b));
+        self.newton.link(members, touching.chain(jointed).filter(|pair| pair.1 != NOBODY));
+        !reach::is_overrun(self.near.contacts.len(), self.newton.work())
     }
 
     /// Half a part of gravity and soft springs, at its start (0) or its end (1).
@@ -210,8 +217,6 @@ impl Direct {
             let at = self.rows.len() - 3;
             self.rows[at].bias = contact.gap_m.max(0.0) / h;
         }
-        let joined = self.rows.iter().filter(|row| row.b != NOBODY).map(|row| (row.a, row.b));
-        self.newton.link(members.len(), joined);
     }
 
     /// Measures what turning adds to the joints' errors; whether that asks for another solve.
