@@ -61,8 +61,8 @@ pub(super) struct Guest {
 const HELD_M_S2: f64 = 0.1;
 /// Bodies that come together by more than this share of the smaller one's size in a step are too fast for their clocks.
 const COARSE_SHARE: f64 = 0.05;
-/// How many steps ahead a landing is foreseen: one to be told of, one to move in.
-const FORESEEN: f64 = 2.0;
+/// How many steps ahead a landing is foreseen: one to be told of, one to move in, one that is under way meanwhile.
+const FORESEEN: f64 = 3.0;
 /// Who bounces by more than this does not stay where it lands.
 const STAYS: f64 = 0.5;
 /// The gap at which two balls touch, as a share of the radius: their distance is known to rounding.
@@ -128,11 +128,12 @@ impl Company {
         }
     }
 
-    /// Finds who will land within two steps of `dt` seconds, while something holds one of the two up: they share a world from
+    /// Finds who may land within three steps of `dt` seconds, while something holds one of the two up: they share a world from
     /// before they touch.
     ///
     /// Who takes steps as long as a good part of its own size would else be stopped by several at once, each of whom knows
-    /// nothing yet of what the others gave it, or by nobody.
+    /// nothing yet of what the others gave it, or by nobody. Whoever is held up, or is about to be, may have come to a stop by
+    /// then, though both fall alike now.
     pub(super) fn foresee(
         &mut self,
         (mover, motion): (&Mover, &Motion),
@@ -143,11 +144,16 @@ impl Company {
         let fall = Fall { gravity, spin_max: 0.0 };
         for guest in guests[..*count].iter().filter(|g| g.touchable && g.is_rigid() && g.restitution <= STAYS) {
             let Some(neighbour) = guest.other.neighbour() else { continue };
-            let coarse = guest.approach_m_s(motion.velocity) * dt > COARSE_SHARE * mover.radius_m.min(guest.radius_m);
-            let held = held || neighbour.snapshot.acceleration.distance(gravity) > HELD_M_S2;
-            if coarse && held {
-                let (free_s, closing) =
-                    guest.approach(&placed(form, motion), (mover, motion, fall), FORESEEN * dt, room);
+            let moved = neighbour.snapshot.acceleration.distance(gravity) > HELD_M_S2;
+            if !(held || moved || !neighbour.snapshot.bonds.is_empty()) {
+                continue;
+            }
+            let [mine, theirs] = [motion.velocity, guest.other.velocities()[0]];
+            let stopped = if held { mine - falling(mine, gravity) } else { mine + falling(theirs, gravity) };
+            let motion = Motion { velocity: stopped, ..*motion };
+            if guest.approach_m_s(stopped) * dt > COARSE_SHARE * mover.radius_m.min(guest.radius_m) {
+                let flight = (mover, &motion, fall);
+                let (free_s, closing) = guest.approach(&placed(form, &motion), flight, FORESEEN * dt, room);
                 if free_s < FORESEEN * dt && closing > 0.0 {
                     pairs.of(neighbour.id, guest.reduced_kg(mass_kg)).expect_contact();
                 }
@@ -221,6 +227,12 @@ impl Company {
         self.guests[..self.count].iter_mut().for_each(|guest| guest.other.go_on(h));
         self.after_s += h;
     }
+}
+
+/// The part of a velocity that goes along gravity.
+fn falling(velocity: DVec3, gravity: DVec3) -> DVec3 {
+    let down = gravity.normalize_or_zero();
+    down * velocity.dot(down).max(0.0)
 }
 
 /// The body itself, for a search.

@@ -102,7 +102,8 @@ impl RigidBody {
         self.bear();
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received != DVec3::ZERO;
-        let stands = self.stand.is_some() || self.touching;
+        let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
+        let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || told();
         let flight = (&self.world.mover, &self.motion);
         self.company.foresee(flight, (self.gravity, dt), (self.spread.mass_kg, held || stands));
         self.company.settle(around, dt, (self.gravity, held));
