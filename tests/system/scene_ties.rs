@@ -297,6 +297,7 @@ fn a_grid_that_cannot_be_says_why() {
         let p = &error.problems[0];
         let said = format!("{}; {}", p.message, p.expected);
         assert_eq!((error.problems.len(), p.text.as_str()), (1, text), "{said}");
+        assert!(scene.lines().nth(p.line - 1).is_some_and(|line| line.ends_with(text)), "line {}: {said}", p.line);
         assert!(said.contains(word), "{word} is not in {said}");
     };
     refused(

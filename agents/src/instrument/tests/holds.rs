@@ -153,3 +153,30 @@ fn a_tool_reports_the_weight_that_hangs_on_it_at_any_rates() {
         );
     }
 }
+
+#[test]
+fn what_is_not_finite_on_one_side_of_a_hold_never_reaches_the_other() {
+    for held in ALL {
+        // whose turn it is next sees what was spoilt: what is held at 0.2 s, the tool, which is faster, just after 0.25 s
+        let (mut stage, id, tool) = stage(held, (DVec3::ZERO, 0.0), DVec3::Z * 0.05, (240.0, 480.0));
+        stage.run(0.2, |_| {});
+        stage.spoil(tool, |seen| {
+            let Body::Tool(tool) = &mut seen.body else { panic!("a tool") };
+            (tool.tip, tool.velocity) = (DVec3::NAN, DVec3::INFINITY);
+        });
+        stage.run(0.2501, |stage| assert!(stage.newest(id).is_finite(), "{held:?}"));
+        stage.spoil(id, |seen| {
+            match &mut seen.body {
+                Body::Curve(curve) => curve.positions[3] = DVec3::NAN,
+                Body::Soft(soft) => soft.velocities[3] = DVec3::NAN,
+                Body::Rigid(body) => body.spin = DVec3::NAN,
+                other => panic!("{other:?}"),
+            }
+            let giver = seen.given.iter_mut().find(|account| account.with == tool).expect("it is held");
+            giver.give(Site::Whole, SimTime::ZERO, 0.0, Impulse { linear: DVec3::NAN, angular: DVec3::ZERO });
+        });
+        stage.run(0.3, |stage| {
+            assert!(stage.newest(tool).is_finite() && force_n(stage, tool).is_finite(), "{held:?}");
+        });
+    }
+}
