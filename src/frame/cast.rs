@@ -65,7 +65,7 @@ fn fair_share(cores: u32, agents: usize) -> f64 {
 }
 
 /// Share of all cores that agents together may plan with: the frame loop wants the rest.
-const ROOM: f64 = 0.75;
+pub(super) const ROOM: f64 = 0.75;
 /// Share of its period that an agent may take however many cores are idle: past it every hiccup makes it late.
 const SHARE_MAX: f64 = 0.6;
 

@@ -5,6 +5,7 @@
 //!
 //! Agents tell and are told through numbers that nobody waits for.
 
+use super::cast::ROOM;
 use crate::control::ObjectView;
 use metachron_agents::AgentId;
 use metachron_budget::adaptive::joint::{Between, Drawing, Market, Worker, temporal_error_px};
@@ -62,8 +63,6 @@ pub(super) struct Purse {
     open: bool,
 }
 
-/// The part of all cores that is shared out: past it every hiccup makes somebody late.
-const ROOM: f64 = 0.9;
 /// Pixels that an agent counts as which nobody sees: it will be seen again.
 const UNSEEN_PX: f64 = 100.0;
 /// The part of its pixels that an agent at its finest draws wrong, however slowly it moves.
@@ -90,7 +89,8 @@ impl Purse {
             let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), tally.rate_hz));
             Worker { full: period_s * tally.full(), least: tally.least, loss }
         }));
-        let capacity = ROOM * f64::from(cores) * period_s;
+        // agents' work is told with what they wait for a core: the picture's own is on top of what they may plan with
+        let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
         let settled = self.market.settle(&self.workers, capacity, drawing);
         if settled.is_some() || self.open {
             for (tally, worker) in self.tallies.iter().zip(&self.workers) {
