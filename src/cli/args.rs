@@ -2,6 +2,7 @@
 
 use super::report::Goal;
 use crate::scene::format::PolicyKind;
+use crate::scene::papers::Paper;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};
 use std::path::PathBuf;
@@ -63,6 +64,12 @@ Examples:
 
 Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
 
+const GENERATE_EXAMPLES: &str = "\
+Examples:
+  metachron generate auditorium                        the built-in scene, on standard output
+  metachron generate grove --trees 2000 --zigzag --out grove-2000.toml
+  metachron run grove-2000.toml";
+
 /// A real-time physics engine in which every object keeps its own time and the frame never waits.
 ///
 /// A scene is a TOML file of objects: soft tubes, rigid bodies, instruments. Each runs as an agent on its own clock, with its
@@ -93,6 +100,9 @@ pub enum Command {
     /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
+    /// Write a scene of the papers' experiments, with a seed and choices of its own
+    #[command(after_help = GENERATE_EXAMPLES)]
+    Generate(GenerateArgs),
     /// Print the JSON Schema of scene files
     Schema,
     /// List the built-in scenes
@@ -107,6 +117,29 @@ pub enum Command {
         /// A command, such as `run`
         command: Option<String>,
     },
+}
+
+/// `generate`.
+#[derive(Debug, Args)]
+pub struct GenerateArgs {
+    /// Which scene
+    #[arg(value_parser = PossibleValuesParser::new(Paper::ALL.map(Paper::name)))]
+    pub scene: String,
+    /// Seed of everything random in it
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=1_000_000))]
+    pub seed: u32,
+    /// Trees of the grove: 600 where this is left out
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=3000))]
+    pub trees: Option<u32>,
+    /// The way through the grove with two sudden turns, not the straight one along it
+    #[arg(long)]
+    pub zigzag: bool,
+    /// Trees of the grove without levels: what there is time for is drawn of the full mesh
+    #[arg(long)]
+    pub prefix: bool,
+    /// Write it here, not to standard output
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub out: Option<PathBuf>,
 }
 
 /// A word of `--style`.

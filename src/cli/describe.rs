@@ -32,7 +32,7 @@ pub(super) fn list(args: &ListArgs) -> anyhow::Result<Exit> {
     let text = if args.json {
         serde_json::to_string_pretty(&rows)? + "\n"
     } else {
-        rows.iter().map(|r| format!("{:<10} {}\n", r.name, r.description)).collect()
+        rows.iter().map(|r| format!("{:<11} {}\n", r.name, r.description)).collect()
     };
     data(&text)?;
     Ok(Exit::Ok)

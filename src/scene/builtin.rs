@@ -12,7 +12,7 @@ pub struct BuiltIn {
 }
 
 /// Every built-in scene; the first is the default.
-pub const ALL: [BuiltIn; 12] = [
+pub const ALL: [BuiltIn; 17] = [
     BuiltIn { name: "tube", text: include_str!("../../scenes/tube.toml") },
     BuiltIn { name: "pendulum", text: include_str!("../../scenes/pendulum.toml") },
     BuiltIn { name: "yard", text: include_str!("../../scenes/yard.toml") },
@@ -25,6 +25,11 @@ pub const ALL: [BuiltIn; 12] = [
     BuiltIn { name: "mesentery", text: include_str!("../../scenes/mesentery.toml") },
     BuiltIn { name: "organ", text: include_str!("../../scenes/organ.toml") },
     BuiltIn { name: "suture", text: include_str!("../../scenes/suture.toml") },
+    BuiltIn { name: "auditorium", text: include_str!("../../scenes/auditorium.toml") },
+    BuiltIn { name: "grove", text: include_str!("../../scenes/grove.toml") },
+    BuiltIn { name: "domes", text: include_str!("../../scenes/domes.toml") },
+    BuiltIn { name: "walkthrough", text: include_str!("../../scenes/walkthrough.toml") },
+    BuiltIn { name: "library", text: include_str!("../../scenes/library.toml") },
 ];
 
 /// Files that built-in scenes name.

@@ -110,6 +110,8 @@ pub enum Camera {
         keys: Vec<(f64, View)>,
         /// Whether it starts again.
         repeat: bool,
+        /// Whether it moves evenly between keyframes, instead of starting and stopping softly at each.
+        even: bool,
     },
 }
 
@@ -293,6 +295,16 @@ impl Scene {
 }
 
 impl Camera {
+    /// How long its path or turn takes, seconds; `None` of a still view.
+    #[must_use]
+    pub fn length_s(&self) -> Option<f64> {
+        match self {
+            Self::Still(_) => None,
+            Self::Orbit { period_s, .. } => Some(period_s.abs()),
+            Self::Path { keys, .. } => keys.last().map(|(at, _)| *at),
+        }
+    }
+
     /// The view `seconds` after the start.
     #[must_use]
     pub fn view_at(&self, seconds: f64) -> View {
@@ -304,20 +316,20 @@ impl Camera {
                 let turned = DVec3::new(cos * arm.x - sin * arm.y, sin * arm.x + cos * arm.y, arm.z);
                 View { eye_m: start.look_at_m + turned, ..*start }
             }
-            Self::Path { keys, repeat } => view_on_path(keys, *repeat, seconds),
+            Self::Path { keys, repeat, even } => view_on_path(keys, (*repeat, *even), seconds),
         }
     }
 }
 
-/// Between two keyframes the view moves by smoothstep: it starts and stops softly at each.
-fn view_on_path(keys: &[(f64, View)], repeat: bool, seconds: f64) -> View {
+/// Between two keyframes the view moves evenly, or by smoothstep: it starts and stops softly at each.
+fn view_on_path(keys: &[(f64, View)], (repeat, even): (bool, bool), seconds: f64) -> View {
     let last = keys[keys.len() - 1];
     let seconds = if repeat && last.0 > 0.0 { seconds.rem_euclid(last.0) } else { seconds };
     let right = keys.partition_point(|(at, _)| *at <= seconds);
     match (right.checked_sub(1).map(|left| keys[left]), keys.get(right)) {
         (Some((from, a)), Some((to, b))) => {
             let w = (seconds - from) / (to - from);
-            let w = w * w * (3.0 - 2.0 * w);
+            let w = if even { w } else { w * w * (3.0 - 2.0 * w) };
             View {
                 eye_m: a.eye_m.lerp(b.eye_m, w),
                 look_at_m: a.look_at_m.lerp(b.look_at_m, w),
@@ -346,12 +358,27 @@ mod tests {
 
     #[test]
     fn a_path_passes_its_keyframes_and_repeats() {
-        let camera = Camera::Path { keys: vec![(0.0, view(0.0)), (1.0, view(1.0)), (3.0, view(0.0))], repeat: true };
+        let keys = vec![(0.0, view(0.0)), (1.0, view(1.0)), (3.0, view(0.0))];
+        let camera = Camera::Path { keys, repeat: true, even: false };
         assert_eq!(camera.view_at(1.0), view(1.0));
         assert_eq!(camera.view_at(4.0), view(1.0));
         assert_eq!(camera.view_at(2.0).eye_m.x, 0.5);
-        let once = Camera::Path { keys: vec![(1.0, view(1.0)), (3.0, view(0.0))], repeat: false };
+        let once = Camera::Path { keys: vec![(1.0, view(1.0)), (3.0, view(0.0))], repeat: false, even: false };
         assert_eq!(once.view_at(0.0), view(1.0));
         assert_eq!(once.view_at(9.0), view(0.0));
+    }
+
+    #[test]
+    fn an_even_path_covers_equal_ways_in_equal_times() {
+        let keys = vec![(0.0, view(0.0)), (4.0, view(1.0))];
+        let at = |even| Camera::Path { keys: keys.clone(), repeat: false, even }.view_at(1.0).eye_m.x;
+        assert_eq!((at(true), at(false)), (0.25, 0.15625)); // smoothstep of a quarter
+    }
+
+    #[test]
+    fn a_path_is_as_long_as_its_last_keyframe_says() {
+        let keys = vec![(1.0, view(0.0)), (4.0, view(1.0))];
+        assert_eq!(Camera::Path { keys, repeat: true, even: true }.length_s(), Some(4.0));
+        assert_eq!(Camera::Still(view(0.0)).length_s(), None);
     }
 }

@@ -10,6 +10,7 @@ mod check;
 mod document;
 pub mod format;
 mod overlap;
+pub mod papers;
 mod problem;
 mod schema;
 mod source;

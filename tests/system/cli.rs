@@ -39,10 +39,25 @@ fn help_teaches_by_examples_and_exit_codes() {
 #[test]
 fn list_names_every_built_in_scene_with_what_it_shows() {
     let list = metachron(&["list"]);
-    assert_eq!((code(&list), out(&list).lines().count()), (0, 12));
-    assert!(out(&list).starts_with("tube       a soft tube"), "{}", out(&list));
+    assert_eq!((code(&list), out(&list).lines().count()), (0, 17));
+    assert!(out(&list).starts_with("tube        a soft tube"), "{}", out(&list));
     let rows: serde_json::Value = serde_json::from_slice(&metachron(&["list", "--json"]).stdout).unwrap();
     assert_eq!(rows[3]["name"], "overload");
+}
+
+#[test]
+fn generate_writes_scenes_that_load_and_refuses_what_a_scene_does_not_have() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grove.toml");
+    let file = path.to_str().unwrap();
+    let done = metachron(&["generate", "grove", "--trees", "30", "--zigzag", "--seed", "5", "--out", file]);
+    assert_eq!((code(&done), out(&done).as_str()), (0, ""));
+    let check = metachron(&["check", "--json", file]);
+    let json: serde_json::Value = serde_json::from_slice(&check.stdout).unwrap();
+    assert_eq!((code(&check), json[0]["content"]["scenery"].as_u64()), (0, Some(60)));
+    assert_eq!(code(&metachron(&["generate", "domes", "--trees", "30"])), 2);
+    assert_eq!(code(&metachron(&["generate", "grove", "--out", folder.path().to_str().unwrap()])), 2);
+    assert_eq!(out(&metachron(&["generate", "domes"])), include_str!("../../scenes/domes.toml"));
 }
 
 #[test]

@@ -3,6 +3,7 @@
 //! In: what kind, a seed, how many triangles. Out: a mesh of a size of about one metre. Never here: levels, files.
 
 use super::PrimitiveMesh;
+use super::furniture::{self, Part};
 use super::mesh::creased_mesh;
 use glam::{DVec2, DVec3};
 
@@ -19,13 +20,35 @@ pub enum Generator {
     Terrain,
     /// A theatre seat that faces +y: cushion, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
     Seat,
-    /// A rod along z from −1 to 1, a twentieth thick.
+    /// A rod along z from −1 to 1, of radius a twentieth.
     Strut,
+    /// A rod along z from −1 to 1, of radius a sixth.
+    Bar,
+    /// A table on four legs, 1.6 long along x, 0.8 wide and 0.75 high, standing on z = 0.
+    Table,
+    /// A shelf that faces −y: two sides and three boards, 1 wide and 2 high, standing on z = 0.
+    Shelf,
+    /// A door in its frame that faces −y, 1 wide and 2.1 high, standing on z = 0.
+    Door,
+    /// Five books side by side along x, their backs to −y, 0.3 wide and high, standing on z = 0.
+    Books,
 }
 
 impl Generator {
     /// All of them, in the order of their names' list.
-    pub const ALL: [Self; 6] = [Self::Sphere, Self::Torus, Self::Blob, Self::Terrain, Self::Seat, Self::Strut];
+    pub const ALL: [Self; 11] = [
+        Self::Sphere,
+        Self::Torus,
+        Self::Blob,
+        Self::Terrain,
+        Self::Seat,
+        Self::Strut,
+        Self::Bar,
+        Self::Table,
+        Self::Shelf,
+        Self::Door,
+        Self::Books,
+    ];
 
     /// The name as scenes write it.
     #[must_use]
@@ -37,6 +60,11 @@ impl Generator {
             Self::Terrain => "terrain",
             Self::Seat => "seat",
             Self::Strut => "strut",
+            Self::Bar => "bar",
+            Self::Table => "table",
+            Self::Shelf => "shelf",
+            Self::Door => "door",
+            Self::Books => "books",
         }
     }
 }
@@ -51,8 +79,13 @@ pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
         Generator::Blob => sheet.ball(side(triangles, 12), |way| way * (1.0 + 0.2 * layers(seed, way * 1.5, 2))),
         Generator::Torus => sheet.ring(triangles),
         Generator::Terrain => sheet.hills(side(triangles, 2), seed),
-        Generator::Seat => sheet.seat(side(triangles, 12 * 5)),
-        Generator::Strut => sheet.rod(triangles),
+        Generator::Strut => sheet.rod(triangles, 1.0 / 20.0),
+        Generator::Bar => sheet.rod(triangles, 1.0 / 6.0),
+        Generator::Seat => sheet.boxes(triangles, &furniture::SEAT),
+        Generator::Table => sheet.boxes(triangles, &furniture::TABLE),
+        Generator::Shelf => sheet.boxes(triangles, &furniture::SHELF),
+        Generator::Door => sheet.boxes(triangles, &furniture::DOOR),
+        Generator::Books => sheet.boxes(triangles, &furniture::BOOKS),
     }
     creased_mesh(&sheet.points, &sheet.triangles)
 }
@@ -121,13 +154,13 @@ impl Sheet {
     }
 
     /// A wall of quads and a fan at each end.
-    fn rod(&mut self, triangles: u32) {
+    fn rod(&mut self, triangles: u32, radius: f64) {
         let around = (libm::sqrt(0.5 * f64::from(triangles)) as u32).clamp(4, 96);
         let rows = (triangles.saturating_sub(2 * around)).div_ceil(2 * around).max(1);
         self.grid((around, rows), |c, r| {
             let turn = std::f64::consts::TAU * f64::from(c % around) / f64::from(around);
             let along = 2.0 * f64::from(r) / f64::from(rows) - 1.0;
-            DVec3::new(0.05 * libm::cos(turn), 0.05 * libm::sin(turn), along)
+            DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), along)
         });
         for (side, row) in [(-1.0, 0), (1.0, rows)] {
             let middle = self.points.len() as u32;
@@ -147,21 +180,15 @@ impl Sheet {
         });
     }
 
-    fn seat(&mut self, cells: u32) {
-        // centre, half extents, how round its edges are
-        let parts = [
-            ([0.0, 0.02, 0.42], [0.24, 0.24, 0.07], 0.6),
-            ([0.0, -0.26, 0.72], [0.24, 0.06, 0.28], 0.6),
-            ([-0.25, 0.0, 0.56], [0.025, 0.22, 0.03], 0.3),
-            ([0.25, 0.0, 0.56], [0.025, 0.22, 0.03], 0.3),
-            ([0.0, 0.0, 0.175], [0.05, 0.16, 0.175], 0.0),
-        ];
+    /// Boxes with edges more or less round, each of as many cells.
+    fn boxes(&mut self, triangles: u32, parts: &[Part]) {
+        let cells = side(triangles, 12 * parts.len() as u32);
         for (centre, half, round) in parts {
             let first = self.points.len();
             self.cube(cells);
             for point in &mut self.points[first..] {
                 let bulged = point.lerp(point.normalize() * 1.2, round * 0.5);
-                *point = DVec3::from(centre) + bulged * DVec3::from(half);
+                *point = DVec3::from(*centre) + bulged * DVec3::from(*half);
             }
             self.weld(first);
         }
@@ -231,7 +258,7 @@ mod tests {
         for kind in Generator::ALL {
             for wanted in [2000, 20_000] {
                 let count = generate(kind, 7, wanted).triangles.len() as f64;
-                // grids are square: one more row of a seat's 6 cells a face is a third more, less the half that chance gives
+                // grids are square: one more row of 6 cells a face is a third more, less the half that chance gives
                 let more = count / f64::from(wanted) - 1.0;
                 assert!((0.0..0.2).contains(&more), "{kind:?}: {count} of {wanted}");
             }

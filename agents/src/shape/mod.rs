@@ -4,7 +4,9 @@ mod convert;
 mod curve;
 pub(crate) mod field;
 mod foliage;
+mod furniture;
 mod generate;
+mod geodesic;
 mod grid;
 mod mesh;
 mod mesh_field;
@@ -23,6 +25,7 @@ pub(crate) use convert::{Triangles, bounds, hull_triangles, is_closed, mesh_tria
 pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
+pub use geodesic::geodesic_edges;
 pub(crate) use grid::Grid;
 pub use mesh::{creased_mesh, hull_mesh, painted_mesh};
 pub use model::{Extent, Model, Placement, proxy};

@@ -5,7 +5,7 @@
 use super::POSITION_MAX_M;
 use crate::scene::cast::{Member, Spec};
 use crate::scene::check::{Checker, Place, allowed};
-use crate::scene::format::CommonFile;
+use crate::scene::format::{CommonFile, OneOrEach};
 use glam::DVec3;
 use metachron_agents::AgentId;
 
@@ -104,7 +104,12 @@ pub(super) fn copies(
         return Copies::single();
     };
     let spacing = c.point(place, "spacing_m", spacing, SPACING_MAX_M);
-    let scatter_m = c.number_or(place, "scatter_m", (common.scatter_m, 0.0), &allowed(0.0..=SPACING_MAX_M, "m"));
+    let mut most = |value: f64| c.number(place, "scatter_m", value, &allowed(0.0..=SPACING_MAX_M, "m"));
+    let scatter_m = match common.scatter_m {
+        None => DVec3::ZERO,
+        Some(OneOrEach::One(value)) => DVec3::splat(most(value)),
+        Some(OneOrEach::Each(values)) => DVec3::from(values.map(most)),
+    };
     let seed = u64::from(common.scatter_seed.unwrap_or(0));
     let [rise_x, rise_y] = common.rise_m.unwrap_or_default();
     let rise = c.point(place, "rise_m", [rise_x, rise_y, 0.0], SPACING_MAX_M);

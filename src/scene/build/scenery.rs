@@ -11,7 +11,10 @@ use crate::scene::cast::{Look, Scenery};
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{GeneratorKind, Material, MeshFile, Point, TreeFile, TreeLod};
 use crate::scene::source::Source;
-use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, generate, painted_mesh, tree};
+use glam::{DQuat, DVec3};
+use metachron_agents::shape::{
+    Generator, Model, Placement, Tom, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
+};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -28,7 +31,7 @@ const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
 /// Meshes that were made, by what they were made from: equal ones are one.
-type Made = BTreeMap<(String, u32, Option<u32>), Arc<Tom>>;
+type Made = BTreeMap<(String, u32, [Option<u32>; 2]), Arc<Tom>>;
 
 /// Reads every mesh and tree.
 pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
@@ -67,6 +70,9 @@ pub(super) fn mesh_model(
     file: &MeshFile,
     source: &Source,
 ) -> Option<(Arc<Tom>, Placement)> {
+    if file.dome_m.is_some() {
+        c.wrong(place, "dome_m", "makes many of one proxy", "expected a single mesh");
+    }
     mesh_of(c, place, file, (source, &mut Made::new()))
 }
 
@@ -78,6 +84,8 @@ fn mesh_of(
 ) -> Option<(Arc<Tom>, Placement)> {
     let count = |n: u32| f64::from(n);
     let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
+    let least =
+        file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), &allowed(1.0..=1e6, "")) as u32);
     let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
     let at = Placement { scale, ..placement(c, place, (file.position_m, file.rotation_deg)) };
     if file.seed.is_some() && file.generate.is_none() {
@@ -95,7 +103,7 @@ fn mesh_of(
             return None;
         }
     };
-    let key = (made_from, file.seed.unwrap_or(0), triangles);
+    let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
     if let Some(tom) = made.get(&key) {
         return Some((Arc::clone(tom), at));
     }
@@ -107,7 +115,11 @@ fn mesh_of(
     match made_now {
         Ok(tom) => {
             let wanted = triangles.or(file.generate.map(|_| TRIANGLES_DEFAULT));
-            let tom = Arc::new(wanted.map_or(tom.clone(), |n| tom.truncated(n)));
+            let tom = match wanted {
+                Some(most) => tom.truncated(most),
+                None => tom,
+            };
+            let tom = Arc::new(tom.no_coarser(least.unwrap_or(0)));
             made.insert(key, Arc::clone(&tom));
             Some((tom, at))
         }
@@ -132,6 +144,11 @@ const fn generator(kind: GeneratorKind) -> Generator {
         GeneratorKind::Terrain => Generator::Terrain,
         GeneratorKind::Seat => Generator::Seat,
         GeneratorKind::Strut => Generator::Strut,
+        GeneratorKind::Bar => Generator::Bar,
+        GeneratorKind::Table => Generator::Table,
+        GeneratorKind::Shelf => Generator::Shelf,
+        GeneratorKind::Door => Generator::Door,
+        GeneratorKind::Books => Generator::Books,
     }
 }
 
@@ -142,7 +159,7 @@ fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<P
 }
 
 /// One copy's parts, each with what its name ends in.
-pub(super) type Parts = Vec<(&'static str, Scenery)>;
+pub(super) type Parts = Vec<(String, Scenery)>;
 
 /// Reads what scenery has no use for, for its own sake: it has no steps, but a wrong rate is still wrong.
 fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
@@ -153,9 +170,16 @@ fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
 fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&Source, &mut Made)) -> Parts {
     read_besides(c, entry);
     let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
-    let found = mesh_of(c, &entry.place, file, from);
-    let part = |(tom, at)| ("", Scenery { name: String::new(), model: Model::Mesh(tom), at, look, texture: None });
-    found.map(part).into_iter().collect()
+    if file.dome_m.is_some() && file.scale.is_some() {
+        c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
+    }
+    let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
+    let Some((tom, at)) = mesh_of(c, &entry.place, file, from) else { return Parts::new() };
+    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&tom)), at, look, texture: None };
+    match dome {
+        None => vec![(String::new(), part(at))],
+        Some(radius_m) => dome_places(at, radius_m).enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect(),
+    }
 }
 
 fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
@@ -186,5 +210,17 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     let at = placement(c, place, (file.position_m, file.rotation_deg));
     let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
     let part = |model, look| Scenery { name: String::new(), model, at, look, texture: None };
-    vec![("", part(trunk, bark)), (".leaves", part(crown, leaf))]
+    vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]
+}
+
+/// Along every edge of a ball of triangles about `at`: what reaches from −1 to 1 on its z axis reaches from end to end.
+fn dome_places(at: Placement, radius_m: f64) -> impl Iterator<Item = Placement> {
+    geodesic_edges().into_iter().map(move |[a, b]| {
+        let along = b - a;
+        Placement {
+            position: at.position + at.rotation * (0.5 * radius_m * (a + b)),
+            rotation: at.rotation * DQuat::from_rotation_arc(DVec3::Z, along.normalize()),
+            scale: 0.5 * radius_m * along.length(),
+        }
+    })
 }

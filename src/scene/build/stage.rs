@@ -79,10 +79,13 @@ pub(in crate::scene) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile
                 c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes alone");
             }
         }
-        return camera_path(c, &place, keys, (fov_deg, file.repeat.unwrap_or(false)));
+        let keys = camera_keys(c, &place, keys, fov_deg)?;
+        return Some(Camera::Path { keys, repeat: file.repeat.unwrap_or(false), even: file.even.unwrap_or(false) });
     }
-    if file.repeat.is_some() {
-        c.wrong(&place, "repeat", "has no path to repeat", "expected `[[camera.keyframe]]` tables beside it");
+    for (key, given) in [("repeat", file.repeat.is_some()), ("even", file.even.is_some())] {
+        if given {
+            c.wrong(&place, key, "has no path to act on", "expected `[[camera.keyframe]]` tables beside it");
+        }
     }
     let Some(eye) = file.eye_m else {
         c.wrong(&place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
@@ -110,12 +113,13 @@ fn view(c: &mut Checker<'_, '_>, place: &Place, (eye, look_at): ([f64; 3], [f64;
     View { eye_m, look_at_m, fov_deg }
 }
 
-fn camera_path(
+/// The views of a path, each with its time.
+fn camera_keys(
     c: &mut Checker<'_, '_>,
     place: &Place,
     files: &[CameraKeyFile],
-    (fov_deg, repeat): (f64, bool),
-) -> Option<Camera> {
+    fov_deg: f64,
+) -> Option<Vec<(f64, View)>> {
     if !(2..=KEYFRAMES_MAX).contains(&files.len()) {
         c.wrong(
             place,
@@ -136,7 +140,7 @@ fn camera_path(
         }
         keys.push((at_s, view(c, &place, (file.eye_m, file.look_at_m), fov)));
     }
-    Some(Camera::Path { keys, repeat })
+    Some(keys)
 }
 
 /// What the scene says of the declared machine.

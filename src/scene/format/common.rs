@@ -1,6 +1,6 @@
 //! The keys that objects of every model share.
 
-use super::{FaultsFile, OneOrRange, Point, ShadingKind};
+use super::{FaultsFile, OneOrEach, OneOrRange, Point, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -63,8 +63,8 @@ pub struct CommonFile {
     #[schemars(length(min = 2, max = 2))]
     pub rise_m: Option<[f64; 2]>,
     /// Moves every object of the grid by a random distance along each axis, evenly up to this far either way, metres,
-    /// 0 … 1e4. Default 0.
-    pub scatter_m: Option<f64>,
+    /// 0 … 1e4; one number, or one an axis: `[x, y, z]`. Default 0.
+    pub scatter_m: Option<OneOrEach>,
     /// Seed of the random distances. Default 0.
     pub scatter_seed: Option<u32>,
 }

@@ -28,7 +28,7 @@ pub use scenery::{GeneratorKind, GroupFile, MeshFile, ShadingKind, TreeFile, Tre
 pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
-pub use value::{OneOrRange, Point};
+pub use value::{OneOrEach, OneOrRange, Point};
 
 /// The models an object can have, as scenes write them.
 pub const MODELS: [&str; 9] = ["tube", "rigid", "sheet", "solid", "rope", "instrument", "synthetic", "mesh", "tree"];

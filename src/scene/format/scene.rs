@@ -221,6 +221,8 @@ pub struct CameraFile {
     pub keyframe: Option<Vec<CameraKeyFile>>,
     /// Whether the path starts again. Default false.
     pub repeat: Option<bool>,
+    /// Whether it moves evenly from keyframe to keyframe, instead of starting and stopping softly at each. Default false.
+    pub even: Option<bool>,
 }
 
 /// Where the camera is at one time.

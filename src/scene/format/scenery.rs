@@ -19,6 +19,9 @@ pub struct MeshFile {
     /// generated, all where it is a file.
     #[schemars(range(min = 4, max = 1_000_000))]
     pub triangles: Option<u32>,
+    /// The fewest triangles that it is drawn with, 1 … 1000000: all where it has fewer. Default: as few as it can be cut to.
+    #[schemars(range(min = 1, max = 1_000_000))]
+    pub least_triangles: Option<u32>,
     /// What coordinates are multiplied by to be metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
     /// Where the mesh's axes start, metres. Default the origin.
@@ -30,6 +33,9 @@ pub struct MeshFile {
     pub texture: Option<String>,
     /// Metres of one repeat of `texture`, 0.001 … 1000. Default 1.
     pub texture_m: Option<f64>,
+    /// Makes a dome of it: 120 of them along the edges of a ball of triangles of this radius, metres, 0.001 … 1e4, each from −1 to 1
+    /// on its z axis; their names are `NAME-0` … `NAME-119`. Not with `scale`, nor of a proxy.
+    pub dome_m: Option<f64>,
 }
 
 /// A tree of boughs and leaves: two things to draw, `NAME` and `NAME.leaves`, from points and lines up to triangles.
@@ -91,8 +97,18 @@ pub enum GeneratorKind {
     Terrain,
     /// A theatre seat that faces +y, 1 high.
     Seat,
-    /// A rod along z from −1 to 1, a twentieth thick.
+    /// A rod along z from −1 to 1, of radius a twentieth.
     Strut,
+    /// A rod along z from −1 to 1, of radius a sixth.
+    Bar,
+    /// A table, 1.6 long, 0.8 wide and 0.75 high.
+    Table,
+    /// A shelf that faces −y, 1 wide and 2 high.
+    Shelf,
+    /// A door that faces −y, 1 wide and 2.1 high.
+    Door,
+    /// Five books side by side, 0.3 wide and high.
+    Books,
 }
 
 /// What a tree looks like from afar.

@@ -19,6 +19,16 @@ pub enum OneOrRange<T> {
     Range([T; 2]),
 }
 
+/// One number for all axes, or `[x, y, z]`.
+#[derive(Debug, Clone, Copy, PartialEq, Deserialize, JsonSchema)]
+#[serde(untagged, expecting = "expected a number, or one an axis: [x, y, z]")]
+pub enum OneOrEach {
+    /// The same along every axis.
+    One(f64),
+    /// Along x, y and z.
+    Each(Point),
+}
+
 impl<T: Copy> OneOrRange<T> {
     /// The least and the greatest value.
     #[must_use]

@@ -76,6 +76,13 @@ impl Tom {
         self
     }
 
+    /// The same mesh without the cuts that are coarser than the one of at most `triangles`.
+    #[must_use]
+    pub fn no_coarser(mut self, triangles: u32) -> Self {
+        self.least = self.cut(triangles).triangles;
+        self
+    }
+
     /// The vertices, in the order in which cuts use them.
     #[must_use]
     pub fn vertices(&self) -> &[PrimitiveVertex] {

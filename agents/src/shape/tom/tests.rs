@@ -263,3 +263,11 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn cuts_below_the_floor_are_the_floor() {
+    let tom = Tom::new(&generate(Generator::Bar, 0, 24)).unwrap().no_coarser(4);
+    assert_eq!(tom.range(), (4, 24));
+    assert_eq!(tom.cut(0).triangles, 4);
+    assert_eq!(tom.clone().no_coarser(2).range(), (4, 24));
+}

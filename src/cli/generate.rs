@@ -1,0 +1,39 @@
+//! `generate`: writes a scene of the papers' experiments.
+//!
+//! In: which one, and what of it is chosen. Out: TOML on standard output or in a file. Never here: what is in a scene.
+
+use super::Exit;
+use super::args::GenerateArgs;
+use super::output::{BadInput, data, message};
+use crate::scene::papers::{Choices, Paper};
+use anyhow::Context;
+
+/// Writes the scene.
+pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
+    let named = |paper: &Paper| paper.name() == args.scene;
+    let paper = Paper::ALL.into_iter().find(named).with_context(|| format!("there is no scene {}", args.scene))?;
+    refuse_strays(args, paper)?;
+    let usual = Choices::default();
+    let trees = args.trees.unwrap_or(usual.trees);
+    let text = paper.text(&Choices { seed: args.seed, trees, zigzag: args.zigzag, prefix: args.prefix });
+    match &args.out {
+        None => data(&text)?,
+        Some(path) => {
+            let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
+            std::fs::write(path, text).map_err(refused)?;
+            message(&format!("scene: {}", path.display()));
+        }
+    }
+    Ok(Exit::Ok)
+}
+
+/// Only the grove has trees and two ways.
+fn refuse_strays(args: &GenerateArgs, paper: Paper) -> Result<(), BadInput> {
+    let given = [("--trees", args.trees.is_some()), ("--zigzag", args.zigzag), ("--prefix", args.prefix)];
+    match given.iter().find(|(_, given)| *given) {
+        Some((flag, _)) if paper != Paper::Grove => {
+            Err(BadInput(format!("{flag} is for the grove; {} has nothing of the kind", paper.name())))
+        }
+        _ => Ok(()),
+    }
+}
