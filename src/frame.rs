@@ -19,6 +19,7 @@ mod session;
 mod ties;
 mod trace;
 mod tuning;
+mod walk;
 mod window;
 
 pub use couplings::Coupling;
@@ -30,4 +31,5 @@ pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
 pub use push::{After, Pushes, push};
 pub use session::{Finished, Session};
 pub use trace::Trace;
+pub use walk::Walk;
 pub use window::{FRAMES_KEPT, GoOn, WindowFailure, WindowPlan, play_in_window};

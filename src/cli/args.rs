@@ -60,6 +60,7 @@ Examples:
   metachron chart stability                            every experiment, into the folder charts/
   metachron chart stability --quick --only tube-map --out /tmp/charts
   metachron chart coupling --quick
+  metachron chart policies --live --only auditorium    the paper's walk on this adapter
   metachron chart stability --json -q | jq '.experiments[].findings'
 
 Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
@@ -293,6 +294,9 @@ pub struct ChartArgs {
     /// A small part of the cases, or shorter runs: minutes become seconds
     #[arg(long)]
     pub quick: bool,
+    /// Policies: on the adapter present, through the renderer, instead of a declared machine
+    #[arg(long)]
+    pub live: bool,
     /// Only this experiment; may be repeated
     #[arg(long, value_name = "NAME")]
     pub only: Vec<String>,

@@ -6,7 +6,7 @@
 use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
 use super::session::{Finished, Session};
-use crate::compositor::{Offscreen, RendererOptions, Size, Style};
+use crate::compositor::{Camera, Offscreen, RendererOptions, Size, Style};
 use crate::runtime::Drive;
 use std::path::PathBuf;
 use std::time::Duration;
@@ -96,13 +96,23 @@ pub(super) fn one_frame(
     drawing: &mut Drawing,
     skip: bool,
 ) -> Result<FrameRecord, SessionError> {
-    let started = session.now();
     let camera = session.scene_camera();
     let camera = session.ahead(camera);
-    session.compose(&camera, size, style, None);
+    frame_seen_by(session, &camera, (size, style), (drawing, skip))
+}
+
+/// The same, as another camera than the scene's own sees it.
+pub(super) fn frame_seen_by(
+    session: &mut Session,
+    camera: &Camera,
+    (size, style): (Size, Style),
+    (drawing, skip): (&mut Drawing, bool),
+) -> Result<FrameRecord, SessionError> {
+    let started = session.now();
+    session.compose(camera, size, style, None);
     let composed = session.now();
     let gpu = match drawing {
-        Drawing::Every(screen) => screen.render(session.picture(), &camera).map_err(SessionError::Draw)?.gpu,
+        Drawing::Every(screen) => screen.render(session.picture(), camera).map_err(SessionError::Draw)?.gpu,
         Drawing::Last(_) | Drawing::Nothing => {
             session.spend_declared(size);
             None

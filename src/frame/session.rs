@@ -276,7 +276,13 @@ impl Session {
     /// The scene's own camera at this moment.
     #[must_use]
     pub fn scene_camera(&self) -> Camera {
-        cast::camera(&self.scene, &self.stage, self.sim_now().as_secs_f64())
+        self.camera_at(self.sim_now().as_secs_f64())
+    }
+
+    /// The scene's own camera so many seconds after the start.
+    #[must_use]
+    pub fn camera_at(&self, seconds: f64) -> Camera {
+        cast::camera(&self.scene, &self.stage, seconds)
     }
 
     /// Where a camera that is read now will be when the picture begun now is finished; where the scene asks for no lag, where it is.

@@ -34,6 +34,33 @@ fn every_limit_of_the_closed_loop_is_kept() {
 }
 
 #[test]
+fn live_policies_are_drawn_and_held_against_full_detail() {
+    if let Err(error) = metachron::compositor::Gpu::headless() {
+        assert!(std::env::var("METACHRON_REQUIRE_ADAPTER").is_err(), "{error}");
+        return eprintln!("live chart skipped: {error}");
+    }
+    let out = tempfile::tempdir().unwrap();
+    let folder = out.path().to_str().unwrap();
+    let done =
+        metachron(&["chart", "policies", "--live", "--quick", "--json", "-q", "--only", "library", "--out", folder]);
+    assert_eq!(done.status.code(), Some(0), "{}", String::from_utf8_lossy(&done.stderr));
+    let json: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let rows = json["experiments"][0]["table"].as_array().unwrap();
+    let of = |policy: &str, column: &str| {
+        let row = rows.iter().find(|row| row["policy"] == policy).unwrap();
+        row[column].as_f64().unwrap_or_else(|| panic!("{column} of {row:#}"))
+    };
+    // full detail is like itself, takes the target it gave so many times over, and nobody draws more
+    assert!((of("full", "ssim") - 1.0).abs() < 1e-9 && (of("full", "mean") - 2.5).abs() < 1e-6);
+    for policy in ["threshold", "greedy", "adaptive"] {
+        assert!((0.2..1.0 + 1e-9).contains(&of(policy, "ssim_least")), "{policy}: {}", of(policy, "ssim_least"));
+        assert!(of(policy, "triangles") <= of("full", "triangles") + 1e-9, "{policy}");
+        assert_eq!(of(policy, "holes"), 0.0, "{policy}");
+    }
+    assert!(out.path().join("policies-live-library.svg").exists());
+}
+
+#[test]
 fn every_limit_of_groves_meshes_and_bounds_is_kept() {
     let of = quick(&["grove", "domes", "library", "walkthrough", "values", "bound"]);
     holds(&of("grove"), 3);

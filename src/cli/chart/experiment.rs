@@ -4,6 +4,7 @@
 
 use super::figure::Figure;
 use super::table::Table;
+use crate::compositor::PictureFile;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
@@ -19,10 +20,13 @@ pub(in crate::cli) trait Experiment: Sync {
     /// What it shows, in one sentence.
     const TITLE: &'static str;
 
+    /// Whether cases are measured one at a time, because they are about the time that this machine takes.
+    const ALONE: bool = false;
+
     /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
     fn cases(quick: bool) -> Vec<Self::Case>;
 
-    /// Measures one case. The same case gives the same row, whoever measures it and when.
+    /// Measures one case. The same case gives the same row, whoever measures it and when, but for times of this machine.
     fn measure(case: &Self::Case) -> Self::Row;
 
     /// The case that a row is of.
@@ -30,6 +34,11 @@ pub(in crate::cli) trait Experiment: Sync {
 
     /// The picture of the rows there are.
     fn figure(rows: &[Self::Row]) -> Figure;
+
+    /// Pictures that show more than the figure tells, each with the end of its file's name.
+    fn pictures(_: &[Self::Row]) -> Vec<(String, PictureFile)> {
+        Vec::new()
+    }
 
     /// The table that is printed.
     fn table(rows: &[Self::Row]) -> Table;

@@ -20,9 +20,11 @@ use super::Exit;
 use super::args::{ChartArgs, Subject};
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
+use crate::compositor::{Gpu, PictureFile};
 use accuracy::diagram::Diagram;
 use anyhow::Context;
 use experiment::Finding;
+use policies::live::Live;
 use rows::RowFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -100,14 +102,31 @@ const POLICIES: &[Entry] = &[
     entry::<policies::bound::Bound>(),
 ];
 
+const POLICIES_LIVE: &[Entry] = &[
+    entry::<Live<0>>(),
+    entry::<Live<1>>(),
+    entry::<Live<2>>(),
+    entry::<Live<3>>(),
+    entry::<Live<4>>(),
+    entry::<policies::live::views::Views>(),
+    entry::<policies::live::prediction::Prediction>(),
+    entry::<policies::live::traversal::Traversal>(),
+];
+
 /// Runs the experiments of a subject.
 pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
-    let (subject, all) = match args.subject {
-        Subject::Accuracy => ("accuracy", ACCURACY),
-        Subject::Stability => ("stability", STABILITY),
-        Subject::Coupling => ("coupling", COUPLING),
-        Subject::Policies => ("policies", POLICIES),
+    let (subject, all) = match (args.subject, args.live) {
+        (Subject::Accuracy, false) => ("accuracy", ACCURACY),
+        (Subject::Stability, false) => ("stability", STABILITY),
+        (Subject::Coupling, false) => ("coupling", COUPLING),
+        (Subject::Policies, false) => ("policies", POLICIES),
+        (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
+        _ => return Err(BadInput("--live is for policies: nothing else is drawn".to_owned()).into()),
     };
+    if args.live {
+        // better known before the first experiment than by its rows
+        Gpu::headless()?;
+    }
     let chosen = chosen(all, &args.only)?;
     let folder = prepared(&args.out)?;
     let stopped = stopper()?;
@@ -185,6 +204,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     let mut files = vec![setting.folder.join(format!("{stem}.csv"))];
     if swept.complete {
         files.extend(drawn::<E>(setting.folder, &stem, &swept.rows)?);
+        files.extend(pictured::<E>(setting.folder, &stem, &swept.rows)?);
     }
     Ok(Done {
         name: E::NAME,
@@ -212,6 +232,16 @@ fn drawn<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::R
         std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
     }
     Ok(paths)
+}
+
+/// Writes the pictures beside the figure.
+fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<Vec<PathBuf>> {
+    let write = |(name, picture): (String, PictureFile)| {
+        let path = folder.join(format!("{stem}-{name}.png"));
+        let written = picture.save(&path).with_context(|| format!("{} cannot be written", path.display()));
+        written.map(|()| path)
+    };
+    E::pictures(rows).into_iter().map(write).collect()
 }
 
 /// An experiment's table, findings and files as text.

@@ -1,4 +1,4 @@
-//! Measures the cases of an experiment on all cores.
+//! Measures the cases of an experiment, on all cores where they are not about time.
 //!
 //! In: cases, rows that are there already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
 //! as it is measured. Which core measures which case is chance; what comes out is not. Never here: what is measured.
@@ -52,7 +52,8 @@ pub(super) fn sweep<E: Experiment>(
     };
     thread::scope(|scope| -> anyhow::Result<()> {
         let (out, rows_in) = mpsc::channel();
-        for number in 0..cores().min(open.len()) {
+        let workers = if E::ALONE { 1 } else { cores() };
+        for number in 0..workers.min(open.len()) {
             let (out, work) = (out.clone(), &work);
             let name = format!("sweep-{number}");
             thread::Builder::new().name(name).spawn_scoped(scope, move || work(out)).context("no thread to be had")?;

@@ -1,4 +1,4 @@
-//! `chart policies`: the papers' experiments on frame budgets, as models in numbers: every policy before the same frames.
+//! `chart policies`: the papers' experiments on frame budgets, in numbers on a declared machine, and live.
 
 pub(super) mod auditorium;
 pub(super) mod bound;
@@ -13,6 +13,7 @@ mod geodesic;
 pub(super) mod grove;
 mod hall;
 pub(super) mod library;
+pub(super) mod live;
 mod machine;
 mod metrics;
 mod scene;

@@ -1,0 +1,157 @@
+//! How well prices foretell what pictures take that they were not fitted to (FS93, fig. 3).
+//!
+//! In: a scene. Out: predicted and measured times of pictures at chance places of its path, under chance targets. The prices are those of
+//! the adapter's benchmark, which draws none of these objects; nothing is learnt on the way.
+
+use super::super::super::experiment::{Experiment, Finding, worst};
+use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::super::table::Table;
+use super::super::machine::Noise;
+use super::walk;
+use crate::scene::papers::Paper;
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(in super::super::super) struct Prediction;
+
+/// Pictures of a scene, and of the quick run.
+const PICTURES: [usize; 2] = [60, 8];
+/// Targets go from one that nothing fits to one that everything does, seconds, by equal factors.
+const TARGETS_S: (f64, f64) = (4e-3, 0.3);
+/// Predictions are to be within this at 19 of 20 pictures (FS93, §4).
+const WANTED: f64 = 0.1;
+const SEED: u64 = 3;
+
+/// A scene and how many pictures of it.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super::super) struct Case {
+    scene: String,
+    pictures: usize,
+}
+
+/// What the pictures of a scene took, and were to take.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(in super::super::super) struct Row {
+    scene: String,
+    adapter: String,
+    pictures: usize,
+    /// |predicted − measured| over measured: the mean, and what 19 of 20 pictures are within.
+    error: f64,
+    error95: f64,
+    /// The same, had all predictions been multiplied by the factor that fits them best: what a κ that is learnt leaves.
+    scaled_error95: f64,
+    factor: f64,
+    /// Predicted and measured, milliseconds, with a colon between the two and spaces between pictures.
+    pairs: String,
+}
+
+impl Row {
+    fn of(case: &Case, adapter: String, pairs: &[(f64, f64)]) -> Self {
+        let factor = quantile(pairs.iter().map(|(told, took)| took / told).collect(), 0.5);
+        let errors = |by: f64| pairs.iter().map(|(told, took)| (by * told / took - 1.0).abs()).collect::<Vec<_>>();
+        let plain = errors(1.0);
+        Self {
+            scene: case.scene.clone(),
+            adapter,
+            pictures: case.pictures,
+            error: plain.iter().sum::<f64>() / plain.len() as f64,
+            error95: quantile(plain, 0.95),
+            scaled_error95: quantile(errors(factor), 0.95),
+            factor,
+            pairs: pairs.iter().map(|(told, took)| format!("{told:.3}:{took:.3}")).collect::<Vec<_>>().join(" "),
+        }
+    }
+
+    fn pairs(&self) -> Vec<(f64, f64)> {
+        let pair = |text: &str| text.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+        self.pairs.split(' ').filter_map(pair).collect()
+    }
+}
+
+fn quantile(mut all: Vec<f64>, part: f64) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get((part * all.len() as f64) as usize).copied().unwrap_or(f64::NAN)
+}
+
+impl Experiment for Prediction {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "prediction";
+    const TITLE: &'static str = "what pictures were to take by the adapter's prices, and took";
+    const ALONE: bool = true;
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let pictures = PICTURES[usize::from(quick)];
+        Paper::ALL.map(|paper| Case { scene: paper.name().to_owned(), pictures }).to_vec()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let mut noise = Noise::new(SEED);
+        let (low, high) = TARGETS_S;
+        let mut places = || (noise.uniform(), low * libm::pow(high / low, noise.uniform()));
+        let asked: Vec<_> = (0..case.pictures).map(|_| places()).collect();
+        let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
+        let told = paper.and_then(|paper| walk::predicted(paper, &asked).ok());
+        let (adapter, pairs) = told.unwrap_or_default();
+        Row::of(case, adapter, &pairs)
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { scene: row.scene.clone(), pictures: row.pictures }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let adapter = rows.first().map_or("", |row| &row.adapter);
+        let (low, high) = span(rows.iter().flat_map(Row::pairs).flat_map(|(told, took)| [told, took]), true);
+        let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
+        let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
+        let mut layers =
+            vec![grey("as told, and ten per cent off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
+        layers.extend(rows.iter().zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
+            label: row.scene.clone(),
+            colour,
+            mark: Mark::Dots(row.pairs()),
+        }));
+        let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
+        let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
+        Figure { title: title.clone(), panels: vec![Panel { title, x, y, layers }], columns: 1 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["scene", "pictures", "error", "error95", "factor", "scaled_error95"]);
+        table.rows.extend(rows.iter().map(|r| {
+            vec![
+                r.scene.clone().into(),
+                (r.pictures as f64, 0).into(),
+                (r.error, 3).into(),
+                (r.error95, 3).into(),
+                (r.factor, 3).into(),
+                (r.scaled_error95, 3).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let all = |of: fn(&Row) -> f64| worst(rows.iter().map(of));
+        vec![
+            Finding::at_most("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
+            Finding::at_most("the same with one factor a scene", all(|r| r.scaled_error95), WANTED),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_that_is_a_third_slower_than_its_prices_is_told_from_one_that_errs() {
+        let case = Case { scene: String::new(), pictures: 40 };
+        let pairs: Vec<_> = (1..=40).map(|k| (f64::from(k), f64::from(k) * if k == 7 { 2.0 } else { 1.5 })).collect();
+        let row = Row::of(&case, String::new(), &pairs);
+        assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
+        assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");
+        assert_eq!(row.pairs().len(), 40);
+    }
+}

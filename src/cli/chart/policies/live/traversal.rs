@@ -1,0 +1,102 @@
+//! How fast meshes of any resolution are gone through, by resolution (GB99): the indices of a cut are found in time that goes with its
+//! triangles.
+//!
+//! In: a mesh of 100,000 triangles. Out: triangles a second at every part of them. Never here: drawing.
+
+use super::super::super::experiment::{Experiment, Finding, worst};
+use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::super::table::Table;
+use metachron_agents::shape::{Generator, Tom, generate};
+use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
+use std::time::Instant;
+
+/// The experiment.
+pub(in super::super::super) struct Traversal;
+
+const TRIANGLES: u32 = 100_000;
+/// Resolutions are halved so often.
+const HALVINGS: u32 = 10;
+/// Each cut is gone through so often; the least time counts.
+const ROUNDS: usize = 15;
+
+/// Triangles of a cut.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in super::super::super) struct Case(u32);
+
+/// A cut and its time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(in super::super::super) struct Row {
+    asked: u32,
+    triangles: u32,
+    /// The least time of some rounds, microseconds.
+    micros: f64,
+    /// Millions of triangles a second.
+    rate: f64,
+}
+
+fn mesh() -> Option<&'static Tom> {
+    static MESH: OnceLock<Option<Tom>> = OnceLock::new();
+    MESH.get_or_init(|| Tom::new(&generate(Generator::Blob, 1, TRIANGLES)).ok()).as_ref()
+}
+
+impl Experiment for Traversal {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "traversal";
+    const TITLE: &'static str = "how fast the triangles of a cut are found, by resolution";
+    const ALONE: bool = true;
+
+    fn cases(_: bool) -> Vec<Case> {
+        (0..=HALVINGS).rev().map(|k| Case(TRIANGLES >> k)).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let (mut corners, mut least, mut triangles) = (Vec::new(), f64::INFINITY, 0);
+        for _ in 0..ROUNDS {
+            let Some(tom) = mesh() else { break };
+            corners.clear();
+            let started = Instant::now();
+            let cut = tom.cut(case.0);
+            tom.resolve(cut, &mut corners);
+            least = least.min(started.elapsed().as_secs_f64());
+            triangles = cut.triangles;
+        }
+        Row { asked: case.0, triangles, micros: 1e6 * least, rate: 1e-6 * f64::from(triangles) / least }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case(row.asked)
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let line: Vec<_> = rows.iter().map(|r| (f64::from(r.triangles) / f64::from(TRIANGLES), r.rate)).collect();
+        let (low, high) = span(line.iter().map(|p| p.0), true);
+        let most = 1.1 * line.iter().map(|p| p.1).fold(0.0, f64::max);
+        let layers = vec![Layer { label: String::new(), colour: Colour::Blue, mark: Mark::Line(line) }];
+        let (x, y) = (
+            Axis::log("triangles of the cut / all", low, high),
+            Axis::linear("millions of triangles a second", 0.0, most),
+        );
+        let title = "Traversal of a mesh of 100,000 triangles (GB99)".to_owned();
+        Figure { title: title.clone(), panels: vec![Panel { title, x, y, layers }], columns: 1 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["triangles", "micros", "million_a_second"]);
+        let cells = |r: &Row| vec![(f64::from(r.triangles), 0).into(), (r.micros, 2).into(), (r.rate, 1).into()];
+        table.rows.extend(rows.iter().map(cells));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        // of the full mesh nothing has to be followed to a substitute
+        let cuts = || rows.iter().filter(|row| row.asked < TRIANGLES).map(|row| row.rate);
+        let spread = worst(cuts()) / cuts().reduce(f64::min).unwrap_or(f64::NAN);
+        vec![Finding::at_most(
+            "triangles a second of the fastest cut over the slowest, the full mesh left out",
+            spread,
+            4.0,
+        )]
+    }
+}
