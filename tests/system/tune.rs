@@ -226,6 +226,19 @@ fn the_gains_for_the_overload_hold_its_frames_and_beat_the_others() {
 }
 
 #[test]
+fn the_gains_for_the_auditorium_hold_its_frames_and_beat_the_others() {
+    // seen from where its walk begins: on the way what is in view changes what is in reach
+    let view = "eye_m=[-0.5,-9.0,2.2],look_at_m=[6.859,-2.374,0.808]";
+    let stand =
+        [format!("camera.keyframe=[{{at_s=0.0,{view}}},{{at_s=100.0,{view}}}]"), "camera.even=false".to_owned()];
+    let tuned = Tuned::new("auditorium", stand.into_iter().flat_map(|set| ["--set".to_owned(), set]).collect());
+    assert_eq!(number(&tuned.said, "/at_speed"), 0.5);
+    assert!(tuned.holds_wherever_it_can() >= 2, "{}", tuned.said["plant"]);
+    tuned.beats_the_printed_gains_and_a_relay(30.0, 0.5);
+    tuned.rests_on_the_clamp_and_leaves(60.0, 1.0);
+}
+
+#[test]
 fn what_was_found_is_said_in_the_keys_that_are_promised_and_its_pushes_come_back_as_predicted() {
     let tuned = Tuned::new("tube", Vec::new());
     for key in [
