@@ -102,7 +102,7 @@ impl Prices {
         self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
     }
 
-    /// The coefficients of a shading; of [`Shading::Shadowed`] those of textured light, whose pixels it takes [`SOFTER`] times as long for.
+    /// The coefficients of a shading; of [`Shading::Shadowed`] those of textured light, whose pixels it takes 2.5 times as long for.
     #[must_use]
     pub fn of(&self, shading: Shading) -> Stages {
         match shading {
