@@ -1,5 +1,6 @@
 //! What is painted on meshes: patterns, images beside a scene and inside a .glb file, and what a wrong one is told.
 
+use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgba, RgbaImage};
 use metachron::compositor::{
@@ -15,18 +16,6 @@ use std::sync::Arc;
 
 const SIZE: Size = Size { width: 240, height: 240 };
 const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 512, shadow_taps: 1, lean: true };
-
-/// A device, or nothing to test with.
-fn gpu() -> Option<Gpu> {
-    match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("METACHRON_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("picture test skipped: {error}");
-            None
-        }
-    }
-}
 
 /// A mesh with a texture, seen from −y.
 fn draw(gpu: &Gpu, (model, texture): (&Model, &Arc<Texture>), shading: Shading) -> RgbaImage {

@@ -19,7 +19,7 @@ const SIZE: Size = Size { width: 320, height: 180 };
 const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 1024, shadow_taps: 4, lean: false };
 
 /// A device; `None`, with a line that says why, where there is none and none is required.
-fn gpu() -> Option<Gpu> {
+pub fn gpu() -> Option<Gpu> {
     match Gpu::headless() {
         Ok(gpu) => Some(gpu),
         Err(error) if std::env::var("METACHRON_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),

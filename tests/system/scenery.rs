@@ -1,9 +1,10 @@
 //! Meshes, trees and groups: what scenes say of them, and what is seen of them against closed forms.
 
+use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
 use metachron::compositor::{
-    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
+    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
 };
 use metachron::scene::{self, Scene, Source};
 use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
@@ -98,18 +99,6 @@ fn wrong_scenery_is_refused_where_it_stands() {
     for (text, expected) in cases {
         let told = load(&text).expect_err(&text);
         assert!(told.contains(expected), "{text}\n{told}");
-    }
-}
-
-/// A device, or nothing to test with.
-fn gpu() -> Option<Gpu> {
-    match Gpu::headless() {
-        Ok(gpu) => Some(gpu),
-        Err(error) if std::env::var("METACHRON_REQUIRE_ADAPTER").is_ok_and(|v| v == "1") => panic!("{error}"),
-        Err(error) => {
-            eprintln!("picture test skipped: {error}");
-            None
-        }
     }
 }
 
