@@ -44,6 +44,8 @@ pub struct Setting<'a> {
     pub substeps: u32,
     /// How it is integrated.
     pub integrator: Integrator,
+    /// The longest substep that the integrator carries while nothing is stretched, seconds (eq. 38, 39).
+    pub longest_s: f64,
 }
 
 /// The state stopped being finite: which slot gave out.
@@ -104,7 +106,8 @@ impl Stepper {
                 until: tick * (gone + size) as f64,
                 integrator: setting.integrator,
             };
-            if self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
+            let stretched = span.1 * now.stretch > setting.longest_s && size > 1;
+            if stretched || self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
                 size /= 2;
                 continue;
             }
@@ -147,7 +150,7 @@ impl Stepper {
         if self.factor.slots() == now.u.len() {
             return Ok(());
         }
-        let Setting { matter, division, springs, dt, substeps, integrator } = *setting;
+        let Setting { matter, division, springs, dt, substeps, integrator, .. } = *setting;
         let h = dt / f64::from(substeps);
         let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
         match integrator {

@@ -118,7 +118,8 @@ impl Tube {
         let Self { stepper, now, ties, matter, division, springs, .. } = self;
         let substeps = self.spec.substeps.max(stepper.company.parts(dt));
         let integrator = self.spec.integrator;
-        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator }, ties)
+        let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s }, ties)
     }
 
     /// The numbers it was built from.
