@@ -28,7 +28,7 @@ pub use experiment::{Experiment, Experimented, experiment};
 pub use headless::{Drawing, End, Headless, play_headless};
 pub use oracle::{Oracle, PairError, consult_oracle};
 pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
-pub use push::{After, Pushes, push};
+pub use push::{After, Pushes, median, push};
 pub use session::{Finished, Session};
 pub use trace::Trace;
 pub use walk::Walk;

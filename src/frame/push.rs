@@ -17,6 +17,8 @@ pub struct Pushes {
     pub polygons: Vec<f64>,
     /// How often each is made, ≥ 1; the median of noisy frames says more than one of them.
     pub times: usize,
+    /// For how long it may come to rest before a push, and for how long it is watched afterwards, seconds, > 0.
+    pub watch_s: f64,
     /// Size of the picture in pixels.
     pub size: Size,
     /// What draws it.
@@ -25,10 +27,6 @@ pub struct Pushes {
 
 /// A frame after a push: seconds since it, and its work in seconds.
 pub type After = (f64, f64);
-
-/// Seconds for which it may come to rest before a push, and for which it is watched afterwards.
-const REST_S: f64 = 2.0;
-const WATCH_S: f64 = 2.0;
 
 /// Makes `pushes` on `session`: the frames after each, in their order. `go_on` is told of the share that is done; on its `false` there
 /// are none.
@@ -50,22 +48,22 @@ pub fn push(
             if !go_on((at * times + time) as f64 / (wanted.len() * times) as f64) {
                 return Ok(Vec::new());
             }
-            watch(&mut session, &mut pushes, REST_S)?;
+            watch(&mut session, &mut pushes)?;
             let held = session.control().last_plan().polygons;
             session.control().coarsen(held / polygons);
-            runs.push(watch(&mut session, &mut pushes, WATCH_S)?);
+            runs.push(watch(&mut session, &mut pushes)?);
         }
         medians.push(median(&runs));
     }
     Ok(medians)
 }
 
-/// Frames for so many seconds.
-fn watch(session: &mut Session, pushes: &mut Pushes, seconds: f64) -> Result<Vec<After>, SessionError> {
+/// The frames of one watch.
+fn watch(session: &mut Session, pushes: &mut Pushes) -> Result<Vec<After>, SessionError> {
     let start = session.now();
     let mut due = start;
     let mut frames = Vec::new();
-    while (session.now() - start).as_secs_f64() < seconds {
+    while (session.now() - start).as_secs_f64() < pushes.watch_s {
         session.wait_until(due);
         let record = one_frame(session, (pushes.size, Style::default()), &mut pushes.drawing, false)?;
         frames.push(((session.now() - start).as_secs_f64(), 1e-3 * record.frame_ms));
@@ -74,8 +72,9 @@ fn watch(session: &mut Session, pushes: &mut Pushes, seconds: f64) -> Result<Vec
     Ok(frames)
 }
 
-/// The median frame by frame, as far as the shortest run goes.
-fn median(runs: &[Vec<After>]) -> Vec<After> {
+/// The median of several runs frame by frame, as far as the shortest goes.
+#[must_use]
+pub fn median(runs: &[Vec<After>]) -> Vec<After> {
     let shortest = runs.iter().map(Vec::len).min().unwrap_or(0);
     let middle = |values: &mut Vec<f64>| {
         values.sort_unstable_by(f64::total_cmp);

@@ -82,13 +82,15 @@ fn settle_s(beats: &[Beat]) -> Option<f64> {
 }
 
 /// The time of the frame after the last at which the running median of nine (time, t/T_set) is past ± 5 % and which does not `rest`
-/// on a limit; `None` where the last is still past.
+/// on a limit; `None` where the last is still past. Of the first frames the median is taken of as many after as before: a loop that
+/// comes home within four frames is not there from the start.
 #[must_use]
 pub fn settled_after(rows: &[(f64, f64)], rests: impl Fn(usize) -> bool) -> Option<f64> {
     let mut window = [0.0; MEDIAN];
     let mut good = |at: usize| {
-        let from = at.saturating_sub(MEDIAN / 2).min(rows.len().saturating_sub(MEDIAN));
-        let near = &rows[from..(from + MEDIAN).min(rows.len())];
+        let half = (MEDIAN / 2).min(at);
+        let from = (at - half).min(rows.len().saturating_sub(2 * half + 1));
+        let near = &rows[from..(from + 2 * half + 1).min(rows.len())];
         let held = &mut window[..near.len()];
         held.iter_mut().zip(near).for_each(|(slot, (_, ratio))| *slot = *ratio);
         held.sort_unstable_by(f64::total_cmp);
@@ -164,6 +166,13 @@ mod tests {
         assert!((settle_s - 34.0 / 30.0).abs() < 4.0 / 30.0, "{settle_s}");
         assert!(measured.cycle.is_none() && measured.overshoot == 0.0 && measured.quality == 0.5);
         assert!((measured.chatter - 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_loop_that_is_home_in_two_frames_was_not_home_before() {
+        let rows = |k: usize| (0.1 * (k + 1) as f64, if k < 2 { 2.5 } else { 1.0 });
+        let rows: Vec<_> = (0..20).map(rows).collect();
+        assert_eq!(settled_after(&rows, |_| false), Some(rows[2].0));
     }
 
     #[test]

@@ -5,15 +5,19 @@
 use super::super::args::TuneArgs;
 use super::super::progress::Bar;
 use super::{Identified, Tuned, live};
-use crate::frame::{Drawing, Pushes, Session, push};
-use crate::tune::{Contender, Measures, Start, Trial, play, settled_after};
+use crate::control::Law;
+use crate::frame::{After, Drawing, Pushes, Session, median, push};
+use crate::tune::{Start, Trial, play, settled_after};
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Parts of the wanted rate at which frames come after a push.
 const RATES: [f64; 2] = [0.4, 2.5];
-/// How often a push is made where frames scatter.
-const TIMES_LIVE: usize = 7;
+/// How often a push is made where frames scatter: by 7 % there, and the median of so many frames by 1.8 %, a third of the band.
+const TIMES_LIVE: usize = 25;
+/// Seconds of a watch: so many predicted settling times, within these bounds.
+const WATCH: f64 = 4.0;
+const WATCH_S: (f64, f64) = (1.0, 2.0);
 
 /// One push.
 pub(super) struct Checked {
@@ -52,10 +56,14 @@ pub(super) fn check(
         return Ok(Vec::new());
     }
     let set_s = tuned.best.set_share() / on.target_hz;
+    let times = if on.live { TIMES_LIVE } else { 1 };
+    let predicted_s = RATES.map(|rate| predicted_s(on, tuned.best, rate, times));
+    let slowest_s = predicted_s.iter().flatten().fold(0.0_f64, |most, s| most.max(*s));
     let pushes = Pushes {
         law: tuned.best,
         polygons: RATES.iter().map(|rate| on.plant.line.x_of(set_s / rate).max(1.0)).collect(),
-        times: if on.live { TIMES_LIVE } else { 1 },
+        times,
+        watch_s: if on.live { (WATCH * slowest_s).clamp(WATCH_S.0, WATCH_S.1) } else { WATCH_S.1 },
         size: on.size,
         drawing: if on.live { live(on.size)? } else { Drawing::Nothing },
     };
@@ -64,18 +72,29 @@ pub(super) fn check(
         bar.tell(share, "pushed away from its target".to_owned());
         !stopped.load(Ordering::Relaxed)
     })?;
-    let of = |(rate, frames): (&f64, &Vec<(f64, f64)>)| {
-        let rows: Vec<_> = frames.iter().map(|(time_s, work_s)| (*time_s, work_s / set_s)).collect();
-        Checked {
-            rate: *rate,
-            predicted_s: predicted_s(on, tuned.best.into(), *rate),
-            measured_s: settled_after(&rows, |_| false),
-        }
-    };
-    Ok(RATES.iter().zip(&runs).map(of).collect())
+    let measured = runs.iter().map(|frames| settled_s(frames, set_s));
+    Ok(RATES
+        .into_iter()
+        .zip(predicted_s)
+        .zip(measured)
+        .map(|((rate, predicted_s), measured_s)| Checked { rate, predicted_s, measured_s })
+        .collect())
 }
 
-fn predicted_s(on: &Identified, contender: Contender, rate: f64) -> Option<f64> {
-    let trial = Trial { start: Start::Rate(rate), seconds: 2.0, ..Trial::calm(contender, on.target_hz) };
-    Measures::of(&play(&on.plant, &trial)).settle_s
+/// When the fitted plant is settled after the same pushes: as often, with its scatter, and told by the same median.
+fn predicted_s(on: &Identified, law: Law, rate: f64, times: usize) -> Option<f64> {
+    let noise = if on.live { on.plant.line.scatter } else { 0.0 };
+    let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S.1, noise, ..Trial::calm(law, on.target_hz) };
+    let played = |seed| -> Vec<After> {
+        let beats = play(&on.plant, &Trial { seed, ..trial });
+        beats.iter().map(|beat| (beat.time_s, beat.part / on.target_hz)).collect()
+    };
+    let runs: Vec<_> = (0..times as u64).map(played).collect();
+    settled_s(&median(&runs), law.set_share() / on.target_hz)
+}
+
+/// Seconds after which frames stay within ± 5 % of the time that is wanted of them.
+fn settled_s(frames: &[After], set_s: f64) -> Option<f64> {
+    let rows: Vec<_> = frames.iter().map(|(time_s, work_s)| (*time_s, work_s / set_s)).collect();
+    settled_after(&rows, |_| false)
 }
