@@ -186,13 +186,15 @@ pub struct Neighbour {
     pub law: Law,
     /// Whether the agent that looks owns the pair ([`crate::coupling::owns`]).
     pub owned: bool,
+    /// How long its steps are as a rule, seconds; zero where that does not matter.
+    pub step_s: f64,
 }
 
 impl Neighbour {
     /// An agent that is only looked at: it is neither touched nor owned.
     #[must_use]
     pub const fn seen(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Ledger, owned: false }
+        Self { id, snapshot, form: None, law: Law::Ledger, owned: false, step_s: 0.0 }
     }
 }
 

@@ -57,7 +57,8 @@ impl std::fmt::Debug for Peer {
 
 impl Peer {
     fn standing(&self) -> Standing {
-        Standing { id: self.shared.id, model: self.shared.model, rate_hz: self.shared.wanted_hz }
+        let held_ends = self.form.as_ref().map_or(0, |form| form.held_ends());
+        Standing { id: self.shared.id, model: self.shared.model, rate_hz: self.shared.wanted_hz, held_ends }
     }
 
     fn law(&self, other: AgentId) -> Law {
@@ -79,6 +80,7 @@ impl Peer {
             form: if self.touches(other) { other.form.clone() } else { None },
             law: self.law(other.shared.id),
             owned: owns(self.standing(), other.standing()),
+            step_s: other.shared.wanted_hz.recip(),
         }
     }
 }

@@ -254,7 +254,7 @@ impl Agent for Dummy {
     }
 
     fn form(&self) -> Option<Arc<Form>> {
-        self.ball.map(|_| Arc::new(Form { kind: FormKind::Chain, friction: 0.0, restitution: 0.0 }))
+        self.ball.map(|_| Arc::new(Form { kind: FormKind::Chain { held_ends: 0 }, friction: 0.0, restitution: 0.0 }))
     }
 
     fn lead(

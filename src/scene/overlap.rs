@@ -148,7 +148,8 @@ fn figure(member: &Member) -> Option<Figure> {
             let radius = DVec3::splat(curve.radii_m.iter().copied().fold(0.0, f64::max));
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
-            (FormKind::Chain, Pose::Chain(curve), low, high)
+            // where it is held is no matter of places
+            (FormKind::Chain { held_ends: 0 }, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {
             let body = SoftBody::new(spec.clone()).ok()?;

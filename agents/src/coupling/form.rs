@@ -20,13 +20,24 @@ pub struct Form {
     pub restitution: f64,
 }
 
+impl Form {
+    /// How many ends of a tube are held in place; none of anything else.
+    #[must_use]
+    pub const fn held_ends(&self) -> u8 {
+        if let FormKind::Chain { held_ends } = self.kind { held_ends } else { 0 }
+    }
+}
+
 /// The kinds of shapes.
 #[derive(Debug, Clone)]
 pub enum FormKind {
     /// A rigid solid.
     Solid(SolidForm),
     /// A tube: cone-capsules between nodes, at its own radius.
-    Chain,
+    Chain {
+        /// How many of its ends are held in place, 0 … 2.
+        held_ends: u8,
+    },
     /// A tool: its parts depend on how far its jaws are open.
     Tool(ToolShape),
     /// The skin of a soft body: triangles and edges between vertices that move.

@@ -175,12 +175,14 @@ impl Stage {
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
         let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
         let owned = owns(self.standing(me), self.standing(id));
-        Neighbour { id, snapshot, form: actor.agent.form(), law, owned }
+        let step_s = 1.0 / actor.rate_hz;
+        Neighbour { id, snapshot, form: actor.agent.form(), law, owned, step_s }
     }
 
     fn standing(&self, id: AgentId) -> Standing {
         let actor = &self.actors[id.0 as usize];
-        Standing { id, model: actor.agent.model(), rate_hz: actor.rate_hz }
+        let held_ends = actor.agent.form().map_or(0, |form| form.held_ends());
+        Standing { id, model: actor.agent.model(), rate_hz: actor.rate_hz, held_ends }
     }
 
     /// Everything that others have given to `id` and its own newest state does not know.

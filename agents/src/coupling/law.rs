@@ -56,13 +56,15 @@ pub struct Standing {
     pub model: &'static str,
     /// The rate its scene wants, Hz.
     pub rate_hz: f64,
+    /// How many ends of a tube are held in place.
+    pub held_ends: u8,
 }
 
-/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, else the faster, of
-/// equals the lower number. A tool is led and owns nothing.
+/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the one
+/// with fewer held ends, else the faster, of equals the lower number. A tool is led and owns nothing.
 ///
-/// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not
-/// (docs/decisions/0012, 0013).
+/// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
+/// all how far one falls that nothing holds (docs/decisions/0012, 0013).
 #[must_use]
 pub fn owns(me: Standing, other: Standing) -> bool {
     let led = |s: Standing| s.model == "instrument";
@@ -75,7 +77,8 @@ pub fn owns(me: Standing, other: Standing) -> bool {
         return soft(me);
     }
     let faster = me.rate_hz.total_cmp(&other.rate_hz);
-    tube(me).cmp(&tube(other)).then(faster).then(other.id.cmp(&me.id)).is_gt()
+    let freer = other.held_ends.cmp(&me.held_ends);
+    tube(me).cmp(&tube(other)).then(freer).then(faster).then(other.id.cmp(&me.id)).is_gt()
 }
 
 #[cfg(test)]
@@ -87,8 +90,10 @@ mod tests {
         let all = ["tube", "rigid", "instrument", "sheet"]
             .into_iter()
             .flat_map(|model| [60.0, 1000.0].map(|rate_hz| (model, rate_hz)));
-        let all: Vec<_> =
-            all.zip(0..).map(|((model, rate_hz), id)| Standing { id: AgentId(id), model, rate_hz }).collect();
+        let all: Vec<_> = all
+            .zip(0..)
+            .map(|((model, rate_hz), id)| Standing { id: AgentId(id), model, rate_hz, held_ends: 0 })
+            .collect();
         for a in &all {
             for b in all.iter().filter(|b| b.id != a.id) {
                 let both_led = a.model == "instrument" && b.model == "instrument";
@@ -97,6 +102,8 @@ mod tests {
         }
         assert!(owns(all[1], all[0]), "the faster");
         assert!(owns(all[0], all[2]) && owns(all[0], all[3]), "the tube, however slow");
+        let held = Standing { held_ends: 2, ..all[1] };
+        assert!(owns(all[0], held) && !owns(held, all[0]), "the one that falls, however slow");
         assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
     }
 }

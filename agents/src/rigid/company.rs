@@ -281,7 +281,7 @@ impl Guest {
                     self.skin_m = BALL_SKIN_SHARE * mover.radius_m;
                 }
             }
-            FormKind::Chain => (self.chain, self.restitution) = (true, 0.0),
+            FormKind::Chain { .. } => (self.chain, self.restitution) = (true, 0.0),
             // a soft body owns its pairs
             FormKind::Tool(_) | FormKind::Surface(_) => {}
         }

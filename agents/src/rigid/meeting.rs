@@ -69,6 +69,8 @@ pub(super) struct Found {
 
 /// The solve of a blow: to rounding, as bounces are measured against closed forms.
 const BLOW: Settings = Settings { iterations: 400, tolerance_m_s: 1e-12 };
+/// A rise of energy below this share of what is exchanged is rounding.
+const ENERGY_SLACK: f64 = 1e-6;
 /// The solve of a press.
 const PRESS: Settings = Settings { iterations: 100, tolerance_m_s: 1e-8 };
 /// A body at rest is immovable until it is approached faster than this, m/s.
@@ -87,8 +89,41 @@ impl Meeting {
         self.wake(company);
         self.blow.forget();
         self.solve(company, 1.0, true);
+        self.strike_in_turn(company);
         self.give(me, company, 0.0);
         true
+    }
+
+    /// Solves a blow again that made energy: with those contacts alone that approach, and if need be without rebound.
+    ///
+    /// Newton's law of restitution asks every contact at once for its own speed. A light body that bounces to and fro between
+    /// two heavy ones may not leave the one and stay on the other: both would be driven apart. It leaves the one, and strikes
+    /// the other in its turn.
+    fn strike_in_turn(&mut self, company: &Company) {
+        for round in 0..2 {
+            if !self.makes_energy() {
+                return;
+            }
+            if round == 0 {
+                self.found.retain(|found| found.approach_m_s > 0.0);
+            } else {
+                self.found.iter_mut().for_each(|found| found.contact.rebound_m_s = 0.0);
+            }
+            self.velocities.clone_from(&self.before);
+            self.blow.forget();
+            self.solve(company, 1.0, true);
+        }
+    }
+
+    /// Whether the blow just solved adds energy: the work of its impulses against the mean velocity, beyond rounding.
+    fn makes_energy(&self) -> bool {
+        let (mut work_j, mut effort_j) = (0.0, 0.0);
+        for (contact, impulse) in self.contacts.iter().zip(self.blow.impulses()) {
+            let [before, after] = [&self.before, &self.velocities].map(|all| contact.slots.velocity(all));
+            work_j += 0.5 * impulse.dot(before + after);
+            effort_j += impulse.length() * (before.length() + after.length());
+        }
+        work_j > ENERGY_SLACK * effort_j
     }
 
     /// Changes the velocities as `h` seconds of contact do, gravity included; `None`, and nothing changed, where nothing

@@ -14,6 +14,7 @@ mod grip;
 mod hold;
 mod lasting;
 mod laws;
+mod squeeze;
 mod surfaces;
 
 const G: f64 = 9.81;

@@ -19,6 +19,7 @@ mod conserve;
 mod contact;
 mod division;
 mod holds;
+mod horizon;
 mod inertia;
 mod light;
 mod mate;

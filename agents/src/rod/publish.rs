@@ -58,7 +58,9 @@ impl Tube {
         if company.is_watched() || self.steps == 0 {
             into.acceleration = if self.steps == 0 { self.spec.gravity } else { self.acceleration };
             let inertia = into.inertia.curve_mut();
-            inertia.copy_from(self.stepper.last(), self.matter.held, &self.now.u);
+            let (own, span_s) = self.stepper.last();
+            let factor = self.stepper.horizon.factor().unwrap_or(own);
+            inertia.copy_from((factor, span_s), self.matter.held, &self.now.u);
             inertia.accelerations.clone_from(&self.accelerations);
         } else {
             into.inertia = Inertia::Immovable;

@@ -10,6 +10,7 @@ use super::config::{Config, Matter};
 use super::contact::{Solved, TubeContacts};
 use super::division::Division;
 use super::holds::{NodeSpring, Tie};
+use super::horizon::Horizon;
 use super::method::Integrator;
 use super::past::Past;
 use super::project::Projector;
@@ -70,6 +71,8 @@ pub struct Stepper {
     pub contacts: TubeContacts,
     /// Who else is near.
     pub company: Company,
+    /// What slower owners have to expect.
+    pub(super) horizon: Horizon,
     /// Work that contact does in the substep tried, J.
     pushed_j: f64,
     /// The length of the substep that ended last, seconds.
@@ -168,6 +171,7 @@ impl Stepper {
     /// Forgets what it knows of nodes and segments: the tube was divided anew.
     pub fn forget(&mut self) {
         self.factor.forget();
+        self.horizon.forget();
         self.contacts.forget();
         self.past.forget();
     }

@@ -95,7 +95,8 @@ impl Tube {
             dt_s: 0.0,
             steps: 0,
         };
-        let form = Form { kind: FormKind::Chain, friction: tube.spec.friction, restitution: 0.0 };
+        let held_ends = tube.matter.held.map(u8::from).iter().sum();
+        let form = Form { kind: FormKind::Chain { held_ends }, friction: tube.spec.friction, restitution: 0.0 };
         tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
         tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
@@ -299,10 +300,15 @@ impl Agent for Tube {
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
         self.end_watch(before, dt_s);
+        self.foresee(around, dt_s);
         self.time = around.time + dt;
         self.steps += 1;
         self.at_rest = self.watch_rest(dt_s);
         Ok(StepReport { work: self.segments() as f64 * f64::from(substeps), substeps, at_rest: self.at_rest })
+    }
+
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        self.foresee(around, dt.as_secs_f64());
     }
 
     fn resolution(&self) -> Option<Resolution> {

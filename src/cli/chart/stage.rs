@@ -167,7 +167,8 @@ impl Stage {
     fn sight(&self, me: usize, other: usize) -> Neighbour {
         let standing = |i: usize| {
             let actor = &self.actors[i];
-            Standing { id: AgentId(i as u32), model: actor.agent.model(), rate_hz: actor.rate_hz }
+            let held_ends = actor.form.as_ref().map_or(0, |form| form.held_ends());
+            Standing { id: AgentId(i as u32), model: actor.agent.model(), rate_hz: actor.rate_hz, held_ends }
         };
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;
@@ -177,6 +178,7 @@ impl Stage {
             form: actor.form.clone(),
             law: self.law,
             owned: owns(standing(me), standing(other)),
+            step_s: 1.0 / actor.rate_hz,
         }
     }
 

@@ -65,7 +65,7 @@ impl<'a> Pieces<'a> {
     pub fn of(placed: &Placed<'a>, known: &'a Known) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
-            (FormKind::Chain, View::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
+            (FormKind::Chain { .. }, View::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
             (FormKind::Solid(form), View::Solid { position, rotation }) => {
                 let SolidForm { solid, com_local, radius_m, .. } = form;
                 let origin = position - rotation * *com_local;

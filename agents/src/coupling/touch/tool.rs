@@ -88,7 +88,7 @@ impl Known {
 /// Whether a form is made of points and spans that are looked for in the fields of others.
 fn is_strand(kind: &FormKind) -> bool {
     let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
-    matches!(kind, FormKind::Chain | FormKind::Surface(_))
+    matches!(kind, FormKind::Chain { .. } | FormKind::Surface(_))
         || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
 }
 

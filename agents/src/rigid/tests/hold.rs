@@ -53,7 +53,8 @@ impl Held {
         let mut owner = Snapshot { time: self.owner_time, ..Snapshot::default() };
         self.owner.write(&mut owner);
         let form = self.body.form();
-        let neighbours = [Neighbour { id: OWNER, snapshot: Arc::new(owner), form, law: Law::Ledger, owned: false }];
+        let neighbours =
+            [Neighbour { id: OWNER, snapshot: Arc::new(owner), form, law: Law::Ledger, owned: false, step_s: 0.0 }];
         let around = Surroundings { me: ME, time: self.time, neighbours: &neighbours, hands, links: &[] };
         let dt = SimSpan::from_secs_f64(h).unwrap();
         self.body.step(dt, &around).unwrap();

@@ -11,7 +11,7 @@ fn cast() -> Vec<Form> {
 fn place<'a>(form: &'a Form, (position, rotation): (DVec3, DQuat), nodes: &'a [DVec3]) -> Placed<'a> {
     let view = match form.kind {
         FormKind::Solid(_) => View::Solid { position, rotation },
-        FormKind::Chain => View::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
+        FormKind::Chain { .. } => View::Chain { positions: nodes, radii_m: &RADII[..nodes.len()] },
         FormKind::Tool(_) => View::Tool { tip: position, rotation, jaw: 0.3 },
         FormKind::Surface(_) => View::Surface(nodes),
     };
