@@ -6,6 +6,7 @@
 mod agent;
 pub mod conformance;
 pub mod coupling;
+mod drift;
 mod envelope;
 pub mod instrument;
 mod rare;
@@ -21,6 +22,7 @@ mod time;
 pub use agent::{
     Agent, AgentId, Companion, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span,
 };
+pub use drift::DRIFT_S;
 pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{

@@ -24,6 +24,8 @@ pub struct Snapshot {
     pub energy_j: f64,
     /// The agent's estimate of its own error, in metres, ≥ 0.
     pub residual_m: f64,
+    /// The part of it that steps make in [`crate::DRIFT_S`], metres, ≥ 0; the rest is what its spacing leaves.
+    pub drift_m: f64,
     /// Agents this one acts on now: they must not rest meanwhile.
     pub touches: Vec<AgentId>,
     /// Forces by which others hold this agent.
@@ -359,6 +361,7 @@ impl Snapshot {
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
         self.stand = None;
+        self.drift_m = 0.0;
         self.sprung.set(None);
         self.pairs.clear();
         self.bonds.clear();

@@ -11,9 +11,10 @@ use super::motion::Motion;
 use super::obstacles::Obstacles;
 use super::sided::Sided;
 use super::ties::Ties;
-use super::world::World;
+use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::{Form, FormKind, SolidForm};
+use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
     Agent, AgentId, Body, Companion, Grip, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport,
@@ -65,6 +66,8 @@ pub struct RigidBody {
     jointed: Option<bool>,
     /// How deep it sank into anything in the last step of its island, metres; zero alone.
     sunk_m: f64,
+    /// What its steps in contact and under springs do wrong in a tenth of a second, metres.
+    drift_m: f64,
 }
 
 /// A stretch of contact or of a spring's pull is solved in parts no longer than this, seconds.
@@ -124,6 +127,7 @@ impl RigidBody {
             island: None,
             jointed: None,
             sunk_m: 0.0,
+            drift_m: 0.0,
         };
         body.put_down();
         Ok(body)
@@ -169,6 +173,8 @@ impl RigidBody {
     /// Ends a step in which a shared world has moved it.
     pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
         (self.touching, self.sunk_m, self.calm_s) = (touching, sunk_m, 0.0);
+        // the world that it shares moves it by parts at the speed of their ends
+        self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
         self.steps += 1;
         self.world.flew();
         self.hold.forget();
@@ -200,9 +206,28 @@ impl RigidBody {
         if self.at_rest {
             (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
             self.world.moved();
+            self.drift_m = 0.0;
         }
         self.at_rest
     }
+
+    /// Takes in what a step of `dt` seconds in so many parts did wrong. Flight and blows are exact; in lasting contact and
+    /// under a spring a part's way is made at the speed of its end.
+    fn doubt(&mut self, before: &Motion, touched: bool, (dt, parts): (f64, u32)) {
+        let pulled = !self.ties.is_empty();
+        let part_s = dt / f64::from(parts) / if pulled { 1.0 } else { PASSES as f64 };
+        self.drift_m = if pulled || (touched && self.touching) {
+            drifting(part_s, self.motion.velocity.distance(before.velocity), dt)
+        } else {
+            0.0
+        };
+    }
+}
+
+/// What parts of so many seconds at the speed of their ends do wrong in [`DRIFT_S`], where a step of `dt` seconds changed the
+/// velocity by so much: ½ h Δv each (docs/theory/control.md, eq. 33).
+fn drifting(part_s: f64, gain_m_s: f64, dt: f64) -> f64 {
+    0.5 * part_s * gain_m_s * DRIFT_S / dt
 }
 
 impl Agent for RigidBody {
@@ -234,6 +259,7 @@ impl Agent for RigidBody {
             }
         }
         self.steps += 1;
+        self.doubt(&before, touching, (dt_s, parts));
         let at_rest = self.rest(dt_s);
         self.tell(around, dt_s);
         self.settle(around, dt_s);
@@ -285,7 +311,7 @@ impl Agent for RigidBody {
             spin: self.motion.spin(&self.spread),
         });
         into.energy_j = self.motion.energy_j(&self.spread, self.gravity);
-        into.residual_m = self.residual_m();
+        (into.residual_m, into.drift_m) = (self.residual_m(), self.drift_m);
         self.write_coupling(into);
         into.grips.clear();
         into.grips.extend_from_slice(&self.grips);
@@ -302,13 +328,14 @@ impl Agent for RigidBody {
 }
 
 impl RigidBody {
-    /// What the body knows of its own error: the rounding of its coordinates, and in contact how deep it sank in.
+    /// What the body knows of its own error: the rounding of its coordinates, what contact and springs do
+    /// wrong in a tenth of a second, and in contact how deep it sank in.
     fn residual_m(&self) -> f64 {
         let size = self.motion.position.abs().max_element() + self.world.mover.radius_m;
         if self.touching {
-            self.world.depth_m(&self.motion).max(self.sunk_m) + size * f64::from(f32::EPSILON)
+            self.world.depth_m(&self.motion).max(self.sunk_m) + size * f64::from(f32::EPSILON) + self.drift_m
         } else {
-            size * f64::EPSILON
+            size * f64::EPSILON + self.drift_m
         }
     }
 }

@@ -10,6 +10,7 @@ use std::sync::Arc;
 
 mod bounces;
 mod coupling;
+mod error;
 mod grip;
 mod hold;
 mod lasting;

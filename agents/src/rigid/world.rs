@@ -40,7 +40,7 @@ const BLOW_S: f32 = 1e-3;
 /// A blow that changes the velocity by less changes nothing, m/s.
 const CHANGED_M_S: f64 = 1e-3;
 /// Solver passes within a contact step; each is a small step of its own.
-const PASSES: usize = 4;
+pub(super) const PASSES: usize = 4;
 /// Natural frequency of a contact, Hz: rapier's 60 lets a resting box sag 5e-5 m, this 2e-6 m.
 const STIFFNESS_HZ: f32 = 300.0;
 /// Damping ratio of a contact, rapier's own.

@@ -18,6 +18,7 @@ mod config;
 mod conserve;
 mod contact;
 mod division;
+mod doubling;
 mod holds;
 mod horizon;
 mod inertia;

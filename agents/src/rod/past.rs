@@ -35,6 +35,13 @@ impl Past {
         self.way.push(to.x[last] - from.x[last]);
     }
 
+    /// Takes over another past, into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.way.clone_from(&other.way);
+        self.gain.clone_from(&other.gain);
+        (self.span_s, self.spare_j) = (other.span_s, other.spare_j);
+    }
+
     /// Forgets it: velocities have jumped, or the tube was divided anew.
     pub fn forget(&mut self) {
         (self.span_s, self.spare_j) = (0.0, 0.0);

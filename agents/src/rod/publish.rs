@@ -33,7 +33,8 @@ impl Tube {
         into.steps = self.steps;
         into.resolution = Some(self.resolution);
         into.energy_j = self.energy_j();
-        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division);
+        into.drift_m = self.doubling.error_m();
+        into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division) + into.drift_m;
         into.grips.clone_from(&self.grips);
         into.at_rest = self.at_rest;
         into.bounds = Some(bounds(&self.now, self.widest_m()));

@@ -76,7 +76,7 @@ pub struct Stepper {
     /// Work that contact does in the substep tried, J.
     pushed_j: f64,
     /// The length of the substep that ended last, seconds.
-    span_s: f64,
+    pub(super) span_s: f64,
 }
 
 /// What became of a trial substep.

@@ -9,6 +9,7 @@ use super::company::Company;
 use super::config::{Config, Matter};
 use super::contact::TubeContacts;
 use super::division::{self, Division};
+use super::doubling::Doubling;
 use super::holds::{NodeSpring, Tie, springs};
 use super::publish::smooth;
 use super::remesh::Remesher;
@@ -39,6 +40,7 @@ pub struct Tube {
     pub(super) ties_before: Vec<Tie>,
     pub(super) grips: Vec<Grip>,
     rest: RestWatch,
+    pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
     /// Of the centre of mass in the last step, without what others gave at its start, m/s².
     pub(super) acceleration: DVec3,
@@ -88,6 +90,7 @@ impl Tube {
             ties_before: vec![],
             grips: vec![],
             rest: RestWatch::default(),
+            doubling: Doubling::default(),
             at_rest: false,
             acceleration: DVec3::ZERO,
             accelerations: vec![],
@@ -206,6 +209,14 @@ impl Tube {
         self.stepper.contacts = contacts;
     }
 
+    /// Makes a step of `dt` seconds in so many substeps again where it is its turn; how many more that took.
+    fn double(&mut self, (dt, substeps): (f64, u32)) -> u32 {
+        let Self { doubling, stepper, now, matter, division, springs, .. } = self;
+        let integrator = self.spec.integrator;
+        let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
+        doubling.end(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s })
+    }
+
     fn write_grips(&mut self, dt: f64) {
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
@@ -246,6 +257,7 @@ impl Tube {
         }
         let at_rest = self.rest.observe(&self.now, dt);
         if at_rest {
+            self.doubling.rest();
             self.now.u.fill(DVec3::ZERO); // what is drawn of a sleeping tube must not drift
             self.now.kinetic_j = 0.0;
         }
@@ -285,6 +297,7 @@ impl Agent for Tube {
     /// meet     what others gave, and who is near
     /// pulls    the springs of hands and tools on this tube, and its links
     /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
+    /// doubling what the step did wrong, now and then
     /// grips    the mean force of each pull
     /// rest     whether it could sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
@@ -295,8 +308,10 @@ impl Agent for Tube {
         self.widen(around.time + dt);
         let watched = self.stepper.company.is_watched();
         let before = self.begin_watch(watched);
+        self.doubling.begin(self.steps, (&self.now, &self.ties), &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
+        let doubled = self.double((dt_s, substeps));
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
         self.end_watch(before, dt_s);
@@ -304,7 +319,8 @@ impl Agent for Tube {
         self.time = around.time + dt;
         self.steps += 1;
         self.at_rest = self.watch_rest(dt_s);
-        Ok(StepReport { work: self.segments() as f64 * f64::from(substeps), substeps, at_rest: self.at_rest })
+        let work = self.segments() as f64 * f64::from(substeps + doubled);
+        Ok(StepReport { work, substeps, at_rest: self.at_rest })
     }
 
     fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {

@@ -5,6 +5,7 @@
 
 use super::company::Company;
 use super::contact::Contacts;
+use super::doubling::Doubling;
 use super::holds::Tie;
 use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
@@ -34,6 +35,7 @@ pub struct SoftBody {
     /// Of the centre of mass in the last step, without what others gave, m/s².
     pub(super) acceleration: DVec3,
     pub(super) at_rest: bool,
+    pub(super) doubling: Doubling,
     before: Vec<DVec3>,
     quiet_s: f64,
     pub(super) steps: u64,
@@ -76,6 +78,7 @@ impl SoftBody {
             touching: false,
             acceleration: spec.gravity,
             at_rest: false,
+            doubling: Doubling::default(),
             quiet_s: 0.0,
             steps: 0,
             spec,
@@ -135,6 +138,7 @@ impl SoftBody {
         self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
         let at_rest = self.quiet_s >= QUIET_S;
         if at_rest {
+            self.doubling.watch.rest();
             velocities.fill(DVec3::ZERO); // what is drawn of a sleeping body must not drift
         }
         before.clone_from(velocities);
@@ -161,9 +165,9 @@ impl Agent for SoftBody {
     /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
-        let substeps = self.advance(around, dt_s)?;
+        let (substeps, doubled) = self.advance(around, dt_s)?;
         self.settle(around, dt_s);
-        Ok(StepReport { work: self.work() * f64::from(substeps), substeps, at_rest: self.at_rest })
+        Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -196,7 +200,7 @@ impl Agent for SoftBody {
 
 impl SoftBody {
     /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
-    fn work(&self) -> f64 {
+    pub(super) fn work(&self) -> f64 {
         1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64
     }
 }

@@ -9,6 +9,7 @@ mod body;
 mod brick;
 mod company;
 mod contact;
+mod doubling;
 mod fold;
 mod grid;
 mod holds;

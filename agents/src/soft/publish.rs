@@ -12,7 +12,8 @@ impl SoftBody {
         into.steps = self.steps;
         into.resolution = None;
         into.energy_j = self.energy_j();
-        into.residual_m = self.lattice.residual_m(&self.positions);
+        into.drift_m = self.doubling.watch.error_m();
+        into.residual_m = self.lattice.residual_m(&self.positions) + into.drift_m;
         into.grips.clone_from(&self.grips);
         into.at_rest = self.at_rest;
         into.acceleration = self.acceleration;

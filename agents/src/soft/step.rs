@@ -14,12 +14,13 @@ const REACH_MAX: f64 = 1e9;
 pub(super) const SUBSTEPS_MAX: u32 = 16;
 
 impl SoftBody {
-    /// Advances by `dt` seconds; into how many substeps it was divided.
+    /// Advances by `dt` seconds; into how many substeps it was divided, and how many more its error estimate took.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state stops being finite.
-    pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<u32, StepError> {
+    pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(u32, u32), StepError> {
         self.receive(around, dt)?;
+        let doubled = self.rehearse(dt);
         let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
         while left > 0 {
             let h = dt / f64::from(parts);
@@ -35,11 +36,12 @@ impl SoftBody {
             self.act(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
         }
-        Ok(done)
+        self.judge(dt, done);
+        Ok((done, doubled))
     }
 
     /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
-    fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
+    pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
         let Self { system, lattice, positions, velocities, free, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
@@ -63,7 +65,7 @@ impl SoftBody {
     }
 
     /// Lets contact act on the foreseen velocities.
-    fn touch(&mut self, h: f64) {
+    pub(super) fn touch(&mut self, h: f64) {
         let Self { system, positions, free, company, contacts, .. } = self;
         contacts.act(positions, free, (system, company), h);
     }

@@ -1,5 +1,6 @@
 //! What a soft body must do, against closed forms.
 
+mod error;
 mod meetings;
 mod promises;
 mod statics;

@@ -1,6 +1,7 @@
 //! What the tube promises, against independent answers (`tests/reference/`).
 
 mod coupling;
+mod error;
 mod methods;
 mod motion;
 mod remesh;

@@ -1,0 +1,97 @@
+//! How far an object's steps carry it from where exact ones would, metres: when they are made a second time, and what that told.
+//!
+//! In: steps that were made, and how far those made again in halves ended from them. Out: the error that the steps of
+//! [`DRIFT_S`] make at that rate. Never here: how a step is made again. Theory: docs/theory/control.md, eq. 31, 32.
+
+/// The error of steps is told over so long, seconds: long enough to be seen, short enough that nothing has turned round.
+pub const DRIFT_S: f64 = 0.1;
+
+/// So many steps in a row are made a second time: what merely trembles is another way off after each.
+const STEPS: u32 = 2;
+/// … of so many: twice two steps' work is 4.2 % of that of 96.
+const EVERY: u64 = 96;
+
+/// The watch over the steps of one object.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Watch {
+    /// Steps of the present row that have been made twice; `None` between rows.
+    made: Option<u32>,
+    /// Their length, seconds.
+    span_s: f64,
+    /// What the last row told, metres.
+    error_m: f64,
+}
+
+impl Watch {
+    /// Whether a row begins with step number `steps`.
+    pub fn begins(&mut self, steps: u64) -> bool {
+        let begins = steps.is_multiple_of(EVERY);
+        if begins {
+            (self.made, self.span_s) = (Some(0), 0.0);
+        }
+        begins
+    }
+
+    /// Whether the present step is made twice.
+    pub fn is_on(&self) -> bool {
+        self.made.is_some()
+    }
+
+    /// The row cannot be ended: it tells nothing.
+    pub fn give_up(&mut self) {
+        self.made = None;
+    }
+
+    /// A step of `dt_s` seconds has been made twice; whether it was the last of its row.
+    pub fn made_twice(&mut self, dt_s: f64) -> bool {
+        self.span_s += dt_s;
+        let made = self.made.map_or(0, |made| made + 1);
+        self.made = (made < STEPS).then_some(made);
+        made == STEPS
+    }
+
+    /// The row has ended `apart_m` from the same in halves, by a rule of this order: those leave 2⁻ᵖ of the error (eq. 31).
+    pub fn learn(&mut self, apart_m: f64, order: i32) {
+        let error_m = apart_m / (1.0 - 0.5_f64.powi(order)) * DRIFT_S / self.span_s;
+        if error_m.is_finite() {
+            self.error_m = error_m;
+        }
+    }
+
+    /// The object rests: how it came there no longer matters.
+    pub fn rest(&mut self) {
+        *self = Self::default();
+    }
+
+    /// What steps make wrong in [`DRIFT_S`], metres.
+    pub fn error_m(&self) -> f64 {
+        self.error_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn of_a_thousand_steps_a_twenty_fourth_is_made_again_in_halves() {
+        let mut watch = Watch::default();
+        let mut again = 0;
+        for step in 0..960 {
+            watch.begins(step);
+            if watch.is_on() {
+                again += 2;
+                if watch.made_twice(1e-3) {
+                    watch.learn(1e-6, 1);
+                }
+            }
+        }
+        assert_eq!(again, 40); // 4.2 %
+        // two steps of 1 ms end 1 µs apart: they err by 2 µs, a hundred by 100
+        assert!((watch.error_m() - 1e-4).abs() < 1e-15);
+        watch.learn(f64::NAN, 1);
+        assert!((watch.error_m() - 1e-4).abs() < 1e-15);
+        watch.rest();
+        assert_eq!(watch.error_m(), 0.0);
+    }
+}
