@@ -62,6 +62,11 @@ impl Factor {
         self.rows.len()
     }
 
+    /// How much memory it takes, bytes.
+    pub fn bytes(&self) -> usize {
+        size_of_val(&self.rows[..])
+    }
+
     /// Takes over another factor, into the storage that is here.
     pub fn copy_from(&mut self, other: &Self) {
         self.rows.clone_from(&other.rows);

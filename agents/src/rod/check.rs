@@ -47,6 +47,8 @@ pub enum TubeError {
 
 /// The sharpest turn between two chords of a path, radians: past it the smooth curve has almost a cusp.
 const TURN_MAX_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
+/// The most twist of a whole tube, radians: what the most segments can hold at some 15° each.
+const TWIST_MAX_RAD: f64 = 1000.0;
 /// Points nearer than this share of the path's extent are the same point.
 const SAME_POINT: f64 = 1e-9;
 
@@ -117,6 +119,7 @@ fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
     }
     let substeps = f64::from(spec.substeps);
     number("substeps", substeps, (1..=super::SUBSTEPS_MAX).contains(&spec.substeps), "1 to 1000")?;
+    number("twist_rad", spec.twist_rad, spec.twist_rad.abs() <= TWIST_MAX_RAD, "-1000 to 1000")?;
     not_negative("damping_per_s", spec.damping_per_s)?;
     number("pressure_pa", spec.pressure_pa, true, "finite")?;
     let widened = super::pressed_radius_m(&spec.section, spec.pressure_pa);

@@ -4,7 +4,7 @@
 //! Never here: the present state ([`super::remesh`] carries that over). Theory: docs/theory/rod.md, eq. 1–4, 25.
 
 use super::skeleton::Skeleton;
-use super::turn::{log, shortest_arc};
+use super::turn::{exp, log, shortest_arc};
 use glam::{DQuat, DVec3};
 
 /// The fewest segments of any tube: one alone has no joint and cannot bend.
@@ -29,7 +29,7 @@ pub struct Division {
     pub length: Vec<f64>,
     /// Chord over arc of each stress-free segment: its rest strain along the director, ≤ 1 (eq. 2).
     pub chord: Vec<f64>,
-    /// Stress-free frames; N entries.
+    /// Frames of the start: stress-free but for a twist that the skeleton has; N entries.
     pub frame: Vec<DQuat>,
     /// 1/l̄ of the joint before each segment and of the end: N + 1 entries; 2/l at the ends (eq. 4).
     pub joint: Vec<f64>,
@@ -153,10 +153,23 @@ impl Division {
             self.chord.push(if skeleton.is_straight() { 1.0 } else { strain });
         }
         self.wall = [skeleton.at(0.0).frame, skeleton.at(skeleton.length_m()).frame];
-        self.rebuild_joints(skeleton.is_straight());
+        self.rebuild_joints(skeleton.is_unbent());
+        self.twist(skeleton);
     }
 
-    fn rebuild_joints(&mut self, straight: bool) {
+    /// Turns the sections and the wall at the end about the curve.
+    fn twist(&mut self, skeleton: &Skeleton) {
+        let turned = |frame: DQuat, arc_m: f64| match skeleton.twist_at(arc_m) {
+            0.0 => frame,
+            angle => frame * exp(DVec3::Z * angle),
+        };
+        for k in 0..self.segments() {
+            self.frame[k] = turned(self.frame[k], self.middle_m(k));
+        }
+        self.wall[1] = turned(self.wall[1], self.total_m());
+    }
+
+    fn rebuild_joints(&mut self, unbent: bool) {
         let count = self.segments();
         self.joint.clear();
         self.bend.clear();
@@ -166,7 +179,7 @@ impl Division {
             let half = |i: usize| 0.5 * self.length[i];
             let dual = if k == 0 { half(0) } else { half(k - 1) + if k == count { 0.0 } else { half(k) } };
             self.joint.push(1.0 / dual);
-            let bend = if straight { DVec3::ZERO } else { before.conjugate() * log(after * before.conjugate()) };
+            let bend = if unbent { DVec3::ZERO } else { before.conjugate() * log(after * before.conjugate()) };
             self.bend.push(bend);
         }
     }

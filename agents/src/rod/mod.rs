@@ -19,6 +19,7 @@ mod conserve;
 mod contact;
 mod division;
 mod doubling;
+mod extent;
 mod holds;
 mod horizon;
 mod inertia;

@@ -1,6 +1,6 @@
-//! The stress-free centre line: a C¹ curve through the path's points, measured by arc length, with frames that do not twist.
+//! The centre line that a tube starts on, stress-free as a rule: a C¹ curve through the path's points, measured by arc length, with frames that do not twist.
 //!
-//! In: the path. Out: place, tangent, frame and curvature at any arc length. Never here: segments, motion.
+//! In: the path, and how it strains the tube. Out: place, tangent, frame and curvature at any arc length. Never here: segments, motion.
 //! Between points the curve is the cubic of Hermite with centripetal Catmull–Rom tangents (YSK11); at the ends it leaves
 //! along the first and last chord. Two points are joined by an exactly straight line. Theory: docs/theory/rod.md, eq. 1.
 
@@ -36,12 +36,14 @@ struct Knot {
     frame: DQuat,
 }
 
-/// The stress-free centre line.
+/// The centre line of the start.
 #[derive(Debug, Clone)]
 pub struct Skeleton {
     spans: Vec<Span>,
     knots: Vec<Knot>,
     straight: bool,
+    unbent: bool,
+    twist_rad: f64,
 }
 
 /// A point of the centre line.
@@ -94,7 +96,23 @@ impl Skeleton {
             let arc_m = if straight { (path[1] - path[0]).length() * b } else { from.arc_m + span.length(a, b) };
             knots.push(Knot { arc_m, frame });
         }
-        Self { spans, knots, straight }
+        Self { spans, knots, straight, unbent: straight, twist_rad: 0.0 }
+    }
+
+    /// The same for a tube that the path strains: one that is straight where nothing bends it, or whose sections are turned
+    /// about the curve, evenly from 0 at the start to `twist_rad` at the end.
+    pub fn strained(self, straight: bool, twist_rad: f64) -> Self {
+        Self { unbent: straight || self.straight, twist_rad, ..self }
+    }
+
+    /// Whether a tube on it is straight where nothing bends it.
+    pub fn is_unbent(&self) -> bool {
+        self.unbent
+    }
+
+    /// By how much sections at `arc_m` are turned about the curve against its untwisted frames, radians.
+    pub fn twist_at(&self, arc_m: f64) -> f64 {
+        self.twist_rad * (arc_m / self.length_m())
     }
 
     /// Whether the path has two points: the line between them has no curvature at all.
@@ -130,10 +148,11 @@ impl Skeleton {
         Station { position: span.at(w), tangent, frame }
     }
 
-    /// The angle that the tangent sweeps along the whole curve, radians.
+    /// The angle that frames sweep along the whole curve, radians, twist added to what the tangent sweeps.
     pub fn turning_rad(&self) -> f64 {
         let tangents = self.knots.iter().map(|k| k.frame * DVec3::Z);
-        tangents.clone().zip(tangents.skip(1)).map(|(a, b)| libm::atan2(a.cross(b).length(), a.dot(b))).sum()
+        let bends = tangents.clone().zip(tangents.skip(1)).map(|(a, b)| libm::atan2(a.cross(b).length(), a.dot(b)));
+        bends.sum::<f64>() + self.twist_rad.abs()
     }
 }
 

@@ -9,9 +9,15 @@ use std::sync::Arc;
 /// A tube, cable or rod before it is divided into segments.
 #[derive(Debug, Clone)]
 pub struct TubeSpec {
-    /// Points of the stress-free centre line in metres, at least two, no two neighbours alike.
+    /// Points of the centre line at the start in metres, at least two, no two neighbours alike; it is free of stress there
+    /// unless one of the next two says otherwise.
     /// Two points make a straight line, more a smooth curve through all of them.
     pub path_m: Vec<DVec3>,
+    /// Whether it is straight where nothing bends it: the path is then what it was bent to, not what it springs back to.
+    pub straight: bool,
+    /// How far its sections are turned about the centre line at the start, radians, evenly from 0 to this at the end;
+    /// it springs back unless both ends are clamped; −1000 … 1000.
+    pub twist_rad: f64,
     /// The section and what it resists.
     pub section: Section,
     /// Density × area in kg/m, > 0.
@@ -121,6 +127,8 @@ impl TubeSpec {
         let resolution = Resolution { eps_m: length_m / segments.max(1) as f64, n: 0 };
         Self {
             path_m,
+            straight: false,
+            twist_rad: 0.0,
             section,
             mass_per_length_kg_m,
             resolution,

@@ -60,13 +60,13 @@ pub fn pressed_radius_m(section: &Section, pressure_pa: f64) -> f64 {
 }
 
 impl Tube {
-    /// Builds a tube at rest on its stress-free path.
+    /// Builds a tube that stands still on its path, stress-free but for what [`TubeSpec::straight`] and a twist make of it.
     ///
     /// # Errors
     /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
     pub fn new(spec: TubeSpec) -> Result<Self, TubeError> {
         check(&spec)?;
-        let skeleton = Skeleton::new(&spec.path_m);
+        let skeleton = Skeleton::new(&spec.path_m).strained(spec.straight, spec.twist_rad);
         let resolution = spec.range.clamp(spec.resolution);
         let count = match spec.segments {
             Some(count) => division::limit(&skeleton, count),

@@ -27,6 +27,7 @@ const YOUNG: Allowed = allowed(1.0..=1e13, "Pa");
 const POISSON: Allowed = allowed(-0.999..=0.5, "");
 const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
 const STIFFNESS: Allowed = allowed(1e-15..=1e15, "");
+const TWIST: Allowed = allowed(-36_000.0..=36_000.0, "°");
 const SHARE: Allowed = allowed(0.0..=1.0, "");
 
 /// A tube and the resolutions it may take.
@@ -45,6 +46,8 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>)
     let (clamp, pin) = ends(c, place, file);
     let spec = TubeSpec {
         path_m,
+        straight: file.straight.unwrap_or(false),
+        twist_rad: c.number_or(place, "twist_deg", (file.twist_deg, 0.0), &TWIST).to_radians(),
         section,
         mass_per_length_kg_m,
         resolution,

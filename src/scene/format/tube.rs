@@ -8,10 +8,15 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TubeFile {
-    /// Points of the stress-free centre line in metres: 2 … 100000, no two neighbours alike.
-    /// Two points make a straight line, more a smooth curve through all of them.
+    /// Points of the centre line at the start in metres: 2 … 100000, no two neighbours alike; free of stress unless
+    /// `straight` or `twist_deg` say otherwise. Two points make a straight line, more a smooth curve through all of them.
     #[schemars(length(min = 2, max = 100_000))]
     pub path_m: Vec<Point>,
+    /// Whether it is straight where nothing bends it: the path is then what it was bent to. Default false.
+    pub straight: Option<bool>,
+    /// How far its end is turned about the tube against its start when the scene begins, degrees, -36000 … 36000, evenly
+    /// along it; it springs back unless both ends are clamped. Default 0.
+    pub twist_deg: Option<f64>,
     /// Outer radius at rest, metres, 1e-6 … 100.
     pub radius_m: f64,
     /// Wall thickness, metres, above 0 and at most `radius_m`. Default: `radius_m`, a solid rod.

@@ -6,6 +6,7 @@ mod methods;
 mod motion;
 mod remesh;
 mod statics;
+mod strained;
 mod violent;
 
 use super::config::Config;
