@@ -357,8 +357,10 @@ pub enum BenchSubject {
 /// A subject of `chart`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Subject {
-    /// How wrong each integrator of the tube is, and what it costs, with other engines' points behind
+    /// How wrong each method is against an independent answer, and what it costs, with other engines' points behind
     Accuracy,
+    /// How cost grows with segments, contacts and agents, and how far it is from what the machine could do
+    Scaling,
     /// Where integrators and couplings blow up, and where they are bounded but wrong
     Stability,
     /// How far a scene with clocks apart is from the same under one tiny clock

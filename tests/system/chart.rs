@@ -88,6 +88,56 @@ fn the_quick_diagram_of_the_cantilever_converges_with_second_order_and_shows_oth
     }
 }
 
+/// What a chart says as JSON.
+fn told(subject: &str, out: &Path, names: &[&str]) -> Value {
+    let only: Vec<&str> = names.iter().flat_map(|name| ["--only", name]).collect();
+    let done = charted(subject, out, &[&only[..], &["--json", "-q"]].concat());
+    assert_eq!((done.status.code(), said(&done).as_str()), (Some(0), ""));
+    serde_json::from_slice(&done.stdout).expect("nothing but JSON on standard output")
+}
+
+#[test]
+fn the_quick_diagrams_answer_as_theory_does() {
+    // the best error of each benchmark with the few segments of `--quick`, and what those leave of space
+    let limits = [
+        ("end-moment", 3e-3),
+        ("helix", 8e-3),
+        ("frequencies", 0.02),
+        ("inflation", 0.3),
+        ("sheet", 2e-3),
+        ("solid-beam", 5e-3),
+    ];
+    let out = folder();
+    let json = told("accuracy", out.path(), &limits.map(|(name, _)| name));
+    let experiments = json["experiments"].as_array().unwrap();
+    for (experiment, (name, limit)) in experiments.iter().zip(limits) {
+        assert_eq!(experiment["name"].as_str(), Some(name));
+        for line in experiment["table"].as_array().unwrap() {
+            let error = line["best error"].as_f64().unwrap_or(f64::NAN);
+            assert!(error < limit, "{name}: {line}");
+        }
+        assert!(experiment["findings"].as_array().unwrap().iter().all(|finding| finding["holds"] != false), "{name}");
+    }
+    assert_eq!(experiments.len(), limits.len());
+}
+
+#[test]
+fn the_quick_scaling_of_a_tube_stands_beside_a_floor() {
+    let out = folder();
+    let json = told("scaling", out.path(), &["segments"]);
+    let table = json["experiments"][0]["table"].as_array().unwrap();
+    assert_eq!(table.len(), 3 * 4, "three kinds of four sizes");
+    for pair in table.windows(2).filter(|pair| pair[0]["case"] == pair[1]["case"]) {
+        let [few, many] = [0, 1].map(|k| pair[k]["us"].as_f64().unwrap());
+        assert!(many > few, "three to four times the segments cost more: {pair:?}");
+    }
+    assert!(table.iter().all(|line| line["floor ns each"].as_f64().unwrap() > 0.0 && line["exponent"].is_number()));
+    let svg = std::fs::read_to_string(out.path().join("scaling-segments.svg")).unwrap();
+    for word in ["held by a tool", "the same memory once", "mujoco 4.0.0", "ns each"] {
+        assert!(svg.contains(word), "{word} is not in the figure");
+    }
+}
+
 #[test]
 fn the_rows_of_two_runs_are_the_same_bytes() {
     let [first, second] = [0, 1].map(|_| {

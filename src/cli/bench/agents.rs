@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// Who runs the agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Executor {
+pub(in crate::cli) enum Executor {
     Threads,
     Pool,
     Lockstep,
@@ -22,7 +22,7 @@ pub(super) enum Executor {
 
 /// One question.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Case {
+pub(in crate::cli) struct Case {
     pub executor: Executor,
     pub model: Model,
     pub agents: usize,
@@ -33,7 +33,7 @@ pub(super) struct Case {
 
 /// One answer. Times are those of the agent at which half, or 99 in 100, are better.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(super) struct Row {
+pub(in crate::cli) struct Row {
     pub executor: Executor,
     pub model: Model,
     pub realtime: bool,
@@ -110,7 +110,7 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
 }
 
 /// Measures one case for about `span` each for the loops and the run.
-pub(super) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
+pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
     let spawns = (0..case.agents).map(|k| anyhow::Ok(spawn(agent(case.model, k)?, k, case.rate_hz)));
     let spawns = spawns.collect::<Result<Vec<_>, _>>()?;

@@ -18,7 +18,7 @@ use std::sync::Arc;
 /// What an agent is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(super) enum Model {
+pub(in crate::cli) enum Model {
     /// Half a microsecond of arithmetic a step: as cheap as agents get.
     Synthetic,
     /// As synthetic, and at rest after its first step.

@@ -2,9 +2,9 @@
 //!
 //! In: what to measure, which folder. Out: files, a table. Never here: what is measured (each subject is a file).
 
-mod agents;
+pub(super) mod agents;
 mod bare;
-mod cast;
+pub(super) mod cast;
 mod machine;
 mod pile;
 mod render;

@@ -4,12 +4,12 @@
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::super::progress::Bar;
 use super::bare::step;
 use super::cast::{ROD_SEGMENTS, rod};
 use super::machine::own_cpu;
-use super::shown::exponent;
 use super::subject::Subject;
 use glam::DVec3;
 use metachron_agents::SimSpan;
@@ -80,7 +80,7 @@ impl Subject for Rod {
         let lines = [("without self-contact", false), ("with the search for it", true)].into_iter().zip(Colour::LINES);
         let layers = lines.map(|((label, contact), colour)| {
             let points = points(contact);
-            let label = format!("{label}: segments^{:.2}", exponent(&points));
+            let label = format!("{label}: segments^{:.2}", exponent(&points).unwrap_or(f64::NAN));
             Layer { label, colour, mark: Mark::Line(points) }
         });
         let (x, y) = (Axis::log("segments", low, high), Axis::log("CPU a step, µs", least, most));

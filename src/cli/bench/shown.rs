@@ -4,6 +4,7 @@
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
 use super::super::output::message;
 use super::super::progress::Bar;
@@ -151,7 +152,7 @@ fn growth(rows: &[&Row]) -> Panel {
     let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));
     let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
     let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
-    let title = format!("as fast as they can: a round costs agents^{:.2}", exponent(&ours));
+    let title = format!("as fast as they can: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
     let layers = vec![
         Layer { label: "pool".to_owned(), colour: Colour::LINES[1], mark: Mark::Line(ours) },
         Layer { label: "bare loop".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(bare) },
@@ -159,25 +160,10 @@ fn growth(rows: &[&Row]) -> Panel {
     Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs a round", least, most), layers }
 }
 
-/// The power of x that y follows, by least squares of the logarithms.
-pub(super) fn exponent(points: &[(f64, f64)]) -> f64 {
-    let logs: Vec<(f64, f64)> = points.iter().map(|(x, y)| (x.ln(), y.ln())).collect();
-    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / logs.len() as f64;
-    let (x, y) = (mean(|p| p.0), mean(|p| p.1));
-    let (along, squares) = logs.iter().fold((0.0, 0.0), |(a, s), p| (a + (p.0 - x) * (p.1 - y), s + (p.0 - x).powi(2)));
-    along / squares
-}
-
 #[cfg(test)]
 mod tests {
     use super::super::subject::write;
     use super::*;
-
-    #[test]
-    fn the_exponent_of_a_power_law_is_found() {
-        let points = [10.0_f64, 100.0, 1000.0].map(|x| (x, 3.0 * x.powf(1.07)));
-        assert!((exponent(&points) - 1.07).abs() < 1e-12);
-    }
 
     fn row(executor: Executor, agents: usize) -> Row {
         let case = Case { executor, model: Model::Synthetic, priority: Priority::Normal, agents, rate_hz: 500.0 };

@@ -9,7 +9,9 @@ mod experiment;
 pub(super) mod figure;
 mod play;
 mod policies;
+pub(super) mod power;
 mod rows;
+mod scaling;
 mod scenes;
 mod stability;
 mod stage;
@@ -26,6 +28,7 @@ use anyhow::Context;
 use experiment::Finding;
 use policies::live::Live;
 use rows::RowFile;
+use scaling::growth::Scaling;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -83,8 +86,19 @@ const ACCURACY: &[Entry] = &[
     entry::<Diagram<accuracy::elastica::Elastica>>(),
     entry::<Diagram<accuracy::catenary::Catenary>>(),
     entry::<Diagram<accuracy::four_point::FourPoint>>(),
+    entry::<Diagram<accuracy::end_moment::EndMoment>>(),
+    entry::<Diagram<accuracy::helix::Helix>>(),
     entry::<Diagram<accuracy::frequencies::Frequencies>>(),
     entry::<Diagram<accuracy::swing::Swing>>(),
+    entry::<Diagram<accuracy::inflation::Inflation>>(),
+    entry::<Diagram<accuracy::sheet::Sheet>>(),
+    entry::<Diagram<accuracy::beam::SolidBeam>>(),
+];
+
+const SCALING: &[Entry] = &[
+    entry::<Scaling<scaling::segments::Segments>>(),
+    entry::<Scaling<scaling::contacts::Contacts>>(),
+    entry::<Scaling<scaling::agents::Agents>>(),
 ];
 
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
@@ -117,6 +131,7 @@ const POLICIES_LIVE: &[Entry] = &[
 pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
     let (subject, all) = match (args.subject, args.live) {
         (Subject::Accuracy, false) => ("accuracy", ACCURACY),
+        (Subject::Scaling, false) => ("scaling", SCALING),
         (Subject::Stability, false) => ("stability", STABILITY),
         (Subject::Coupling, false) => ("coupling", COUPLING),
         (Subject::Policies, false) => ("policies", POLICIES),

@@ -4,10 +4,12 @@
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::power::exponent;
 use super::super::table::{Cell, Table};
-use super::front::{front, order};
+use super::front::front;
 use super::peers;
 use super::play::Play;
+use metachron_agents::rod::Integrator;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -26,8 +28,10 @@ pub(in super::super) trait Benchmark: Send + Sync + 'static {
     /// Plays a case: the error, none where the tube was lost.
     fn play(case: &Case) -> Option<(Play, f64)>;
 
-    /// Error and CPU time to reach, a line each.
-    fn goals() -> Vec<Goal>;
+    /// What is to be reached, a line each.
+    fn goals() -> Vec<Goal> {
+        Vec::new()
+    }
 }
 
 /// One run of a benchmark.
@@ -43,14 +47,53 @@ pub(in super::super) struct Case {
     pub(super) substeps: u32,
 }
 
-/// What a method should reach.
+impl Case {
+    /// Every problem by every method with every number of segments, in steps of `dt_ms`.
+    pub(super) fn ladder(cases: &[&str], methods: &[Integrator], sizes: &[u32], dt_ms: f64) -> Vec<Self> {
+        let mut list = Vec::new();
+        for (case, method) in cases.iter().flat_map(|case| methods.iter().map(move |method| (case, method))) {
+            let (case, method) = ((*case).to_owned(), method.name().to_owned());
+            let of = |&segments| Self { case: case.clone(), method: method.clone(), segments, dt_ms, substeps: 1 };
+            list.extend(sizes.iter().map(of));
+        }
+        list
+    }
+
+    /// The same for problems in which hands pull: meanwhile every implicit method moves by implicit Euler.
+    pub(super) fn pulled(cases: &[&str], quick: bool) -> Vec<Self> {
+        let sizes = if quick { &[8, 16][..] } else { &[8, 16, 32, 64, 128] };
+        Self::ladder(cases, &[Integrator::ImplicitEuler], sizes, 10.0)
+    }
+}
+
+/// What some method should reach.
 pub(in super::super) struct Goal {
     pub(super) case: &'static str,
     /// Only with so many segments; with any where it is zero.
     pub(super) segments: u32,
     pub(super) error: f64,
-    /// CPU milliseconds a simulated second.
-    pub(super) cpu_ms_per_s: f64,
+    /// At no more than so many CPU milliseconds a simulated second, where that is asked.
+    pub(super) cpu_ms_per_s: Option<f64>,
+}
+
+impl Goal {
+    /// Holds the goal against the rows; nothing where none of them is of its case.
+    fn finding(self, rows: &[Row]) -> Option<Finding> {
+        let Self { case, segments, error, cpu_ms_per_s } = self;
+        let asked = || rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
+        asked().next()?;
+        let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
+        Some(match cpu_ms_per_s {
+            None => {
+                let least = asked().filter_map(|r| r.error).min_by(f64::total_cmp);
+                Finding::at_most(format!("{case}{size}: least error"), least.unwrap_or(f64::NAN), error)
+            }
+            Some(limit) => {
+                let claim = format!("{case}{size}: CPU ms a simulated second for an error of at most {error:e}");
+                Finding::at_most(claim, cheapest(asked(), error).unwrap_or(f64::NAN), limit)
+            }
+        })
+    }
 }
 
 /// A run with what came out.
@@ -82,7 +125,7 @@ impl<B: Benchmark> Experiment for Diagram<B> {
 
     fn measure(case: &Case) -> Row {
         let played = B::play(case);
-        let cpu_ms_per_s = played.as_ref().map_or(0.0, |(play, _)| play.cpu_ms_per_s());
+        let cpu_ms_per_s = played.as_ref().map_or(0.0, |(play, _)| cost::<B>(case, play));
         let substeps_per_step = played.as_ref().map_or(0.0, |(play, _)| play.substeps_per_step());
         let error = played.map(|(_, error)| error).filter(|error| error.is_finite());
         let Case { case, method, segments, dt_ms, substeps } = case.clone();
@@ -126,15 +169,18 @@ impl<B: Benchmark> Experiment for Diagram<B> {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        let finding = |goal: Goal| {
-            let Goal { case, segments, error, cpu_ms_per_s } = goal;
-            let asked = rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
-            let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
-            let claim = format!("{case}{size}: CPU ms a simulated second for an error of at most {error:e}");
-            Finding::at_most(claim, cheapest(asked, error).unwrap_or(f64::NAN), cpu_ms_per_s)
-        };
-        B::goals().into_iter().map(finding).collect()
+        B::goals().into_iter().filter_map(|goal| goal.finding(rows)).collect()
     }
+}
+
+/// CPU milliseconds a simulated second: the least of some repetitions where a run takes milliseconds, as what a shared
+/// machine adds is never negative.
+fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
+    const SHORT_S: f64 = 0.02;
+    const REPETITIONS: usize = 4;
+    let count = if first.cpu_s() < SHORT_S { REPETITIONS } else { 0 };
+    let more = (0..count).filter_map(|_| B::play(case)).map(|(play, _)| play.cpu_ms_per_s());
+    more.fold(first.cpu_ms_per_s(), f64::min)
 }
 
 /// A number in a cell, or that there is none.
@@ -162,7 +208,7 @@ fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64) -> Option<f64> 
 fn dt_order(rows: &[&Row]) -> Option<f64> {
     let most = rows.iter().map(|r| r.segments).max()?;
     let points = rows.iter().filter(|r| r.segments == most && r.substeps_per_step > 0.0);
-    order(&points.filter_map(|r| Some((r.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
+    exponent(&points.filter_map(|r| Some((r.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
 }
 
 /// By which power of their length errors fall with segments, with the shortest substeps.
@@ -170,7 +216,7 @@ fn segment_order(rows: &[&Row]) -> Option<f64> {
     let least = |r: &&&Row| r.dt_ms / f64::from(r.substeps);
     let shortest = rows.iter().map(|r| least(&r)).min_by(f64::total_cmp)?;
     let points = rows.iter().filter(|r| least(r) == shortest);
-    order(&points.filter_map(|r| Some((1.0 / f64::from(r.segments), r.error?))).collect::<Vec<_>>())
+    exponent(&points.filter_map(|r| Some((1.0 / f64::from(r.segments), r.error?))).collect::<Vec<_>>())
 }
 
 /// One problem of the benchmark: methods as lines, other engines as dots, the front of all as a broken line.

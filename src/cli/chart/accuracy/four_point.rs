@@ -1,10 +1,10 @@
 //! Four-point bending: a beam on two supports with two loads between them, against beam theory with shear.
 
 use super::super::stability::common::dead_load;
-use super::diagram::{Benchmark, Case, Goal};
-use super::play::{Play, reference_tube};
+use super::diagram::{Benchmark, Case};
+use super::play::{Play, metre, reference_tube};
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, TubeSpec};
+use metachron_agents::rod::TubeSpec;
 
 /// The benchmark.
 pub(in super::super) struct FourPoint;
@@ -21,22 +21,12 @@ impl Benchmark for FourPoint {
     const ERROR: &'static str = "error of the deflection / deflection";
 
     fn cases(quick: bool) -> Vec<Case> {
-        let mut list = Vec::new();
-        for (case, _) in PLACES {
-            // while it is pulled a tube moves by implicit Euler, whichever method of second order it has
-            let method = Integrator::ImplicitEuler.name();
-            for &segments in if quick { &[8, 16][..] } else { &[8, 16, 32, 64, 128] } {
-                let (case, method) = (case.to_owned(), method.to_owned());
-                list.push(Case { case, method, segments, dt_ms: 10.0, substeps: 1 });
-            }
-        }
-        list
+        Case::pulled(&PLACES.map(|(name, _)| name), quick)
     }
 
     fn play(case: &Case) -> Option<(Play, f64)> {
         let (_, a) = PLACES.into_iter().find(|(name, _)| *name == case.case)?;
-        let spec =
-            TubeSpec { damping_per_s: 12.0, pin: [true, true], ..reference_tube(1e7, vec![DVec3::ZERO, DVec3::X]) };
+        let spec = TubeSpec { damping_per_s: 12.0, pin: [true, true], ..reference_tube(1e7, metre()) };
         // P a (3 L² − 4 a²)/24 EI, and P a/GA of shear
         let softness = a * (3.0 - 4.0 * a * a) / (24.0 * spec.section.ei_n_m2) + a / spec.section.ga_n;
         let load = DVec3::NEG_Z * (DEFLECTION_M / softness);
@@ -45,9 +35,5 @@ impl Benchmark for FourPoint {
         let sound = play.run(SECONDS, &hands);
         let error = (-play.point(0.5).z / DEFLECTION_M - 1.0).abs();
         sound.then_some((play, error))
-    }
-
-    fn goals() -> Vec<Goal> {
-        vec![]
     }
 }

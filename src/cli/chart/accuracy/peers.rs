@@ -9,20 +9,29 @@ const TABLE: &str = include_str!("peers.csv");
 
 /// A run of another engine.
 #[derive(Debug, Clone, Deserialize)]
-pub(super) struct Peer {
+pub(in super::super) struct Peer {
     benchmark: String,
     /// Which case of the benchmark.
-    pub(super) case: String,
+    pub(in super::super) case: String,
     /// Engine and version.
-    pub(super) peer: String,
+    pub(in super::super) peer: String,
+    pub(in super::super) segments: f64,
+    dt_ms: f64,
     /// CPU milliseconds a simulated second.
     pub(super) cpu_ms_per_s: f64,
     /// In the benchmark's own measure.
     pub(super) error: f64,
 }
 
+impl Peer {
+    /// CPU microseconds a step.
+    pub(in super::super) fn us_per_step(&self) -> f64 {
+        self.cpu_ms_per_s * self.dt_ms
+    }
+}
+
 /// The runs of a benchmark.
-pub(super) fn of(benchmark: &str) -> Vec<Peer> {
+pub(in super::super) fn of(benchmark: &str) -> Vec<Peer> {
     let rows = csv::Reader::from_reader(TABLE.as_bytes()).into_deserialize::<Peer>();
     rows.flatten().filter(|peer| peer.benchmark == benchmark).collect()
 }

@@ -1,24 +1,41 @@
-//! Runs a tube alone and counts what that costs.
+//! Runs an agent alone and counts what that costs.
 //!
-//! In: a tube's numbers, its method, a step. Out: CPU time of its steps, and whatever is asked of the tube on the way.
+//! In: a tube's numbers or a soft body's, a method, a step. Out: CPU time of its steps, and how it lies and moves on the way.
 //! Never here: answers, errors, what is drawn.
 
+use super::super::stability::common::plain_tube;
 use super::diagram::Case;
 use cpu_time::ThreadTime;
 use glam::DVec3;
 use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
-use metachron_agents::{Agent, AgentId, Pull, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_agents::soft::{SoftBody, SoftSpec};
+use metachron_agents::{Agent, AgentId, Body, CurveState, Pull, SimSpan, SimTime, Snapshot, Surroundings};
+
+/// Stretch and shear of a [`slender_tube`] are this much stiffer than those of the tube of the references.
+const STIFFER: f64 = 1e3;
 
 /// The tube of the references: 1 m along `path_m`, 15 mm radius, 2 mm wall.
 pub(super) fn reference_tube(young_pa: f64, path_m: Vec<DVec3>) -> TubeSpec {
     let material = Material { young_pa, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let (section, mass_per_length_kg_m) = Section::hollow(0.015, 0.002, material);
-    TubeSpec { section, mass_per_length_kg_m, ..super::super::stability::common::plain_tube(path_m, 0.015, 16) }
+    TubeSpec { section, mass_per_length_kg_m, ..plain_tube(path_m, 0.015, 16) }
 }
 
-/// A tube and how it is stepped.
+/// The same for answers that know neither stretch nor shear.
+pub(super) fn slender_tube(young_pa: f64, path_m: Vec<DVec3>) -> TubeSpec {
+    let mut spec = reference_tube(young_pa, path_m);
+    (spec.section.ea_n, spec.section.ga_n) = (spec.section.ea_n * STIFFER, spec.section.ga_n * STIFFER);
+    spec
+}
+
+/// A metre along x.
+pub(super) fn metre() -> Vec<DVec3> {
+    vec![DVec3::ZERO, DVec3::X]
+}
+
+/// An agent and how it is stepped.
 pub(in super::super) struct Play {
-    pub(super) tube: Tube,
+    agent: Box<dyn Agent>,
     dt: SimSpan,
     time: SimTime,
     cpu_s: f64,
@@ -32,13 +49,22 @@ impl Play {
         let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.method)?;
         let segments = Some(case.segments as usize);
         let mut spec = TubeSpec { integrator, segments, substeps: case.substeps, ..spec };
-        let dt = SimSpan::from_secs_f64(case.dt_ms * 1e-3)?;
+        let dt_s = case.dt_ms * 1e-3;
         // a tenth to spare: limits shrink with the stretch
-        let needed = |limit_s: f64| libm::ceil(1.1 * dt.as_secs_f64() / limit_s) as u32;
+        let needed = |limit_s: f64| libm::ceil(1.1 * dt_s / limit_s) as u32;
         let limit_s = Tube::new(spec.clone()).ok()?.longest_substep_s();
         spec.substeps = spec.substeps.max(limit_s.map_or(1, needed));
-        let tube = Tube::new(spec).ok()?;
-        Some(Self { tube, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps: 0, steps: 0 })
+        Self::of(Box::new(Tube::new(spec).ok()?), dt_s)
+    }
+
+    /// A soft body of a case; none where it cannot be.
+    pub(super) fn soft(spec: SoftSpec, case: &Case) -> Option<Self> {
+        Self::of(Box::new(SoftBody::new(spec).ok()?), case.dt_ms * 1e-3)
+    }
+
+    fn of(agent: Box<dyn Agent>, dt_s: f64) -> Option<Self> {
+        let dt = SimSpan::from_secs_f64(dt_s)?;
+        Some(Self { agent, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps: 0, steps: 0 })
     }
 
     /// Goes on for `seconds` under `hands`; whether every step could be made.
@@ -48,7 +74,7 @@ impl Play {
         let mut sound = true;
         while sound && self.time.as_secs_f64() < until {
             let around = Surroundings { hands, ..Surroundings::alone(AgentId(0), self.time) };
-            match self.tube.step(self.dt, &around) {
+            match self.agent.step(self.dt, &around) {
                 Ok(report) => self.substeps += u64::from(report.substeps),
                 Err(_) => sound = false,
             }
@@ -59,16 +85,45 @@ impl Play {
         sound
     }
 
-    /// The point of the tube at a share of its length, metres.
-    pub(super) fn point(&self, share: f64) -> DVec3 {
+    /// How it lies and moves.
+    pub(super) fn body(&self) -> Body {
         let mut seen = Snapshot::default();
-        self.tube.write_snapshot(&mut seen);
-        seen.body.probe(share).map_or(DVec3::NAN, |(point, _)| point)
+        self.agent.write_snapshot(&mut seen);
+        seen.body
+    }
+
+    /// The same of a tube; empty of anything else.
+    pub(super) fn curve(&self) -> CurveState {
+        match self.body() {
+            Body::Curve(curve) => curve,
+            _ => CurveState::default(),
+        }
+    }
+
+    /// The point of it at a share of its length, metres.
+    pub(super) fn point(&self, share: f64) -> DVec3 {
+        self.body().probe(share).map_or(DVec3::NAN, |(point, _)| point)
+    }
+
+    /// The lowest height of its nodes or vertices, metres.
+    pub(super) fn lowest_m(&self) -> f64 {
+        let body = self.body();
+        let positions = match &body {
+            Body::Curve(curve) => &curve.positions[..],
+            Body::Soft(soft) => &soft.positions[..],
+            _ => &[],
+        };
+        positions.iter().map(|x| x.z).fold(f64::INFINITY, f64::min)
     }
 
     /// CPU milliseconds a simulated second, so far.
     pub(super) fn cpu_ms_per_s(&self) -> f64 {
         self.cpu_s * 1e3 / self.time.as_secs_f64()
+    }
+
+    /// CPU seconds of its steps, so far.
+    pub(super) fn cpu_s(&self) -> f64 {
+        self.cpu_s
     }
 
     /// Substeps a step, so far.

@@ -3,7 +3,7 @@
 
 use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case, Goal};
-use super::play::{Play, reference_tube};
+use super::play::{Play, metre, slender_tube};
 use glam::DVec3;
 use metachron_agents::rod::{Integrator, TubeSpec};
 use serde::Deserialize;
@@ -18,8 +18,6 @@ struct Trajectory {
 }
 
 const REFERENCE: &str = include_str!("../../../../tests/reference/swing_cable.json");
-/// Stretch and shear are this much stiffer than the soft tube's: the reference has neither.
-const STIFFER: f64 = 1e3;
 /// How often the tip is compared, in the first second, every 10 ms.
 const LOOKS: usize = 100;
 
@@ -43,12 +41,8 @@ impl Benchmark for Swing {
 
     fn play(case: &Case) -> Option<(Play, f64)> {
         let tips = serde_json::from_str::<Trajectory>(REFERENCE).ok()?.tip_xz_every_10ms;
-        let mut spec = TubeSpec {
-            pin: [true, false],
-            gravity: DVec3::NEG_Z * GRAVITY,
-            ..reference_tube(1e6, vec![DVec3::ZERO, DVec3::X])
-        };
-        (spec.section.ea_n, spec.section.ga_n) = (spec.section.ea_n * STIFFER, spec.section.ga_n * STIFFER);
+        // the reference has neither stretch nor shear
+        let spec = TubeSpec { pin: [true, false], gravity: DVec3::NEG_Z * GRAVITY, ..slender_tube(1e6, metre()) };
         let mut play = Play::new(spec, case)?;
         let mut sum = 0.0;
         for [x, z] in tips.into_iter().skip(1).take(LOOKS) {
@@ -61,6 +55,6 @@ impl Benchmark for Swing {
     }
 
     fn goals() -> Vec<Goal> {
-        vec![Goal { case: "cable", segments: 32, error: 5e-4, cpu_ms_per_s: 6.0 }]
+        vec![Goal { case: "cable", segments: 32, error: 5e-4, cpu_ms_per_s: Some(6.0) }]
     }
 }

@@ -1,0 +1,68 @@
+//! What a step of a tube that lies folded on itself costs by its contacts, free and held by a tool.
+
+use super::super::experiment::Finding;
+use super::growth::{Case, Cost, Growth, Row};
+use super::timing::{floor_us, least_us};
+use super::tubes::{folded, holding, step};
+use metachron_agents::SimSpan;
+use std::time::Duration;
+
+/// The question.
+pub(in super::super) struct Contacts;
+
+const FREE: &str = "free, steps of 4 ms";
+const HELD: &str = "held by a tool, steps of 1 ms";
+const DT: SimSpan = SimSpan::from_nanos(4_000_000);
+const DT_HELD: SimSpan = SimSpan::from_nanos(1_000_000);
+/// How long each case is measured, and steps of 4 ms until the tube lies on itself.
+const SPAN: Duration = Duration::from_millis(500);
+const FALLS: u32 = 1500;
+/// Steps in the tool's grasp before that is measured.
+const HOLDS: u32 = 200;
+
+impl Growth for Contacts {
+    const NAME: &'static str = "contacts";
+    const TITLE: &'static str = "What a step of a folded tube costs by its contacts";
+    const COUNTED: &'static str = "contacts";
+    const COST: &'static str = "CPU µs a step";
+    const FLOOR: &'static str = "the same memory once";
+
+    /// Sizes are segments, 14 a strand.
+    fn cases(quick: bool) -> Vec<Case> {
+        let sizes: &[u32] = if quick { &[28, 100] } else { &[28, 56, 100, 200, 400, 800] };
+        let kinds = [FREE, HELD].into_iter();
+        kinds.flat_map(|case| sizes.iter().map(|&size| Case { case: case.to_owned(), size })).collect()
+    }
+
+    fn measure(case: &Case) -> Option<Cost> {
+        let mut tube = folded(case.size)?;
+        for _ in 0..FALLS {
+            step(&mut tube, DT, &[])?;
+        }
+        let held = case.case == HELD;
+        let (dt, neighbours) = if held { (DT_HELD, holding(&tube)?) } else { (DT, vec![]) };
+        for _ in 0..if held { HOLDS } else { 0 } {
+            step(&mut tube, dt, &neighbours)?;
+        }
+        let us = least_us(SPAN, || step(&mut tube, dt, &neighbours))?;
+        let floor_us = floor_us(tube.memory_bytes(), SPAN / 10)?;
+        Some(Cost { count: tube.contacts() as f64, us, floor_us })
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let us = |case: &str, size: u32| {
+            let row = rows.iter().find(|row| row.case == case && row.size == size);
+            row.map_or(f64::NAN, |row| row.point().1)
+        };
+        let mut list = vec![Finding::at_most(
+            "100 segments on themselves: µs a step of 4 ms (10,000 a second)",
+            us(FREE, 100),
+            100.0,
+        )];
+        if rows.iter().any(|row| row.size == 400) {
+            let claim = "400 segments on themselves in a grasp: µs a step of 1 ms (1 kHz)";
+            list.push(Finding::at_most(claim, us(HELD, 400), 1000.0));
+        }
+        list
+    }
+}

@@ -1,0 +1,207 @@
+//! Cost against number: what so many cost, what that is each, the floor beside it, and the power that cost grows by.
+//!
+//! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
+
+use super::super::experiment::{Experiment, Finding};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::power::exponent;
+use super::super::table::Table;
+use serde::{Deserialize, Serialize};
+use std::marker::PhantomData;
+
+/// A question of how cost grows.
+pub(in super::super) trait Growth: Send + Sync + 'static {
+    /// As [`Experiment::NAME`].
+    const NAME: &'static str;
+    /// As [`Experiment::TITLE`].
+    const TITLE: &'static str;
+    /// What is counted, for the axis.
+    const COUNTED: &'static str;
+    /// What costs the time, for the axis.
+    const COST: &'static str;
+    /// What the floor is.
+    const FLOOR: &'static str;
+
+    /// What is asked.
+    fn cases(quick: bool) -> Vec<Case>;
+
+    /// Measures a case; none where it could not be carried out.
+    fn measure(case: &Case) -> Option<Cost>;
+
+    /// What was claimed, and what came out.
+    fn findings(rows: &[Row]) -> Vec<Finding>;
+
+    /// Points of others in the same terms: name, count, microseconds.
+    fn peers() -> Vec<(String, f64, f64)> {
+        Vec::new()
+    }
+}
+
+/// One size of one kind.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    /// Which kind.
+    pub(super) case: String,
+    /// The size asked for.
+    pub(super) size: u32,
+}
+
+/// What a size costs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in super::super) struct Cost {
+    /// How many there are of what is counted.
+    pub(super) count: f64,
+    pub(super) us: f64,
+    pub(super) floor_us: f64,
+}
+
+/// A case with what was measured.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    pub(super) case: String,
+    pub(super) size: u32,
+    /// Empty, as what follows, where the case could not be carried out.
+    pub(super) count: Option<f64>,
+    pub(super) us: Option<f64>,
+    pub(super) floor_us: Option<f64>,
+}
+
+impl Row {
+    /// Count and microseconds; no numbers where there are none.
+    pub(super) fn point(&self) -> (f64, f64) {
+        (self.count.unwrap_or(f64::NAN), self.us.unwrap_or(f64::NAN))
+    }
+
+    fn floor(&self) -> (f64, f64) {
+        (self.count.unwrap_or(f64::NAN), self.floor_us.unwrap_or(f64::NAN))
+    }
+
+    /// Nanoseconds each.
+    pub(super) fn ns_each(&self) -> f64 {
+        let (count, us) = self.point();
+        us * 1e3 / count
+    }
+}
+
+/// The diagram of a question.
+pub(in super::super) struct Scaling<G>(PhantomData<G>);
+
+impl<G: Growth> Experiment for Scaling<G> {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = G::NAME;
+    const TITLE: &'static str = G::TITLE;
+    const ALONE: bool = true;
+
+    fn cases(quick: bool) -> Vec<Case> {
+        G::cases(quick)
+    }
+
+    fn measure(case: &Case) -> Row {
+        let cost = G::measure(case);
+        let number = |of: fn(&Cost) -> f64| cost.as_ref().map(of).filter(|number| number.is_finite());
+        let Case { case, size } = case.clone();
+        Row { case, size, count: number(|c| c.count), us: number(|c| c.us), floor_us: number(|c| c.floor_us) }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { case: row.case.clone(), size: row.size }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        Figure { title: G::TITLE.to_owned(), panels: vec![whole::<G>(rows), each::<G>(rows)], columns: 2 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let columns = ["case", "size", G::COUNTED, "us", "ns each", "floor ns each", "times the floor", "exponent"];
+        let mut table = Table::new(&columns);
+        for row in rows {
+            let (count, us) = row.point();
+            let floor_us = row.floor().1;
+            table.rows.push(vec![
+                row.case.as_str().into(),
+                (f64::from(row.size), 0).into(),
+                (count, 0).into(),
+                (us, 2).into(),
+                (row.ns_each(), 1).into(),
+                (floor_us * 1e3 / count, 1).into(),
+                (us / floor_us, 1).into(),
+                (power(rows, &row.case, (0.0, f64::INFINITY)), 3).into(),
+            ]);
+        }
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        G::findings(rows)
+    }
+}
+
+/// By which power of the count the cost of a case grows, between two counts.
+pub(super) fn power(rows: &[Row], case: &str, (least, most): (f64, f64)) -> f64 {
+    let inside = |row: &&Row| row.case == case && row.count.is_some_and(|n| (least..=most).contains(&n));
+    let points: Vec<_> = rows.iter().filter(inside).map(Row::point).collect();
+    exponent(&points).unwrap_or(f64::NAN)
+}
+
+/// The different cases, in the order of the rows.
+fn names(rows: &[Row]) -> Vec<&str> {
+    let mut list: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
+    list.dedup();
+    list
+}
+
+/// Cost against count, the floor as a broken line, others as dots.
+fn whole<G: Growth>(rows: &[Row]) -> Panel {
+    let of = |case: &str, y: fn(&Row) -> (f64, f64)| rows.iter().filter(|r| r.case == case).map(y).collect::<Vec<_>>();
+    let mut layers = Vec::new();
+    let peers = G::peers();
+    let mut engines: Vec<&str> = peers.iter().map(|peer| peer.0.as_str()).collect();
+    engines.dedup();
+    for (k, engine) in engines.iter().enumerate() {
+        let points = peers.iter().filter(|peer| peer.0 == *engine).map(|peer| (peer.1, peer.2)).collect();
+        let colour = if k == 0 { Colour::Grey } else { Colour::LINES[Colour::LINES.len() - k.min(3)] };
+        layers.push(Layer { label: (*engine).to_owned(), colour, mark: Mark::Dots(points) });
+    }
+    for (case, colour) in names(rows).into_iter().zip(Colour::LINES) {
+        let label = format!("{case}: ^{:.2}", power(rows, case, (0.0, f64::INFINITY)));
+        layers.push(Layer { label, colour, mark: Mark::Line(of(case, Row::point)) });
+        layers.push(Layer { label: String::new(), colour, mark: Mark::Dashed(of(case, Row::floor)) });
+    }
+    layers.push(Layer { label: G::FLOOR.to_owned(), colour: Colour::Grey, mark: Mark::Dashed(Vec::new()) });
+    let all = || rows.iter().flat_map(|row| [row.point(), row.floor()]).chain(peers.iter().map(|p| (p.1, p.2)));
+    let ((left, right), (low, high)) = (span(all().map(|p| p.0), true), span(all().map(|p| p.1), true));
+    let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log(G::COST, low, high));
+    Panel { title: "all of them".to_owned(), x, y, layers }
+}
+
+/// Cost of each against count.
+fn each<G: Growth>(rows: &[Row]) -> Panel {
+    let of = |case: &str| rows.iter().filter(|r| r.case == case).map(|r| (r.point().0, r.ns_each())).collect();
+    let lines = names(rows).into_iter().zip(Colour::LINES);
+    let layers = lines.map(|(case, colour)| Layer { label: String::new(), colour, mark: Mark::Line(of(case)) });
+    let ((left, right), (low, high)) =
+        (span(rows.iter().map(|r| r.point().0), true), span(rows.iter().map(Row::ns_each), true));
+    let (x, y) = (Axis::log(G::COUNTED, left, right), Axis::log("ns each", low, high));
+    Panel { title: "each of them".to_owned(), x, y, layers: layers.collect() }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_power_is_fitted_between_two_counts() {
+        let row = |size: u32, us: f64| Row {
+            case: "a".to_owned(),
+            size,
+            count: Some(f64::from(size)),
+            us: Some(us),
+            floor_us: Some(1.0),
+        };
+        // a fixed cost below 100, proportional from there on
+        let rows = [row(1, 50.0), row(10, 50.0), row(100, 100.0), row(1000, 1000.0)];
+        assert!((power(&rows, "a", (100.0, 1000.0)) - 1.0).abs() < 1e-12);
+        assert!(power(&rows, "a", (0.0, 1e9)) < 0.7 && power(&rows, "b", (0.0, 1e9)).is_nan());
+    }
+}

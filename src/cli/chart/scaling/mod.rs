@@ -1,0 +1,8 @@
+//! `chart scaling`: how cost grows with segments, contacts and agents, and how far it is from what the machine could do.
+
+pub(super) mod agents;
+pub(super) mod contacts;
+pub(super) mod growth;
+pub(super) mod segments;
+mod timing;
+mod tubes;

@@ -1,0 +1,70 @@
+//! What a step of a tube costs by its segments: alone, searching for contact with itself, and held by a tool besides.
+
+use super::super::accuracy::peers;
+use super::super::experiment::{Finding, worst};
+use super::growth::{Case, Cost, Growth, Row, power};
+use super::timing::{floor_us, least_us};
+use super::tubes::{holding, step, straight};
+use metachron_agents::SimSpan;
+use std::time::Duration;
+
+/// The question.
+pub(in super::super) struct Segments;
+
+const ALONE: &str = "alone";
+const WARY: &str = "may touch itself";
+const HELD: &str = "held by a tool";
+/// What was claimed for the whole step at [`CLAIMED`] segments.
+const CLAIMED_NS: f64 = 160.0;
+const CLAIMED_POWER: f64 = 1.05;
+const CLAIMED: (f64, f64) = (100.0, 4000.0);
+/// How long each case is measured.
+const SPAN: Duration = Duration::from_millis(200);
+/// Steps before that, so that all hang alike: the tube comes to rest in the first half of them.
+const WARM: u32 = 500;
+const DT: SimSpan = SimSpan::from_nanos(10_000_000);
+
+impl Growth for Segments {
+    const NAME: &'static str = "segments";
+    const TITLE: &'static str = "What a step of a tube costs by its segments";
+    const COUNTED: &'static str = "segments";
+    const COST: &'static str = "CPU µs a step";
+    const FLOOR: &'static str = "the same memory once";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let sizes: &[u32] = if quick {
+            &[8, 32, 100, 400]
+        } else {
+            &[8, 16, 32, 64, 100, 128, 256, 400, 512, 1000, 1024, 2048, 4000, 4096]
+        };
+        let kinds = [ALONE, WARY, HELD].into_iter();
+        kinds.flat_map(|case| sizes.iter().map(|&size| Case { case: case.to_owned(), size })).collect()
+    }
+
+    fn measure(case: &Case) -> Option<Cost> {
+        let mut tube = straight(case.size, case.case != ALONE)?;
+        let neighbours = if case.case == HELD { holding(&tube)? } else { vec![] };
+        for _ in 0..WARM {
+            step(&mut tube, DT, &neighbours)?;
+        }
+        let us = least_us(SPAN, || step(&mut tube, DT, &neighbours))?;
+        let floor_us = floor_us(tube.memory_bytes(), SPAN / 10)?;
+        Some(Cost { count: f64::from(case.size), us, floor_us })
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let (least, most) = CLAIMED;
+        let inside = |row: &&Row| row.case == ALONE && (least..=most).contains(&f64::from(row.size));
+        let slowest = worst(rows.iter().filter(inside).map(Row::ns_each));
+        let range = format!("{least} … {most} segments");
+        vec![
+            Finding::at_most(format!("ns a segment and step, {range}, alone"), slowest, CLAIMED_NS),
+            Finding::at_most(format!("exponent, {range}, alone"), power(rows, ALONE, CLAIMED), CLAIMED_POWER),
+        ]
+    }
+
+    fn peers() -> Vec<(String, f64, f64)> {
+        let soft = peers::of("cantilever").into_iter().filter(|peer| peer.case == "soft");
+        soft.map(|peer| (peer.peer.clone(), peer.segments, peer.us_per_step())).collect()
+    }
+}

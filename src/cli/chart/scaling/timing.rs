@@ -1,0 +1,53 @@
+//! What a call costs at least, and what nothing that touches the same memory can be faster than.
+//!
+//! In: a call, or a number of bytes. Out: CPU time. Never here: what the call does.
+
+use cpu_time::ThreadTime;
+use std::hint::black_box;
+use std::time::Duration;
+
+/// A batch lasts about so long: far above what looking at the clock takes.
+const BATCH: Duration = Duration::from_micros(500);
+
+/// CPU time of one call in the fastest of many batches, over about `span`, microseconds; none where a call fails.
+///
+/// What a shared machine adds is never negative, so the least is nearest to the call's own.
+pub(super) fn least_us(span: Duration, mut call: impl FnMut() -> Option<()>) -> Option<f64> {
+    let start = ThreadTime::now();
+    call()?;
+    let once = start.elapsed().max(Duration::from_nanos(100));
+    let count = (BATCH.as_secs_f64() / once.as_secs_f64()).ceil() as u32;
+    let (whole, mut least) = (ThreadTime::now(), f64::INFINITY);
+    while whole.elapsed() < span {
+        let batch = ThreadTime::now();
+        for _ in 0..count {
+            call()?;
+        }
+        least = least.min(batch.elapsed().as_secs_f64() / f64::from(count));
+    }
+    Some(least * 1e6)
+}
+
+/// CPU time of a plain loop that reads and writes every number in so many bytes once, microseconds.
+pub(super) fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
+    let mut memory = vec![1.0_f64; bytes / size_of::<f64>()];
+    least_us(span, || {
+        for x in black_box(&mut memory[..]) {
+            *x = *x * 0.75 + 0.25;
+        }
+        Some(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ten_times_the_work_costs_more_and_a_call_that_fails_has_no_cost() {
+        let span = Duration::from_millis(10);
+        let [few, many] = [1 << 12, 10 << 12].map(|bytes| floor_us(bytes, span).unwrap());
+        assert!(few > 0.0 && many > 2.0 * few, "{few} {many}");
+        assert_eq!(least_us(span, || None), None);
+    }
+}

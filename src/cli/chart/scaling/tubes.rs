@@ -1,0 +1,97 @@
+//! The tubes whose cost is measured.
+//!
+//! In: segments. Out: tubes as they lie when they have come to rest, and the tool that holds them. Never here: time.
+
+use super::super::stability::common::{GRAVITY, plain_tube};
+use glam::{DQuat, DVec3};
+use metachron_agents::rod::{Tube, TubeSpec};
+use metachron_agents::shape::{Obstacle, Solid};
+use metachron_agents::{
+    Agent, AgentId, Anchor, Body, Grasp, Neighbour, SimSpan, SimTime, Snapshot, Surroundings, ToolState,
+};
+use std::sync::Arc;
+
+/// Segments of one strand of a folded tube.
+const STRAND_SEGMENTS: u32 = 14;
+const STRAND_M: f64 = 0.2;
+const RADIUS_M: f64 = 0.016;
+/// From one strand's axis to the next one's: they fall by a few millimetres.
+const PITCH_M: f64 = 0.034;
+/// Strands lie in so many layers.
+const LAYERS: u32 = 2;
+
+/// A soft tube of a metre, clamped at its start, under gravity.
+pub(super) fn straight(segments: u32, self_contact: bool) -> Option<Tube> {
+    let path_m = vec![DVec3::ZERO, DVec3::X];
+    let spec = TubeSpec {
+        damping_per_s: 6.0,
+        clamp: [true, false],
+        self_contact,
+        gravity: DVec3::NEG_Z * GRAVITY,
+        ..plain_tube(path_m, 0.015, segments as usize)
+    };
+    Tube::new(spec).ok()
+}
+
+/// A very soft tube that lies folded on the ground and on itself, in two layers of strands side by side.
+pub(super) fn folded(segments: u32) -> Option<Tube> {
+    let strands = segments.div_ceil(STRAND_SEGMENTS).max(2);
+    let wide = strands.div_ceil(LAYERS);
+    let mut path_m = vec![];
+    for k in 0..strands {
+        let (layer, column) = (k / wide, k % wide);
+        // the second layer is laid on the first from where that ends
+        let row = if layer.is_multiple_of(2) { column } else { wide - 1 - column };
+        let at = |x: f64| DVec3::new(x, f64::from(row) * PITCH_M, 0.02 + f64::from(layer) * PITCH_M);
+        let (near, far) = if k.is_multiple_of(2) { (0.0, STRAND_M) } else { (STRAND_M, 0.0) };
+        path_m.extend([near, 0.5 * STRAND_M, far].map(at));
+    }
+    let plain = plain_tube(path_m, RADIUS_M, segments as usize);
+    let ground = Obstacle {
+        name: "ground".into(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.3,
+        restitution: 0.0,
+    };
+    let mut spec = TubeSpec {
+        self_contact: true,
+        friction: 0.3,
+        damping_per_s: 1.0,
+        gravity: DVec3::NEG_Z * GRAVITY,
+        obstacles: [ground].into(),
+        ..plain
+    };
+    // 5e4 Pa in place of 1e6
+    for stiffness in
+        [&mut spec.section.ea_n, &mut spec.section.ga_n, &mut spec.section.ei_n_m2, &mut spec.section.gj_n_m2]
+    {
+        *stiffness *= 0.05;
+    }
+    Tube::new(spec).ok()
+}
+
+/// A tool that holds the middle of `tube` where it now is, as it was published once.
+pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
+    let mut seen = Snapshot::default();
+    tube.write_snapshot(&mut seen);
+    let anchor = Anchor::Arc(0.5 * tube.length_m());
+    let (tip, _) = seen.body.point(anchor)?;
+    let pose = ToolState {
+        tip,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        jaw: 0.0,
+        grasp: Some(Grasp { target: AgentId(0), anchor, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
+        force_n: 0.0,
+    };
+    let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
+    Some(vec![Neighbour { owned: true, ..Neighbour::seen(AgentId(1), tool) }])
+}
+
+/// One step among `neighbours`; none where it is refused.
+pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
+    let around = Surroundings { neighbours, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
+    tube.step(dt, &around).ok().map(drop)
+}
