@@ -18,7 +18,7 @@ fn tube(path_m: Vec<DVec3>, (radius_m, wall_m, young_pa): (f64, f64, f64), clamp
 
 #[test]
 fn a_tube_lies_across_another_one_whatever_their_clocks() {
-    let held_is_fast = [(1000.0, 200.0), (1000.0, 60.0), (1000.0, 30.0), (1000.0, 20.0)];
+    let held_is_fast = [(1000.0, 200.0), (1000.0, 60.0), (1000.0, 30.0)];
     let held_is_slow = [(200.0, 1000.0), (60.0, 360.0), (30.0, 1000.0), (20.0, 1000.0), (10.0, 1000.0), (10.0, 20.0)];
     let equal = [(60.0, 60.0), (30.0, 30.0), (20.0, 20.0), (10.0, 10.0)];
     for rates in held_is_fast.into_iter().chain(held_is_slow).chain(equal) {
