@@ -92,11 +92,6 @@ impl Menu {
         &mut self.objects
     }
 
-    /// Where the steps of an object lie among all, below [`Self::room`].
-    pub(crate) fn range_of(&self, object: &Object) -> Range<usize> {
-        range(object)
-    }
-
     /// How many places all steps take, those no longer used with them.
     pub(crate) fn room(&self) -> usize {
         self.steps.len()

@@ -3,10 +3,13 @@
 //! In: a menu, κ of every stage, a budget. Out: steps taken of every object, λ, and a bound.
 //! Never here: where the budget comes from. Theory: `docs/theory/budget.md`, eq. 32 and 33.
 //!
-//! Steps fall into buckets by the leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the
-//! steps of the one bucket that does not fit whole are sorted. So the answer is the one of a full sort, without its time.
+//! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
+//! leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the steps of the one bucket that does
+//! not fit whole are sorted. Where the price is not near the last one, all steps are near. So the answer is the one of a full sort,
+//! without its time.
 
 use alloc::vec::Vec;
+use core::ops::Range;
 
 use super::STAGES;
 use super::menu::{Menu, Object, Step};
@@ -109,16 +112,36 @@ struct Edge {
     step: u16,
 }
 
+/// Gains per time that are told apart: from the first on, below the second. What is above is taken, what is below is not.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Near(f64, f64);
+
+impl Near {
+    const ALL: Self = Self(0.0, f64::INFINITY);
+
+    /// A fifth of the last price up and down; where all was had, all is taken again.
+    fn to(price: f64) -> Self {
+        Self(price / 1.2, 1.2 * price)
+    }
+
+    /// The buckets that it reaches into.
+    fn buckets(self) -> Range<usize> {
+        bucket(self.0)..bucket(self.1) + 1
+    }
+}
+
 /// Buffers of the choice, kept from frame to frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(crate) struct Picker {
-    /// What the steps of every stage and bucket take by the table.
+    /// The price of the last choice.
+    price: f64,
+    /// What the near steps of every stage and bucket take by the table.
     bins: Vec<[u64; BUCKETS]>,
-    /// The bucket of every step on offer, where the menu has the step.
-    buckets: Vec<u16>,
+    /// Steps whose gain per time is near the price, object after object.
+    near: Vec<Edge>,
     /// Steps of the bucket in which the budget ends.
     edge: Vec<Edge>,
-    /// Steps on offer, and then steps taken, of every object.
+    /// Steps taken of every object.
     taken: Vec<u16>,
 }
 
@@ -136,10 +159,11 @@ impl Picker {
             return picked;
         }
         picked.feasible = true;
-        self.sort_into_buckets(menu, &terms);
-        let edge = self.find_edge(&terms, &mut picked);
-        self.take_above(menu, &terms, edge);
+        let found = self.find_edge(menu, &terms, Near::to(self.price));
+        picked.table = found.unwrap_or_else(|| self.find_edge(menu, &terms, Near::ALL).unwrap_or(menu.least));
+        self.sort_edge();
         picked.lambda = self.take_edge(menu, &terms, &mut picked);
+        self.price = picked.lambda;
         if picked.lambda > 0.0 && (menu.droppable > 0 || menu.objects().len() < FEW) {
             self.go_on(menu, &terms, &mut picked);
         }
@@ -147,59 +171,76 @@ impl Picker {
         picked
     }
 
-    /// Fills the bins.
-    fn sort_into_buckets(&mut self, menu: &Menu, terms: &Terms) {
-        self.bins.clear();
-        self.bins.resize(STAGES, [0; BUCKETS]);
-        self.buckets.resize(menu.room(), 0);
-        self.taken.clear();
-        for object in menu.objects() {
-            let steps = menu.steps_of(object);
-            let offered = terms.on_offer(object, steps);
-            let worth = terms.worth(object);
-            let bins = &mut self.bins[usize::from(object.stage)];
-            let buckets = &mut self.buckets[menu.range_of(object)][..offered];
-            for (at, (step, place)) in steps[..offered].iter().zip(buckets).enumerate() {
-                // an index, not a branch: what an object had cannot be foreseen
-                let bucket = bucket(step.slope * worth[usize::from(at < usize::from(object.taken))]);
-                bins[bucket] += u64::from(step.cost);
-                *place = bucket as u16;
-            }
-            self.taken.push(offered as u16);
+    /// Takes all steps above the bucket in which the budget ends, and lays those in it aside: what is taken comes to, by the table.
+    /// `None` where that bucket is not among the near ones.
+    fn find_edge(&mut self, menu: &Menu, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
+        let (mut table, all) = self.take_far(menu, terms, near);
+        if terms.cost(&table) > terms.budget {
+            return None;
         }
-    }
-
-    /// The bucket in which the budget ends, and in `picked` what all above it come to; 0 where everything fits.
-    fn find_edge(&self, terms: &Terms, picked: &mut Picked) -> u16 {
-        for at in (1..BUCKETS).rev() {
-            if self.bins.iter().all(|bins| bins[at] == 0) {
-                continue;
-            }
-            let mut with = picked.table;
+        self.sort_into_buckets(menu, near);
+        for at in near.buckets().rev() {
+            let mut with = table;
             with.iter_mut().zip(&self.bins).for_each(|(sum, bins)| *sum += bins[at]);
             if terms.cost(&with) > terms.budget {
-                return at as u16;
+                self.take_above(at);
+                return Some(table);
             }
-            picked.table = with;
+            table = with;
         }
-        0
+        self.take_above(0);
+        all.then_some(table)
     }
 
-    /// Takes all steps above the edge, and lays those on it aside, best first.
-    fn take_above(&mut self, menu: &Menu, terms: &Terms, edge: u16) {
+    /// Takes the steps above the near ones and collects those: what is taken comes to, and whether no step is below.
+    fn take_far(&mut self, menu: &Menu, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
+        self.near.clear();
+        self.near.reserve(menu.room());
+        self.taken.clear();
+        let (mut table, mut all) = (menu.least, true);
+        for (i, object) in (0..).zip(menu.objects()) {
+            let steps = menu.steps_of(object);
+            let offered = &steps[..terms.on_offer(object, steps)];
+            let worth = terms.worth(object);
+            let merit = |at: usize| offered[at].slope * worth[usize::from(at < usize::from(object.taken))];
+            let (mut at, mut cost) = (0, 0);
+            while at < offered.len() && merit(at) >= high {
+                cost += u64::from(offered[at].cost);
+                at += 1;
+            }
+            table[usize::from(object.stage)] += cost;
+            self.taken.push(at as u16);
+            while at < offered.len() && merit(at) >= low {
+                self.near.push(Edge { merit: merit(at), object: i, step: at as u16 });
+                at += 1;
+            }
+            all &= at == offered.len();
+        }
+        (table, all)
+    }
+
+    /// Fills the bins.
+    fn sort_into_buckets(&mut self, menu: &Menu, near: Near) {
+        self.bins.resize(STAGES, [0; BUCKETS]);
+        self.bins.iter_mut().for_each(|bins| bins[near.buckets()].fill(0));
+        for step in &self.near {
+            let object = &menu.objects()[step.object as usize];
+            let cost = menu.steps_of(object)[usize::from(step.step)].cost;
+            self.bins[usize::from(object.stage)][bucket(step.merit)] += u64::from(cost);
+        }
+    }
+
+    /// Takes the near steps above a bucket, and lays those in it aside.
+    fn take_above(&mut self, edge: usize) {
         self.edge.clear();
-        for (i, (object, taken)) in menu.objects().iter().zip(&mut self.taken).enumerate() {
-            let own = &self.buckets[menu.range_of(object)][..usize::from(*taken)];
-            // along a hull buckets never rise
-            let above = own.partition_point(|bucket| *bucket > edge);
-            *taken = above as u16;
-            for (at, _) in own.iter().enumerate().skip(above).take_while(|(_, bucket)| **bucket == edge) {
-                let worth = terms.worth(object)[usize::from(at < usize::from(object.taken))];
-                let merit = menu.steps_of(object)[at].slope * worth;
-                self.edge.push(Edge { merit, object: i as u32, step: at as u16 });
+        // along a hull buckets never rise: of every object those above come first
+        for step in &self.near {
+            let at = bucket(step.merit);
+            self.taken[step.object as usize] += u16::from(at > edge);
+            if at == edge {
+                self.edge.push(*step);
             }
         }
-        self.sort_edge();
     }
 
     /// Best first; objects stand in the order of their ids, and that decides between equals.
@@ -252,8 +293,8 @@ impl Picker {
             let kappa = terms.kappa[usize::from(object.stage)];
             let net = |step: &Step| (step.slope * worth - picked.lambda) * (kappa * f64::from(step.cost));
             let (had, rest) = steps.split_at(usize::from(taken));
-            astray -= had.iter().rev().map(net).take_while(|n| *n < 0.0).sum::<f64>();
-            astray += rest.iter().map(net).take_while(|n| *n > 0.0).sum::<f64>();
+            astray -= had.iter().rev().take_while(|s| s.slope * worth < picked.lambda).map(net).sum::<f64>();
+            astray += rest.iter().take_while(|s| s.slope * worth > picked.lambda).map(net).sum::<f64>();
             menu.objects_mut()[i].settle(taken, dwell);
         }
         picked.upper = picked.value + picked.lambda * (terms.budget - terms.cost(&picked.table)) + astray;
