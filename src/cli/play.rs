@@ -16,6 +16,7 @@ use crate::frame::{
 use crate::runtime::{AgentState, Spread};
 use crate::scene::{Overlap, Scene};
 use metachron_agents::AgentId;
+use metachron_budget::Bound;
 use std::path::PathBuf;
 
 /// Told of every frame; answers whether to go on.
@@ -177,6 +178,12 @@ fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {
         parked_reason,
         energy_j: stats.energy_j,
         residual_m: stats.residual_m,
+        drift_m: stats.drift_m,
+        tolerance_m: agent.held.map(|held| held.tolerance_m),
+        rests: agent.held.and_then(|held| held.rests).map(|end| match end {
+            Bound::Finest => "finest",
+            Bound::Coarsest => "coarsest",
+        }),
     }
 }
 

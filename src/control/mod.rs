@@ -21,6 +21,7 @@ mod raise;
 mod rate;
 mod select;
 mod status;
+mod tolerance;
 mod view;
 mod worth;
 
@@ -35,4 +36,5 @@ pub use policy::{Law, Policy};
 pub use price::{Backdrop, Measured, Prices};
 pub use rate::{RateControl, RateDemand, RateLimits, TurnMeasure};
 pub use status::Status;
+pub use tolerance::{ErrorControl, ErrorLimits, ErrorMeasure};
 pub use view::{Kind, ObjectView, Shading};

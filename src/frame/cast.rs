@@ -4,13 +4,14 @@
 //! Never here: time passing.
 
 use super::error::SessionError;
-use super::governor::RateGovernor;
-use super::purse::{Purse, Tally};
+use super::governor::{ErrorGovernor, RateGovernor};
+use super::holding::Holding;
+use super::purse::Tally;
 use super::ties::{Ties, faults};
 use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
 use crate::control::{
-    self, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices, RateControl,
-    RateLimits, Stages, Value,
+    self, ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy,
+    Prices, RateControl, RateDemand, RateLimits, Stages, Value,
 };
 use crate::runtime::{
     AUTO_THREADS_MAX, AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, Priority, StepPrice, Watch,
@@ -33,13 +34,22 @@ use std::sync::Arc;
 ///
 /// # Errors
 /// [`SessionError::Build`] where a model refuses its object.
-pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Purse), SessionError> {
+pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Steered), SessionError> {
     let share = fair_share(machine(scene).cores, scene.agents.len());
     let mut ties = Ties::of(scene);
-    let mut tallies = Vec::new();
-    let spawn = |member| spawn(scene, member, (share, &mut tallies), &mut ties);
+    let mut steered = Steered::default();
+    let spawn = |member| spawn(scene, member, (share, &mut steered), &mut ties);
     let spawns: Result<_, _> = scene.agents.iter().map(spawn).collect();
-    Ok((spawns?, Purse::new(tallies)))
+    Ok((spawns?, steered))
+}
+
+/// What the controllers of agents tell the frame loop.
+#[derive(Debug, Default)]
+pub(super) struct Steered {
+    /// Those that keep a rate.
+    pub tallies: Vec<Arc<Tally>>,
+    /// Those that hold an error.
+    pub holdings: Vec<Arc<Holding>>,
 }
 
 /// Who runs the agents of `scene`: where it leaves that open, by their number.
@@ -72,7 +82,7 @@ const SHARE_MAX: f64 = 0.6;
 fn spawn(
     scene: &Scene,
     member: &Member,
-    (share, tallies): (f64, &mut Vec<Arc<Tally>>),
+    (share, steered): (f64, &mut Steered),
     ties: &mut Ties,
 ) -> Result<AgentSpawn, SessionError> {
     let agent = build(member, scene.executor)
@@ -92,7 +102,7 @@ fn spawn(
         together: ties.together(member.id),
         faults: faults(member.faults),
         watches: watches.collect(),
-        governor: governor(member, share, tallies),
+        governor: governor(member, share, steered),
     })
 }
 
@@ -111,8 +121,11 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
 }
 
 /// Who steers the agent's dt and ε; nobody where the scene fixes both.
-fn governor(member: &Member, share: f64, tallies: &mut Vec<Arc<Tally>>) -> Option<Box<dyn Governor>> {
+fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
     let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
+    if let Some(tolerance_m) = member.tolerance_m {
+        return error_governor(member, (tolerance_m, meshed), steered);
+    }
     let limits = RateLimits {
         dt_wanted_s: member.pace.dt.as_secs_f64(),
         dt_max_s: member.pace.dt_range.1.as_secs_f64(),
@@ -125,8 +138,27 @@ fn governor(member: &Member, share: f64, tallies: &mut Vec<Arc<Tally>>) -> Optio
     }
     let limits = (control.least_part(), control.share());
     let tally = Arc::new(Tally::new(member.id, member.pace.rate_hz, limits));
-    tallies.push(Arc::clone(&tally));
+    steered.tallies.push(Arc::clone(&tally));
     Some(Box::new(RateGovernor(control, tally)))
+}
+
+/// Who holds the error of an agent that is to hold one.
+fn error_governor(
+    member: &Member,
+    (tolerance_m, meshed): (f64, bool),
+    steered: &mut Steered,
+) -> Option<Box<dyn Governor>> {
+    let (least, greatest) = member.pace.dt_range;
+    let dt_s = (least.as_secs_f64(), greatest.as_secs_f64());
+    let limits = ErrorLimits { tolerance_m, dt_s, eps_m: meshed.then_some(member.simulation.eps_m) };
+    let now = RateDemand { dt_s: member.pace.dt.as_secs_f64(), eps_m: meshed.then_some(member.start.eps_m) };
+    let control = ErrorControl::new(&limits, now);
+    if !control.steers() {
+        return None;
+    }
+    let holding = Holding::new(member.id, tolerance_m);
+    steered.holdings.push(Arc::clone(&holding));
+    Some(Box::new(ErrorGovernor(control, holding)))
 }
 
 /// The machine that `scene` declares.

@@ -2,8 +2,9 @@
 //!
 //! In: a turn's measure. Out: a demand on dt and on the simulation's ε. Never here: the law.
 
+use super::holding::Holding;
 use super::purse::Tally;
-use crate::control::{self, RateControl};
+use crate::control::{self, ErrorControl, ErrorMeasure, RateControl, RateDemand};
 use crate::runtime::{Demand, Governor, TurnMeasure};
 use metachron_agents::{Resolution, SimSpan};
 use std::sync::Arc;
@@ -25,11 +26,28 @@ impl Governor for RateGovernor {
         if let Some(load) = control.full_load() {
             tally.tell(load);
         }
-        let Some(demand) = demand else { return Demand::default() };
-        let level = measure.resolution.map_or(0, |held| held.n);
-        Demand {
-            dt: SimSpan::from_secs_f64(demand.dt_s),
-            resolution: demand.eps_m.map(|eps_m| Resolution { eps_m, n: level }),
-        }
+        demanded(demand, measure)
     }
+}
+
+/// An agent's error control as the runtime wants it, and what it tells the frame loop.
+pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<Holding>);
+
+impl Governor for ErrorGovernor {
+    fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
+        let Self(control, holding) = self;
+        let TurnMeasure { residual_m, drift_m, .. } = *measure;
+        let space_m = (residual_m - drift_m).max(0.0);
+        let turn = ErrorMeasure { space_m, time_m: drift_m, dt_s: measure.dt.as_secs_f64() };
+        let demand = control.after_turn(&turn);
+        holding.tell(control.rest());
+        demanded(demand, measure)
+    }
+}
+
+/// A demand in the runtime's words, at the level of the primitive that is held.
+fn demanded(demand: Option<RateDemand>, measure: &TurnMeasure) -> Demand {
+    let Some(demand) = demand else { return Demand::default() };
+    let n = measure.resolution.map_or(0, |held| held.n);
+    Demand { dt: SimSpan::from_secs_f64(demand.dt_s), resolution: demand.eps_m.map(|eps_m| Resolution { eps_m, n }) }
 }

@@ -3,6 +3,7 @@
 //! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
 
 use super::couplings::Coupling;
+use super::holding::Held;
 use super::trace::Trace;
 use crate::runtime::{AgentStats, Sample};
 use glam::DVec3;
@@ -74,6 +75,8 @@ pub struct AgentOutcome {
     pub stats: AgentStats,
     /// The resolution it was last drawn at; `None` where it has no picture.
     pub picture: Option<Resolution>,
+    /// How it holds an error; `None` where it is to hold none.
+    pub held: Option<Held>,
 }
 
 /// A run that has ended.

@@ -9,6 +9,7 @@ use super::calibrate;
 use super::cast;
 use super::couplings::{Coupling, Couplings};
 use super::error::SessionError;
+use super::holding::{self, Holding};
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::purse::Purse;
 use super::trace::Trace;
@@ -34,6 +35,7 @@ pub struct Session {
     /// Whether pictures are drawn on the processor that agents step on.
     shares_processor: bool,
     purse: Purse,
+    holdings: Vec<Arc<Holding>>,
     reader: Reader,
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
@@ -99,7 +101,7 @@ impl Session {
     pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
         scene.executor = cast::executor(&scene);
         let machine = cast::machine(&scene);
-        let (spawns, purse) = cast::spawns(&scene)?;
+        let (spawns, steered) = cast::spawns(&scene)?;
         let mut stage = cast::stage(&scene);
         stage.glide_over(GLIDE_FRAMES);
         let clock = || Arc::new(runtime::SystemClock::new());
@@ -111,7 +113,8 @@ impl Session {
         Ok(Self {
             control: cast::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep,
-            purse,
+            purse: Purse::new(steered.tallies),
+            holdings: steered.holdings,
             reader: Reader::new(run.agents()),
             stage,
             declared: cast::prices(&machine.draw),
@@ -383,6 +386,7 @@ impl Session {
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.run.shutdown();
+        let held = |at: usize| holding::held(&self.holdings, AgentId(at as u32));
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
         Outcome {
             scene,
@@ -402,7 +406,7 @@ impl Session {
             agents: stats
                 .into_iter()
                 .enumerate()
-                .map(|(at, stats)| AgentOutcome { picture: drawn(at), stats })
+                .map(|(at, stats)| AgentOutcome { picture: drawn(at), held: held(at), stats })
                 .collect(),
             couplings: self.couplings.all().to_vec(),
             trace: self.trace,

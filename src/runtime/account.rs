@@ -55,6 +55,8 @@ pub struct AgentStats {
     pub resolution: Option<Resolution>,
     /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
     pub work_s: f64,
+    /// Work of the steps that it made, in its model's unit.
+    pub work: f64,
     /// CPU time of its turns so far, seconds; really measured, in lockstep too.
     pub cpu_s: f64,
     /// How old its newest state was when a reader used it ([`super::AgentHandle::record_age`]).
@@ -73,6 +75,8 @@ pub struct AgentStats {
     pub energy_j: f64,
     /// Estimated error of the newest state, metres.
     pub residual_m: f64,
+    /// The part of it that its steps made, metres.
+    pub drift_m: f64,
     /// Who makes its turns, on his own thread and clock, because the two share a world; `None` where it makes them itself.
     pub led_by: Option<AgentId>,
 }
@@ -107,6 +111,7 @@ pub(super) struct Gauges {
     pub rate_hz: Gauge,
     pub mean_hz: Gauge,
     pub work_s: Gauge,
+    pub work: Gauge,
     late: [Gauge; 3],
     state: AtomicU8,
     reason: OnceLock<String>,

@@ -28,6 +28,10 @@ pub struct TurnMeasure {
     pub dt: SimSpan,
     /// The resolution the step was made at; `None` for a model that has none.
     pub resolution: Option<Resolution>,
+    /// What the agent says of its own error, metres.
+    pub residual_m: f64,
+    /// The part of it that its steps made, metres.
+    pub drift_m: f64,
 }
 
 /// What a governor wants of its agent; `None` leaves things as they are.

@@ -153,6 +153,7 @@ impl AgentHandle {
             dt: span(&gauges.dt),
             resolution: newest.resolution,
             work_s: gauges.work_s.get(),
+            work: gauges.work.get(),
             cpu_s: self.cpu_s(),
             age: self.ages().spread(),
             late: gauges.late(),
@@ -162,6 +163,7 @@ impl AgentHandle {
             state: gauges.state(),
             energy_j: newest.energy_j,
             residual_m: newest.residual_m,
+            drift_m: newest.drift_m,
             led_by: self.led_by(),
         }
     }

@@ -62,6 +62,8 @@ pub(super) struct Open {
     pub start: Start,
     pub dt: SimSpan,
     pub resolution: Option<Resolution>,
+    /// What it says of its own error afterwards, metres: in all, and the part that its steps made.
+    pub errors_m: [f64; 2],
     /// Whether it could rest after this turn.
     pub rests: bool,
 }
@@ -243,10 +245,13 @@ impl Actor {
         let dt = self.faults.span(self.pace.dt(), self.id(), self.diary.steps());
         let resolution = self.agent.resolution();
         let (report, led) = if self.company.is_empty() { (self.step(dt)?, 0) } else { self.lead(dt)? };
+        let done = &self.shared.gauges.work;
+        done.set(done.get() + report.work * f64::from(1 + led));
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
-        let open = Open { start, dt, resolution, rests };
+        let mut open = Open { start, dt, resolution, errors_m: [0.0; 2], rests };
         self.write_led(&open);
         self.write_snapshot(self.pace.time() + dt, rests)?;
+        open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
         self.pace.advance_by(dt);
         Ok((open, Effort { work: report.work, steps: 1 + led + alone }))
     }
@@ -290,6 +295,8 @@ impl Actor {
             dropped: open.start.dropped,
             dt: open.dt,
             resolution: open.resolution,
+            residual_m: open.errors_m[0],
+            drift_m: open.errors_m[1],
         });
         dt.into_iter().for_each(|dt| self.set_dt(dt));
         resolution.into_iter().for_each(|wanted| self.retune(wanted));

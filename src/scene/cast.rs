@@ -181,6 +181,8 @@ pub struct Member {
     pub spec: Spec,
     /// How it keeps time.
     pub pace: PaceWish,
+    /// The error that its steps and spacing are chosen by, metres; `None` where it keeps a rate instead.
+    pub tolerance_m: Option<f64>,
     /// Resolutions that its simulation may take.
     pub simulation: ResolutionRange,
     /// Resolution of its simulation at the start.

@@ -100,6 +100,14 @@ pub struct AgentReport {
     pub energy_j: f64,
     /// Its own estimate of its error, metres.
     pub residual_m: f64,
+    /// The part of it that its steps made, metres.
+    pub drift_m: f64,
+    /// The error that it was to hold, metres; `None` where it kept a rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance_m: Option<f64>,
+    /// The end of its ranges at which it rested while it held an error: `finest` (out of reach) or `coarsest`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rests: Option<&'static str>,
 }
 
 /// The middle and the tail of a measured time, milliseconds.

@@ -28,10 +28,11 @@ impl Report {
         }
         let _ = writeln!(
             out,
-            "\n{:<20} {:<10} {:>9} {:>9} {:>8} {:>9} {:>8} {:>9} {:>10}",
-            "agent", "model", "rate Hz", "wanted", "dt ms", "ε mm", "cpu s", "age ms", "dropped ms"
+            "\n{:<20} {:<10} {:>9} {:>9} {:>8} {:>9} {:>9} {:>8} {:>9} {:>10}",
+            "agent", "model", "rate Hz", "wanted", "dt ms", "ε mm", "error mm", "cpu s", "age ms", "dropped ms"
         );
         self.agents.iter().for_each(|agent| agent_row(&mut out, agent));
+        self.agents.iter().for_each(|agent| out_of_reach(&mut out, agent));
         coupling_table(&mut out, &self.couplings);
         if let Some(oracle) = &self.oracle {
             oracle_table(&mut out, oracle);
@@ -58,19 +59,33 @@ fn agent_row(out: &mut String, agent: &AgentReport) {
     let eps = agent.eps_m.map_or_else(|| "-".to_owned(), |eps| format!("{:.2}", eps * 1e3));
     let _ = write!(
         out,
-        "{:<20} {:<10} {:>9.1} {:>9.1} {:>8.2} {:>9} {:>8.3} {:>9.2} {:>10.1}",
+        "{:<20} {:<10} {:>9.1} {:>9.1} {:>8.2} {:>9} {:>9.4} {:>8.3} {:>9.2} {:>10.1}",
         agent.name,
         agent.model,
         agent.rate_hz,
         agent.wanted_hz,
         agent.dt_ms,
         eps,
+        agent.residual_m * 1e3,
         agent.cpu_s,
         agent.age_ms.p50,
         agent.dropped_ms
     );
     let reason = agent.parked_reason.as_deref().unwrap_or("parked");
     let _ = if agent.parked { writeln!(out, "  {reason}") } else { writeln!(out) };
+}
+
+/// Says so where an agent cannot hold the error that it is to hold.
+fn out_of_reach(out: &mut String, agent: &AgentReport) {
+    let AgentReport { name, residual_m, dt_ms, eps_m, .. } = agent;
+    let (Some(tolerance_m), Some("finest")) = (agent.tolerance_m, agent.rests) else { return };
+    let eps = eps_m.map_or_else(String::new, |eps_m| format!(" and an ε of {:.2} mm", eps_m * 1e3));
+    let _ = writeln!(
+        out,
+        "note  `{name}` cannot hold {:.4} mm: at steps of {dt_ms:.2} ms{eps}, the finest of its ranges, it errs by {:.4} mm",
+        tolerance_m * 1e3,
+        residual_m * 1e3
+    );
 }
 
 /// More couplings than this are counted, not shown: the report has them all.

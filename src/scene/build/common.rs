@@ -2,9 +2,9 @@
 
 use crate::scene::cast::{Look, PaceWish};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{CommonFile, FaultsFile, Material, OneOrRange, ShadingKind};
+use crate::scene::format::{CommonFile, FaultsFile, HoldKind, Material, OneOrRange, ShadingKind};
 use crate::scene::ties::Faults;
-use metachron_agents::{N_MAX, SimSpan};
+use metachron_agents::{N_MAX, ResolutionRange, SimSpan};
 
 /// Wanted rate where a scene says neither rate nor step, hertz.
 const RATE_DEFAULT_HZ: f64 = 240.0;
@@ -16,6 +16,7 @@ const RATE_AGREES: f64 = 1e-4;
 const RATE: Allowed = allowed(1.0..=100_000.0, "Hz");
 const DT: Allowed = allowed(0.01..=1000.0, "ms");
 const IMPORTANCE: Allowed = allowed(0.001..=1000.0, "");
+const TOLERANCE: Allowed = allowed(1e-9..=1e3, "m");
 const JITTER: Allowed = allowed(0.0..=0.5, "");
 const LOSS: Allowed = allowed(0.0..=0.9, "");
 
@@ -48,6 +49,49 @@ fn wish(rate_hz: f64, dt_ms: f64, range_ms: Option<(f64, f64)>) -> PaceWish {
     let span = |ms: f64| SimSpan::from_secs_f64(ms * 1e-3).unwrap_or(SimSpan::from_nanos(1_000_000));
     let (least, greatest) = range_ms.unwrap_or((dt_ms, dt_ms));
     PaceWish { rate_hz, dt: span(dt_ms), dt_range: (span(least), span(greatest)) }
+}
+
+/// The error that an object of this pace is to hold with the resolutions that it may take; it has no error where there are none.
+pub(super) fn tolerance(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &CommonFile,
+    (pace, range): (PaceWish, Option<ResolutionRange>),
+) -> Option<f64> {
+    let Some(tolerance_m) = file.tolerance_m else {
+        if file.hold == Some(HoldKind::Error) {
+            let expected = "expected `tolerance_m` beside it: the error that it may have, in metres";
+            c.wrong(place, "hold", "is `error`, and nothing says which", expected);
+        }
+        return None;
+    };
+    let tolerance_m = c.number(place, "tolerance_m", tolerance_m, &TOLERANCE);
+    let Some(range) = range else {
+        untolerated(c, place, file);
+        return None;
+    };
+    if file.hold == Some(HoldKind::Rate) {
+        c.wrong(
+            place,
+            "tolerance_m",
+            "stands beside `hold = \"rate\"`",
+            "expected `hold = \"error\"`, or no `tolerance_m`",
+        );
+    }
+    if pace.dt_range.0 == pace.dt_range.1 && range.eps_m.0 == range.eps_m.1 {
+        let what = "cannot be held: its step is fixed, and so is its spacing";
+        let expected = "expected `dt_ms = [least, greatest]`, or for a tube `eps_m = [finest, coarsest]`";
+        c.wrong(place, "tolerance_m", what, expected);
+    }
+    Some(tolerance_m)
+}
+
+/// Tells of an object without an error of its own that is to hold one.
+pub(super) fn untolerated(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
+    let asked = [("tolerance_m", file.tolerance_m.is_some()), ("hold", file.hold == Some(HoldKind::Error))];
+    if let Some((key, _)) = asked.iter().find(|(_, there)| *there) {
+        c.wrong(place, key, "is of no use: it makes no error of its own", "expected no such key");
+    }
 }
 
 fn shown(dt: OneOrRange<f64>) -> String {

@@ -1,6 +1,6 @@
 //! The objects of a scene: read one by one by their model, named, linked.
 
-use super::common::{faults, levels, look, pace};
+use super::common::{faults, levels, look, pace, tolerance, untolerated};
 use super::grid::{Copies, copies};
 use super::{instrument, rigid, scenery, soft, synthetic, tube};
 use crate::scene::cast::{Look, Member, Scenery, Spec};
@@ -204,7 +204,10 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
     let model = model_name(c, table, item.span())?;
     let (mut common, mut own) = (DeTable::new(), DeTable::new());
     for (key, value) in table {
-        let into = if COMMON_KEYS.contains(&key.get_ref().as_ref()) { &mut common } else { &mut own };
+        // sides that hold a soft body are the model's own
+        let sides = key.get_ref() == "hold" && matches!(value.get_ref(), DeValue::Array(_));
+        let shared = COMMON_KEYS.contains(&key.get_ref().as_ref()) && !sides;
+        let into = if shared { &mut common } else { &mut own };
         into.insert(key.clone(), value.clone());
     }
     own.remove("model");
@@ -294,6 +297,7 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
         let ModelFile::Rigid(file) = &entry.model else { continue };
         // read for their own sake: a fixed object has no steps, but a wrong rate is still wrong
         pace(c, &entry.place, &entry.common);
+        untolerated(c, &entry.place, &entry.common);
         levels(c, &entry.place, &entry.common);
         let look = look(c, &entry.place, &entry.common, Material::Plastic);
         if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
@@ -412,7 +416,8 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
         ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
     };
     let (name, links) = (common.name.clone(), Vec::new());
-    Some(Member { id, name, spec, pace, simulation, start, picture, links, look, faults })
+    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Instrument(_))).then_some(simulation)));
+    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 
 /// Tools and the tubes that they can hold see each other.

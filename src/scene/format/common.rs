@@ -5,10 +5,12 @@ use schemars::JsonSchema;
 use serde::Deserialize;
 
 /// The keys of [`CommonFile`]: they are read apart from the keys of the model.
-pub const COMMON_KEYS: [&str; 15] = [
+pub const COMMON_KEYS: [&str; 17] = [
     "name",
     "rate_hz",
     "dt_ms",
+    "hold",
+    "tolerance_m",
     "n",
     "importance",
     "colour",
@@ -37,6 +39,13 @@ pub struct CommonFile {
     /// Step length in milliseconds, 0.01 … 1000: one number fixes it, `[least, greatest]` is what the controller may use.
     /// Default: 1000 / `rate_hz`, fixed.
     pub dt_ms: Option<OneOrRange<f64>>,
+    /// What its controller holds within `dt_ms` and `eps_m`: `rate` (default) or `error`, which wants `tolerance_m`.
+    /// For a sheet, solid or rope `hold` names what is held; `tolerance_m` alone says this of it.
+    pub hold: Option<HoldKind>,
+    /// The error that it may have by its own estimate, metres, 1e-9 … 1e3: it takes the longest steps and the coarsest ε of
+    /// its ranges that keep it.
+    #[schemars(range(min = 1e-9, max = 1e3))]
+    pub tolerance_m: Option<f64>,
     /// Level of the primitive drawn over one interval, 0 … 10: O(2ⁿ) polygons. Default: `[1, 5]`.
     pub n: Option<OneOrRange<u8>>,
     /// Weight of the object's picture against the others', 0.001 … 1000. Default 1.
@@ -67,6 +76,16 @@ pub struct CommonFile {
     pub scatter_m: Option<OneOrEach>,
     /// Seed of the random distances. Default 0.
     pub scatter_seed: Option<u32>,
+}
+
+/// What the controller of an object holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HoldKind {
+    /// The rate at which it steps.
+    Rate,
+    /// The error of its answer.
+    Error,
 }
 
 /// How a surface looks.

@@ -15,7 +15,7 @@ mod synthetic;
 mod tube;
 mod value;
 
-pub use common::{COMMON_KEYS, CommonFile, Material};
+pub use common::{COMMON_KEYS, CommonFile, HoldKind, Material};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use instrument::{InstrumentFile, KeyframeFile};
 pub use joint::{JointFile, JointKind};
