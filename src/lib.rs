@@ -5,6 +5,7 @@
 pub mod cli;
 pub mod compositor;
 pub mod control;
+pub mod fit;
 pub mod frame;
 pub mod runtime;
 pub mod scene;

@@ -7,13 +7,17 @@ use std::path::{Path, PathBuf};
 const SOURCE_ROOTS: [&str; 3] = ["agents/src", "budget/src", "src"];
 
 /// Who may know whom: text that starts a path to the room on the right must not stand in the room on the left.
-const FORBIDDEN: [(&str, &[&str]); 8] = [
+const FORBIDDEN: [(&str, &[&str]); 9] = [
     ("agents/src", &["metachron_budget", "metachron::", "std::time", "std::thread", "std::fs", "wgpu", "egui"]),
     ("budget/src", &["metachron_agents", "metachron::", "std::", "rapier3d", "glam"]),
     ("src/scene", &["crate::runtime", "crate::control", "crate::compositor", "crate::cli", "crate::frame"]),
     ("src/runtime", &["crate::scene", "crate::control", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
     ("src/control", &["crate::scene", "crate::runtime", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
     ("src/tune", &["crate::scene", "crate::runtime", "crate::compositor", "crate::cli", "crate::frame", "wgpu"]),
+    (
+        "src/fit",
+        &["crate::scene", "crate::runtime", "crate::control", "crate::compositor", "crate::cli", "crate::frame"],
+    ),
     ("src/compositor", &["crate::scene", "crate::runtime", "crate::control", "crate::cli", "crate::frame"]),
     ("src/frame", &["crate::cli"]),
 ];

@@ -55,6 +55,15 @@ Examples:
 
 Ctrl-C keeps the best gains so far.";
 
+const FIT_EXAMPLES: &str = "\
+Examples:
+  metachron fit my.toml --tolerance 1e-3               what every object pays, and what a millimetre needs
+  metachron fit my.toml --tolerance 1e-3 --write       and the scene with that
+  metachron fit tube --tolerance 5e-3 --probe intestine --seconds 1
+  metachron fit my.toml --tolerance 1e-4 --json -q | jq '.objects[].needs'
+
+Ctrl-C keeps the best found so far.";
+
 const CHART_EXAMPLES: &str = "\
 Examples:
   metachron chart stability                            every experiment, into the folder charts/
@@ -95,6 +104,9 @@ pub enum Command {
     /// Find feedback gains for a scene, or explain given ones
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
+    /// Find the cheapest steps, segments and integrators that keep a scene's probes where its converged answer has them
+    #[command(after_help = FIT_EXAMPLES, allow_negative_numbers = true)]
+    Fit(FitArgs),
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
@@ -283,6 +295,38 @@ pub struct TuneArgs {
     pub quiet: bool,
 }
 
+/// `fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// A built-in scene or the path of a scene file
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// How far a probe may be from where the converged answer has it, metres
+    #[arg(long, value_name = "METRES")]
+    pub tolerance: f64,
+    /// Hold the probes of this object only; the ends and the middle of it where it has none
+    #[arg(long, value_name = "NAME")]
+    pub probe: Option<String>,
+    /// Simulated seconds that are compared, 0.01 to 1000
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = fit_seconds)]
+    pub seconds: f64,
+    /// No more runs of the scene than this in the search
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub runs: u32,
+    /// Write what was found into the scene file; every other line stays as it is
+    #[arg(long)]
+    pub write: bool,
+    /// Change a key of the scene; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Print the result as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
 /// `chart`.
 #[derive(Debug, Args)]
 pub struct ChartArgs {
@@ -379,6 +423,10 @@ pub struct ListArgs {
 
 fn seconds(text: &str) -> Result<f64, String> {
     bounded(text, 1e-3, 1e7, "seconds")
+}
+
+fn fit_seconds(text: &str) -> Result<f64, String> {
+    bounded(text, 0.01, 1000.0, "seconds")
 }
 
 fn target_fps(text: &str) -> Result<f64, String> {

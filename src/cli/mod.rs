@@ -8,6 +8,7 @@ mod bench;
 mod chart;
 mod check;
 mod describe;
+mod fit;
 mod generate;
 mod output;
 mod play;
@@ -70,6 +71,7 @@ fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
         Command::Chart(args) => chart::command(&args),
         Command::Bench(args) => bench::command(&args),
         Command::Tune(args) => tune::command(&args),
+        Command::Fit(args) => fit::command(&args),
         Command::Generate(args) => generate::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),

@@ -3,6 +3,7 @@ mod chart;
 mod chart_policies;
 mod cli;
 mod coupling;
+mod fit;
 mod painting;
 mod picture;
 mod play;

@@ -1,0 +1,175 @@
+//! `fit`: the cheapest steps, divisions and integrators with which a scene's points stay where its converged answer has them.
+//!
+//! In: a scene, a tolerance. Out: a table of what is paid and what is needed, sentences on what a simpler model would do, and with
+//! `--write` the scene. Never here: how a search goes ([`crate::fit`]), how a scene is played ([`crate::frame`]).
+
+mod limits;
+mod objects;
+mod simpler;
+mod task;
+mod told;
+mod written;
+
+use super::Exit;
+use super::args::FitArgs;
+use super::output::{BadInput, data, message};
+use super::progress::Bar;
+use crate::fit::{Converged, Found, Search, Setting, Trial, converge};
+use crate::scene::{Source, builtin, load};
+use anyhow::Context;
+use objects::Object;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use task::Task;
+
+/// Step and spacing are halved so often at most for the converged answer.
+const LEVELS_MAX: u32 = 4;
+/// The converged answer is to be known to this share of the tolerance.
+const KNOWN: f64 = 0.2;
+
+/// What a fit came to.
+struct Fitted {
+    /// What the converged answer is known to, metres.
+    known_m: f64,
+    /// The settings that the scene has, and what they came to.
+    now: (Vec<Setting>, Trial),
+    /// The cheapest that were found to hold.
+    need: Found,
+    /// Measured CPU of each object, seconds a simulated second: now, and as is needed.
+    cpu_s: [Vec<f64>; 2],
+    /// What a simpler model would do.
+    notes: Vec<String>,
+}
+
+/// Fits a scene.
+pub(super) fn command(args: &FitArgs) -> anyhow::Result<Exit> {
+    if !(args.tolerance.is_finite() && args.tolerance > 0.0) {
+        let what = format!("the tolerance is {} m; expected a length above zero, such as 1e-3", args.tolerance);
+        return Err(BadInput(what).into());
+    }
+    if args.write {
+        refuse_built_in(&args.scene)?;
+    }
+    let source = Source::open(&args.scene)?;
+    let scene = load(&source, &args.set)?;
+    let objects = objects::of(&scene, source.text());
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let bar = Bar::new("fit", args.quiet || args.json);
+    let mut task = Task::new(args, scene, objects, (&stopped, bar))?;
+    let fitted = fit(&mut task, args)?;
+    task.clear_bar();
+    let fitted = match fitted {
+        Outcome::Fitted(fitted) => fitted,
+        Outcome::OutOfReach(sentence) => {
+            message(&format!("error: {}: {sentence}", args.scene));
+            return Ok(Exit::Failed);
+        }
+        Outcome::Interrupted => {
+            message("interrupted before anything was found to hold: nothing was written");
+            return Ok(Exit::Interrupted);
+        }
+    };
+    let written = if args.write { Some(written::write(Path::new(&args.scene), &task, &fitted)?) } else { None };
+    data(&if args.json {
+        told::json(args, &task, &fitted, written.is_some())?
+    } else {
+        told::text(args, &task, &fitted)
+    })?;
+    if let Some(changes) = written {
+        message(&format!("{}: {changes} keys were changed", args.scene));
+    }
+    if stopped.load(Ordering::Relaxed) {
+        message("interrupted: this is the best that was found so far");
+        return Ok(Exit::Interrupted);
+    }
+    Ok(Exit::Ok)
+}
+
+/// Scenes that come with the program are not files.
+fn refuse_built_in(name: &str) -> anyhow::Result<()> {
+    if builtin::find(name).is_none() {
+        return Ok(());
+    }
+    let what = format!(
+        "`{name}` comes with the program and is not overwritten: `--write` changes scene files; save it as one, such as {name}.toml, and fit that"
+    );
+    Err(BadInput(what).into())
+}
+
+/// How a fit ends.
+enum Outcome {
+    Fitted(Fitted),
+    /// Nothing holds the tolerance: the best reached, and what limits it.
+    OutOfReach(String),
+    Interrupted,
+}
+
+/// Finds the converged answer, what holds, and the cheapest of that.
+fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
+    let tolerance_m = args.tolerance;
+    let now = task.settings();
+    let found = converge(LEVELS_MAX, KNOWN * tolerance_m, &mut |level| task.reference(level));
+    task.failure()?;
+    let Some(answer) = found else {
+        return Ok(if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(task.lost()) });
+    };
+    let room_m = tolerance_m - answer.error_m;
+    let present = task.attempt(&now, &answer.paths);
+    task.failure()?;
+    let Some(present) = present else { return Ok(Outcome::Interrupted) };
+    let mut best = f64::INFINITY;
+    let start = start(task, &answer, room_m, &mut best);
+    task.failure()?;
+    let Some((settings, trial)) = start else {
+        let stopped = task.is_stopped();
+        return Ok(if stopped {
+            Outcome::Interrupted
+        } else {
+            Outcome::OutOfReach(limits::told(task, &answer, (tolerance_m, best)))
+        });
+    };
+    let choices = task.choices();
+    let trials_max = args.runs;
+    let mut attempt = |settings: &[Setting]| task.attempt(settings, &answer.paths);
+    let need =
+        Search { choices: &choices, tolerance_m: room_m, trials_max, attempt: &mut attempt }.run(settings, trial);
+    task.failure()?;
+    let cpu_s = [task.cpu(&now), task.cpu(&need.settings)];
+    let notes = simpler::notes(task, &answer, &need, room_m);
+    task.failure()?;
+    Ok(Outcome::Fitted(Fitted { known_m: answer.error_m, now: (now, present), need, cpu_s, notes }))
+}
+
+/// The coarsest settings that hold by halving alone: as the scene is, with a method of second order, or ever finer.
+fn start(task: &mut Task<'_>, answer: &Converged, room_m: f64, best: &mut f64) -> Option<(Vec<Setting>, Trial)> {
+    for level in 0..=answer.level {
+        for second in [false, true] {
+            let settings = task.refined(level, second);
+            let trial = task.attempt(&settings, &answer.paths)?;
+            *best = best.min(trial.error_m);
+            if trial.error_m <= room_m {
+                return Some((settings, trial));
+            }
+        }
+    }
+    None
+}
+
+/// A length as people say it.
+fn length(metres: f64) -> String {
+    match metres {
+        m if !m.is_finite() => "no".to_owned(),
+        m if m < 1e-6 => format!("{:.3} nm", m * 1e9),
+        m if m < 1e-3 => format!("{:.3} µm", m * 1e6),
+        m if m < 1.0 => format!("{:.3} mm", m * 1e3),
+        m => format!("{m:.3} m"),
+    }
+}
+
+/// The objects' names, as a list in words.
+fn names(objects: &[Object]) -> String {
+    objects.iter().map(|object| format!("`{}`", object.name)).collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,98 @@
+//! The scene written back with what was found: every other line stays as it was.
+//!
+//! In: a scene file and settings. Out: the same file with other steps, segments and integrators. Never here: what they should be.
+
+use super::super::output::BadInput;
+use super::Fitted;
+use super::objects::{name, tables};
+use super::task::Task;
+use crate::fit::Setting;
+use crate::frame::cells_of;
+use crate::scene::{Member, Source, Spec, load};
+use anyhow::Context;
+use metachron_agents::rod::Integrator;
+use std::path::Path;
+use toml_edit::{Array, DocumentMut, Item, Table, Value};
+
+/// Writes the settings that are needed into the file; how many keys that changed.
+pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Result<usize> {
+    let shown = path.display();
+    let before = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
+    let (text, changes) = changed(&before, task, fitted).map_err(|what| BadInput(format!("{shown}: {what}")))?;
+    std::fs::write(path, &text).with_context(|| format!("{shown} cannot be written"))?;
+    let again = Source::open(&path.to_string_lossy()).and_then(|source| load(&source, &[]));
+    if let Err(error) = again {
+        std::fs::write(path, &before).with_context(|| format!("{shown} cannot be written"))?;
+        return Err(anyhow::Error::from(error).context(format!("{shown} was left as it was")));
+    }
+    Ok(changes)
+}
+
+/// The text with the settings that are needed, and how many keys that changed.
+fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usize), String> {
+    let mut document: DocumentMut = text.parse().map_err(|error| format!("{error}"))?;
+    let scene = task.scene_at(&fitted.need.settings);
+    let mut changes = 0;
+    for (object, (now, need)) in fitted.now.0.iter().zip(&fitted.need.settings).enumerate() {
+        if now == need {
+            continue;
+        }
+        let wanted = &task.objects[object];
+        let member = &scene.agents[wanted.agents[0].0 as usize];
+        let table = tables(&mut document).find(|table| name(table) == Some(&wanted.name));
+        let table = table.ok_or_else(|| format!("`{}` has no table `[[object]]` of its own", wanted.name))?;
+        changes += put(table, member, (now, need));
+    }
+    Ok((document.to_string(), changes))
+}
+
+/// Puts a setting into an object's table; how many keys that changed.
+fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
+    let mut changes = 0;
+    if need.dt_s != now.dt_s {
+        let dt_ms = tidy(need.dt_s * 1e3);
+        let has_rate = table.contains_key("rate_hz");
+        if has_rate {
+            changes += set(table, "rate_hz", (1e3 / dt_ms).into());
+        }
+        if !has_rate || table.contains_key("dt_ms") {
+            changes += set(table, "dt_ms", dt_ms.into());
+        }
+    }
+    if need.pieces != now.pieces {
+        changes += set(table, "segments", segments(member));
+    }
+    if need.method != now.method {
+        changes += set(table, "integrator", Integrator::ALL[need.method].name().into());
+    }
+    changes
+}
+
+/// How a body is divided, as its table says it.
+fn segments(member: &Member) -> Value {
+    match &member.spec {
+        Spec::Tube(tube) => Value::from(tube.segments.unwrap_or(0) as i64),
+        _ => match cells_of(member).as_slice() {
+            [one] => Value::from(i64::from(*one)),
+            many => many.iter().map(|count| i64::from(*count)).collect::<Array>().into(),
+        },
+    }
+}
+
+/// Gives a key its value; what is written around the old one stays.
+fn set(table: &mut Table, key: &str, value: Value) -> usize {
+    match table.get_mut(key).and_then(Item::as_value_mut) {
+        Some(old) => {
+            let decor = old.decor().clone();
+            *old = value;
+            *old.decor_mut() = decor;
+        }
+        None => table[key] = Item::Value(value),
+    }
+    1
+}
+
+/// Six digits, so that 0.1 + 0.2 is 0.3.
+fn tidy(value: f64) -> f64 {
+    format!("{value:.6}").parse().unwrap_or(value)
+}
