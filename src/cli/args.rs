@@ -302,7 +302,7 @@ pub struct FitArgs {
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
     /// How far a probe may be from where the converged answer has it, metres
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub tolerance: f64,
     /// Hold the probes of this object only; the ends and the middle of it where it has none
     #[arg(long, value_name = "NAME")]
