@@ -68,6 +68,9 @@ pub(super) struct Ladder {
 pub(super) struct Ladders {
     all: Vec<Ladder>,
     made: u64,
+    /// The unlike ones of those that were made for this frame: after a turn of the camera hundreds of objects need a new one at once,
+    /// and copies of one object that are as large need the same.
+    new: Vec<usize>,
 }
 
 impl Ladders {
@@ -75,6 +78,7 @@ impl Ladders {
     pub fn update(&mut self, views: &[Seen], raise: bool, prices: &Prices, sliders: &Sliders) {
         let steps = steps_an_octave(views);
         self.all.truncate(views.len());
+        self.new.clear();
         for (at, (view, span)) in views.iter().enumerate() {
             let before = self.all.get(at).map(|ladder| ladder.key);
             let key = Key::of(view, (steps, raise), before);
@@ -82,7 +86,14 @@ impl Ladders {
                 continue;
             }
             self.made += 1;
-            let ladder = Ladder::new(key, self.made, (view, *span), (prices, sliders));
+            let alike = self.new.iter().map(|&at| &self.all[at]).find(|ladder| ladder.key.is_copy(&key));
+            let ladder = match alike {
+                Some(ladder) => Ladder { key, version: self.made, ..ladder.clone() },
+                None => Ladder::new(key, self.made, (view, *span), (prices, sliders)),
+            };
+            if alike.is_none() {
+                self.new.push(at);
+            }
             match self.all.get_mut(at) {
                 Some(place) => *place = ladder,
                 None => self.all.push(ladder),
@@ -133,6 +144,11 @@ impl Key {
         kinds
             && (self.range, self.shading, self.size, self.steps, self.raise)
                 == (other.range, other.shading, other.size, other.steps, other.raise)
+    }
+
+    /// Whether the rungs of an object with this key are those of one with the other to the bit: meshes of one size.
+    fn is_copy(&self, other: &Self) -> bool {
+        matches!((self.kind, other.kind), (Kind::Counted { .. }, Kind::Counted { .. })) && self.is_same(other)
     }
 
     /// The middle of its half octave of pixels.

@@ -5,6 +5,7 @@
 //! Never here: agents, threads, scenes, the GPU. Theory: `docs/theory/control.md`, after (GDC04), and `docs/theory/budget.md`.
 
 mod adaptive;
+mod area;
 mod ask;
 mod changes;
 mod closing;
@@ -25,6 +26,7 @@ mod tolerance;
 mod view;
 mod worth;
 
+pub use area::{AREAS_PX, Areas};
 pub use ask::Promise;
 pub use level::PRIMITIVE_LEVELS;
 pub use metachron_budget::cost::benefit::Sliders;

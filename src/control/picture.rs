@@ -170,7 +170,8 @@ impl PictureControl {
     }
 
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
-        self.ladders.update(&self.views, self.raise.is_some_and(|raise| raise.is_open()), &self.prices, &self.sliders);
+        let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.policy.prices(&self.prices));
+        self.ladders.update(&self.views, raised, &prices, &self.sliders);
         self.groups.update(&self.views);
         let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
         let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));

@@ -2,6 +2,7 @@
 //!
 //! In: a name, gains. Out: words for [`super::PictureControl`]. Never here: a choice.
 
+use super::price::Prices;
 use metachron_budget::{grisoni, log_law};
 
 /// Who chooses the level of every visible object. Theory and papers: `docs/theory/budget.md`.
@@ -90,6 +91,12 @@ impl Policy {
     #[must_use]
     pub const fn predicts(self) -> bool {
         !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
+    }
+
+    /// What it knows of prices: of every area where it is Robin Hood's (RH05), else two stages (FS93). The default goes by the stages
+    /// too: areas that objects hide from each other are priced in full, and its κ is learnt for what is left (control.md, section 7).
+    pub(super) fn prices(self, known: &Prices) -> Prices {
+        if self == Self::RobinHood { *known } else { known.by_lines() }
     }
 
     /// The policy of this name.

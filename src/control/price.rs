@@ -1,8 +1,10 @@
-//! What drawing costs: two stages for each shading, of which the slower counts, and the picture itself.
+//! What drawing costs: by lines, two stages for each shading of which the slower counts; by areas, a price of a triangle for every area
+//! that it may cover; and the picture itself.
 //!
 //! In: coefficients, declared, or fitted to measured pictures. Out: seconds. Never here: a measurement.
-//! Theory: `docs/theory/budget.md`, eq. 41 … 43.
+//! Theory: `docs/theory/budget.md`, eq. 41 … 44.
 
+use super::area::Areas;
 use super::view::Shading;
 use metachron_budget::cost::fit::{Sample, fit};
 use metachron_budget::cost::stages::{Stages, Work};
@@ -22,6 +24,8 @@ pub struct Prices {
     pub pixel_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
     pub shading: [Stages; 4],
+    /// The same by the area of its triangles, where that was measured: then it counts in place of the stages.
+    pub areas: Option<[Areas; 4]>,
 }
 
 /// A measured picture of equal objects.
@@ -54,7 +58,7 @@ impl Default for Prices {
     /// Two cores with Mesa, as they were measured once: what to believe before anything better is known.
     fn default() -> Self {
         let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
-        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4] }
+        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4], areas: None }
     }
 }
 
@@ -74,7 +78,14 @@ impl Prices {
             frame_s: of(self.frame_s, usual.frame_s),
             pixel_s: of(self.pixel_s, usual.pixel_s),
             shading: std::array::from_fn(|i| stages(self.shading[i], usual.shading[i])),
+            areas: self.areas.filter(|areas| areas.iter().all(Areas::is_sound)),
         }
+    }
+
+    /// The same prices without those by area: what policies are told that know two stages and no more (FS93, MB97, GB99).
+    #[must_use]
+    pub fn by_lines(self) -> Self {
+        Self { areas: None, ..self }
     }
 
     /// The prices that predict measured pictures best; `None` with too few of them: two sizes without an object, and of each shading
@@ -82,17 +93,20 @@ impl Prices {
     #[must_use]
     pub fn fitted(pictures: &[Measured]) -> Option<Self> {
         let (pixel_s, frame_s) = line(pictures.iter().filter(|p| p.objects == 0.0).map(|p| (p.picture_px, p.seconds)))?;
+        let draws = |shading: Shading| {
+            let of = pictures.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
+            of.map(move |p| (p.polygons, p.pixels, (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects))
+        };
         let object = |shading: Shading| {
-            let of = pictures.iter().filter(|p| p.objects > 0.0 && p.shading == shading);
-            let sample = |p: &Measured| {
-                let work = work(p.polygons, p.pixels);
-                Sample { work, time: (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects }
-            };
-            fit(&of.map(sample).collect::<Vec<_>>()).map(|found| found.stages)
+            let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
+            fit(&draws(shading).map(sample).collect::<Vec<_>>()).map(|found| found.stages)
         };
         let [flat, gouraud, per_pixel, textured] = Shading::ALL.map(object);
         let shading = [flat?, gouraud?, per_pixel?, textured?];
-        Some(Self { frame_s, pixel_s, shading })
+        let [flat, gouraud, per_pixel, textured] =
+            Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
+        let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
+        Some(Self { frame_s, pixel_s, shading, areas: areas() })
     }
 
     /// What a measured picture should have taken, seconds.
@@ -117,7 +131,11 @@ impl Prices {
     /// Seconds of an object with so many triangles that covers so many pixels.
     #[must_use]
     pub fn object_s(&self, shading: Shading, polygons: f64, pixels: f64) -> f64 {
-        self.of(shading).time(work(polygons, pixels))
+        match (&self.areas, shading) {
+            (None, _) => self.of(shading).time(work(polygons, pixels)),
+            (Some(areas), Shading::Shadowed) => areas[Shading::Textured as usize].time(polygons, SOFTER * pixels),
+            (Some(areas), _) => areas[shading as usize].time(polygons, pixels),
+        }
     }
 
     /// Seconds of a picture in which nothing is chosen.
@@ -176,8 +194,9 @@ mod tests {
             frame_s: 1.4e-3,
             pixel_s: 6e-9,
             shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9), stages(0.3e-6, 55e-9)],
+            areas: None,
         };
-        let found = Prices::fitted(&pictures(1, &machine)).unwrap();
+        let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
         // without the stalls of others: no model foresees an interruption
         let others = pictures(2, &machine);
         let calm = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
@@ -198,7 +217,7 @@ mod tests {
     #[test]
     fn the_slower_stage_counts() {
         let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5 };
-        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4] };
+        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4], areas: None };
         // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);
         assert_eq!(prices.object_s(Shading::Flat, 10.0, 200.0), 101.0);

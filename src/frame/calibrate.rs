@@ -4,13 +4,13 @@
 //! A file that cannot be read, is of another version, another adapter or no file at all is measured anew and says nothing.
 
 use crate::compositor::{self, Drawn, Gpu, RendererOptions};
-use crate::control::{Measured, Prices, Shading, Stages};
+use crate::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};
 use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Another number wherever the benchmark or what it draws with changes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// A file of the cache.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,6 +21,8 @@ struct Kept {
     pixel_s: f64,
     /// Of each shading: setup, polygon, vertex, pixel.
     shading: [[f64; 4]; 4],
+    /// Of each shading by area: setup, and a triangle at every one of [`AREAS_PX`].
+    areas: Option<[(f64, [f64; AREAS_PX.len()]); 4]>,
 }
 
 /// Prices of the adapter of this name: from the cache, else measured on the device that `open` gives, and put there; `None` where
@@ -31,7 +33,7 @@ pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>) -> Optio
         return Some(known);
     }
     let gpu = &open().filter(|gpu| gpu.describe() == adapter)?;
-    let drawn = compositor::benchmark(gpu, RendererOptions::for_adapter(&gpu.info)).ok()?;
+    let drawn = compositor::benchmark(gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX).ok()?;
     let prices = Prices::fitted(&drawn.iter().map(measured).collect::<Vec<_>>())?;
     if let Some(folder) = folder {
         keep(&folder, adapter, &prices);
@@ -69,15 +71,19 @@ fn read(folder: &Path, adapter: &str) -> Option<Prices> {
     let all = [kept.frame_s, kept.pixel_s].into_iter().chain(kept.shading.into_iter().flatten());
     let sound = all.into_iter().all(|price| price.is_finite() && price >= 0.0);
     let stages = |[setup, polygon, vertex, pixel]: [f64; 4]| Stages { setup, polygon, vertex, pixel };
-    let prices = Prices { frame_s: kept.frame_s, pixel_s: kept.pixel_s, shading: kept.shading.map(stages) };
+    let areas = kept.areas.map(|areas| areas.map(|(setup, polygon)| Areas { setup, polygon }));
+    let sound = sound && areas.iter().flatten().all(Areas::is_sound);
+    let prices = Prices { frame_s: kept.frame_s, pixel_s: kept.pixel_s, shading: kept.shading.map(stages), areas };
     (sound && kept.version == VERSION && kept.adapter == adapter).then_some(prices)
 }
 
 /// Writes the file in one go, so that nobody reads half of it; where that fails it is measured again the next time.
 fn keep(folder: &Path, adapter: &str, prices: &Prices) {
     let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel];
-    let Prices { frame_s, pixel_s, shading } = *prices;
-    let kept = Kept { version: VERSION, adapter: adapter.to_owned(), frame_s, pixel_s, shading: shading.map(stages) };
+    let Prices { frame_s, pixel_s, shading, areas } = *prices;
+    let (adapter_name, shading) = (adapter.to_owned(), shading.map(stages));
+    let areas = areas.map(|areas| areas.map(|a| (a.setup, a.polygon)));
+    let kept = Kept { version: VERSION, adapter: adapter_name, frame_s, pixel_s, shading, areas };
     let (path, Ok(text)) = (file(folder, adapter), serde_json::to_vec_pretty(&kept)) else { return };
     let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
     let written = std::fs::create_dir_all(folder).and_then(|()| std::fs::write(&unfinished, text));
@@ -93,6 +99,7 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let mut prices = Prices::default();
         prices.shading[1].vertex = 1.25e-7;
+        prices.areas = Some([Areas { setup: 2e-6, polygon: AREAS_PX.map(|area| 1e-7 + 3e-9 * area) }; 4]);
         assert_eq!(read(folder.path(), "one"), None);
         keep(folder.path(), "one", &prices);
         assert_eq!(read(folder.path(), "one"), Some(prices));
@@ -106,5 +113,8 @@ mod tests {
         }
         keep(folder.path(), "one", &Prices { frame_s: -1.0, ..prices });
         assert_eq!(read(folder.path(), "one"), None, "a price below nothing");
+        let areas = prices.areas.map(|areas| areas.map(|a| Areas { setup: -1.0, ..a }));
+        keep(folder.path(), "one", &Prices { areas, ..prices });
+        assert_eq!(read(folder.path(), "one"), None, "one by area below nothing");
     }
 }

@@ -293,6 +293,7 @@ pub(super) fn prices(draw: &DrawPrice) -> Prices {
         frame_s: draw.setup_ms * 1e-3,
         pixel_s: draw.pixel_ns * 1e-9,
         shading: draw.objects.each_ref().map(object),
+        areas: None,
     }
 }
 

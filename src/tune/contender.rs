@@ -54,6 +54,7 @@ impl Contender {
                     frame_s: plant.line.intercept.max(0.0),
                     pixel_s: 0.0,
                     shading: [object; 4],
+                    areas: None,
                 });
                 control.set_margin(margin);
                 control

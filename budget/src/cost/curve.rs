@@ -33,17 +33,7 @@ impl Curve {
     /// The time at `x`: between the points by a straight line, before the first as there, past the last by the last line's slope.
     #[must_use]
     pub fn at(&self, x: f64) -> f64 {
-        let after = self.points.partition_point(|p| p.0 <= x);
-        let (first, last) = (self.points[0], self.points[self.points.len() - 1]);
-        if after == 0 || x.is_nan() {
-            return first.1;
-        }
-        let to = if after < self.points.len() { after } else { after - 1 };
-        if to == 0 {
-            return last.1;
-        }
-        let (a, b) = (self.points[to - 1], self.points[to]);
-        a.1 + (b.1 - a.1) / (b.0 - a.0) * (x - a.0)
+        between(&self.points, x)
     }
 
     /// The points, in rising abscissa.
@@ -51,6 +41,23 @@ impl Curve {
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
+}
+
+/// The time at `x` on straight lines through points in rising abscissa: before the first as there, past the last by the last line's slope.
+/// 0 without a point.
+#[must_use]
+pub fn between(points: &[(f64, f64)], x: f64) -> f64 {
+    let after = points.partition_point(|p| p.0 <= x);
+    let (Some(first), Some(last)) = (points.first(), points.last()) else { return 0.0 };
+    if after == 0 || x.is_nan() {
+        return first.1;
+    }
+    let to = if after < points.len() { after } else { after - 1 };
+    if to == 0 {
+        return last.1;
+    }
+    let (a, b) = (points[to - 1], points[to]);
+    a.1 + (b.1 - a.1) / (b.0 - a.0) * (x - a.0)
 }
 
 /// The time of an instance of `primitives` equal primitives that cover `area` together, by the curve of one of them (eq. 44).

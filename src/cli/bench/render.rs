@@ -8,6 +8,7 @@ use super::super::chart::table::Table;
 use super::super::progress::Bar;
 use super::subject::Subject;
 use crate::compositor::{Drawn, Gpu, RendererOptions, Shading, benchmark};
+use crate::control::AREAS_PX;
 use anyhow::Context;
 use serde::{Deserialize, Serialize};
 
@@ -36,7 +37,7 @@ impl Subject for Render {
     fn measure(_args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
         let gpu = Gpu::headless().context("there is no adapter to measure")?;
         bar.tell(0.0, gpu.describe());
-        let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info))?;
+        let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX)?;
         Ok(drawn.iter().map(|drawn| row(&gpu.describe(), drawn)).collect())
     }
 

@@ -15,7 +15,11 @@ impl PictureControl {
     /// Changes the policy. The loop goes on from the picture as it is.
     pub fn set_policy(&mut self, policy: Policy) {
         if policy != self.policy {
+            let other = policy.prices(&self.prices) != self.policy.prices(&self.prices);
             self.policy = policy;
+            if other {
+                self.forget_ladders();
+            }
             self.raise = self.raise.map(|_| Raise::default());
             self.take_over();
         }

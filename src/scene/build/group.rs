@@ -68,16 +68,13 @@ fn claim(
     for (at, wanted) in file.members.iter().enumerate() {
         let key = format!("members.{at}");
         let found: Vec<usize> = (0..owner.len()).filter(|&i| is_meant(&objects.scenery[i].name, wanted)).collect();
+        let others = objects.names.only(|named| named != Named::Scenery);
+        if let Some(other) = others.into_iter().find(|name| is_meant(name, wanted)) {
+            let what = format_args!("names `{other}`, which is neither mesh nor tree");
+            return c.wrong(place, &key, what, "expected scenery: what is simulated or fixed is drawn by itself");
+        }
         if found.is_empty() {
-            match objects.names.get(wanted) {
-                Some(_) => {
-                    let what = format_args!("names `{wanted}`, which is neither mesh nor tree");
-                    c.wrong(place, &key, what, "expected scenery: it does not move");
-                }
-                None => {
-                    c.reference(place, &key, wanted, objects.names.only(|named| named == Named::Scenery));
-                }
-            }
+            c.reference(place, &key, wanted, objects.names.only(|named| named == Named::Scenery));
         }
         for i in found {
             if owner[i].is_some_and(|other| other != number) {
@@ -136,4 +133,28 @@ fn mean_colour(members: &[Scenery]) -> [u8; 3] {
     std::array::from_fn(|i| {
         (members.iter().map(|m| weight(m) * f64::from(m.look.colour[i])).sum::<f64>() / all.max(1.0)).round() as u8
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::scene::{Source, load};
+
+    /// What is said of a group of these members beside a mesh `a1` and a ball `a2` that falls.
+    fn told(members: &str) -> String {
+        let text = format!(
+            "format = 1\n[[object]]\nname = \"a1\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n[[object]]\nname = \"a2\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n[[group]]\nname = \"g\"\nmembers = {members}\n"
+        );
+        let loaded = Source::memory("group", text.as_bytes()).and_then(|source| load(&source, &[]));
+        loaded.err().map_or(String::new(), |problems| format!("{problems:?}"))
+    }
+
+    #[test]
+    fn what_is_simulated_is_refused_as_a_member_by_its_name_and_by_a_star() {
+        assert_eq!(told("[\"a1\"]"), "");
+        for members in ["[\"a2\"]", "[\"a1\", \"a2\"]", "[\"a*\"]"] {
+            let told = told(members);
+            assert!(told.contains("names `a2`, which is neither mesh nor tree"), "{members}: {told}");
+        }
+        assert!(told("[\"b*\"]").contains("does not exist"));
+    }
 }

@@ -94,25 +94,45 @@ fn walked(play: &Play, case: &Case, target_s: f64) -> anyhow::Result<Walked> {
     Ok(walked)
 }
 
-/// Predicted and measured milliseconds of pictures at places of a scene's path under targets in seconds, and the adapter.
+/// What was foretold of one picture, and what it took each time it was drawn, milliseconds.
+pub(super) struct Foretold {
+    pub(super) told_ms: f64,
+    pub(super) took_ms: Vec<f64>,
+}
+
+/// Frames until a picture is itself: meshes of levels that were never drawn are made, and all are at the end of their way.
+const SETTLED: usize = 8;
+
+/// Pictures at places of a scene's path under targets in seconds, as `policy` foretells and chooses them, each drawn several times; and
+/// the adapter.
 ///
 /// # Errors
 /// Of the scene, of the adapter.
-pub(super) fn predicted(paper: Paper, asked: &[(f64, f64)]) -> anyhow::Result<(String, Vec<(f64, f64)>)> {
+pub(super) fn predicted(
+    paper: Paper,
+    policy: Policy,
+    (asked, times): (&[(f64, f64)], usize),
+) -> anyhow::Result<(String, Vec<Foretold>)> {
     let (adapter, mut walk) = opened(paper)?;
-    walk.session().control().set_policy(Policy::MarginalFill);
+    walk.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
         walk.step(0.0)?;
     }
-    let mut pairs = Vec::with_capacity(asked.len());
+    let mut pictures = Vec::with_capacity(asked.len());
     for (part, target_s) in asked {
         walk.session().control().set_target_hz(1.0 / target_s);
-        // meshes of levels that were never drawn are made once: a picture tells what it takes the second time
         walk.step(*part)?;
-        let record = walk.step(*part)?;
-        pairs.extend(record.predicted_ms.map(|told| (told, record.frame_ms)));
+        let told = walk.step(*part)?.predicted_ms;
+        walk.session().control().freeze(true);
+        for _ in 2..SETTLED {
+            walk.step(*part)?;
+        }
+        let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
+        walk.session().control().freeze(false);
+        let took_ms = took?.iter().map(|record| record.frame_ms).collect();
+        pictures.extend(told.map(|told_ms| Foretold { told_ms, took_ms }));
     }
-    Ok((adapter, pairs))
+    Ok((adapter, pictures))
 }
 
 /// A scene of the papers before the first frame, and the adapter that draws it.
