@@ -18,6 +18,7 @@ mod panels;
 mod purse;
 mod push;
 mod session;
+mod sight;
 mod ties;
 mod trace;
 mod tuning;

@@ -89,6 +89,10 @@ pub struct RateControl {
     full_load: Option<f64>,
     /// The loop variable at the last demand.
     asked: f64,
+    /// ln(ε that somebody may tell from a finer one / finest ε), from 0.
+    plain: f64,
+    /// Where on the stairs the agent was last sent.
+    sent: f64,
     calm: u32,
     patience: u32,
     /// The loop variable before the last demand, if that was for something finer and has not proved itself yet.
@@ -112,6 +116,8 @@ impl RateControl {
             usual_s: None,
             full_load: None,
             asked: start,
+            plain: 0.0,
+            sent: start,
             calm: 0,
             patience: PATIENCE.0,
             refined_from: None,
@@ -137,6 +143,19 @@ impl RateControl {
         self.limits.share
     }
 
+    /// Says which ε is as fine as anybody can see, metres, > 0; +∞ where nobody looks. Until it is said again the agent is asked for
+    /// nothing finer, and comes back to where it was when it may.
+    pub fn set_plain(&mut self, eps_m: f64) {
+        if let Some((fine, _)) = self.limits.eps_m {
+            self.plain = if eps_m == f64::INFINITY { self.landing } else { ratio_ln(eps_m, fine).min(self.landing) };
+        }
+    }
+
+    /// Where on the stairs the agent belongs.
+    fn held(&self) -> f64 {
+        self.asked.max(self.plain)
+    }
+
     /// What the agent would take of a core at its finest ε and the rate that is wanted, from 0; `None` before anything was measured.
     /// Work falls as 1/ε and as 1/dt.
     #[must_use]
@@ -158,7 +177,7 @@ impl RateControl {
         let window = std::mem::take(&mut self.window);
         self.usual_s = Some(window.work_s / f64::from(window.turns));
         // on both stairs the load falls as e⁻ᶻ
-        self.full_load = Some(window.work_s / window.wanted_s * libm::exp(self.asked));
+        self.full_load = Some(window.work_s / window.wanted_s * libm::exp(self.sent));
         self.learn(&window);
         self.demand_if_worth_it()
     }
@@ -188,10 +207,18 @@ impl RateControl {
         let load = window.work_s / (self.limits.share * window.wanted_s);
         let lateness = window.late / f64::from(window.turns);
         let ratio = if lateness > LATE { load.max(lateness) } else { load };
+        let eased = self.sent > self.asked;
         if ratio > 1.0 + GAINS.late {
             self.calm = 0;
+            if eased {
+                self.law.set_value(self.sent);
+            }
             self.law.observe(ratio, None);
             self.take_back();
+            return;
+        }
+        if eased {
+            // what it does with less work says nothing of what it could bear
             return;
         }
         self.calm = self.calm.saturating_add(1);
@@ -213,25 +240,31 @@ impl RateControl {
     }
 
     fn demand_if_worth_it(&mut self) -> Option<RateDemand> {
-        let (value, range) = (self.law.value(), self.law.range());
-        let at_an_end = value <= range.0 || value >= range.1;
-        let step = value - self.asked;
-        if step == 0.0 || (step.abs() < RETUNE_MIN && !at_an_end) {
+        let (value, held) = (self.law.value(), self.asked);
+        if self.is_worth_it(held, value) {
+            if value < held {
+                (self.refined_from, self.calm) = (Some(held), 0);
+            }
+            self.asked = value;
+        }
+        if !self.is_worth_it(self.sent, self.held()) {
             return None;
         }
-        if step < 0.0 {
-            (self.refined_from, self.calm) = (Some(self.asked), 0);
-        }
-        self.asked = value;
+        self.sent = self.held();
         Some(self.demand())
+    }
+
+    fn is_worth_it(&self, from: f64, to: f64) -> bool {
+        let (least, most) = self.law.range();
+        to != from && ((to - from).abs() >= RETUNE_MIN || to <= least || to >= most)
     }
 
     /// What is asked for at present (control.md, eq. 18).
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
-        let eps_m = self.limits.eps_m.map(|(fine, coarse)| on_stair(fine, coarse, self.asked.min(self.landing)));
-        let dt_s = on_stair(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.asked - self.landing).max(0.0));
+        let eps_m = self.limits.eps_m.map(|(fine, coarse)| on_stair(fine, coarse, self.held().min(self.landing)));
+        let dt_s = on_stair(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.held() - self.landing).max(0.0));
         RateDemand { dt_s, eps_m }
     }
 

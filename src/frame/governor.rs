@@ -16,6 +16,7 @@ impl Governor for RateGovernor {
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
         let Self(control, tally) = self;
         control.set_share(tally.share());
+        control.set_plain(tally.plain_m());
         let turn = control::TurnMeasure {
             work_s: measure.work_s,
             wanted_period_s: measure.wanted_period_s,

@@ -26,13 +26,30 @@ pub(super) struct Tally {
     /// What it would take of a core at its finest, and the share of its period that its work may take; bits of f64.
     full: AtomicU64,
     share: AtomicU64,
+    /// The ε that is as fine as anybody can see, metres, +∞ where nobody looks; bits of f64.
+    plain: AtomicU64,
 }
 
 impl Tally {
     /// Nothing is told yet.
     pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
-        let [full, share] = [0.0, fair].map(|x: f64| AtomicU64::new(x.to_bits()));
-        Self { id, rate_hz, least, fair, full, share }
+        let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
+        Self { id, rate_hz, least, fair, full, share, plain }
+    }
+
+    /// Whose it is.
+    pub fn id(&self) -> AgentId {
+        self.id
+    }
+
+    /// The frame loop tells the ε that is as fine as anybody can see, metres.
+    pub fn show(&self, plain_m: f64) {
+        self.plain.store(plain_m.to_bits(), Ordering::Relaxed);
+    }
+
+    /// The ε that is as fine as anybody can see, metres, +∞ where nobody looks; 0 until it is told.
+    pub fn plain_m(&self) -> f64 {
+        f64::from_bits(self.plain.load(Ordering::Relaxed))
     }
 
     /// The agent tells what it would take of a core at its finest.

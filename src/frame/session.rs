@@ -12,6 +12,7 @@ use super::error::SessionError;
 use super::holding::{self, Holding};
 use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::purse::Purse;
+use super::sight::Sight;
 use super::trace::Trace;
 use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Seen, Size, Stage, States, Style};
 use crate::control::{Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Status};
@@ -36,6 +37,7 @@ pub struct Session {
     shares_processor: bool,
     purse: Purse,
     holdings: Vec<Arc<Holding>>,
+    sight: Sight,
     reader: Reader,
     seen: Vec<Seen>,
     views: Vec<ObjectView>,
@@ -113,6 +115,7 @@ impl Session {
         Ok(Self {
             control: cast::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep,
+            sight: Sight::new(&steered.tallies),
             purse: Purse::new(steered.tallies),
             holdings: steered.holdings,
             reader: Reader::new(run.agents()),
@@ -321,6 +324,7 @@ impl Session {
         let started = self.now();
         self.gather();
         self.stage.survey(camera, size, &mut self.seen);
+        self.sight.look(started, &self.seen, camera, size);
         let culled = self.now();
         self.chosen.cull = culled.saturating_sub(started);
         self.choose(size);

@@ -15,6 +15,7 @@ mod scenes;
 mod scenes_coupled;
 mod scenes_soft;
 mod shares;
+mod sight;
 mod throughput;
 mod tune;
 mod viewer;

@@ -167,3 +167,31 @@ fn demands_stay_in_their_ranges_whatever_is_measured() {
         }
     }
 }
+
+#[test]
+fn nothing_finer_is_asked_for_than_can_be_seen_and_what_was_held_comes_back() {
+    // one with time to spare, and one that rests at an ε which its share pays for
+    for full in [0.1, 0.9] {
+        let mut agent = Agent::new(full * PERIOD_S);
+        agent.run(20.0);
+        let held = agent.now;
+        for (plain_m, eps_m) in
+            [(0.015, 0.015), (f64::INFINITY, limits().eps_m.unwrap().1), (0.001, held.eps_m.unwrap())]
+        {
+            agent.control.set_plain(plain_m);
+            agent.run(1.0);
+            let now = agent.now.eps_m.unwrap();
+            assert!((now / eps_m - 1.0).abs() < 1e-9, "{full}: as fine as {plain_m} m can be seen, {now} for {eps_m}");
+            agent.run(20.0);
+        }
+        assert_eq!(agent.now, held, "{full}");
+    }
+}
+
+#[test]
+fn an_agent_that_is_late_out_of_sight_still_slows_down() {
+    let mut agent = Agent::new(4.0 * PERIOD_S);
+    agent.control.set_plain(0.01);
+    agent.run(20.0);
+    assert!(agent.load() < 1.06 && agent.now.eps_m.unwrap() > 0.01, "{:?}", agent.now);
+}
