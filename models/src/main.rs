@@ -20,23 +20,32 @@ mod sync {
 }
 
 #[path = "../../src/runtime/bell.rs"]
-#[expect(dead_code, reason = "a model uses what it needs")]
 mod bell;
 #[path = "../../src/runtime/news.rs"]
 mod news;
+#[path = "../../src/runtime/seqlock.rs"]
+mod seqlock;
 #[path = "../../src/runtime/slot.rs"]
 #[expect(dead_code, reason = "a model uses what it needs")]
 mod slot;
+#[path = "../../src/runtime/switchboard.rs"]
+#[expect(dead_code, reason = "a model uses what it needs")]
+mod switchboard;
+#[path = "../../agents/src/time.rs"]
+mod time;
 
 use bell::Bell;
 use loom::sync::Arc;
 use loom::sync::atomic::{AtomicU32, Ordering};
 use loom::thread;
 use news::News;
+use seqlock::{Glance, Seqlock};
 use slot::SlotWriter;
+use switchboard::Switchboard;
+pub use time::{SimSpan, SimTime};
 
 /// Stands for the agents' own.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct AgentId(pub u32);
 
 fn main() {
@@ -44,6 +53,11 @@ fn main() {
     check("a state that a reader keeps is never written to", slot_keeps_what_is_held);
     check("who takes the news of a state sees it, and no news is lost", news_come_after_the_state);
     check("nobody sleeps through a summons", nobody_sleeps_through_a_summons);
+    check("words are read whole or not at all, and newer ones after those that were seen", words_are_read_whole);
+    check("who goes to rest is summoned by whoever wakes it meanwhile", a_wake_meets_a_rest);
+    check("who goes to rest is summoned by whoever touches it meanwhile", a_touch_meets_a_rest);
+    check("who leads another is summoned by whoever wakes that one meanwhile", a_wake_of_one_who_is_led_meets_a_rest);
+    check("what was said before a wake is seen by the turn that heeds it, or the wake stands", a_wake_meets_a_turn);
 }
 
 /// Holds a claim against every run in which threads are stopped in the middle at most twice.
@@ -125,4 +139,68 @@ fn nobody_sleeps_through_a_summons() {
     };
     bell.ring(AgentId(0));
     worker.join().unwrap();
+}
+
+fn words_are_read_whole() {
+    let lock = Arc::new(Seqlock::<2>::new());
+    let writer = {
+        let lock = Arc::clone(&lock);
+        thread::spawn(move || (1..=2).for_each(|value| lock.write([value; 2])))
+    };
+    let mut last = 0;
+    for _ in 0..2 {
+        if let Glance::Whole([a, b]) = lock.read() {
+            assert_eq!(a, b, "torn");
+            assert!(a >= last, "{a} after {last}");
+            last = a;
+        }
+    }
+    writer.join().unwrap();
+    assert_eq!(lock.read(), Glance::Whole([2, 2]));
+}
+
+const LEADER: AgentId = AgentId(0);
+const LED: AgentId = AgentId(1);
+
+/// One goes to rest, and leads another, while `disturb` does something about it: in the end it must not rest unsummoned.
+fn meets_a_rest(disturb: fn(&Switchboard)) {
+    let board = Arc::new(Switchboard::new(2));
+    let disturber = {
+        let board = Arc::clone(&board);
+        thread::spawn(move || disturb(&board))
+    };
+    // it takes in the one it leads, then it lies down
+    board.follow(LED, Some(LEADER));
+    let rests = board.try_rest(LEADER, std::iter::once(LED), SimTime::ZERO);
+    disturber.join().unwrap();
+    let summoned = board.take_rung();
+    assert!(!rests || summoned, "it sleeps for good");
+    assert!(!rests || board.take_wake(LEADER), "it would lie down again");
+}
+
+fn a_wake_meets_a_rest() {
+    meets_a_rest(|board| board.wake(LEADER));
+}
+
+fn a_touch_meets_a_rest() {
+    meets_a_rest(|board| board.touch(LEADER, SimTime::ZERO));
+}
+
+fn a_wake_of_one_who_is_led_meets_a_rest() {
+    meets_a_rest(|board| board.wake(LED));
+}
+
+fn a_wake_meets_a_turn() {
+    let (board, letter) = (Arc::new(Switchboard::new(1)), Arc::new(AtomicU32::new(0)));
+    let sender = {
+        let (board, letter) = (Arc::clone(&board), Arc::clone(&letter));
+        thread::spawn(move || {
+            letter.store(1, Ordering::Relaxed);
+            board.wake(LEADER);
+        })
+    };
+    board.heed(LEADER);
+    let read = letter.load(Ordering::Relaxed) == 1;
+    sender.join().unwrap();
+    assert!(read || board.is_woken(LEADER), "the letter lies unread");
 }

@@ -4,6 +4,7 @@ use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
 use super::{AgentState, Clock, Command, Drive, ManualClock, Run};
 use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 use std::time::Duration;
 
 #[test]
@@ -95,6 +96,37 @@ fn a_lag_past_the_cap_is_dropped_once_and_the_agent_is_on_time_again() {
         let stats = run.shutdown().remove(0);
         assert_eq!(stats.dropped, SimSpan::from_nanos(2_996_000_000), "3 s less the step that was made");
         assert_eq!(stats.steps, 2);
+    });
+}
+
+/// A clock that can be set back: [`Clock`] forbids it, a broken machine does it.
+#[derive(Default)]
+struct BrokenClock(AtomicU64);
+
+impl Clock for BrokenClock {
+    fn now(&self) -> Duration {
+        Duration::from_millis(self.0.load(SeqCst))
+    }
+}
+
+#[test]
+fn a_clock_that_falls_back_holds_agents_until_it_is_where_it_was_and_costs_them_nothing() {
+    on_every_executor(|start| {
+        let (clock, rates) = (Arc::new(BrokenClock::default()), [250.0, 100.0]);
+        let run = start(rates.map(|hz| Dummy::new(1.0).at(hz)).into(), Arc::clone(&clock) as Arc<dyn Clock>);
+        let ms = |n: u64| SimTime::from_nanos(n * 1_000_000);
+        for (wall_ms, reached_ms) in [(40, 40), (15, 40), (30, 40), (60, 60)] {
+            clock.0.store(wall_ms, SeqCst);
+            let made = |a: &super::AgentHandle| a.latest().time;
+            eventually("what was released is made", || run.agents().iter().all(|a| made(a) >= ms(reached_ms)));
+            // the step released at the latest time ever shown is the last one
+            assert!(run.agents().iter().zip([4, 10]).all(|(a, dt)| made(a) <= ms(reached_ms + dt)), "at {wall_ms} ms");
+        }
+        let kept = run.agents().to_vec();
+        for (agent, stats) in kept.iter().zip(run.shutdown()) {
+            assert_eq!((stats.dropped, &stats.state), (SimSpan::ZERO, &AgentState::Running));
+            assert_eq!(agent.latest().time.as_nanos(), stats.steps * stats.dt.as_nanos());
+        }
     });
 }
 

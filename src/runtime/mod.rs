@@ -26,6 +26,7 @@ mod pace;
 mod pool;
 mod priority;
 mod reader;
+mod seqlock;
 mod show;
 mod slot;
 mod spawn;

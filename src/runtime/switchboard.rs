@@ -4,15 +4,20 @@
 //! An agent that another leads has no turns of its own: who wakes it wakes its leader, and the leader rests for all it leads.
 //! Never here: when an agent is due ([`super::pace`]), what it is told ([`super::mailbox`]).
 //!
-//! Leaders have lower numbers than those they lead, so that the way up always ends. No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
-//! first and looks at `resting` after. In one total order (SeqCst) at least one of the two sees the other.
+//! Leaders have lower numbers than those they lead, so that the way up always ends.
+//! No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
+//! first and looks at `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 
 use super::bell::Bell;
 use super::news::News;
+use super::sync::atomic::{
+    AtomicBool, AtomicU32, AtomicU64,
+    Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
+    fence,
+};
+use super::sync::thread::Thread;
 use metachron_agents::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
-use std::sync::atomic::{AtomicBool, AtomicU32, AtomicU64, Ordering::SeqCst};
-use std::thread::Thread;
 
 /// How long after the last touch an agent may not rest, simulated time: longer than the period of any toucher above 10 Hz,
 /// so that a touched agent does not doze off between two touches.
@@ -97,7 +102,7 @@ impl Switchboard {
     /// Hands the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
     pub fn follow(&self, id: AgentId, leader: Option<AgentId>) {
         if let Some(signal) = self.signal(id) {
-            signal.leader.store(leader.map_or(NOBODY, |l| l.0), SeqCst);
+            signal.leader.store(leader.map_or(NOBODY, |l| l.0), Release);
         }
     }
 
@@ -111,20 +116,20 @@ impl Switchboard {
     }
 
     fn next_up(&self, id: AgentId) -> Option<AgentId> {
-        let leader = self.signal(id)?.leader.load(SeqCst);
+        let leader = self.signal(id)?.leader.load(Acquire);
         (leader < id.0).then_some(AgentId(leader))
     }
 
     /// `id` makes no turns any more.
     pub fn close(&self, id: AgentId) {
         if let Some(signal) = self.signal(id) {
-            signal.closed.store(true, SeqCst);
+            signal.closed.store(true, Release);
         }
     }
 
     /// Whether `id` makes no turns any more.
     pub fn is_closed(&self, id: AgentId) -> bool {
-        self.signal(id).is_some_and(|signal| signal.closed.load(SeqCst))
+        self.signal(id).is_some_and(|signal| signal.closed.load(Acquire))
     }
 
     /// `id` must not rest before its next turn; if it rests now, it wakes.
@@ -132,8 +137,9 @@ impl Switchboard {
         let mut at = Some(id);
         while let Some(who) = at {
             let Some(signal) = self.signal(who) else { return };
-            signal.woken.store(true, SeqCst);
-            if signal.resting.load(SeqCst) {
+            signal.woken.store(true, Release);
+            fence(SeqCst);
+            if signal.resting.load(Relaxed) {
                 self.summon(who);
             }
             at = self.next_up(who);
@@ -147,14 +153,15 @@ impl Switchboard {
             bell.ring(id);
             return;
         }
-        self.rung.store(true, SeqCst);
+        self.rung.store(true, Release);
         signal.thread.get().inspect(|t| t.unpark());
     }
 
     /// Another agent acts on `id` at simulated time `now`.
     pub fn touch(&self, id: AgentId, now: SimTime) {
         let Some(signal) = self.signal(id) else { return };
-        signal.touched.fetch_max(now.as_nanos().saturating_add(1), SeqCst);
+        signal.touched.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
+        fence(SeqCst);
         if self.rests(id) {
             self.wake(id);
         }
@@ -162,56 +169,54 @@ impl Switchboard {
 
     /// Whether whoever makes the turns of `id` rests.
     pub fn rests(&self, id: AgentId) -> bool {
-        self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(SeqCst))
+        self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(Acquire))
     }
 
     /// Whether `id` was touched so lately, or woken, that it may not rest at `now`.
     pub fn is_stirred(&self, id: AgentId, now: SimTime) -> bool {
-        self.signal(id).is_some_and(|signal| signal.woken.load(SeqCst) || signal.is_held(now))
+        self.signal(id).is_some_and(|signal| signal.woken.load(Acquire) || signal.is_held(now))
     }
 
     /// Goes to rest, with all whose turns it makes, unless somebody woke or touched one of them lately; whether it did.
     pub fn try_rest(&self, id: AgentId, led: impl Iterator<Item = AgentId>, now: SimTime) -> bool {
         let Some(signal) = self.signal(id) else { return false };
-        signal.resting.store(true, SeqCst);
+        signal.resting.store(true, Release);
+        fence(SeqCst);
         let mut disturbed = false;
         for signal in std::iter::once(id).chain(led).filter_map(|id| self.signal(id)) {
-            disturbed |= signal.is_held(now) | signal.woken.swap(false, SeqCst);
+            disturbed |= signal.is_held(now) | signal.take_wake();
         }
         if disturbed {
-            signal.resting.store(false, SeqCst);
+            signal.resting.store(false, Release);
         }
         !disturbed
     }
 
     /// A turn of `id` begins: what it was woken for is looked after in this turn. To be said before looking.
     pub fn heed(&self, id: AgentId) {
-        // a flag that is down is not written: its line of the cache stays with all who read there
-        if let Some(signal) = self.signal(id)
-            && signal.woken.load(SeqCst)
-        {
-            signal.woken.store(false, SeqCst);
+        if let Some(signal) = self.signal(id) {
+            signal.take_wake();
         }
     }
 
     /// Whether somebody woke `id` and it has not looked yet.
     pub fn is_woken(&self, id: AgentId) -> bool {
-        self.signal(id).is_some_and(|signal| signal.woken.load(SeqCst))
+        self.signal(id).is_some_and(|signal| signal.woken.load(Acquire))
     }
 
     /// Ends the rest of `id` if somebody woke it; whether somebody did.
     pub fn take_wake(&self, id: AgentId) -> bool {
         let Some(signal) = self.signal(id) else { return false };
-        if !signal.woken.swap(false, SeqCst) {
-            return false;
+        let woken = signal.take_wake();
+        if woken {
+            signal.resting.store(false, Release);
         }
-        signal.resting.store(false, SeqCst);
-        true
+        woken
     }
 
     /// Whether anybody was summoned since the last call.
     pub fn take_rung(&self) -> bool {
-        self.rung.load(SeqCst) && self.rung.swap(false, SeqCst)
+        self.rung.load(Relaxed) && self.rung.swap(false, AcqRel)
     }
 
     /// Unparks every thread, so that it looks at the timeline again.
@@ -224,20 +229,27 @@ impl Switchboard {
 
     /// Asks every thread to end.
     pub fn stop(&self) {
-        self.stop.store(true, SeqCst);
+        self.stop.store(true, Release);
         self.unpark_all();
     }
 
     /// Whether threads have been asked to end.
     pub fn stopping(&self) -> bool {
-        self.stop.load(SeqCst)
+        self.stop.load(Acquire)
     }
 }
 
 impl Signal {
+    /// Whether somebody woke it since this was asked last; what was said before the wake can be seen then.
+    fn take_wake(&self) -> bool {
+        // a flag that is down is not written: its line of the cache stays with all who read there;
+        // one that is up is exchanged, not only lowered: a wake that came just before would be overwritten unseen
+        self.woken.load(Relaxed) && self.woken.swap(false, AcqRel)
+    }
+
     /// Whether the last touch still keeps it awake.
     fn is_held(&self, now: SimTime) -> bool {
-        let touched = self.touched.load(SeqCst);
+        let touched = self.touched.load(Acquire);
         touched > 0 && SimTime::from_nanos(touched - 1) + TOUCH_HOLD > now
     }
 }

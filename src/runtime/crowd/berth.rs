@@ -1,10 +1,10 @@
 //! Where each agent's matter is, for all to read without waiting.
 //!
 //! In: one agent's box at a time, from the one who makes its turns. Out: whole boxes, or none where one is just being written:
-//! the reader must think the worst then. A version before and after the numbers tells (a seqlock in atomic words).
+//! the reader must think the worst then ([`Seqlock`]).
 //! Never here: who is near whom.
 
-use super::super::sync::atomic::{AtomicU64, Ordering, fence};
+use super::super::seqlock::{Glance, Seqlock};
 use glam::DVec3;
 use metachron_agents::{Bounds, SimTime};
 
@@ -28,7 +28,12 @@ impl Reach {
 
     /// The distance between two boxes, metres; zero where they overlap.
     pub fn gap_m(&self, other: &Self) -> f64 {
-        (other.low - self.high).max(self.low - other.high).max(DVec3::ZERO).length()
+        self.gap_vector(other).length()
+    }
+
+    /// From the one box to the other along each axis, without sign, metres; zero where they overlap.
+    pub fn gap_vector(&self, other: &Self) -> DVec3 {
+        (other.low - self.high).max(self.low - other.high).max(DVec3::ZERO)
     }
 }
 
@@ -46,11 +51,7 @@ pub(super) enum Seen {
 /// One agent's reach in shared memory: a line of the cache of its own, so that writers do not disturb each other's readers.
 #[derive(Debug, Default)]
 #[repr(align(64))]
-pub(super) struct Berth {
-    /// Odd while the words are being written; zero before the first writing.
-    version: AtomicU64,
-    words: [AtomicU64; 5],
-}
+pub(super) struct Berth(Seqlock<5>);
 
 /// How often a reader looks again at a box that is just being written. A writing takes 10 ns.
 const TRIES: u32 = 8;
@@ -63,26 +64,16 @@ impl Berth {
 
     /// Writes `reach`; from one thread at a time. Numbers are rounded outwards to 24 bits.
     pub fn write(&self, reach: &Reach) {
-        let version = self.version.load(Ordering::Relaxed);
-        self.version.store(version.wrapping_add(1), Ordering::Relaxed);
-        fence(Ordering::Release);
-        for (word, value) in self.words.iter().zip(words(reach)) {
-            word.store(value, Ordering::Relaxed);
-        }
-        self.version.store(version.wrapping_add(2), Ordering::Release);
+        self.0.write(words(reach));
     }
 
     /// What was written last.
     pub fn read(&self) -> Seen {
         for _ in 0..TRIES {
-            let version = self.version.load(Ordering::Acquire);
-            if version == 0 {
-                return Seen::Nowhere;
-            }
-            let words = std::array::from_fn(|k| self.words[k].load(Ordering::Relaxed));
-            fence(Ordering::Acquire);
-            if version.is_multiple_of(2) && self.version.load(Ordering::Relaxed) == version {
-                return Seen::There(reach(words));
+            match self.0.read() {
+                Glance::Nothing => return Seen::Nowhere,
+                Glance::Whole(words) => return Seen::There(reach(words)),
+                Glance::Torn => {}
             }
         }
         Seen::Unsure
@@ -130,7 +121,7 @@ fn up(x: f64) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::AtomicBool;
+    use std::sync::atomic::{AtomicBool, Ordering};
 
     #[test]
     fn what_is_read_holds_what_was_written() {
