@@ -5,6 +5,7 @@
 //! numbers. Nothing is allocated once the sizes settle. Never here: when an agent looks.
 
 use super::crowd::{Crowd, Sight};
+use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, owns};
@@ -114,22 +115,23 @@ impl Eyes {
     }
 
     /// Looks around before the step of `dt` from `now` of `me`, whose states `writer` writes and who shares a world with
-    /// `fellows` (by rising numbers).
+    /// `fellows`.
     pub fn look(
         &mut self,
         peers: &Peers,
         me: &SlotWriter<Snapshot>,
         (id, now, dt): (AgentId, SimTime, SimSpan),
-        fellows: &[AgentId],
+        fellows: &Fellows,
     ) {
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
             let mine = peers.get(id);
-            sight.look(crowd, (now, dt), |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
+            sight
+                .look(crowd, (now, dt), fellows, |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
             self.want(crowd, me, id, fellows);
             self.list_wanted(peers, id);
         }
         for (neighbour, look) in self.neighbours.iter_mut().zip(&mut self.looks) {
-            let fellow = fellows.binary_search(&neighbour.id).is_ok();
+            let fellow = fellows.has(neighbour.id);
             if fellow != look.fellow {
                 look.fellow = fellow;
                 regard(neighbour, peers, id, fellow);
@@ -140,13 +142,13 @@ impl Eyes {
 
     /// Gathers whom it must see: who is near, who has called, who is neither but has an account to settle, and who gives to
     /// somebody that it gives to.
-    fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &[AgentId]) {
+    fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
         let Self { neighbours, links, sight, wanted, looks } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
         let near = sight.iter().flat_map(|sight| sight.near().iter().copied());
-        wanted.extend(near.filter(|id| !is_linked(*id) && fellows.binary_search(id).is_err()));
+        wanted.extend(near.filter(|id| !is_linked(*id) && !fellows.has(*id)));
         let near = wanted.len();
         for (neighbour, look) in near_once.iter_mut().zip(&looks[*links..]) {
             if wanted[..near].binary_search(&neighbour.id).is_ok() {
@@ -164,7 +166,7 @@ impl Eyes {
         });
         for neighbour in linked.iter().chain(&*near_once) {
             let givers = others_who_give(id, &neighbour.snapshot);
-            wanted.extend(givers.filter(|id| !is_linked(*id) && fellows.binary_search(id).is_err()));
+            wanted.extend(givers.filter(|id| !is_linked(*id) && !fellows.has(*id)));
         }
         if wanted.len() > near {
             wanted.sort_unstable();

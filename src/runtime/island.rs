@@ -16,6 +16,7 @@ mod seats;
 pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_in};
 
 use super::account::Entry;
+use super::fellows::Fellows;
 use super::pace::{Start, Timeline};
 use super::turn::{Actor, Open, contained};
 use metachron_agents::{Companion, DT_MAX_S, SimSpan, SimTime, StepReport, Surroundings};
@@ -101,7 +102,7 @@ impl Actor {
     }
 
     /// This agent, as one who leads it wants it.
-    fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &[metachron_agents::AgentId]) -> Companion<'_> {
+    fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> Companion<'_> {
         let id = self.shared.id;
         self.eyes.look(&self.peers, &self.writer, (id, time, dt), fellows);
         let neighbours = self.eyes.neighbours();

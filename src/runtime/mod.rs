@@ -13,6 +13,7 @@ mod cpu;
 mod crowd;
 mod eyes;
 mod faults;
+mod fellows;
 mod governor;
 mod handle;
 mod island;

@@ -11,6 +11,7 @@
 use super::account::{Diary, SMOOTHING};
 use super::eyes::{Eyes, Peers};
 use super::faults::Faults;
+use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::island::Company;
@@ -140,7 +141,7 @@ impl Actor {
             return;
         }
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
-        self.eyes.look(&self.peers, &self.writer, (me, time, dt), &[]);
+        self.eyes.look(&self.peers, &self.writer, (me, time, dt), &Fellows::default());
         let neighbours = self.eyes.neighbours();
         let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
@@ -259,7 +260,7 @@ impl Actor {
     /// Steps by itself.
     pub fn step(&mut self, dt: SimSpan) -> Result<StepReport, String> {
         let time = self.pace.time();
-        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, dt), &[]);
+        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, dt), &Fellows::default());
         let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
         let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
         self.agent.step(dt, &around).map_err(|e| e.to_string())

@@ -6,6 +6,7 @@
 //! remembered one by one; all others share one, the earliest of theirs, at which everybody is looked at: what an agent
 //! remembers does not grow with the crowd. Never here: why they are listed.
 
+use super::super::fellows::{Fellows, World};
 use super::berth::{Reach, Seen};
 use super::{Crowd, SPEED_LEAST_M_S};
 use metachron_agents::{AgentId, Bounds, SimSpan, SimTime};
@@ -28,6 +29,8 @@ pub(in super::super) struct Sight {
     /// The first note of the log that has not been read.
     unread: u64,
     near: Vec<AgentId>,
+    /// The world whose members were passed over last.
+    world: World,
 }
 
 /// Another agent, and when it is looked at again.
@@ -50,6 +53,9 @@ const NEAR_STEPS: f64 = 2.0;
 /// Who is near stays so until he could not touch within so many.
 const FAR_STEPS: f64 = 4.0;
 
+/// What is surely far is so with this factor to spare: more than roundings of times and distances.
+const FAR_ROOM: f64 = 1.001;
+
 /// So many are remembered besides those who are near.
 const LISTED: usize = 8;
 
@@ -69,6 +75,7 @@ impl Sight {
             dt: SimSpan::ZERO,
             unread: 0,
             near: Vec::new(),
+            world: World::default(),
         }
     }
 
@@ -92,9 +99,18 @@ impl Sight {
     }
 
     /// Looks at those whose appointment has come, before a step of `dt` from `now`; says how many that were. Only those that
-    /// it `may_touch` are near.
-    pub fn look(&mut self, crowd: &Crowd, (now, dt): (SimTime, SimSpan), may_touch: impl Fn(AgentId) -> bool) -> usize {
-        self.read_notes(crowd);
+    /// it `may_touch` are near, and `fellows` are passed over.
+    pub fn look(
+        &mut self,
+        crowd: &Crowd,
+        (now, dt): (SimTime, SimSpan),
+        fellows: &Fellows,
+        may_touch: impl Fn(AgentId) -> bool,
+    ) -> usize {
+        if self.world != fellows.world() {
+            (self.world, self.everybody) = (fellows.world(), SimTime::ZERO);
+        }
+        self.read_notes(crowd, fellows);
         // appointments leave time for two steps
         if dt.as_nanos() > 2 * self.dt.as_nanos() {
             self.everybody = SimTime::ZERO;
@@ -105,8 +121,9 @@ impl Sight {
         let Some(mine) = self.mine else { return 0 };
         let looks = if self.everybody <= now {
             self.dt = dt;
-            self.survey(crowd, &mine, now, may_touch)
+            self.survey(crowd, &mine, now, (fellows, may_touch))
         } else {
+            self.listed.retain(|other| !fellows.has(other.id));
             self.keep_appointments(crowd, &mine, now, may_touch)
         };
         self.soonest = self.listed.iter().map(|other| other.at).min().unwrap_or(NEVER);
@@ -136,15 +153,25 @@ impl Sight {
     }
 
     /// Looks at everybody, and lists those whose appointments come first.
-    fn survey(&mut self, crowd: &Crowd, mine: &Reach, now: SimTime, may_touch: impl Fn(AgentId) -> bool) -> usize {
+    fn survey(
+        &mut self,
+        crowd: &Crowd,
+        mine: &Reach,
+        now: SimTime,
+        (fellows, may_touch): (&Fellows, impl Fn(AgentId) -> bool),
+    ) -> usize {
         let (mut room, mut looks) = (2 * LISTED, 0);
         self.everybody = NEVER;
         self.listed.clear();
         let me = self.me;
-        for (id, berth) in (0..).map(AgentId).zip(&crowd.berths).filter(|(id, _)| *id != me) {
-            let was_near = self.near.binary_search(&id).is_ok();
-            let (at, near) = appointment(mine, berth.read(), was_near, (now, self.dt));
+        for (id, berth) in (0..).map(AgentId).zip(&crowd.berths).filter(|(id, _)| *id != me && !fellows.has(*id)) {
+            let seen = berth.read();
             looks += 1;
+            if is_far(mine, &seen, self.everybody, (now, self.dt)) {
+                continue;
+            }
+            let was_near = self.near.binary_search(&id).is_ok();
+            let (at, near) = appointment(mine, seen, was_near, (now, self.dt));
             if (!near && at >= self.everybody) || !may_touch(id) {
                 continue;
             }
@@ -171,11 +198,11 @@ impl Sight {
     }
 
     /// Makes new appointments with those who have become faster than they had said.
-    fn read_notes(&mut self, crowd: &Crowd) {
+    fn read_notes(&mut self, crowd: &Crowd, fellows: &Fellows) {
         let Self { me, listed, soonest, everybody, near, .. } = self;
         let most = 2 * (LISTED + near.len());
         let (next, whole) = crowd.notes(self.unread, |id| {
-            if id == *me || *everybody == SimTime::ZERO {
+            if id == *me || *everybody == SimTime::ZERO || fellows.has(id) {
                 return;
             }
             *soonest = SimTime::ZERO;
@@ -190,6 +217,21 @@ impl Sight {
             self.everybody = SimTime::ZERO;
         }
     }
+}
+
+/// Whether the appointment with one who is `seen` would not be before `everybody`, nor he near: told without a root or a
+/// quotient, as most of a crowd is far from anyone. What it cannot tell so it denies.
+fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, (now, dt): (SimTime, SimSpan)) -> bool {
+    let Seen::There(theirs) = seen else { return false };
+    if everybody == NEVER {
+        return false;
+    }
+    let dt_s = dt.as_secs_f64();
+    // the common appointment, with the steps before it in which one is near already
+    let until_s = (everybody.secs_after(now) + NEAR_STEPS * dt_s).max(FAR_STEPS * dt_s);
+    let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s);
+    let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + 0.5 * ACCELERATION_M_S2 * dt_s * dt_s);
+    mine.gap_vector(theirs).length_squared() > least_m * least_m
 }
 
 /// When one who is `seen` is looked at again, and whether he is near now, before a step of `dt` from `now`.

@@ -5,6 +5,7 @@
 //! that is not looked at. A door that is shut sends everybody home again.
 //! Never here: steps.
 
+use super::super::fellows::Fellows;
 use super::super::handle::{AgentHandle, Shared};
 use super::super::pace::Timeline;
 use super::super::turn::Actor;
@@ -35,8 +36,8 @@ type Guest = Box<Actor>;
 pub(in super::super) struct Company {
     /// By rising numbers.
     pub(super) seats: Vec<Seat>,
-    /// All that step as one in this turn, by rising numbers.
-    pub(super) fellows: Vec<AgentId>,
+    /// All that step as one in this turn.
+    pub(super) fellows: Fellows,
     /// What became of them, as the model says it.
     pub(super) apart: Vec<u32>,
     /// Storage, empty between turns.
@@ -100,10 +101,7 @@ impl Company {
 
     pub(super) fn gather_fellows(&mut self, leader: AgentId, time: SimTime) {
         let Self { seats, fellows, .. } = self;
-        fellows.clear();
-        fellows.push(leader);
-        fellows.extend(seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
-        fellows.sort_unstable();
+        fellows.gather(leader, seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
     }
 
     /// Notes for those at `time` what the model said became of them.
