@@ -17,6 +17,10 @@ use std::time::Duration;
 /// After so long without sleep a worker lets others have its core for a moment: the frame loop above all.
 const SHIFT: Duration = Duration::from_millis(1);
 
+/// An agent that is behind keeps its worker for so long: twenty cheap turns. Ten thousand such spells on two cores last as long as
+/// the lag cap: longer ones would make states old.
+const SPELL: Duration = Duration::from_micros(20);
+
 /// Every so many turns a worker looks whether agents elsewhere are served worse than its own.
 const BALANCE_TURNS: u32 = 64;
 
@@ -55,10 +59,26 @@ impl Worker {
         let timeline = self.hall.timeline.read();
         self.answer(&timeline);
         match self.hall.exchange(self.at, self.last.take(), &timeline, self.now) {
-            Some(actor) => self.last = self.turn(actor, &timeline),
+            Some(actor) => self.last = self.spell(actor, &timeline),
             None => self.sleep(),
         }
         self.pause(&timeline);
+    }
+
+    /// Makes turns of `actor` for as long as it is behind, but for [`SPELL`] at most; gives it back if it waits for another one.
+    ///
+    /// Where all are behind, what one needs is still in the cache for its second turn, and gone when all others have had theirs.
+    fn spell(&mut self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
+        let until = self.now + SPELL;
+        let mut waiting = self.turn(actor, timeline);
+        while self.now < until {
+            let now = self.now;
+            let is_behind = |actor: &mut Box<Actor>| actor.pace.due(timeline).is_some_and(|due| due <= now);
+            let Some(mut actor) = waiting.take_if(is_behind) else { break };
+            actor.served += actor.pace.dt();
+            waiting = self.turn(actor, timeline);
+        }
+        waiting
     }
 
     /// Makes a turn of `actor`; gives it back if it waits for another one.
