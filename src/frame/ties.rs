@@ -71,16 +71,35 @@ fn link(coupling: &Coupling) -> Option<(AgentId, Link)> {
     Some((coupling.a, Link { other: coupling.b, here: at_a, there: at_b, stiffness_n_m, damping_n_s_m, rest_m, law }))
 }
 
-/// For each agent the lowest number among those that joints hold together with it or that it lies against at rest: its own
-/// where there are none. A stack that starts standing must not first be dropped on itself.
+/// More bodies than this that are near each other begin in one world: below, an island solves them directly, and they come to
+/// it one by one.
+const HEAP_MIN: usize = 128;
+
+/// For each agent the lowest number among those that joints hold together with it, that it lies against at rest or that it
+/// makes a heap with: its own where there are none. A stack that starts standing must not first be dropped on itself, and
+/// a thousand bodies that will lie on each other in a moment must not first look at each other one by one.
 fn leaders(scene: &Scene) -> Vec<AgentId> {
     let mut above: Vec<usize> = (0..scene.agents.len()).collect();
     let jointed = scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?)));
-    for (a, b) in jointed.chain(scene.resting_pairs()) {
-        let (a, b) = (root(&mut above, a.0 as usize), root(&mut above, b.0 as usize));
-        above[a.max(b)] = a.min(b);
-    }
+    jointed.chain(scene.resting_pairs()).chain(heaps(scene)).for_each(|pair| join(&mut above, pair));
     (0..above.len()).map(|at| AgentId(root(&mut above, at) as u32)).collect()
+}
+
+/// The pairs of rigid bodies near each other of which more than [`HEAP_MIN`] hang together.
+fn heaps(scene: &Scene) -> Vec<(AgentId, AgentId)> {
+    let mut pairs = scene.near_pairs();
+    let mut above: Vec<usize> = (0..scene.agents.len()).collect();
+    pairs.iter().for_each(|pair| join(&mut above, *pair));
+    let mut sizes = vec![0; above.len()];
+    (0..above.len()).for_each(|at| sizes[root(&mut above, at)] += 1);
+    pairs.retain(|(a, _)| sizes[root(&mut above, a.0 as usize)] > HEAP_MIN);
+    pairs
+}
+
+/// Both hang together from now on.
+fn join(above: &mut [usize], (a, b): (AgentId, AgentId)) {
+    let (a, b) = (root(above, a.0 as usize), root(above, b.0 as usize));
+    above[a.max(b)] = a.min(b);
 }
 
 /// Follows `above` to the top, and shortens the way.
@@ -130,6 +149,22 @@ mod tests {
         assert_eq!(leaders(""), [0, 0, 2, 2, 4]);
         assert_eq!(leaders("coupling = [{ a = \"0\", b = \"1\", law = \"off\" }]"), [0, 1, 2, 2, 4]);
         assert_eq!(leaders("world = { contacts = false }"), [0, 1, 2, 3, 4]);
+    }
+
+    #[test]
+    fn a_heap_begins_in_one_world_and_what_is_smaller_or_sparser_does_not() {
+        let worlds = |grid: &str, spacing: &str, more: &str| {
+            let text = format!(
+                "format = 1\n{more}\n[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.1, 0.1, 0.1]\nrate_hz = 60.0\ngrid = {grid}\nspacing_m = {spacing}\n"
+            );
+            let scene = Source::memory("heap", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
+            leaders(&scene).into_iter().collect::<std::collections::BTreeSet<_>>().len()
+        };
+        let near = "[0.3, 0.4, 0.4]"; // rows along x: the ball around a box is 0.35 m thick
+        assert_eq!(worlds("[129, 2, 1]", near, ""), 2);
+        assert_eq!(worlds("[128, 2, 1]", near, ""), 256, "too small");
+        assert_eq!(worlds("[129, 2, 1]", "[0.4, 0.4, 0.4]", ""), 258, "too sparse");
+        assert_eq!(worlds("[129, 2, 1]", near, "[world]\ncontacts = false"), 258, "nothing touches");
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! Agents that start against or inside each other.
 //!
-//! In: a scene. Out: every pair that overlaps where the two would touch, and how deep; every pair that lies at rest.
+//! In: a scene. Out: every pair that overlaps where the two would touch, and how deep; every pair that lies at rest; every pair
+//! of rigid bodies so near that turning could make them touch.
 //! Never here: what is done about it.
 
 use super::cast::{Member, Scene, Spec};
@@ -68,9 +69,7 @@ impl Scene {
             Some(Spec::Rigid(body)) => body.velocity == DVec3::ZERO && body.spin == DVec3::ZERO,
             _ => false,
         };
-        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
-        let other: BTreeSet<_> =
-            self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect();
+        let other = self.pairs_by_other_laws();
         let mut pairs = Vec::new();
         self.pairs_within(TOUCH_MAX_M, |one, two, _| {
             let pair = (one.id.min(two.id), one.id.max(two.id));
@@ -82,19 +81,50 @@ impl Scene {
         pairs
     }
 
+    /// Every pair of rigid agents of one rate that touches by the ledger and whose balls, those around each, overlap.
+    #[must_use]
+    pub fn near_pairs(&self) -> Vec<(AgentId, AgentId)> {
+        let rate = |id: AgentId| self.agents.get(id.0 as usize).map(|member| member.pace.rate_hz);
+        let other = self.pairs_by_other_laws();
+        let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
+        let mut pairs = Vec::new();
+        self.met(rigid.filter_map(figure).collect(), 0.0, |one, two| {
+            let pair = (one.id.min(two.id), one.id.max(two.id));
+            let apart_m = (one.low + one.high).distance(two.low + two.high) / 2.0;
+            let reach_m = (one.high.x - one.low.x + two.high.x - two.low.x) / 2.0;
+            if apart_m < reach_m && rate(pair.0) == rate(pair.1) && !other.contains(&pair) {
+                pairs.push(pair);
+            }
+        });
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// Pairs with a law of contact that is not the ledger.
+    fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
+        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
+        self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()
+    }
+
     /// Calls `visit` with every pair that touches and starts no farther apart than `reach_m`, and with its least gap.
     fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure, f64)) {
-        let mut figures: Vec<Figure> = self.agents.iter().filter_map(figure).collect();
+        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        self.met(self.agents.iter().filter_map(figure).collect(), reach_m, |one, two| {
+            touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
+            if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
+                visit(one, two, gap_m);
+            }
+        });
+    }
+
+    /// Calls `visit` with every pair of `figures` that can touch and whose boxes are no farther apart than `reach_m`.
+    fn met(&self, mut figures: Vec<Figure>, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure)) {
         figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         let apart = self.pairs_apart();
-        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
         for (at, one) in figures.iter().enumerate() {
             for two in figures[at + 1..].iter().take_while(|two| two.low.x <= one.high.x + reach_m) {
                 if one.meets(two, reach_m) && self.touch(one, two, &apart) {
-                    touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
-                    if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
-                        visit(one, two, gap_m);
-                    }
+                    visit(one, two);
                 }
             }
         }

@@ -56,10 +56,12 @@ fn a_chain_keeps_its_length_and_gains_no_energy_while_it_swings() {
 
 #[test]
 fn a_thousand_agents_play_in_virtual_time() {
-    let report = lockstep("pile", &["--seconds", "0.1"]);
+    // a heap begins in one world, and a turn of all takes as long as a thousand
+    let report = lockstep("pile", &["--seconds", "0.2"]);
     let agents = report["agents"].as_array().unwrap();
     assert_eq!(agents.len(), 1000);
     assert!(agents.iter().all(|a| a["parked"] == false && number(a, "/steps") >= 5.0));
+    assert!(agents[1..].iter().all(|a| a["led_by"] == "box-0"));
     // m g z of the grid: 1000 boxes of 0.0448 kg, in the mean 0.31 m high; the first of them have landed
     let energy: f64 = agents.iter().map(|a| number(a, "/energy_j")).sum();
     assert!(energy < 44.8 * 9.81 * 0.31 * 1.01, "{energy} J");

@@ -278,9 +278,12 @@ impl Island {
             Solver::Many(pile) if *unseen_s >= LOOK_S => {
                 *unseen_s = 0.0;
                 reach.clear();
-                let contacts = pile.touches(members, |a, b| {
+                // who is merely near stays too: a heap that parts gathers again at once, and both cost more than a hundred steps
+                let contacts = pile.touches(members, |a, b, touch| {
                     watch.join(a, b);
-                    reach.note(a, b);
+                    if touch {
+                        reach.note(a, b);
+                    }
                 });
                 reach.suits(members.len(), contacts)
             }

@@ -209,33 +209,39 @@ impl Pile {
         Ok(())
     }
 
-    /// Notes for every member whether it touches anything and how deep, and shows every touching pair of members.
-    pub(super) fn touches(&self, members: &mut [Member], mut pair: impl FnMut(u32, u32)) -> usize {
+    /// Notes for every member whether it touches anything and how deep, and shows every pair of members that is near enough to
+    /// touch by turning alone, and whether it does touch. Gives the number of points that touch.
+    pub(super) fn touches(&self, members: &mut [Member], mut pair: impl FnMut(u32, u32, bool)) -> usize {
         members.iter_mut().for_each(|m| (m.touching, m.depth_m) = (false, 0.0));
         let mut count = 0;
         for contact in self.sim.narrow_phase.contact_pairs() {
-            let Some((gap, points)) = nearest(contact) else { continue };
             let owner = |handle| {
                 let data = self.sim.colliders.get(handle).map_or(GROUND, |c| c.user_data);
                 usize::try_from(data).ok().filter(|&i| i < members.len())
             };
             let (a, b) = (owner(contact.collider1), owner(contact.collider2));
             let size = [a, b].iter().flatten().map(|&i| members[i].radius_m).fold(f64::INFINITY, f64::min);
-            if gap > MARGIN_SHARE * size {
-                continue;
+            let touch = nearest(contact).filter(|(gap, _)| *gap <= MARGIN_SHARE * size);
+            if let (Some(a), Some(b)) = (a, b)
+                && is_near(&members[a], &members[b])
+            {
+                pair(a as u32, b as u32, touch.is_some());
             }
+            let Some((gap, points)) = touch else { continue };
             count += points;
             for index in [a, b].into_iter().flatten() {
                 let member = &mut members[index];
                 member.touching = true;
                 member.depth_m = member.depth_m.max(-gap);
             }
-            if let (Some(a), Some(b)) = (a, b) {
-                pair(a as u32, b as u32);
-            }
         }
         count
     }
+}
+
+/// Whether the balls around two members overlap.
+fn is_near(a: &Member, b: &Member) -> bool {
+    a.motion.position.distance(b.motion.position) < a.radius_m + b.radius_m
 }
 
 /// The nearest gap of a pair, metres, and how many points it has; `None` where the shapes are far.
