@@ -43,6 +43,8 @@ const REFINE_MAX: f64 = 4.0;
 const DEMAND_MIN: f64 = 0.095;
 /// Windows within the tolerance before anything gets coarser; doubled whenever that turns out to have been too soon.
 const PATIENCE: (u32, u32) = (1, 32);
+/// What was made coarser has proved itself after so many times its patience: a motion that comes and goes within it has not.
+const PROOF: u32 = 16;
 
 /// One value that may be chosen, and how the error grows with it.
 #[derive(Debug, Clone, Copy)]
@@ -120,7 +122,7 @@ impl Stair {
 
     fn coarsen(&mut self, error_m: f64, allowed_m: f64) {
         self.calm = self.calm.saturating_add(1);
-        if self.calm >= 2 * self.patience && self.coarsened_from.take().is_some() {
+        if self.calm >= PROOF * self.patience && self.coarsened_from.take().is_some() {
             self.patience = (self.patience / 2).max(PATIENCE.0);
         }
         if error_m < LEAST * allowed_m && self.calm >= self.patience {
