@@ -10,6 +10,8 @@ pub const DRIFT_S: f64 = 0.1;
 const STEPS: u32 = 2;
 /// … of so many: twice two steps' work is 4.2 % of that of 96.
 const EVERY: u64 = 96;
+/// The first of them: not the first of all, by which controllers learn what a step costs.
+pub(crate) const FIRST: u64 = EVERY / 2;
 
 /// The watch over the steps of one object.
 #[derive(Debug, Clone, Copy, Default)]
@@ -23,9 +25,9 @@ pub(crate) struct Watch {
 }
 
 impl Watch {
-    /// Whether a row begins with step number `steps`: not with the first ones, by which controllers learn what a step costs.
+    /// Whether a row begins with step number `steps`.
     pub fn begins(&mut self, steps: u64) -> bool {
-        let begins = steps % EVERY == EVERY / 2;
+        let begins = steps % EVERY == FIRST;
         if begins {
             (self.made, self.span_s) = (Some(0), 0.0);
         }

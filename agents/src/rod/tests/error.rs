@@ -2,6 +2,7 @@
 
 use super::*;
 use crate::DRIFT_S;
+use crate::drift::FIRST;
 use glam::DVec3;
 
 /// A clamped tube of 1 MPa, straight out, about to be let go.
@@ -27,7 +28,7 @@ fn said_and_true(integrator: Integrator, (segments, dt_ms): (usize, f64), (dampi
     exact.spec.integrator =
         if integrator == Integrator::EnergyMomentum { Integrator::Bdf2 } else { Integrator::EnergyMomentum };
     run(&mut exact, 0.2, DRIFT_S);
-    tube.steps = 0; // the steps that come first are made twice
+    tube.steps = FIRST; // the steps that come next are made twice
     run(&mut tube, dt_ms, DRIFT_S);
     [tube.doubling.error_m(), apart(&tube, &exact)]
 }
@@ -64,6 +65,7 @@ fn the_error_of_a_fall_is_that_of_the_closed_form() {
         let mut spec = reference_spec(1e6, 16);
         spec.gravity = DVec3::NEG_Z * 9.81;
         let mut tube = Tube::new(spec).unwrap();
+        tube.steps = FIRST;
         run(&mut tube, dt_ms, DRIFT_S);
         // x = g t (t + h)/2: half a step's speed too far
         let (said, truth) = (tube.doubling.error_m(), 0.5e-3 * 9.81 * dt_ms * DRIFT_S);
@@ -90,9 +92,9 @@ fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
 #[test]
 fn a_step_that_is_made_twice_leaves_the_bits_of_one_that_is_not() {
     for integrator in Integrator::ALL {
-        let mut tubes = [0, 1].map(|first| {
+        let mut tubes = [FIRST, FIRST + 1].map(|first| {
             let mut tube = Tube::new(carried(let_go(integrator, 16, 0.0).spec.clone(), 2.0)).unwrap();
-            tube.steps = first; // the one watches steps 0 and 1, the other none of these
+            tube.steps = first; // the one watches its next two steps, the other none of these
             tube
         });
         for _ in 0..20 {
