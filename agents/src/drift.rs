@@ -3,6 +3,8 @@
 //! In: steps that were made, and how far those made again in halves ended from them. Out: the error that the steps of
 //! [`DRIFT_S`] make at that rate. Never here: how a step is made again. Theory: docs/theory/control.md, eq. 31, 32.
 
+use glam::DVec3;
+
 /// The error of steps is told over so long, seconds: long enough to be seen, short enough that nothing has turned round.
 pub const DRIFT_S: f64 = 0.1;
 
@@ -69,6 +71,11 @@ impl Watch {
     pub fn error_m(&self) -> f64 {
         self.error_m
     }
+}
+
+/// The greatest distance of a point from its own in another state, metres.
+pub(crate) fn farthest(a: &[DVec3], b: &[DVec3]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max).sqrt()
 }
 
 #[cfg(test)]

@@ -10,7 +10,7 @@ use super::holds::Tie;
 use super::method::Integrator;
 use super::past::Past;
 use super::step::{Setting, Stepper};
-use crate::drift::Watch;
+use crate::drift::{Watch, farthest};
 
 /// The error in time of one tube.
 #[derive(Debug, Clone, Default)]
@@ -34,6 +34,11 @@ impl Doubling {
     /// What steps make wrong in a tenth of a second, metres.
     pub fn error_m(&self) -> f64 {
         self.watch.error_m()
+    }
+
+    /// Whether the present step is made again.
+    pub fn is_on(&self) -> bool {
+        self.watch.is_on()
     }
 
     /// The tube rests: only space errs.
@@ -61,10 +66,10 @@ impl Doubling {
         again.ties.extend_from_slice(ties);
     }
 
-    /// A step has ended at `now`, in `setting`'s substeps; where it is to be, it is made again in twice as many. Returns how many
-    /// more that were.
+    /// A step that is to be made again has ended at `now`, in `setting`'s substeps: it is, in twice as many. Returns how many more that
+    /// were.
     pub fn end(&mut self, stepper: &mut Stepper, now: &Config, setting: &Setting<'_>) -> u32 {
-        let Some(again) = self.again.as_deref_mut().filter(|_| self.watch.is_on()) else { return 0 };
+        let Some(again) = self.again.as_deref_mut() else { return 0 };
         let touching = stepper.contacts.is_touching();
         let setting = Setting { substeps: 2 * setting.substeps, ..*setting };
         let Some(taken) = again.step(stepper, &setting) else {
@@ -72,9 +77,7 @@ impl Doubling {
             return 0;
         };
         if self.watch.made_twice(setting.dt) {
-            let pairs = now.x.iter().zip(&again.state.x);
-            let apart2 = pairs.map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max);
-            self.watch.learn(apart2.sqrt(), order(setting.integrator, touching));
+            self.watch.learn(farthest(&now.x, &again.state.x), order(setting.integrator, touching));
         }
         taken
     }

@@ -211,10 +211,14 @@ impl Tube {
 
     /// Makes a step of `dt` seconds in so many substeps again where it is its turn; how many more that took.
     fn double(&mut self, (dt, substeps): (f64, u32)) -> u32 {
-        let Self { doubling, stepper, now, matter, division, springs, .. } = self;
-        let integrator = self.spec.integrator;
-        let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
-        doubling.end(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s })
+        if !self.doubling.is_on() {
+            return 0;
+        }
+        let mut doubling = std::mem::take(&mut self.doubling);
+        let taken =
+            self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
+        self.doubling = doubling;
+        taken
     }
 
     fn write_grips(&mut self, dt: f64) {

@@ -5,7 +5,7 @@
 
 use super::body::SoftBody;
 use super::holds::Tie;
-use crate::drift::Watch;
+use crate::drift::{Watch, farthest};
 use glam::DVec3;
 
 /// The error in time of one soft body.
@@ -80,9 +80,7 @@ impl SoftBody {
             return doubling.watch.give_up();
         }
         if doubling.watch.made_twice(dt) {
-            let pairs = positions.iter().zip(&doubling.finer[0]);
-            let apart2 = pairs.map(|(a, b)| a.distance_squared(*b)).fold(0.0, f64::max);
-            doubling.watch.learn(apart2.sqrt(), 1);
+            doubling.watch.learn(farthest(positions, &doubling.finer[0]), 1);
         }
     }
 }
