@@ -1,4 +1,4 @@
-//! What is painted on the meshes of a scene: patterns, PNG files, and the image inside a .glb file.
+//! What is painted on the meshes of a scene: patterns, PNG and JPEG files, and the image inside a .glb file.
 //!
 //! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or what is wrong with the image. Never here: drawing.
 
@@ -69,7 +69,7 @@ fn texture_of(
     let texture = made.unwrap_or_else(|why| {
         let patterns = Pattern::ALL.map(|pattern| format!("`{}`", pattern.name())).join(", ");
         let what = format!("cannot be painted: {name}: {why}");
-        c.wrong(place, key, what, format!("expected {patterns} or a PNG image beside the scene"));
+        c.wrong(place, key, what, format!("expected {patterns} or a PNG or JPEG image beside the scene"));
         None
     });
     textures.entry(made_from).or_insert(texture.map(Arc::new)).clone()
@@ -92,13 +92,13 @@ fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
     glb::image(&bytes)?.map(|image| decode(image, Wrap::Corners)).transpose()
 }
 
-/// The pixels of a PNG image.
+/// The pixels of a PNG or JPEG image.
 fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
     let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|why| why.to_string())?;
     match reader.format() {
-        Some(ImageFormat::Png) => {}
-        Some(other) => return Err(format!("its image is a {other:?}; only PNG is understood")),
-        None => return Err("its image is of no kind that is known; only PNG is understood".to_owned()),
+        Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+        Some(other) => return Err(format!("its image is a {other:?}; only PNG and JPEG are understood")),
+        None => return Err("its image is of no kind that is known; only PNG and JPEG are understood".to_owned()),
     }
     let mut limits = Limits::default();
     (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
@@ -129,11 +129,24 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_png_or_too_large_is_refused_with_its_reason() {
+    fn a_jpeg_is_read_up_to_what_its_kind_loses() {
+        let grey = image::RgbImage::from_fn(16, 8, |x, _| image::Rgb([16 * x as u8; 3]));
+        let mut bytes = Cursor::new(Vec::new());
+        grey.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+        let texture = decode(&bytes.into_inner(), Wrap::Corners).unwrap();
+        assert_eq!(texture.size(), (16, 8));
+        for (i, texel) in texture.texels().iter().enumerate() {
+            assert!(texel[0].abs_diff(16 * (i % 16) as u8) <= 8, "{i}: {texel:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_image_or_too_large_is_refused_with_its_reason() {
         for (bytes, told) in [
-            (&b""[..], "only PNG"),
-            (b"hello there, this is no image", "only PNG"),
-            (b"\xff\xd8\xff\xe0\x00\x10JFIF\x00", "Jpeg"),
+            (&b""[..], "only PNG and JPEG"),
+            (b"hello there, this is no image", "only PNG and JPEG"),
+            (b"GIF89a\x01\x00\x01\x00", "Gif"),
+            (b"\xff\xd8\xff\xe0\x00\x10JFIF\x00", ""),
         ] {
             let why = decode(bytes, Wrap::Corners).unwrap_err();
             assert!(why.contains(told), "{why}");

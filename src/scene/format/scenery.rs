@@ -28,8 +28,9 @@ pub struct MeshFile {
     pub position_m: Option<Point>,
     /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// What is painted on it: `checker`, `planks`, `books`, or a PNG file, its path relative to the scene's; laid straight onto each
-    /// side and multiplied by `colour`. Default: of a .glb file the image of its base colours, if they all come from one; else nothing.
+    /// What is painted on it: `checker`, `planks`, `books`, or a PNG or JPEG file, its path relative to the scene's; laid straight onto
+    /// each side and multiplied by `colour`. Default: of a .glb file the image of its base colours, if they all come from one; else
+    /// nothing.
     pub texture: Option<String>,
     /// Metres of one repeat of `texture`, 0.001 … 1000. Default 1.
     pub texture_m: Option<f64>,
