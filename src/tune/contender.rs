@@ -20,7 +20,8 @@ pub enum Contender {
     },
 }
 
-/// How much κ may wander from one frame to the next, and the least deviation of a measurement, as (budget.md, eq. 34 … 36) have them.
+/// How much κ is taken to wander from one frame to the next where errors have nothing in common, and the least deviation of a
+/// measurement, as (budget.md, eq. 34 … 36) have them.
 const WANDER: f64 = 2e-4;
 const SIGMA_LEAST: f64 = 0.01;
 

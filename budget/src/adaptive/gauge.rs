@@ -5,8 +5,12 @@
 
 use crate::within;
 
-/// Growth of the variance of κ from one lesson to the next: it may wander by 1.4 % a frame.
-const WANDER: f64 = 2e-4;
+/// Least and greatest growth of the variance of κ from one lesson to the next: it may wander by 1.4 to 14 % a frame.
+const WANDER: (f64, f64) = (2e-4, 2e-2);
+/// How fast that growth follows what errors have in common with those before them, and the correlation that is taken for chance: to
+/// follow more of it turns levels back.
+const HASTE: f64 = 0.1;
+const CHANCE: f64 = 0.25;
 /// Variance of κ at first: the table may be 14 % wrong before a surprise is an outlier.
 const P_START: f64 = 0.02;
 /// Variance of κ after a change of regime: the next lesson is believed whole.
@@ -41,13 +45,26 @@ pub struct Gauge {
     kappa: f64,
     variance: f64,
     sigma2: f64,
+    /// Q: growth of the variance from one lesson to the next.
+    wander: f64,
+    /// The last error that was learned from, and the mean product of neighbouring ones.
+    before: f64,
+    common: f64,
     /// Outliers in a row, counted up where too slow and down where too fast.
     strange: i8,
 }
 
 impl Default for Gauge {
     fn default() -> Self {
-        Self { kappa: 1.0, variance: P_START, sigma2: SIGMA_LEAST * SIGMA_LEAST, strange: 0 }
+        Self {
+            kappa: 1.0,
+            variance: P_START,
+            sigma2: SIGMA_LEAST * SIGMA_LEAST,
+            wander: WANDER.0,
+            before: 0.0,
+            common: 0.0,
+            strange: 0,
+        }
     }
 }
 
@@ -80,14 +97,23 @@ impl Gauge {
         }
         // a measurement of κ with standard deviation σ/ŷ₀
         let noise = self.sigma2 / (table * table);
-        self.variance += WANDER;
+        self.variance += self.wander;
         let gain = self.variance / (self.variance + noise);
         self.kappa = within(self.kappa + gain * (took / table - self.kappa), KAPPA_RANGE);
         self.variance *= 1.0 - gain;
         if lesson == Lesson::Learned {
             self.sigma2 = (FORGET * self.sigma2 + (1.0 - FORGET) * error * error).max(SIGMA_LEAST * SIGMA_LEAST);
+            self.follow(error);
         }
         lesson
+    }
+
+    /// Errors that resemble those before them say that κ is followed too slowly; those that do not, fast enough (Meh70, eq. 35a).
+    fn follow(&mut self, error: f64) {
+        self.common = FORGET * self.common + (1.0 - FORGET) * error * self.before;
+        self.before = error;
+        let correlation = within(self.common / self.sigma2, (-1.0, 1.0));
+        self.wander = within(self.wander * libm::exp(HASTE * (correlation - CHANCE)), WANDER);
     }
 
     fn doubt(&mut self, error: f64) -> Lesson {
@@ -99,5 +125,55 @@ impl Gauge {
         self.strange = 0;
         self.variance = P_REGIME;
         Lesson::NewRegime
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// What the filter plans past κ in the last half of 4000 lessons of tables that are 1: the rms of its error.
+    fn error_rms(mut next: impl FnMut(usize) -> f64) -> (f64, Gauge) {
+        let mut gauge = Gauge::default();
+        let mut square = 0.0;
+        for k in 0..4000 {
+            let took = next(k);
+            square += if k >= 2000 { (took - gauge.kappa()) * (took - gauge.kappa()) } else { 0.0 };
+            gauge.observe(1.0, took);
+        }
+        (libm::sqrt(square / 2000.0), gauge)
+    }
+
+    /// Numbers of deviation 1, nearly: four uniform ones of a congruential generator.
+    fn dice() -> impl FnMut() -> f64 {
+        let mut state = 7_u64;
+        move || {
+            let mut uniform = || {
+                state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) as f64 / f64::from(1_u32 << 31) - 0.5
+            };
+            let four = uniform() + uniform() + uniform() + uniform();
+            four * 1.732
+        }
+    }
+
+    #[test]
+    fn a_machine_that_trembles_is_not_followed() {
+        let mut dice = dice();
+        let (rms, gauge) = error_rms(|_| 1.0 + 0.05 * dice());
+        assert!(gauge.wander == WANDER.0, "{}", gauge.wander);
+        assert!(rms < 0.056, "{rms}: the tremble itself is 0.05");
+    }
+
+    #[test]
+    fn a_machine_that_wanders_is_followed_as_fast_as_it_does() {
+        let (mut dice, mut wandered) = (dice(), 0.0);
+        // a walk of 5 % a lesson, held together, and 2 % of tremble: the filter that knows both errs by 0.057
+        let (rms, gauge) = error_rms(|_| {
+            wandered = 0.98 * wandered + 0.05 * dice();
+            1.0 + wandered + 0.02 * dice()
+        });
+        assert!(gauge.wander > 4.0 * WANDER.0, "{}", gauge.wander);
+        assert!(rms < 1.2 * 0.057, "{rms}");
     }
 }
