@@ -2,6 +2,7 @@
 //!
 //! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
+use super::borne::Borne;
 use super::company::Company;
 use super::hold::Hold;
 use super::island::{self, Island};
@@ -46,8 +47,12 @@ pub struct RigidBody {
     /// The velocity after what was received at the step's start, and what couplings of its own have added since, m/s.
     pub(super) begun: DVec3,
     pub(super) coupled: DVec3,
+    /// Where it then was, metres, and its angular momentum, kg·m²/s.
+    pub(super) begun_at: (DVec3, DVec3),
     /// The velocity that was received at the step's start, m/s.
     pub(super) received: DVec3,
+    /// What fixed solids gave lately.
+    pub(super) borne: Borne,
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
@@ -114,7 +119,9 @@ impl RigidBody {
             held_up: false,
             begun: spec.velocity,
             coupled: DVec3::ZERO,
+            begun_at: (spec.position, DVec3::ZERO),
             received: DVec3::ZERO,
+            borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
             hold: Hold::default(),
@@ -178,6 +185,7 @@ impl RigidBody {
         self.steps += 1;
         self.world.flew();
         self.hold.forget();
+        self.borne.forget();
         self.settle(around, dt);
     }
 
@@ -259,6 +267,7 @@ impl Agent for RigidBody {
             }
         }
         self.steps += 1;
+        self.note_borne(around.time, dt);
         self.doubt(&before, touching, (dt_s, parts));
         let at_rest = self.rest(dt_s);
         self.tell(around, dt_s);

@@ -11,7 +11,7 @@ use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use crate::coupling::touch::touches;
 use crate::coupling::{Impulse, Law, Place};
-use crate::{AgentId, Bounds, Inertia, SimSpan, Snapshot, Stand, Surroundings};
+use crate::{AgentId, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -42,6 +42,7 @@ impl RigidBody {
         self.received = self.motion.velocity - before;
         self.company.gather(around, &self.world.mover, fellows);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
+        self.begun_at = (self.motion.position, self.motion.angular);
         self.held_up = !fellows.is_empty();
     }
 
@@ -57,11 +58,20 @@ impl RigidBody {
             taken = Some((given + sum, carried + way));
         });
         if let Some((given, carried)) = taken {
+            let carried = self.spare(given, carried, around.time);
             // what the ground bears carries nothing, and what is still to act lifts nothing off it
             let stand = self.stand.filter(|stand| stand.bears(self.motion.position, given));
             self.shift(stand.map_or(carried, |stand| stand.leaves(carried)));
             self.world.moved();
         }
+    }
+
+    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; the way that is left.
+    fn spare(&mut self, given: Impulse, carried: Impulse, now: SimTime) -> Impulse {
+        let [back, way] = self.borne.in_place_of(given, carried, now);
+        self.motion.velocity -= back.linear / self.spread.mass_kg;
+        self.motion.angular -= back.angular;
+        carried - way
     }
 
     /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.

@@ -14,6 +14,7 @@
 //! Two rules hold for every pair: friction is the geometric mean of both coefficients, restitution the larger of both.
 
 mod body;
+mod borne;
 mod clearance;
 mod company;
 mod couple;

@@ -12,6 +12,7 @@ mod meetings;
 mod rates;
 mod received;
 mod snap;
+mod squeezed;
 mod tools;
 
 use crate::coupling::{Exchange, Form, FormKind, SolidForm};

@@ -12,16 +12,20 @@ use crate::{Agent, AgentId, Body, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// A box of half height 2 cm, 10 cm long and wide, with its middle at `position`.
-pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody {
-    let floor = Obstacle {
+/// A floor at z = 0.
+pub(super) fn floor() -> Obstacle {
+    Obstacle {
         name: String::new(),
         solid: Solid::Plane,
         position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
         friction: 0.5,
         restitution: 0.0,
-    };
+    }
+}
+
+/// A box of half height 2 cm, 10 cm long and wide, with its middle at `position`.
+pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody {
     RigidBody::new(RigidSpec {
         solid: Solid::Box { half_extents_m: DVec3::new(0.05, 0.05, 0.02) },
         position,
@@ -32,7 +36,7 @@ pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody 
         restitution: 0.0,
         friction: 0.5,
         gravity,
-        obstacles: if gravity == DVec3::ZERO { Arc::from([]) } else { Arc::from([floor]) },
+        obstacles: if gravity == DVec3::ZERO { Arc::from([]) } else { Arc::from([floor()]) },
         joints: Arc::from([]),
         sleep: false,
     })

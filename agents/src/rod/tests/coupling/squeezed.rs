@@ -1,0 +1,71 @@
+//! A ball that falls on a tube close above the floor: it meets both within one step.
+//!
+//! The floor has stopped it by the time it hears what the tube gave: taken on top of that, it would be thrown back higher than it fell.
+
+use super::super::reference_spec;
+use super::bodies::floor;
+use super::meetings::{GRAVITY, RADIUS};
+use crate::coupling::harness::{Faults, Stage};
+use crate::rigid::{RigidBody, RigidSpec};
+use crate::rod::{Tube, TubeSpec};
+use crate::shape::Solid;
+use crate::{AgentId, Body};
+use glam::{DQuat, DVec3};
+use std::sync::Arc;
+
+const BALL_M: f64 = 0.1;
+
+fn height_m(stage: &Stage, ball: AgentId) -> f64 {
+    let Body::Rigid(body) = &stage.newest(ball).body else { panic!("a body") };
+    body.position.z
+}
+
+/// How high the ball rises after it was lowest, and how high it lies in the end, at such rates of the tube and the ball, metres.
+fn dropped(rates: (f64, f64), faults: Faults) -> (f64, f64) {
+    let mut stage = Stage::new(faults);
+    let spec = RigidSpec {
+        solid: Solid::Ball { radius_m: BALL_M },
+        position: DVec3::Z * 0.5,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        spin: DVec3::ZERO,
+        mass_kg: 1.0,
+        restitution: 0.0,
+        friction: 0.5,
+        gravity: GRAVITY,
+        obstacles: Arc::from([floor()]),
+        joints: Arc::from([]),
+        sleep: false,
+    };
+    let path_m = vec![DVec3::new(-0.5, 0.0, 0.1), DVec3::new(0.5, 0.0, 0.1)];
+    let base = TubeSpec { friction: 0.5, clamp: [true; 2], obstacles: Arc::from([floor()]), ..reference_spec(1e6, 30) };
+    stage.add(Tube::new(TubeSpec { path_m, gravity: GRAVITY, ..base }).unwrap(), rates.0);
+    let ball = stage.add(RigidBody::new(spec).unwrap(), rates.1);
+    let (mut lowest, mut highest) = (f64::INFINITY, 0.0_f64);
+    stage.run(3.0, |stage| {
+        let height = height_m(stage, ball);
+        (lowest, highest) = if height < lowest { (height, height) } else { (lowest, highest.max(height)) };
+    });
+    (highest, height_m(&stage, ball))
+}
+
+#[test]
+fn a_ball_that_presses_a_tube_on_the_floor_is_not_thrown_back() {
+    for rates in [(60.0, 60.0), (60.0, 120.0), (60.0, 240.0), (240.0, 60.0), (30.0, 60.0), (60.0, 30.0), (240.0, 240.0)]
+    {
+        let (highest, end) = dropped(rates, Faults::default());
+        println!("{rates:?}: highest {highest} end {end}");
+        // e = 0: what the tube's bending gives back is all that may lift it
+        assert!(highest < BALL_M + 4.0 * RADIUS, "{rates:?}: thrown to {highest} m");
+        assert!(end > BALL_M - 1e-3 && end < BALL_M + 2.5 * RADIUS, "{rates:?}: it lies at {end} m");
+    }
+}
+
+#[test]
+fn nor_where_messages_are_late_or_lost() {
+    for (rates, seed) in [((240.0, 240.0), 0), ((60.0, 240.0), 1), ((60.0, 60.0), 2)] {
+        let (highest, _) = dropped(rates, Faults { jitter: 0.2, loss: 0.1, seed, ..Faults::default() });
+        println!("{rates:?}: highest {highest}");
+        assert!(highest < BALL_M + 8.0 * RADIUS, "{rates:?}: thrown to {highest} m");
+    }
+}
