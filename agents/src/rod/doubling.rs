@@ -10,6 +10,7 @@ use super::holds::Tie;
 use super::method::Integrator;
 use super::past::Past;
 use super::step::{Setting, Stepper};
+use crate::AgentId;
 use crate::drift::{Watch, farthest};
 
 /// The error in time of one tube.
@@ -46,9 +47,10 @@ impl Doubling {
         self.watch.rest();
     }
 
-    /// Prepares for step number `steps` from `now`. Those that others press on are made once: what they give is given once.
-    pub fn begin(&mut self, steps: u64, (now, ties): (&Config, &[Tie]), stepper: &Stepper) {
-        let begins = self.watch.begins(steps);
+    /// Prepares for step number `steps` of the tube `me` from `now`. Those that others press on are made once: what they give is
+    /// given once.
+    pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&Config, &[Tie]), stepper: &Stepper) {
+        let begins = self.watch.begins(steps, me);
         if !stepper.company.is_empty() || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now)) {
             self.watch.give_up();
         }

@@ -312,7 +312,7 @@ impl Agent for Tube {
         self.widen(around.time + dt);
         let watched = self.stepper.company.is_watched();
         let before = self.begin_watch(watched);
-        self.doubling.begin(self.steps, (&self.now, &self.ties), &self.stepper);
+        self.doubling.begin((self.steps, around.me), (&self.now, &self.ties), &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
         let doubled = self.double((dt_s, substeps));

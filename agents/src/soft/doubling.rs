@@ -5,6 +5,7 @@
 
 use super::body::SoftBody;
 use super::holds::Tie;
+use crate::AgentId;
 use crate::drift::{Watch, farthest};
 use glam::DVec3;
 
@@ -22,11 +23,11 @@ pub(super) struct Doubling {
 }
 
 impl SoftBody {
-    /// Makes the step of `dt` seconds that comes in twice the substeps of the last one, where it is its turn, beside the state;
-    /// in how many. Steps that others press on are made once: what they give is given once.
-    pub(super) fn rehearse(&mut self, dt: f64) -> u32 {
+    /// Makes the step of `dt` seconds that comes in twice the substeps of the last one, where it is the turn of the body `me`, beside
+    /// the state; in how many. Steps that others press on are made once: what they give is given once.
+    pub(super) fn rehearse(&mut self, me: AgentId, dt: f64) -> u32 {
         let Self { doubling, positions, velocities, ties, .. } = self;
-        if doubling.watch.begins(self.steps) {
+        if doubling.watch.begins(self.steps, me) {
             doubling.finer[0].clone_from(positions);
             doubling.finer[1].clone_from(velocities);
         }

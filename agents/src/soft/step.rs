@@ -20,7 +20,7 @@ impl SoftBody {
     /// [`StepError::Diverged`] where the state stops being finite.
     pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(u32, u32), StepError> {
         self.receive(around, dt)?;
-        let doubled = self.rehearse(dt);
+        let doubled = self.rehearse(around.me, dt);
         let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
         while left > 0 {
             let h = dt / f64::from(parts);

@@ -90,6 +90,24 @@ fn of_many_steps_a_twenty_fourth_is_made_again_and_nothing_else_changes() {
 }
 
 #[test]
+fn alike_tubes_do_not_make_their_dear_steps_at_once() {
+    let mut tubes = vec![let_go(Integrator::ImplicitEuler, 8, 0.0); 12];
+    let mut dear = [0; 240];
+    for dear in &mut dear {
+        // all move alike: a step of one that takes more than the least of all is made twice
+        let step = |(tube, me): (&mut Tube, AgentId)| {
+            tube.step(millis(2.0), &Surroundings::alone(me, SimTime::ZERO)).unwrap().work
+        };
+        let work: Vec<f64> = tubes.iter_mut().zip((0..).map(AgentId)).map(step).collect();
+        let least = work.iter().copied().fold(f64::INFINITY, f64::min);
+        *dear = work.iter().filter(|work| **work > least).count();
+    }
+    assert!(dear[..FIRST as usize].iter().all(|count| *count == 0), "{dear:?}");
+    assert!(dear.iter().all(|count| *count <= 1), "{dear:?}");
+    assert!(dear.iter().sum::<usize>() >= 2 * 12, "{dear:?}");
+}
+
+#[test]
 fn a_step_that_is_made_twice_leaves_the_bits_of_one_that_is_not() {
     for integrator in Integrator::ALL {
         let mut tubes = [FIRST, FIRST + 1].map(|first| {
