@@ -240,13 +240,21 @@ pub struct CheckArgs {
     /// Built-in scenes or paths of scene files
     #[arg(required = true, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scenes: Vec<String>,
-    /// Change a key before the check; may be repeated
+    /// What it shares with others that judge scenes.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// What commands that judge scenes have in common: `check`, `tune`, `fit`.
+#[derive(Debug, Args)]
+pub struct CommonArgs {
+    /// Change a key of the scene; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
     pub set: Vec<(String, String)>,
-    /// Print the result as JSON on standard output
+    /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
     pub json: bool,
-    /// Say nothing of scenes that are sound
+    /// No progress, and no word of scenes that are sound
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -281,18 +289,12 @@ pub struct TuneArgs {
     /// Seed of the declared machine's noise
     #[arg(long, value_name = "N")]
     pub seed: Option<u32>,
-    /// Change a key of the scene; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
-    pub set: Vec<(String, String)>,
     /// Fewer frames and fewer seeds: seconds instead of a minute
     #[arg(long)]
     pub quick: bool,
-    /// Print the result as JSON on standard output and nothing else there
-    #[arg(long)]
-    pub json: bool,
-    /// No progress
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// What it shares with others that judge scenes.
+    #[command(flatten)]
+    pub common: CommonArgs,
 }
 
 /// `fit`.
@@ -316,15 +318,9 @@ pub struct FitArgs {
     /// Write what was found into the scene file; every other line stays as it is
     #[arg(long)]
     pub write: bool,
-    /// Change a key of the scene; may be repeated
-    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
-    pub set: Vec<(String, String)>,
-    /// Print the result as JSON on standard output and nothing else there
-    #[arg(long)]
-    pub json: bool,
-    /// No progress
-    #[arg(short, long)]
-    pub quiet: bool,
+    /// What it shares with others that judge scenes.
+    #[command(flatten)]
+    pub common: CommonArgs,
 }
 
 /// `chart`.

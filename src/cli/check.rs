@@ -48,14 +48,14 @@ pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
     let results: Vec<(&str, Result<Scene, SceneError>)> = args
         .scenes
         .iter()
-        .map(|name| (name.as_str(), Source::open(name).and_then(|source| load(&source, &args.set))))
+        .map(|name| (name.as_str(), Source::open(name).and_then(|source| load(&source, &args.common.set))))
         .collect();
-    if args.json {
+    if args.common.json {
         let rows: Vec<_> = results.iter().map(|(name, result)| row(name, result)).collect();
         data(&format!("{}\n", serde_json::to_string_pretty(&rows)?))?;
     } else {
         for (name, result) in &results {
-            tell(name, result, args.quiet)?;
+            tell(name, result, args.common.quiet)?;
         }
     }
     Ok(if results.iter().all(|(_, result)| result.is_ok()) { Exit::Ok } else { Exit::BadInput })

@@ -52,12 +52,12 @@ pub(super) fn command(args: &FitArgs) -> anyhow::Result<Exit> {
         refuse_built_in(&args.scene)?;
     }
     let source = Source::open(&args.scene)?;
-    let scene = load(&source, &args.set)?;
+    let scene = load(&source, &args.common.set)?;
     let objects = objects::of(&scene, source.text());
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
-    let bar = Bar::new("fit", args.quiet || args.json);
+    let bar = Bar::new("fit", args.common.quiet || args.common.json);
     let mut task = Task::new(args, scene, objects, (&stopped, bar))?;
     let fitted = fit(&mut task, args)?;
     task.clear_bar();
@@ -73,7 +73,7 @@ pub(super) fn command(args: &FitArgs) -> anyhow::Result<Exit> {
         }
     };
     let written = if args.write { Some(written::write(Path::new(&args.scene), &task, &fitted)?) } else { None };
-    data(&if args.json {
+    data(&if args.common.json {
         told::json(args, &task, &fitted, written.is_some())?
     } else {
         told::text(args, &task, &fitted)

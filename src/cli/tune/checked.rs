@@ -67,7 +67,7 @@ pub(super) fn check(
         size: on.size,
         drawing: if on.live { live(on.size)? } else { Drawing::Nothing },
     };
-    let bar = Bar::new("its own frames", args.quiet || args.json);
+    let bar = Bar::new("its own frames", args.common.quiet || args.common.json);
     let runs = push(Session::open(on.scene.clone())?, pushes, &mut |share| {
         bar.tell(share, "pushed away from its target".to_owned());
         !stopped.load(Ordering::Relaxed)

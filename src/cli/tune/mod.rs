@@ -94,7 +94,7 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     let session = Session::open(scene.clone())?;
     let drawing = if args.live { live(size)? } else { Drawing::Nothing };
     let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
-    let bar = Bar::new("experiment", args.quiet || args.json);
+    let bar = Bar::new("experiment", args.common.quiet || args.common.json);
     let done = experiment(session, plan, &mut |share| {
         bar.tell(share, "drawing at many resolutions".to_owned());
         !stopped.load(Ordering::Relaxed)
@@ -118,7 +118,7 @@ fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
         ("machine.seed", args.seed.map(|n| n.to_string())),
     ];
     let flags = flags.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
-    let overrides: Vec<_> = args.set.iter().cloned().chain(flags).collect();
+    let overrides: Vec<_> = args.common.set.iter().cloned().chain(flags).collect();
     Ok(load(&Source::open(&args.scene)?, &overrides)?)
 }
 
@@ -136,7 +136,7 @@ fn extent(args: &TuneArgs) -> Extent {
 fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Result<Exit> {
     let explanation = explain(&on.plant, contender, on.target_hz);
     let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
-    data(&if args.json {
+    data(&if args.common.json {
         told::analysis_json(on, &explanation, &verdict)?
     } else {
         told::analysis(on, &explanation, &verdict)
@@ -155,7 +155,7 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     let files = figures::write(folder, &stem(&on.scene.name), on, &tuned)?;
     let files: Vec<_> = std::iter::once(fragment.to_owned()).chain(files).collect();
     let checked = if tuned.interrupted { Vec::new() } else { checked::check(args, on, &tuned, stopped)? };
-    data(&if args.json {
+    data(&if args.common.json {
         told::json(on, &tuned, &checked, &files)?
     } else {
         told::text(on, &tuned, &checked, &files)
@@ -177,7 +177,7 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
     let extent = extent(args);
     let mut found = Vec::new();
     for family in Family::ALL {
-        let bar = Bar::new(family_name(family), args.quiet || args.json);
+        let bar = Bar::new(family_name(family), args.common.quiet || args.common.json);
         let mut go_on = |share: f64, best: &Verdict| {
             bar.tell(share, format!("best so far {}: {:.3}", gains::told(best.contender), best.objective));
             !stopped.load(Ordering::Relaxed)
