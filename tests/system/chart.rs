@@ -103,6 +103,8 @@ fn the_quick_diagrams_answer_as_theory_does() {
         ("end-moment", 3e-3),
         ("helix", 8e-3),
         ("frequencies", 0.02),
+        ("twist-buckling", 0.02),
+        ("michell-ring", 0.02),
         ("inflation", 0.3),
         ("sheet", 2e-3),
         ("solid-beam", 5e-3),

@@ -90,6 +90,8 @@ const ACCURACY: &[Entry] = &[
     entry::<Diagram<accuracy::helix::Helix>>(),
     entry::<Diagram<accuracy::frequencies::Frequencies>>(),
     entry::<Diagram<accuracy::swing::Swing>>(),
+    entry::<Diagram<accuracy::buckling::TwistBuckling>>(),
+    entry::<Diagram<accuracy::buckling::MichellRing>>(),
     entry::<Diagram<accuracy::inflation::Inflation>>(),
     entry::<Diagram<accuracy::sheet::Sheet>>(),
     entry::<Diagram<accuracy::beam::SolidBeam>>(),

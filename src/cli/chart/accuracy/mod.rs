@@ -1,6 +1,7 @@
 //! `chart accuracy`: how wrong each method is against an independent answer, and what it costs.
 
 pub(super) mod beam;
+pub(super) mod buckling;
 pub(super) mod cantilever;
 pub(super) mod catenary;
 pub(super) mod diagram;
