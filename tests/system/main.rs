@@ -16,6 +16,7 @@ mod scenes_coupled;
 mod scenes_soft;
 mod shares;
 mod sight;
+mod system_calls;
 mod throughput;
 mod tune;
 mod viewer;

@@ -6,9 +6,14 @@ use std::path::{Path, PathBuf};
 use std::process::Output;
 use tempfile::TempDir;
 
-/// The program, without what a user's shell says of it. The variables kept are those an adapter is found by.
+/// The program, without what a user's shell says of it.
 pub fn program() -> std::process::Command {
-    let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_metachron"));
+    cleaned(env!("CARGO_BIN_EXE_metachron"))
+}
+
+/// A program, without what a user's shell says of it. The variables kept are those an adapter is found by.
+pub fn cleaned(name: &str) -> std::process::Command {
+    let mut command = std::process::Command::new(name);
     command.env_clear();
     for kept in ["PATH", "HOME", "XDG_RUNTIME_DIR", "VK_ICD_FILENAMES", "VK_DRIVER_FILES", "LIBGL_ALWAYS_SOFTWARE"] {
         if let Some(value) = std::env::var_os(kept) {

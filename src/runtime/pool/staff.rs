@@ -127,13 +127,13 @@ impl Staff {
         }
     }
 
-    /// A worker ended before its time: that is a bug of ours, and the others must not suffer from it.
+    /// A worker has ended. Before the end of the run that is a bug of ours, and the others must not suffer from it.
     fn bury(&mut self, number: u32) {
         let Some(at) = self.posts.iter().position(|post| post.number == number) else { return };
         if let Some(sitting) = self.posts[at].desk.sitting() {
             self.park(sitting.whose(), "its worker broke down, which is a bug in metachron");
         }
-        self.replace(at);
+        if self.hall.board.stopping() { self.join(number) } else { self.replace(at) }
     }
 
     /// Where the system gives no thread any more, the other workers do without.
@@ -160,16 +160,20 @@ impl Staff {
         });
     }
 
+    fn join(&mut self, number: u32) {
+        let post = self.posts.iter_mut().find(|post| post.number == number);
+        // a panic outside a turn has been printed, and the others must still be joined
+        drop(post.and_then(|post| post.thread.take()).map(JoinHandle::join));
+    }
+
     /// Waits for the workers, as long as it has patience, and ends the lives of all agents.
     fn dismiss(&mut self) {
-        let mut missing = self.posts.len();
-        while missing > 0 {
-            let Ok(note) = self.notes.recv_timeout(PARTING) else { break };
-            let Note::Ended(number) = note else { continue };
-            let Some(post) = self.posts.iter_mut().find(|post| post.number == number) else { continue };
-            missing -= 1;
-            // a panic outside a turn has been printed, and the others must still be joined
-            drop(post.thread.take().map(JoinHandle::join));
+        while self.posts.iter().any(|post| post.thread.is_some()) {
+            match self.notes.recv_timeout(PARTING) {
+                Ok(Note::Ended(number)) => self.join(number),
+                Ok(Note::Stop) => {}
+                Err(_) => break,
+            }
         }
         for post in self.posts.iter().filter(|post| post.thread.is_some()) {
             if let Some(sitting) = post.desk.sitting().filter(|sitting| post.desk.give_up(*sitting)) {
