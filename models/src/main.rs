@@ -2,15 +2,17 @@
 //!
 //! In: the runtime's own files, over loom's primitives instead of the standard library's. Out: a line for each claim that
 //! holds; a claim that does not ends the program with the steps that break it. Never here: other copies of what is checked.
+//! With the feature `threads` the same claims are held against real threads, thousands of times, for ThreadSanitizer to watch.
 
 extern crate self as metachron_agents;
 
 /// What the files know as the runtime's `sync`.
+#[cfg(not(feature = "threads"))]
 mod sync {
     pub use loom::sync::{Arc, Mutex, RwLock, atomic};
 
     pub mod thread {
-        pub use loom::thread::{Thread, current, park};
+        pub use loom::thread::{Thread, current, park, spawn, yield_now};
 
         /// A sleep that may end at any moment.
         pub fn park_timeout(_span: std::time::Duration) {
@@ -18,6 +20,11 @@ mod sync {
         }
     }
 }
+
+/// The runtime's own.
+#[cfg(feature = "threads")]
+#[path = "../../src/runtime/sync.rs"]
+mod sync;
 
 #[path = "../../src/runtime/bell.rs"]
 mod bell;
@@ -35,13 +42,12 @@ mod switchboard;
 mod time;
 
 use bell::Bell;
-use loom::sync::Arc;
-use loom::sync::atomic::{AtomicU32, Ordering};
-use loom::thread;
 use news::News;
 use seqlock::{Glance, Seqlock};
 use slot::SlotWriter;
 use switchboard::Switchboard;
+use sync::atomic::{AtomicU32, Ordering};
+use sync::{Arc, thread};
 pub use time::{SimSpan, SimTime};
 
 /// Stands for the agents' own.
@@ -60,7 +66,16 @@ fn main() {
     check("what was said before a wake is seen by the turn that heeds it, or the wake stands", a_wake_meets_a_turn);
 }
 
+/// Holds a claim against so many runs on real threads.
+#[cfg(feature = "threads")]
+fn check(claim: &str, model: fn()) {
+    const RUNS: u32 = 2000;
+    (0..RUNS).for_each(|_| model());
+    println!("held {RUNS} times: {claim}");
+}
+
 /// Holds a claim against every run in which threads are stopped in the middle at most twice.
+#[cfg(not(feature = "threads"))]
 fn check(claim: &str, model: fn()) {
     let mut checked = loom::model::Builder::new();
     checked.preemption_bound = Some(2);
