@@ -197,6 +197,11 @@ impl Diary {
         self.steps
     }
 
+    /// Reads a word of what a turn will write to ([`super::fetch`]).
+    pub fn fetch(&self) {
+        self.late.fetch();
+    }
+
     /// Writes a turn down.
     pub fn write(&mut self, gauges: &Gauges, pace: &Pace, entry: Entry) {
         self.steps += 1;

@@ -26,6 +26,9 @@ impl Actor {
     /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that
     /// time.
     pub fn gather(&mut self, timeline: &Timeline, wall: Duration, start: &Start) -> u32 {
+        if self.company.is_empty() {
+            return 0;
+        }
         let (time, mut steps) = (self.pace.time(), 0);
         self.company.each(|seat| {
             let caught_up = contained(|| {
@@ -119,6 +122,9 @@ impl Actor {
 
     /// Writes the states of those that have just stepped with it. One that is broken is parked alone.
     pub fn write_led(&mut self, open: &Open) {
+        if self.company.is_empty() {
+            return;
+        }
         let time = self.pace.time();
         self.company.each(|seat| {
             if seat.pace.time() != time {
@@ -127,7 +133,7 @@ impl Actor {
             match contained(|| seat.write_snapshot(time + open.dt, open.rests)) {
                 Ok(()) => {
                     seat.pace.advance_by(open.dt);
-                    seat.open = Some(Open { resolution: seat.agent.resolution(), ..*open });
+                    seat.open = Some(*open);
                 }
                 Err(reason) => seat.park(reason),
             }

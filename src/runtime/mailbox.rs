@@ -79,9 +79,14 @@ impl Mailbox {
         Ok(())
     }
 
+    /// Whether anything has come.
+    pub fn has_letters(&self) -> bool {
+        self.full.load(Acquire)
+    }
+
     /// All that has come since the last call. It waits for nobody: where somebody is just writing it finds nothing yet.
     pub fn take(&self) -> Letters {
-        if !self.full.load(Acquire) {
+        if !self.has_letters() {
             return Letters::default();
         }
         let Some(Ok(mut letters)) = self.letters.get().map(|letters| letters.try_lock()) else {

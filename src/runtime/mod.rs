@@ -14,6 +14,7 @@ mod crowd;
 mod eyes;
 mod faults;
 mod fellows;
+mod fetch;
 mod governor;
 mod handle;
 mod island;

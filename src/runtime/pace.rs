@@ -85,10 +85,9 @@ impl Pace {
         let now = timeline.sim_at(wall);
         let lag = now.since(self.time);
         let late = timeline.wall_span(lag);
-        let cap =
-            LAG_CAP.max(timeline.wall_span(SimSpan::from_nanos(self.dt.as_nanos().saturating_mul(LAG_CAP_STEPS))));
+        let steps = SimSpan::from_nanos(self.dt.as_nanos().saturating_mul(LAG_CAP_STEPS));
         let mut dropped = SimSpan::ZERO;
-        if late > cap {
+        if late > LAG_CAP && late > timeline.wall_span(steps) {
             dropped = lag;
             self.dropped += lag;
             self.time = now;

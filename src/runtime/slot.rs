@@ -44,6 +44,11 @@ impl<T> LatestSlot<T> {
         }
     }
 
+    /// Reads a word of it ([`super::fetch`]).
+    pub(super) fn fetch(&self) {
+        std::hint::black_box(self.newest.load(Ordering::Relaxed));
+    }
+
     /// Makes `value` the newest and takes back what is not read any more; gives `value` back if no cell is free.
     fn put(&self, value: Arc<T>, spare: &mut Vec<Arc<T>>) -> Result<(), Arc<T>> {
         let newest = self.newest.load(Ordering::Relaxed);
@@ -83,7 +88,8 @@ impl<T: Default> SlotWriter<T> {
     /// A slot whose first value is `first`, and its writer.
     #[must_use]
     pub fn new(first: T) -> Self {
-        Self { slot: Arc::new(LatestSlot::new(first)), spare: Vec::new(), filled: None, made: 1 }
+        // one published, one filled: made one after the other they lie on neighbouring pages
+        Self { slot: Arc::new(LatestSlot::new(first)), spare: vec![Arc::new(T::default())], filled: None, made: 2 }
     }
 
     /// The slot, for readers.
@@ -115,6 +121,12 @@ impl<T: Default> SlotWriter<T> {
         self.filled.as_deref()
     }
 
+    /// The value that will be filled next, where one is at hand.
+    #[must_use]
+    pub fn spare(&self) -> Option<&T> {
+        self.spare.iter().find(|value| Arc::strong_count(value) == 1).map(|value| &**value)
+    }
+
     /// How many values were ever allocated.
     #[must_use]
     pub const fn made(&self) -> usize {
@@ -133,7 +145,8 @@ impl<T: Default> SlotWriter<T> {
 
     /// A spare value that no reader holds.
     fn unread(&mut self) -> Option<Arc<T>> {
-        let at = self.spare.iter_mut().position(|s| Arc::get_mut(s).is_some())?;
+        // what lies in no cell any more nobody comes to hold again
+        let at = self.spare.iter().position(|value| Arc::strong_count(value) == 1)?;
         Some(self.spare.swap_remove(at))
     }
 }

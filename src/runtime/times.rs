@@ -54,6 +54,13 @@ impl Times {
         self.longest_us = self.longest_us.max(us);
     }
 
+    /// Reads a word of every page ([`super::fetch`]).
+    pub fn fetch(&self) {
+        for page in &self.pages {
+            std::hint::black_box(page[0]);
+        }
+    }
+
     fn halve(&mut self) {
         self.pages.iter_mut().flatten().for_each(|count| *count /= 2);
         self.count = self.pages.iter().flatten().map(|count| u64::from(*count)).sum();

@@ -62,6 +62,7 @@ pub(super) struct Actor {
 pub(super) struct Open {
     pub start: Start,
     pub dt: SimSpan,
+    /// Which the step was made at, where a governor wants to know.
     pub resolution: Option<Resolution>,
     /// What it says of its own error afterwards, metres: in all, and the part that its steps made.
     pub errors_m: [f64; 2],
@@ -202,15 +203,17 @@ impl Actor {
 
     /// Accounts for the time of a turn on the wall: those it leads share it.
     pub fn count(&mut self, wall: Duration) {
-        let share = wall / (1 + self.company.len() as u32);
+        let share = if self.company.is_empty() { wall } else { wall / (1 + self.company.len() as u32) };
         self.unsettled += share;
         self.company.each(|seat| seat.unsettled += share);
     }
 
     /// Accounts for the CPU time of the turns since the last call: `share` of what they took on the wall.
     pub fn settle(&mut self, share: f64) {
-        let nanos = (std::mem::take(&mut self.unsettled).as_nanos() as f64 * share) as u64;
-        self.shared.gauges.cpu_nanos.fetch_add(nanos, Relaxed);
+        let nanos = (std::mem::take(&mut self.unsettled).as_secs_f64() * share * 1e9) as u64;
+        let cpu = &self.shared.gauges.cpu_nanos;
+        // nobody else writes: to exchange the word would cost more
+        cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
         self.company.each(|seat| seat.settle(share));
     }
 
@@ -240,11 +243,13 @@ impl Actor {
 
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Open, Effort), String> {
         self.take_commands();
-        self.rhythm.beat(timeline, wall);
+        if self.governor.is_some() {
+            self.rhythm.beat(timeline, wall);
+        }
         let start = self.pace.begin(timeline, wall);
         let alone = self.gather(timeline, wall, &start);
         let dt = self.faults.span(self.pace.dt(), self.id(), self.diary.steps());
-        let resolution = self.agent.resolution();
+        let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
         let (report, led) = if self.company.is_empty() { (self.step(dt)?, 0) } else { self.lead(dt)? };
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work * f64::from(1 + led));

@@ -156,6 +156,9 @@ impl Actor {
 
     /// Sends home those who have lost touch with it.
     pub fn part(&mut self) {
+        if self.company.is_empty() {
+            return;
+        }
         let leaving = self.company.seats.extract_if(.., |seat| seat.apart != 0);
         let mut leaving: Vec<Seat> = leaving.collect();
         leaving.sort_unstable_by_key(|seat| (seat.apart, seat.actor.id()));

@@ -6,6 +6,10 @@
 use arc_swap::ArcSwap;
 use metachron_agents::{SimSpan, SimTime};
 use std::sync::Arc;
+use std::sync::atomic::{
+    AtomicU64,
+    Ordering::{Acquire, Release},
+};
 use std::time::Duration;
 
 /// The slowest and the fastest that simulated time may run, simulated seconds a wall second.
@@ -134,13 +138,15 @@ fn scaled(span: Duration, speed: f64) -> SimSpan {
 #[derive(Debug)]
 pub struct SharedTimeline {
     piece: ArcSwap<Timeline>,
+    /// The number of the piece, written after it.
+    number: AtomicU64,
 }
 
 impl SharedTimeline {
     /// Shares a fresh timeline.
     #[must_use]
     pub fn new() -> Self {
-        Self { piece: ArcSwap::from_pointee(Timeline::new()) }
+        Self { piece: ArcSwap::from_pointee(Timeline::new()), number: AtomicU64::new(0) }
     }
 
     /// The piece in force.
@@ -149,9 +155,18 @@ impl SharedTimeline {
         **self.piece.load()
     }
 
+    /// Brings `known`, a piece that was read before, up to date: that costs a glance while it is in force.
+    pub fn renew(&self, known: &mut Timeline) {
+        if self.number.load(Acquire) != known.piece {
+            *known = self.read();
+        }
+    }
+
     /// Changes the timeline at wall time `wall`. Whoever sleeps until a due time must be woken after it.
     pub fn drive(&self, wall: Duration, drive: Drive) {
-        self.piece.store(Arc::new(self.read().after(wall, drive)));
+        let next = self.read().after(wall, drive);
+        self.piece.store(Arc::new(next));
+        self.number.store(next.piece, Release);
     }
 }
 

@@ -29,21 +29,35 @@ const SLACK_MOST: u64 = 1_000_000;
 pub(super) struct Queue {
     timeline: Timeline,
     /// By the wall time at which their turns are to begin at the latest.
-    waiting: BinaryHeap<Place>,
-    /// Released, by deadline.
-    ready: BinaryHeap<Place>,
+    waiting: BinaryHeap<Place<Waiter>>,
+    /// By deadline.
+    ready: BinaryHeap<Place<Released>>,
     /// The latest served time of those taken so far.
     served: SimTime,
     /// Since when somebody has been ready, wall nanoseconds.
     ready_since: u64,
 }
 
-/// An agent and its rank: the least comes first.
-struct Place {
+/// Someone's rank: the least comes first. All that is asked of an agent that waits lies beside it, for the agent itself is in no
+/// cache any more.
+struct Place<T> {
     rank: u64,
-    /// The wall time at which its step is released, nanoseconds.
-    release: u64,
+    of: T,
+}
+
+/// An agent whose step is released, and up to which time it had been served when it came.
+struct Released {
+    served: SimTime,
     actor: Box<Actor>,
+}
+
+/// An agent whose step will be released.
+struct Waiter {
+    /// The wall time of that, nanoseconds.
+    release: u64,
+    /// Its rank then.
+    deadline: u64,
+    then: Released,
 }
 
 impl Queue {
@@ -53,8 +67,8 @@ impl Queue {
             return;
         }
         self.timeline = *timeline;
-        let all: Vec<Place> = self.waiting.drain().chain(self.ready.drain()).collect();
-        all.into_iter().for_each(|place| self.put_back(place.actor, now));
+        let all: Vec<_> = self.drain().collect();
+        all.into_iter().for_each(|actor| self.put_back(actor, now));
     }
 
     /// Lets `actor`, who comes from elsewhere, wait for its next turn.
@@ -67,32 +81,34 @@ impl Queue {
     pub fn put_back(&mut self, mut actor: Box<Actor>, now: Duration) {
         actor.served = actor.served.max(self.served - actor.owed);
         actor.owed = actor.owed.min(self.served.since(actor.served));
-        match actor.pace.due(&self.timeline) {
-            Some(due) if due <= now => self.make_ready(actor, now),
-            None => self.waiting.push(Place { rank: NEVER, release: NEVER, actor }),
-            Some(due) => {
-                let slack = nanos(self.timeline.wall_span(actor.pace.dt())) / SLACK;
-                let release = nanos(due);
-                self.waiting.push(Place { rank: release + slack.min(SLACK_MOST), release, actor });
+        let (due, dt) = (actor.pace.due(&self.timeline), actor.pace.dt());
+        let deadline = (actor.served + dt).as_nanos();
+        let then = Released { served: actor.served, actor };
+        match due {
+            Some(due) if due <= now => self.make_ready(deadline, then, now),
+            due => {
+                let release = due.map_or(NEVER, nanos);
+                let slack = nanos(self.timeline.wall_span(dt)) / SLACK;
+                let rank = release.saturating_add(slack.min(SLACK_MOST));
+                self.waiting.push(Place { rank, of: Waiter { release, deadline, then } });
             }
         }
     }
 
-    /// The most urgent of those whose steps are released at `now`: it has had its share of one step more.
+    /// The most urgent of those whose steps are released at `now`: who makes its turn writes down that it is served by a step.
     pub fn take(&mut self, now: Duration) -> Option<Box<Actor>> {
         self.release(now);
-        let mut actor = self.ready.pop()?.actor;
-        self.served = self.served.max(actor.served);
-        actor.served += actor.pace.dt();
+        let Released { served, actor } = self.ready.pop()?.of;
+        self.served = self.served.max(served);
         Some(actor)
     }
 
     /// Hands over an agent that is ready to another worker's queue, `thief`, where its rights stay what they are.
     pub fn give(&mut self, thief: &mut Self, now: Duration) -> bool {
-        let Some(Place { mut actor, .. }) = self.ready.pop() else { return false };
+        let Some(Place { rank, of: mut given }) = self.ready.pop() else { return false };
         // what it was given too little here it is owed there
-        actor.owed = thief.served.since(actor.served);
-        thief.make_ready(actor, now);
+        given.actor.owed = thief.served.since(given.served);
+        thief.make_ready(rank, given, now);
         true
     }
 
@@ -104,29 +120,29 @@ impl Queue {
 
     /// How far the most urgent of those that are ready has been served, nanoseconds; [`NEVER`] where none is ready.
     pub fn frontier(&self) -> u64 {
-        self.ready.peek().map_or(NEVER, |place| place.actor.served.as_nanos())
+        self.ready.peek().map_or(NEVER, |place| place.of.served.as_nanos())
     }
 
     /// All that are left, at the end of a run.
     pub fn drain(&mut self) -> impl Iterator<Item = Box<Actor>> {
-        self.waiting.drain().chain(self.ready.drain()).map(|place| place.actor)
+        let waiting = self.waiting.drain().map(|place| place.of.then);
+        waiting.chain(self.ready.drain().map(|place| place.of)).map(|released| released.actor)
     }
 
     fn release(&mut self, now: Duration) {
-        let now_nanos = nanos(now);
-        while self.waiting.peek().is_some_and(|place| place.release <= now_nanos && place.release != NEVER) {
-            if let Some(Place { actor, .. }) = self.waiting.pop() {
-                self.make_ready(actor, now);
+        let until = nanos(now);
+        while self.waiting.peek().is_some_and(|place| place.of.release <= until && place.of.release != NEVER) {
+            if let Some(Place { of: Waiter { deadline, then, .. }, .. }) = self.waiting.pop() {
+                self.make_ready(deadline, then, now);
             }
         }
     }
 
-    fn make_ready(&mut self, actor: Box<Actor>, now: Duration) {
+    fn make_ready(&mut self, deadline: u64, released: Released, now: Duration) {
         if self.ready.is_empty() {
             self.ready_since = nanos(now);
         }
-        let deadline = actor.served + actor.pace.dt();
-        self.ready.push(Place { rank: deadline.as_nanos(), release: 0, actor });
+        self.ready.push(Place { rank: deadline, of: released });
     }
 }
 
@@ -135,21 +151,21 @@ fn nanos(span: Duration) -> u64 {
     u64::try_from(span.as_nanos()).unwrap_or(NEVER)
 }
 
-impl PartialEq for Place {
+impl<T> PartialEq for Place<T> {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other) == Ordering::Equal
     }
 }
 
-impl Eq for Place {}
+impl<T> Eq for Place<T> {}
 
-impl PartialOrd for Place {
+impl<T> PartialOrd for Place<T> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl Ord for Place {
+impl<T> Ord for Place<T> {
     /// The standard library's heap gives the greatest first.
     fn cmp(&self, other: &Self) -> Ordering {
         other.rank.cmp(&self.rank)
@@ -172,11 +188,18 @@ mod tests {
         queue
     }
 
+    /// The most urgent agent, served by the step that it is taken for.
+    fn take(queue: &mut Queue, now: Duration) -> Option<Box<Actor>> {
+        let mut actor = queue.take(now)?;
+        actor.served += actor.pace.dt();
+        Some(actor)
+    }
+
     /// Makes turns of [`COST`] each on one worker until `end`, as often as `made` is told of one.
     fn work(queue: &mut Queue, mut now: Duration, end: Duration, mut made: impl FnMut(usize)) {
         let line = Timeline::new();
         while now < end {
-            let Some(mut actor) = queue.take(now) else {
+            let Some(mut actor) = take(queue, now) else {
                 now = Duration::from_nanos(queue.due());
                 continue;
             };
@@ -211,7 +234,7 @@ mod tests {
         let line = Timeline::new();
         let turns = |queue: &mut Queue, now: Duration| {
             let mut made = Vec::new();
-            while let Some(mut actor) = queue.take(now) {
+            while let Some(mut actor) = take(queue, now) {
                 made.push(actor.id().0);
                 actor.pace.begin(&line, now);
                 actor.pace.advance();
@@ -245,7 +268,7 @@ mod tests {
     #[test]
     fn who_was_away_saves_nothing_up() {
         let mut queue = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
-        let away = queue.take(Duration::ZERO).unwrap();
+        let away = take(&mut queue, Duration::ZERO).unwrap();
         let (came_back, end) = (Duration::from_secs(4), Duration::from_secs(6));
         work(&mut queue, Duration::ZERO, came_back, |_| ());
         queue.put(away, came_back);
@@ -272,7 +295,7 @@ mod tests {
     fn rights_move_with_the_agent_that_another_worker_takes() {
         let mut mine = queue([1000.0; 4].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut theirs = Queue::default();
-        let taken = mine.take(Duration::ZERO).unwrap();
+        let taken = take(&mut mine, Duration::ZERO).unwrap();
         assert!(mine.give(&mut theirs, COST));
         assert_eq!(theirs.due(), 1_000_000);
         assert_eq!((theirs.frontier(), mine.frontier()), (0, 0));
@@ -291,7 +314,7 @@ mod tests {
         assert!(mine.give(&mut theirs, late));
         let mut turns = 0;
         loop {
-            let actor = theirs.take(late).unwrap();
+            let actor = take(&mut theirs, late).unwrap();
             let is_owed = actor.owed > SimSpan::ZERO;
             theirs.put_back(actor, late);
             if !is_owed {

@@ -31,6 +31,7 @@ pub(super) struct Worker {
     desk: Arc<Desk>,
     cpu: CpuShare,
     turns: u32,
+    timeline: Timeline,
     /// The clock as it was read last.
     now: Duration,
     awake_since: Duration,
@@ -41,8 +42,9 @@ pub(super) struct Worker {
 
 impl Worker {
     pub fn new(hall: Arc<Hall>, at: usize, desk: Arc<Desk>) -> Self {
-        let now = hall.clock.now();
-        Self { hall, at, desk, cpu: CpuShare::new(), turns: 0, now, awake_since: now, given_up: false, last: None }
+        let (now, timeline) = (hall.clock.now(), hall.timeline.read());
+        let cpu = CpuShare::new();
+        Self { hall, at, desk, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
     }
 
     /// Works until the run is to end, or until the worker has been given up.
@@ -56,7 +58,8 @@ impl Worker {
 
     /// Makes the next turn, or sleeps until one is due.
     fn round(&mut self) {
-        let timeline = self.hall.timeline.read();
+        self.hall.timeline.renew(&mut self.timeline);
+        let timeline = self.timeline;
         self.answer(&timeline);
         match self.hall.exchange(self.at, self.last.take(), &timeline, self.now) {
             Some(actor) => self.last = self.spell(actor, &timeline),
@@ -70,12 +73,12 @@ impl Worker {
     /// Where all are behind, what one needs is still in the cache for its second turn, and gone when all others have had theirs.
     fn spell(&mut self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
         let until = self.now + SPELL;
+        actor.fetch();
         let mut waiting = self.turn(actor, timeline);
         while self.now < until {
             let now = self.now;
             let is_behind = |actor: &mut Box<Actor>| actor.pace.due(timeline).is_some_and(|due| due <= now);
-            let Some(mut actor) = waiting.take_if(is_behind) else { break };
-            actor.served += actor.pace.dt();
+            let Some(actor) = waiting.take_if(is_behind) else { break };
             waiting = self.turn(actor, timeline);
         }
         waiting
@@ -86,6 +89,7 @@ impl Worker {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
+        actor.served += actor.pace.dt();
         let sitting = self.desk.sit(self.turns, actor.id());
         let begun = actor.begin(timeline, began);
         if !self.desk.rise(sitting) {

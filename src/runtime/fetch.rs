@@ -1,0 +1,58 @@
+//! What a turn will need, on its way to the cache before it is needed.
+//!
+//! In: an agent whose turn begins after thousands of others have had theirs, so that of the forty lines of the cache that it needs
+//! none is left. Out: nothing: a word of each was read. Fetched one after the other, where the turn comes to them, they take
+//! longer than a cheap step; all at once they arrive while the step computes. Never here: anything that depends on what is read.
+
+use super::handle::Shared;
+use super::turn::Actor;
+use metachron_agents::{Body, Inertia, Snapshot};
+use std::hint::black_box;
+use std::sync::atomic::Ordering::Relaxed;
+
+impl Actor {
+    /// Reads a word of what lies together, for all that a turn of its own reads or writes.
+    pub fn fetch(&self) {
+        black_box(self.agent.resolution());
+        black_box([
+            self.pace.time().as_nanos(),
+            self.served.as_nanos(),
+            self.dt_range.0.as_nanos(),
+            self.diary.steps(),
+            self.faults.seed,
+            u64::from(self.unsettled.subsec_nanos()),
+        ]);
+        black_box([
+            self.links.len(),
+            self.hands.len(),
+            self.company.len(),
+            self.announced.len(),
+            self.eyes.neighbours().len(),
+        ]);
+        black_box([self.open.is_some(), self.governor.is_some(), self.range.is_some(), self.withheld]);
+        self.writer.spare().into_iter().for_each(fetch_state);
+        fetch_shared(&self.shared);
+        self.diary.fetch();
+    }
+}
+
+fn fetch_shared(shared: &Shared) {
+    let Shared { gauges, .. } = shared;
+    black_box([
+        gauges.steps.load(Relaxed),
+        gauges.dropped.load(Relaxed),
+        gauges.cpu_nanos.load(Relaxed),
+        gauges.work.get().to_bits(),
+        shared.wanted_hz.to_bits(),
+        u64::from(shared.id.0),
+    ]);
+    black_box([gauges.is_running(), shared.seating.is_some(), shared.traces.is_empty(), shared.mail.has_letters()]);
+    shared.slot.fetch();
+}
+
+fn fetch_state(state: &Snapshot) {
+    black_box([state.time.as_nanos(), state.steps, state.energy_j.to_bits(), state.acceleration.x.to_bits()]);
+    black_box([state.touches.len(), state.grips.len(), state.given.len(), state.pairs.len(), state.bonds.len()]);
+    black_box([state.at_rest, state.resolution.is_some(), state.stand.is_some(), state.bounds.is_some()]);
+    black_box([matches!(state.body, Body::Nothing), matches!(state.inertia, Inertia::Immovable)]);
+}
