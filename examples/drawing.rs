@@ -33,8 +33,7 @@ fn draw(gpu: Gpu, path: &Path, numbers: &[String]) -> Result<(), Box<dyn std::er
         _ => Style::default(),
     };
     let (mut stage, camera) = stage::still_life();
-    let mut seen = Vec::new();
-    stage.survey(&camera, size, &mut seen);
+    stage.survey(&camera, size);
     let mut offscreen = Offscreen::new(gpu, size, options)?;
     let times = offscreen.render(stage.compose(&camera, &stage::level(eps_m, n), style, None), &camera)?;
     offscreen.save(path)?;
@@ -54,14 +53,13 @@ struct Cost {
 
 fn cost(gpu: &Gpu, size: Size, eps_m: f64, n: u8) -> Result<Cost, GpuError> {
     let (mut stage, camera) = stage::still_life();
-    let mut seen = Vec::new();
     let options = RendererOptions::for_adapter(&gpu.info);
     let mut offscreen = Offscreen::new(gpu.clone(), size, options)?;
     let levels = stage::level(eps_m, n);
     let mut least = Cost { wall_ms: f64::INFINITY, cpu_ms: f64::INFINITY, triangles: 0 };
     for _ in 0..15 {
         let (start, work) = (Instant::now(), ProcessTime::now());
-        stage.survey(&camera, size, &mut seen);
+        stage.survey(&camera, size);
         let picture = stage.compose(&camera, &levels, Style::default(), None);
         least.triangles = offscreen.render(picture, &camera)?.triangles;
         least.wall_ms = least.wall_ms.min(start.elapsed().as_secs_f64() * 1e3);

@@ -114,16 +114,15 @@ fn measure(
 
 /// Pixels that the first ball covers.
 fn seen_pixels(stage: &mut Stage, distance_m: f64) -> f64 {
-    let mut seen = Vec::new();
-    stage.survey(&camera(distance_m), SIZE, &mut seen);
-    seen.first().map_or(0.0, |seen| seen.pixels)
+    stage.survey(&camera(distance_m), SIZE);
+    stage.seen().first().map_or(0.0, |seen| seen.pixels)
 }
 
 fn median(screen: &mut Offscreen, stage: &mut Stage, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
-    let (camera, mut times, mut seen) = (camera(distance_m), Vec::with_capacity(DRAWINGS + 1), Vec::new());
+    let (camera, mut times) = (camera(distance_m), Vec::with_capacity(DRAWINGS + 1));
     for _ in 0..=DRAWINGS {
         let started = Instant::now();
-        stage.survey(&camera, screen.size(), &mut seen);
+        stage.survey(&camera, screen.size());
         screen.render(stage.compose(&camera, levels, Style::default(), None), &camera)?;
         times.push(started.elapsed().as_secs_f64());
     }

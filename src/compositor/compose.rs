@@ -98,7 +98,7 @@ impl Stage {
         let reach = FOCUS_REACH * camera.distance_m;
         let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
         let moving = self.tracks.iter().filter(|t| !matches!(t.actor.form, Form::Unseen | Form::Tool(_)));
-        let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.half_extents()));
+        let moving = moving.map(|t| (t.bounds.centre, t.bounds.radius_m, t.bounds.half_m));
         let fixed = self.props.iter().map(|p| (p.position, p.body.radius_m, p.half_extents()));
         let (mut ball, mut tight) = ([DVec3::INFINITY, DVec3::NEG_INFINITY], [DVec3::INFINITY, DVec3::NEG_INFINITY]);
         for (centre, radius, half) in moving.chain(fixed).filter(|(c, r, _)| near(*c, *r)) {
@@ -141,7 +141,10 @@ impl Stage {
                 }
                 _ => continue,
             };
-            let frames = track.skeleton.rebuild(curve, at.eps_m);
+            if track.cut_m.replace(at.eps_m) != Some(at.eps_m) {
+                track.skeleton.rebuild(curve, at.eps_m);
+            }
+            let frames = track.skeleton.frames();
             let Some(last) = frames.len().checked_sub(1) else { continue };
             let paint = Paint::of(track.actor.look, tint(picture.style, asked, track.age_s));
             let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
@@ -325,16 +328,17 @@ mod tests {
     #[test]
     fn later_frames_use_the_storage_of_the_first_ones() {
         let (mut stage, camera) = stage();
-        let (mut seen, mut places) = (Vec::new(), Vec::new());
+        let mut places = Vec::new();
         let levels = [Resolution { eps_m: 0.005, n: 4 }.into()];
         for frame in 0..6 {
             stage.see(AgentId(0), &tube_at(10 * frame), true);
             stage.pose(SimTime::from_nanos(10_000_000 * frame + 500_000), States::Interpolate);
-            stage.survey(&camera, SIZE, &mut seen);
+            stage.survey(&camera, SIZE);
             let picture = stage.compose(&camera, &levels, Style::default(), None);
             let buffers = [picture.samples.as_ptr().addr(), picture.instances.as_ptr().addr()];
+            let seen = stage.seen().as_ptr().addr();
             let Some((Body::Curve(curve), _)) = stage.shown(AgentId(0)) else { panic!("a curve was seen") };
-            places.push((buffers, curve.positions.as_ptr().addr(), seen.as_ptr().addr()));
+            places.push((buffers, curve.positions.as_ptr().addr(), seen));
         }
         assert!(places[1..].iter().all(|p| *p == places[1]), "{places:?}");
     }
@@ -368,7 +372,7 @@ mod tests {
         stage.see(AgentId(0), &tube_at(0), true);
         stage.pose(SimTime::ZERO, States::Latest);
         let away = Camera::looking(camera.eye(), camera.eye() - camera.forward(), camera.fov_y_rad);
-        stage.survey(&away, SIZE, &mut Vec::new());
+        stage.survey(&away, SIZE);
         let picture = stage.compose(&away, &[], Style::default(), None);
         assert!(!picture.tubes[0].shown);
     }

@@ -7,6 +7,8 @@ use super::glide::Glide;
 use super::painting::Painting;
 use super::picture::Picture;
 use super::pose;
+use super::survey::Seen;
+use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::SurfaceForm;
 use metachron_agents::shape::{
@@ -99,6 +101,9 @@ pub struct Stage {
     pub(super) props: Vec<PropShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
+    /// What the last survey found, and by whose eye.
+    pub(super) found: Vec<Seen>,
+    pub(super) eye: Option<(Camera, Size)>,
     /// Over how many frames meshes change their cut.
     pub(super) glide_frames: u8,
 }
@@ -111,6 +116,10 @@ pub(super) struct Track {
     before: Option<Arc<Snapshot>>,
     newest: Option<Arc<Snapshot>>,
     awake: bool,
+    /// It rests, and is shown as it rests: until there is news of it nothing about it changes.
+    still: bool,
+    /// Whether it was posed anew since the last survey.
+    pub fresh: bool,
     /// The state that is shown.
     pub pose: Body,
     pub shown: SimTime,
@@ -118,6 +127,8 @@ pub(super) struct Track {
     pub bounds: Bounds,
     pub seen: bool,
     pub skeleton: Skeleton,
+    /// At which ε the skeleton was made of the pose; `None` where it was made of another one.
+    pub cut_m: Option<f64>,
     /// The cut that a mesh is drawn at while it is seen.
     pub glide: Option<Glide>,
     /// A rope as it is shown.
@@ -154,6 +165,22 @@ pub(super) struct BodyShape {
 pub(super) struct Bounds {
     pub centre: DVec3,
     pub radius_m: f64,
+    /// Half the box along the world's axes that holds it, about the centre, metres.
+    pub half_m: DVec3,
+}
+
+impl Bounds {
+    fn ball(centre: DVec3, radius_m: f64) -> Self {
+        Self { centre, radius_m, half_m: DVec3::splat(radius_m) }
+    }
+
+    /// Around points with a skin of this thickness.
+    fn of(points: &[DVec3], skin_m: f64) -> Self {
+        let corners = points.iter().copied().reduce(DVec3::min).zip(points.iter().copied().reduce(DVec3::max));
+        let Some((low, high)) = corners else { return Self::default() };
+        let radius_m = 0.5 * low.distance(high) + skin_m;
+        Self { centre: 0.5 * (low + high), radius_m, half_m: 0.5 * (high - low) + skin_m }
+    }
 }
 
 impl Stage {
@@ -165,7 +192,7 @@ impl Stage {
         let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
         let models = models.0.into_iter().map(|(model, _)| model).collect();
         let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
-        Self { tracks, props, picture, scratch: Default::default(), glide_frames: 0 }
+        Self { tracks, props, picture, ..Self::default() }
     }
 
     /// Takes the newest snapshot of an agent; `awake` tells whether it goes on stepping.
@@ -180,11 +207,14 @@ impl Stage {
         }
     }
 
-    /// Brings every object to the frame's time as `states` asks.
-    pub fn pose(&mut self, time: SimTime, states: States) {
-        for track in &mut self.tracks {
-            track.pose_at(time, states);
+    /// Brings every object to the frame's time as `states` asks, but for those that rest and are shown so; says how many that
+    /// were.
+    pub fn pose(&mut self, time: SimTime, states: States) -> usize {
+        let mut posed = 0;
+        for track in self.tracks.iter_mut().filter(|track| !track.still) {
+            posed += usize::from(track.pose_at(time, states));
         }
+        posed
     }
 
     /// Age in seconds of the newest state of an agent when the frame was posed; zero for one at rest.
@@ -224,12 +254,15 @@ impl Track {
             before: None,
             newest: None,
             awake: true,
+            still: false,
+            fresh: true,
             pose,
             shown: SimTime::ZERO,
             age_s: 0.0,
             bounds: Bounds::default(),
             seen: true,
             skeleton: Skeleton::default(),
+            cut_m: None,
             glide: None,
             rope: CurveState::default(),
             painting: None,
@@ -239,7 +272,7 @@ impl Track {
     }
 
     fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
-        self.awake = awake;
+        (self.awake, self.still) = (awake, false);
         match &self.newest {
             Some(known) if known.time == newest.time && known.steps == newest.steps => {}
             Some(known) if known.time < newest.time => {
@@ -252,8 +285,9 @@ impl Track {
         }
     }
 
-    fn pose_at(&mut self, time: SimTime, states: States) {
-        let Some(newest) = &self.newest else { return };
+    /// Whether there was a state to pose it by.
+    fn pose_at(&mut self, time: SimTime, states: States) -> bool {
+        let Some(newest) = &self.newest else { return false };
         self.age_s = if self.awake { time.secs_after(newest.time).max(0.0) } else { 0.0 };
         self.shown = match (states, &self.before) {
             (States::Interpolate, Some(before)) => pose::between(before, newest, time, &mut self.pose),
@@ -264,6 +298,9 @@ impl Track {
             }
         };
         self.bounds = self.find_bounds();
+        self.still = !self.awake && self.shown == newest.time;
+        (self.fresh, self.cut_m) = (true, None);
+        true
     }
 
     fn find_bounds(&self) -> Bounds {
@@ -271,29 +308,14 @@ impl Track {
             Body::Nothing => Bounds::default(),
             Body::Rigid(rigid) => {
                 let centre = rigid.position + rigid.rotation * self.body.middle_m;
-                Bounds { centre, radius_m: self.body.radius_m }
+                Bounds::ball(centre, self.body.radius_m)
             }
             Body::Tool(tool) => {
                 let half = 0.5 * self.body.radius_m;
-                Bounds { centre: tool.tip - tool.rotation * DVec3::Z * half, radius_m: 1.2 * half }
+                Bounds::ball(tool.tip - tool.rotation * DVec3::Z * half, 1.2 * half)
             }
-            Body::Curve(curve) => {
-                let Some((low, high, skin)) = curve_box(curve) else { return Bounds::default() };
-                Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) + skin }
-            }
-            Body::Soft(soft) => {
-                let Some((low, high)) = box_of(&soft.positions) else { return Bounds::default() };
-                Bounds { centre: 0.5 * (low + high), radius_m: 0.5 * low.distance(high) }
-            }
-        }
-    }
-
-    /// Half the box along the world's axes that holds it, about the centre of its bounds, metres.
-    pub fn half_extents(&self) -> DVec3 {
-        match &self.pose {
-            Body::Curve(curve) => curve_box(curve).map_or(DVec3::ZERO, |(low, high, skin)| 0.5 * (high - low) + skin),
-            Body::Soft(soft) => box_of(&soft.positions).map_or(DVec3::ZERO, |(low, high)| 0.5 * (high - low)),
-            _ => DVec3::splat(self.bounds.radius_m),
+            Body::Curve(curve) => Bounds::of(&curve.positions, curve.radii_m.iter().copied().fold(0.0, f64::max)),
+            Body::Soft(soft) => Bounds::of(&soft.positions, 0.0),
         }
     }
 }
@@ -315,17 +337,6 @@ impl PropShape {
             _ => DVec3::splat(self.body.radius_m),
         }
     }
-}
-
-/// Lower and upper corner of the box around a curve's nodes, and its greatest radius, metres; `None` for one without nodes.
-fn curve_box(curve: &CurveState) -> Option<(DVec3, DVec3, f64)> {
-    let skin = curve.radii_m.iter().copied().fold(0.0, f64::max);
-    box_of(&curve.positions).map(|(low, high)| (low, high, skin))
-}
-
-/// Lower and upper corner of the box around points, metres; `None` for none.
-fn box_of(points: &[DVec3]) -> Option<(DVec3, DVec3)> {
-    Some((points.iter().copied().reduce(DVec3::min)?, points.iter().copied().reduce(DVec3::max)?))
 }
 
 /// Every model once, with its extent: copies share both.

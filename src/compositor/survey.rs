@@ -33,14 +33,29 @@ pub struct Seen {
 }
 
 impl Stage {
-    /// Finds what the camera sees, one entry an actor in their order. Keeps for [`Stage::compose`] who is visible.
-    pub fn survey(&mut self, camera: &Camera, size: Size, seen: &mut Vec<Seen>) {
-        seen.clear();
-        for track in &mut self.tracks {
+    /// Finds what the camera sees ([`Stage::seen`]). What stays as it is before a camera that stays where it is is not looked at
+    /// again; says how many were looked at. Keeps for [`Stage::compose`] who is visible.
+    pub fn survey(&mut self, camera: &Camera, size: Size) -> usize {
+        let eye = Some((*camera, size));
+        let moved = self.eye != eye;
+        self.eye = eye;
+        let mut looks = 0;
+        for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
             let view = look(track, camera, size);
-            track.seen = view.visible;
-            seen.push(view);
+            (track.seen, track.fresh) = (view.visible, false);
+            match self.found.get_mut(at) {
+                Some(before) => *before = view,
+                None => self.found.push(view),
+            }
+            looks += 1;
         }
+        looks
+    }
+
+    /// What the last [`Stage::survey`] found, one entry an actor in their order.
+    #[must_use]
+    pub fn seen(&self) -> &[Seen] {
+        &self.found
     }
 
     /// Centre and radius in metres of a ball that holds one actor, or all of them; `None` where there is nothing to see.
@@ -61,6 +76,7 @@ fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
     let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
     let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
     let (area, speed_m_s, tube_m) = match &track.pose {
+        Body::Curve(curve) if !visible => (0.0, 0.0, tube_measures(curve)),
         Body::Curve(curve) => {
             let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
             let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
@@ -70,7 +86,7 @@ fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
         Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
         Body::Soft(soft) => {
             let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
-            let half = track.half_extents();
+            let half = bounds.half_m;
             // the mean side of its box: a sheet covers less, a ball about as much
             let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
             (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
@@ -138,9 +154,47 @@ mod tests {
         let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
         stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
         stage.pose(SimTime::ZERO, States::Latest);
-        let mut seen = Vec::new();
-        stage.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE, &mut seen);
-        seen[0]
+        stage.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE);
+        stage.seen()[0]
+    }
+
+    #[test]
+    fn what_rests_is_posed_and_looked_at_once_and_again_when_the_camera_moves_or_there_is_news() {
+        let look = Look { colour: [200; 3], material: Material::Plastic };
+        let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
+        let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
+        let mut stage = Stage::new((0..1010).map(actor).collect(), vec![]);
+        let state = |id: u32, ms: u64| {
+            let position = DVec3::new(f64::from(id), 1e-3 * ms as f64, 0.0);
+            let body = Body::Rigid(RigidState { position, ..RigidState::default() });
+            let time = SimTime::from_nanos(ms * 1_000_000);
+            Arc::new(Snapshot { time, steps: ms / 10, body, ..Snapshot::default() })
+        };
+        let camera = |x: f64| Camera::looking(DVec3::new(x, -4.0, 0.0), DVec3::new(x, 0.0, 0.0), 0.8);
+        let mut plain = Stage::new((0..1010).map(actor).collect(), vec![]);
+        (0..1010).for_each(|id| plain.see(AgentId(id), &state(id, 0), true));
+        plain.pose(SimTime::ZERO, States::Latest);
+        // ten move on, a thousand have come to rest
+        let mut frame = |ms: u64, news: &[u32], x: f64| {
+            (0..10).for_each(|id| stage.see(AgentId(id), &state(id, ms), true));
+            news.iter().for_each(|id| stage.see(AgentId(*id), &state(*id, ms), false));
+            let posed = stage.pose(SimTime::from_nanos(ms * 1_000_000), States::Interpolate);
+            let looks = stage.survey(&camera(x), SIZE);
+            plain.survey(&camera(x), SIZE);
+            let same = |(a, b): (&Seen, &Seen)| a.id.0 < 10 || a.id.0 == 700 || a == b;
+            assert!(stage.seen().len() == 1010 && stage.seen().iter().zip(plain.seen()).all(same));
+            (posed, looks, (1e3 * stage.seen()[700].centre_m.y).round())
+        };
+        let all: Vec<u32> = (10..1010).collect();
+        assert_eq!(frame(0, &all, 0.0), (1010, 1010, 0.0));
+        assert_eq!(frame(10, &[], 0.0), (10, 10, 0.0));
+        assert_eq!(frame(20, &[], 0.0), (10, 10, 0.0));
+        assert_eq!(frame(30, &[], 500.0), (10, 1010, 0.0), "another camera");
+        assert_eq!(frame(40, &[], 500.0), (10, 10, 0.0));
+        // five steps of 10 ms have led there, and a frame shows a step less
+        assert_eq!(frame(50, &[700], 500.0), (11, 11, 40.0));
+        assert_eq!(frame(60, &[], 500.0), (11, 11, 50.0));
+        assert_eq!(frame(70, &[], 500.0), (10, 10, 50.0));
     }
 
     #[test]

@@ -14,7 +14,6 @@ use metachron_agents::{AgentId, N_MAX, Resolution};
 use metachron_budget::grisoni::{GrisoniLaw, Limits};
 use metachron_budget::log_law::LogLaw;
 use metachron_budget::share::{Share, water_level};
-use std::collections::BTreeMap;
 
 /// Intervals of a tube at ε̂ = 1: ε̂ = 40 ε/L.
 const INTERVALS_AT_ONE: f64 = 40.0;
@@ -38,7 +37,8 @@ pub(super) struct Feedback {
     pushed: f64,
     /// The level of the last sharing: a guess for the next.
     water: f64,
-    held: BTreeMap<AgentId, Held>,
+    /// What each object was drawn with, in the order in which they are given.
+    held: Vec<(AgentId, Held)>,
 }
 
 impl Feedback {
@@ -52,7 +52,7 @@ impl Feedback {
             started: false,
             pushed: 0.0,
             water: 1.0,
-            held: BTreeMap::new(),
+            held: Vec::new(),
         }
     }
 
@@ -84,6 +84,13 @@ impl Feedback {
 
     /// Chooses (ε, n) of every object for the next frame.
     pub fn plan(&mut self, views: &[Seen], levels: &mut Vec<LevelDemand>) {
+        self.held.resize(views.len(), (AgentId(0), Held::default()));
+        for ((view, _), (of, held)) in views.iter().zip(&mut self.held) {
+            if *of != view.id || !view.visible {
+                *of = view.id;
+                held.forget();
+            }
+        }
         match self.law {
             Law::Corrected { .. } => self.plan_corrected(views, levels),
             Law::Printed { .. } => self.plan_printed(views, levels),
@@ -109,14 +116,9 @@ impl Feedback {
 
     /// Chooses the level of those in view that are `of` the kind, by their shares at `water`.
     fn choose(&mut self, (views, levels): (&[Seen], &mut [LevelDemand]), water: f64, of: impl Fn(&ObjectView) -> bool) {
-        let all = views.iter().zip(levels);
-        for (seen, level) in all.filter(|((view, _), _)| of(view)) {
-            let held = self.held.entry(seen.0.id).or_default();
-            if seen.0.visible {
-                (level.resolution, level.polygons) = held.choose(&seen.0, seen.1, share(seen).at(water));
-            } else {
-                held.forget();
-            }
+        let all = views.iter().zip(levels).zip(&mut self.held);
+        for ((seen, level), (_, held)) in all.filter(|(((view, _), _), _)| view.visible && of(view)) {
+            (level.resolution, level.polygons) = held.choose(&seen.0, seen.1, share(seen).at(water));
         }
     }
 
@@ -140,10 +142,6 @@ impl Feedback {
         let mean = mean_coarseness(views);
         self.bound_printed(views, mean);
         for (view, _) in views {
-            let held = self.held.entry(view.id).or_default();
-            if !view.visible {
-                held.forget();
-            }
             let eps_m = match view.kind {
                 Kind::Tube { length_m, .. } => self.printed.eps() * length_m / INTERVALS_AT_ONE * weight(view, mean),
                 Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,

@@ -1,7 +1,8 @@
 //! What agents did to each other in a run, kept from what they publish.
 //!
-//! In: the newest states, gathering by gathering. Out: a [`Coupling`] for every pair and kind that was ever there.
-//! Never here: forces; only their owners know them.
+//! In: the newest states, gathering by gathering, and whose have changed. Out: a [`Coupling`] for every pair and kind that was ever
+//! there. What two say of each other is read again when one of them has news: a heap at rest is not. Never here: forces; only their
+//! owners know them.
 
 use crate::scene::Scene;
 use glam::DVec3;
@@ -51,7 +52,14 @@ pub(super) struct Couplings {
     /// Pairs that lie against each other from the start: they have no time to bond, they are together already.
     resting: Vec<(AgentId, AgentId)>,
     all: Vec<Coupling>,
+    /// Joints between the two of each.
+    joints: Vec<u32>,
     known: BTreeMap<(AgentId, AgentId, &'static str), usize>,
+    /// The numbers of each agent's couplings.
+    of: Vec<Vec<usize>>,
+    /// Who has news, each once, and those with a coupling to one of them.
+    heard: Vec<AgentId>,
+    is_heard: Vec<bool>,
 }
 
 /// Rigid bodies that share a clock.
@@ -117,14 +125,12 @@ impl Couplings {
     /// What is there before the first step: jointed bodies share a clock from the start.
     pub(super) fn of(scene: &Scene) -> Self {
         let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
-        couplings.note_joints(scene);
-        couplings
-    }
-
-    fn note_joints(&mut self, scene: &Scene) {
         for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
-            self.at(a.min(b), a.max(b), ISLAND).contacts += 1;
+            let at = couplings.number(a.min(b), a.max(b), ISLAND);
+            couplings.joints[at] += 1;
+            couplings.all[at].contacts = couplings.joints[at];
         }
+        couplings
     }
 
     /// All of them, in the order in which they were first seen.
@@ -132,32 +138,68 @@ impl Couplings {
         &self.all
     }
 
-    /// Keeps what the `newest` states say, agent by agent; `leader` says in whose world one steps.
-    pub(super) fn note(&mut self, scene: &Scene, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
-        self.all.iter_mut().for_each(|c| (c.contacts, c.force_n, c.penetration_m) = (0, 0.0, 0.0));
-        self.note_joints(scene);
-        self.note_resting(leader);
-        for (member, snapshot) in scene.agents.iter().zip(newest) {
-            self.note_grasp(member.id, snapshot);
-            for state in &snapshot.pairs {
-                self.note_pair(member.id, state, newest);
-            }
-            // both sides say so while they share a clock: the lower number counts it
-            for other in snapshot.bonds.iter().filter(|other| **other > member.id) {
-                let coupling = self.at(member.id, *other, ISLAND);
-                coupling.contacts = coupling.contacts.max(1);
-            }
+    /// There is a new state of `id`.
+    pub(super) fn hear(&mut self, id: AgentId) {
+        let at = id.0 as usize;
+        if self.is_heard.len() <= at {
+            self.is_heard.resize(at + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_heard[at], true) {
+            self.heard.push(id);
         }
     }
 
-    fn note_resting(&mut self, leader: impl Fn(AgentId) -> AgentId) {
-        for (a, b) in std::mem::take(&mut self.resting) {
-            if leader(a) == leader(b) {
-                let coupling = self.at(a, b, ISLAND);
+    /// Keeps what the `newest` states say of those who were heard of, agent by agent; `leader` says in whose world one steps.
+    pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
+        self.open_anew();
+        self.note_resting(leader);
+        let heard = std::mem::take(&mut self.heard);
+        for &id in &heard {
+            let Some(snapshot) = newest.get(id.0 as usize) else { continue };
+            self.note_grasp(id, snapshot);
+            for state in &snapshot.pairs {
+                self.note_pair(id, state, newest);
+            }
+            // both sides say so while they share a clock: the lower number counts it
+            for other in snapshot.bonds.iter().filter(|other| **other > id) {
+                let coupling = self.at(id, *other, ISLAND);
                 coupling.contacts = coupling.contacts.max(1);
-                self.resting.push((a, b));
             }
         }
+        heard.iter().for_each(|id| self.is_heard[id.0 as usize] = false);
+        self.heard = heard;
+        self.heard.clear();
+    }
+
+    /// Forgets what is now between those who were heard of and others, and asks these as well.
+    fn open_anew(&mut self) {
+        let of = std::mem::take(&mut self.of);
+        for k in 0..self.heard.len() {
+            for &at in of.get(self.heard[k].0 as usize).into_iter().flatten() {
+                let coupling = &mut self.all[at];
+                (coupling.contacts, coupling.force_n, coupling.penetration_m) = (self.joints[at], 0.0, 0.0);
+                let (a, b) = (coupling.a, coupling.b);
+                self.hear(a);
+                self.hear(b);
+            }
+        }
+        self.of = of;
+    }
+
+    fn note_resting(&mut self, leader: impl Fn(AgentId) -> AgentId) {
+        let mut resting = std::mem::take(&mut self.resting);
+        resting.retain(|&(a, b)| {
+            if ![a, b].iter().any(|id| self.is_heard.get(id.0 as usize) == Some(&true)) {
+                return true;
+            }
+            let together = leader(a) == leader(b);
+            if together {
+                let coupling = self.at(a, b, ISLAND);
+                coupling.contacts = coupling.contacts.max(1);
+            }
+            together
+        });
+        self.resting = resting;
     }
 
     /// What a tool says of its hold.
@@ -196,11 +238,26 @@ impl Couplings {
     }
 
     fn at(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> &mut Coupling {
-        let at = *self.known.entry((a, b, kind)).or_insert_with(|| {
-            self.all.push(Coupling::new(a, b, kind));
-            self.all.len() - 1
-        });
+        let at = self.number(a, b, kind);
         &mut self.all[at]
+    }
+
+    /// The number of a coupling among all; a new one where it is not known.
+    fn number(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> usize {
+        if let Some(&at) = self.known.get(&(a, b, kind)) {
+            return at;
+        }
+        let at = self.all.len();
+        self.known.insert((a, b, kind), at);
+        self.all.push(Coupling::new(a, b, kind));
+        self.joints.push(0);
+        for id in [a, b].map(|id| id.0 as usize) {
+            if self.of.len() <= id {
+                self.of.resize_with(id + 1, Vec::new);
+            }
+            self.of[id].push(at);
+        }
+        at
     }
 }
 
@@ -232,9 +289,10 @@ mod tests {
         Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
     }
 
-    /// Everybody steps in a world of its own.
-    fn alone(id: AgentId) -> AgentId {
-        id
+    /// Hears of all `states`, of agents that step in worlds of their own.
+    fn note(couplings: &mut Couplings, states: &[Arc<Snapshot>]) {
+        (0..).map(AgentId).take(states.len()).for_each(|id| couplings.hear(id));
+        couplings.note(states, |id| id);
     }
 
     fn pushed(x: f64) -> Impulse {
@@ -263,13 +321,13 @@ mod tests {
         };
         let scene = two_balls();
         let mut couplings = Couplings::of(&scene);
-        couplings.note(&scene, &states(&given, early.clone(), state), alone);
+        note(&mut couplings, &states(&given, early.clone(), state));
         // two of four newton seconds are not taken yet, and the owner knows of one and a half
         assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
-        couplings.note(&scene, &states(&given, given.clone(), state), alone);
+        note(&mut couplings, &states(&given, given.clone(), state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
         // a reader that lost half of it and does not know
-        couplings.note(&scene, &states(&given, Ledger { revision: given.revision, ..early }, state), alone);
+        note(&mut couplings, &states(&given, Ledger { revision: given.revision, ..early }, state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.5));
         assert_eq!(
             (couplings.all().len(), couplings.all()[0].kind, couplings.all()[0].force_max_n),
@@ -283,7 +341,7 @@ mod tests {
         let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
         let scene = two_balls();
         let mut couplings = Couplings::of(&scene);
-        couplings.note(&scene, &[state(side(1, 5.0)), state(side(0, 4.0))], alone);
+        note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
         let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
         assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, "penalty"));
         assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
@@ -294,12 +352,30 @@ mod tests {
         let bound = |with| Arc::new(Snapshot { bonds: vec![AgentId(with)], ..Snapshot::default() });
         let scene = two_balls();
         let mut couplings = Couplings::of(&scene);
-        couplings.note(&scene, &[bound(1), bound(0)], alone);
+        note(&mut couplings, &[bound(1), bound(0)]);
         assert_eq!(
             couplings.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>(),
             [(0, 1, "island", 1)]
         );
-        couplings.note(&scene, &[Arc::default(), Arc::default()], alone);
+        note(&mut couplings, &[Arc::default(), Arc::default()]);
         assert_eq!(couplings.all()[0].contacts, 0);
+    }
+    #[test]
+    fn what_nobody_has_news_of_stays_and_either_side_opens_it_anew() {
+        let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
+        let state = |pairs: Vec<PairState>| Arc::new(Snapshot { pairs, ..Snapshot::default() });
+        let mut couplings = Couplings::of(&two_balls());
+        let touching = [state(vec![pair(3)]), Arc::default()];
+        note(&mut couplings, &touching);
+        // nobody has changed: nothing is read
+        couplings.note(&[], |id| id);
+        assert_eq!(couplings.all()[0].contacts, 3);
+        // the other one has: the owner is asked again
+        couplings.hear(AgentId(1));
+        couplings.note(&touching, |id| id);
+        assert_eq!(couplings.all()[0].contacts, 3);
+        couplings.hear(AgentId(0));
+        couplings.note(&[Arc::default(), Arc::default()], |id| id);
+        assert_eq!((couplings.all().len(), couplings.all()[0].contacts), (1, 0));
     }
 }

@@ -14,7 +14,7 @@ use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::purse::Purse;
 use super::sight::Sight;
 use super::trace::Trace;
-use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Seen, Size, Stage, States, Style};
+use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Size, Stage, States, Style};
 use crate::control::{Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Status};
 use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
 use crate::scene::Scene;
@@ -39,7 +39,6 @@ pub struct Session {
     holdings: Vec<Arc<Holding>>,
     sight: Sight,
     reader: Reader,
-    seen: Vec<Seen>,
     views: Vec<ObjectView>,
     levels: Vec<Level>,
     couplings: Couplings,
@@ -123,7 +122,6 @@ impl Session {
             declared: cast::prices(&machine.draw),
             machine,
             run,
-            seen: Vec::new(),
             views: Vec::new(),
             levels: Vec::new(),
             couplings: Couplings::of(&scene),
@@ -323,8 +321,8 @@ impl Session {
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
         let started = self.now();
         self.gather();
-        self.stage.survey(camera, size, &mut self.seen);
-        self.sight.look(started, &self.seen, camera, size);
+        self.stage.survey(camera, size);
+        self.sight.look(started, self.stage.seen(), camera, size);
         let culled = self.now();
         self.chosen.cull = culled.saturating_sub(started);
         self.choose(size);
@@ -437,13 +435,16 @@ impl Session {
 
     fn gather(&mut self) {
         let now = self.run.sim_now();
-        let stage = &mut self.stage;
-        self.reader.read(self.run.agents(), now, |agent, newest, awake| stage.see(agent.id(), newest, awake));
+        let (stage, couplings) = (&mut self.stage, &mut self.couplings);
+        self.reader.read(self.run.agents(), now, |agent, newest, awake| {
+            stage.see(agent.id(), newest, awake);
+            couplings.hear(agent.id());
+        });
         self.stage.pose(now, states(self.scene.states));
         self.chosen.sim = now;
         let agents = self.run.agents();
         let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
-        self.couplings.note(&self.scene, self.reader.newest(), leader);
+        self.couplings.note(self.reader.newest(), leader);
         if let Some(trace) = &mut self.trace {
             trace.note(&self.scene, self.reader.newest());
         }
@@ -451,7 +452,7 @@ impl Session {
 
     fn choose(&mut self, size: Size) {
         self.views.clear();
-        self.views.extend(cast::views(&self.seen, &self.scene));
+        self.views.extend(cast::views(self.stage.seen(), &self.scene));
         // what is in the picture besides hardly changes from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         self.buy();
@@ -459,7 +460,7 @@ impl Session {
         let plan = self.control.plan(&self.views);
         self.levels.clear();
         self.levels.extend(self.views.iter().zip(&plan.levels).map(cast::level));
-        self.chosen.objects = self.seen.iter().filter(|s| s.visible).count() as u64;
+        self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
     }
 

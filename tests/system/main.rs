@@ -4,6 +4,7 @@ mod chart_policies;
 mod cli;
 mod coupling;
 mod fit;
+mod idle;
 mod painting;
 mod picture;
 mod play;

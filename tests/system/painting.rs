@@ -24,7 +24,7 @@ fn draw(gpu: &Gpu, (model, texture): (&Model, &Arc<Texture>), shading: Shading) 
     let mut stage = Stage::new(vec![Actor { id: AgentId(0), form: Form::Scenery(model.clone(), at), look }], vec![]);
     stage.paint(AgentId(0), texture);
     let camera = Camera::looking(DVec3::NEG_Y * 5.0, DVec3::ZERO, 0.3);
-    stage.survey(&camera, SIZE, &mut Vec::new());
+    stage.survey(&camera, SIZE);
     let level = Level { shading, ..Resolution { eps_m: 1.0, n: 3 }.into() };
     let mut screen = Offscreen::new(gpu.clone(), SIZE, OPTIONS).expect("a small target");
     let picture = stage.compose(&camera, &[level], Style::default(), None);

@@ -114,7 +114,7 @@ impl Studio {
     }
 
     fn draw(&mut self, stage: &mut Stage, levels: &[Level]) -> RgbaImage {
-        stage.survey(&self.camera, SIZE, &mut Vec::new());
+        stage.survey(&self.camera, SIZE);
         let picture = stage.compose(&self.camera, levels, Style::default(), None);
         self.offscreen.render(picture, &self.camera).expect("a picture");
         self.offscreen.read_back().expect("pixels")
@@ -272,7 +272,7 @@ fn copies_of_a_mesh_at_one_count_are_one_draw() {
     });
     let mut stage = Stage::new(actors.collect(), vec![]);
     let camera = Camera::looking(DVec3::new(-60.0, -60.0, 60.0), DVec3::new(50.0, 70.0, 0.0), 1.4);
-    stage.survey(&camera, SIZE, &mut Vec::new());
+    stage.survey(&camera, SIZE);
     let levels: Vec<Level> = scene.scenery.iter().map(|_| level(100, Shading::PerPixel)).collect();
     let picture = stage.compose(&camera, &levels, Style::default(), None);
     assert_eq!(picture.solids.len(), 3, "{:?}", picture.solids); // seats, trunks, leaves

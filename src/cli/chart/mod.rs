@@ -101,6 +101,7 @@ const SCALING: &[Entry] = &[
     entry::<Scaling<scaling::segments::Segments>>(),
     entry::<Scaling<scaling::contacts::Contacts>>(),
     entry::<Scaling<scaling::agents::Agents>>(),
+    entry::<Scaling<scaling::sleepers::Sleepers>>(),
 ];
 
 const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];

@@ -43,8 +43,8 @@ impl Session {
     /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
     fn mean_level(&self) -> f64 {
         let mean = |tubes_only: bool| {
-            let drawn =
-                self.seen.iter().zip(&self.levels).filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
+            let all = self.stage.seen().iter().zip(&self.levels);
+            let drawn = all.filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
             let (sum, count) =
                 drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
             (count > 0.0).then(|| sum / count)

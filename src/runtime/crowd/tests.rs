@@ -186,6 +186,35 @@ fn who_is_far_is_never_looked_at_and_who_comes_is() {
 }
 
 #[test]
+fn ten_that_swing_beside_a_thousand_that_rest_seldom_look_at_them() {
+    let (dt, count) = (SimSpan::from_nanos(5_000_000), 1010);
+    let crowd = Crowd::new(count);
+    let mut sights: Vec<_> = (0..count as u32).map(AgentId).map(Sight::new).collect();
+    let half = DVec3::splat(0.25);
+    // a floor of them, half a metre apart, a metre below those that swing
+    for (k, sight) in sights.iter_mut().enumerate().skip(10) {
+        let at = DVec3::new(0.5 * (k % 40) as f64, 0.5 * (k / 40) as f64, -1.5) - half;
+        sight.stand(&crowd, Some(&Bounds { low: at, high: at + 0.1, speed_m_s: 0.0 }), SimTime::ZERO);
+        crowd.stay(AgentId(k as u32));
+    }
+    let mut looks = 0;
+    for turn in 0..2000_u64 {
+        let now = SimTime::from_nanos(turn * dt.as_nanos());
+        for (k, sight) in sights[..10].iter_mut().enumerate() {
+            // a second to and fro, at 2 m/s in the middle
+            let phase = std::f64::consts::TAU * now.as_secs_f64() + k as f64;
+            let at = DVec3::new(0.32 * libm::sin(phase) + 2.0 * k as f64, 5.0, 0.0);
+            let speed_m_s = 2.0 * libm::cos(phase).abs();
+            sight.stand(&crowd, Some(&Bounds { low: at - half, high: at + half, speed_m_s }), now);
+            looks += sight.look(&crowd, (now, dt), &Fellows::default(), |_| true);
+        }
+    }
+    // everybody once in 33 turns
+    let each = looks as f64 / 20_000.0;
+    assert!(each < 40.0, "{each} looks a turn");
+}
+
+#[test]
 fn a_log_that_has_run_over_means_everybody() {
     let crowd = Crowd::new(3);
     let mut sight = Sight::new(AgentId(0));

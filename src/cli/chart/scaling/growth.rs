@@ -76,6 +76,11 @@ impl Row {
         (self.count.unwrap_or(f64::NAN), self.floor_us.unwrap_or(f64::NAN))
     }
 
+    /// How many times the floor it costs.
+    pub(super) fn times_floor(&self) -> f64 {
+        self.point().1 / self.floor().1
+    }
+
     /// Nanoseconds each.
     pub(super) fn ns_each(&self) -> f64 {
         let (count, us) = self.point();
@@ -125,7 +130,7 @@ impl<G: Growth> Experiment for Scaling<G> {
                 (us, 2).into(),
                 (row.ns_each(), 1).into(),
                 (floor_us * 1e3 / count, 1).into(),
-                (us / floor_us, 1).into(),
+                (row.times_floor(), 2).into(),
                 (power(rows, &row.case, (0.0, f64::INFINITY)), 3).into(),
             ]);
         }
