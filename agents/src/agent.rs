@@ -92,7 +92,7 @@ pub struct Companion<'a> {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
     /// Work done, in the model's unit: a declared machine gives its price in seconds.
-    /// Tube: segments × substeps, those of its own error estimate among them. Rigid, instrument: 1. Synthetic: its declared microseconds.
+    /// Tube: segments × systems solved: one a substep, more where its rule iterates, and those of its own error estimate. Rigid, instrument: 1. Synthetic: its declared microseconds.
     pub work: f64,
     /// Into how many substeps the step was divided, ≥ 1.
     pub substeps: u32,

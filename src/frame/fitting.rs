@@ -33,7 +33,7 @@ pub struct Point {
 pub struct Played {
     /// Where the points were, in their order.
     pub paths: Vec<Path>,
-    /// What each agent costs by the declared machine, seconds of one core a simulated second.
+    /// What each agent costs by the declared machine, seconds of one core a simulated second; a solve of every integrator alike.
     pub costs_s: Vec<f64>,
     /// CPU time of each agent's turns, seconds a simulated second, as measured.
     pub cpu_s: Vec<f64>,
@@ -60,21 +60,6 @@ pub fn setting_of(member: &Member) -> Setting {
         Spec::Rigid(_) | Spec::Instrument(_) | Spec::Synthetic(_) => (0, 0),
     };
     Setting { dt_s: member.pace.dt.as_secs_f64(), pieces, method }
-}
-
-/// What a step of a method costs beside one of implicit Euler: the iterations that it takes (docs/accuracy.md).
-#[must_use]
-pub fn weight(member: &Member, method: usize) -> f64 {
-    if !matches!(member.spec, Spec::Tube(_)) {
-        return 1.0;
-    }
-    match Integrator::ALL[method] {
-        Integrator::SymplecticEuler => 0.7,
-        Integrator::Xpbd => 1.2,
-        Integrator::ImplicitEuler => 1.0,
-        Integrator::Bdf2 => 2.7,
-        Integrator::EnergyMomentum => 8.0,
-    }
 }
 
 /// The number of an integrator among all.
@@ -207,8 +192,7 @@ pub fn play_points(
     let stats = || outcome.agents.iter().map(|agent| &agent.stats);
     let cost = |(member, stats): (&Member, &crate::runtime::AgentStats)| {
         let steps = stats.steps.max(1) as f64;
-        let declared = steps * machine.step_s(member.spec.model(), stats.work / steps, 0, 0);
-        declared * weight(member, setting_of(member).method) / seconds
+        steps * machine.step_s(member.spec.model(), stats.work / steps, 0, 0) / seconds
     };
     let parked = stats().zip(&scene.agents).find_map(|(stats, member)| match &stats.state {
         AgentState::Parked(reason) => Some((member.id, reason.clone())),

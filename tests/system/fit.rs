@@ -52,6 +52,8 @@ fn a_tube_that_is_too_fine_is_written_coarser_and_still_holds() {
     assert!(number(needs, "/dt_ms") > 1.0 && number(needs, "/segments") < 64.0, "{needs}");
     assert!(number(needs, "/ms_per_s") < 0.25 * number(pays, "/ms_per_s"), "{said}");
     assert!(number(&said, "/needs/error_m") + number(&said, "/known_m") <= tolerance, "{said}");
+    assert_eq!(number(&said, "/solves/implicit-euler"), 1.0, "the unit of what was measured");
+    assert!(number(&said, "/solves/bdf2") > 0.0);
 
     // the file: what was written, and nothing else
     let text = std::fs::read_to_string(folder.scene()).unwrap();
@@ -63,9 +65,14 @@ fn a_tube_that_is_too_fine_is_written_coarser_and_still_holds() {
     // the scene that was written, beside a finer one of another rule, which errs by a tenth of that itself
     let finest = TUBE.replace("segments = 64", "segments = 128").replace("dt_ms = 1.0", "dt_ms = 0.5");
     let finest = finest.replace("every_ms = 20", "every_ms = 0.5").replace("sleep = false", "integrator = \"bdf2\"");
-    let fine = samples(&Folder::with(&finest).lockstep(&["--seconds", "0.6"]));
-    let coarse = samples(&folder.lockstep(&["--seconds", "0.6"]));
-    assert!(coarse.len() > 20, "{coarse:?}");
+    holds(&folder, &finest, tolerance);
+}
+
+/// Whether the first probe of a scene that was written stays within 1.1 tolerances of where a finer scene has it.
+fn holds(written: &Folder, finest: &str, tolerance: f64) {
+    let fine = samples(&Folder::with(finest).lockstep(&["--seconds", "0.6"]));
+    let coarse = samples(&written.lockstep(&["--seconds", "0.6"]));
+    assert!(coarse.len() > 8, "{coarse:?}");
     for at in coarse.iter().filter(|at| at[0] < fine[fine.len() - 1][0]) {
         let after = fine.partition_point(|there| there[0] < at[0]).max(1);
         let [a, b] = [fine[after - 1], fine[after]];
@@ -85,10 +92,8 @@ fn a_tolerance_that_cannot_be_met_says_the_best_reached_and_what_limits_it() {
     assert!(errors.contains("the best reached is") && errors.contains("what limits it"), "{errors}");
 }
 
-#[test]
-fn simpler_models_are_named_where_they_would_do() {
-    let folder = Folder::with(
-        r#"
+/// A cord between two nails that swings to where it hangs.
+const CORD: &str = r#"
 [[object]]
 name = "cord"
 model = "tube"
@@ -101,7 +106,13 @@ pin = ["start", "end"]
 segments = 24
 dt_ms = 2.0
 self_contact = false
+"#;
 
+#[test]
+fn simpler_models_are_named_where_they_would_do() {
+    let folder = Folder::with(&format!(
+        "{CORD}{}",
+        r#"
 [[object]]
 name = "ball"
 model = "rigid"
@@ -124,8 +135,8 @@ name = "floor"
 model = "rigid"
 shape = "plane"
 position_m = [0, 0, -1]
-"#,
-    );
+"#
+    ));
     let (code, said, errors) = fit(folder.scene(), &["--tolerance", "1e-2", "--seconds", "0.5"]);
     assert_eq!(code, 0, "{errors}");
     let notes = said["notes"].as_array().unwrap();
@@ -133,6 +144,43 @@ position_m = [0, 0, -1]
     assert!(told("`cord` neither twists nor bends"), "{notes:?}");
     assert!(told("nothing touches `ball`"), "{notes:?}");
     assert!(told("`block` does not move"), "{notes:?}");
+    let word =
+        |name: &str| said["objects"].as_array().unwrap().iter().find(|o| o["name"] == name).unwrap()["simpler"].clone();
+    assert_eq!(["cord", "ball", "block"].map(word), ["rope", "flight: no solver", "fixed: no agent"]);
+    let table = metachron(&["fit", folder.scene(), "--tolerance", "1e-2", "--seconds", "0.1", "-q"]);
+    let table = String::from_utf8_lossy(&table.stdout).into_owned();
+    assert!(table.contains("simpler") && table.contains("fixed: no agent"), "{table}");
+}
+
+#[test]
+fn a_tube_that_hangs_as_a_rope_does_is_written_as_one_where_that_is_cheaper_and_still_holds() {
+    let probe =
+        "[[probe]]\nobject = \"cord\"\nat = 0.5\nevery_ms = 10\n[machine.step.rope]\nunit_us = 0.01\nbase_us = 0.1\n";
+    let scene = format!("{CORD}{probe}");
+    let folder = Folder::with(&scene);
+    let (code, said, errors) = fit(folder.scene(), &["--tolerance", "1e-2", "--seconds", "0.6", "--write"]);
+    assert_eq!(code, 0, "{errors}");
+    let [pays, needs] = ["pays", "needs"].map(|side| &said["objects"][0][side]);
+    assert_eq!((pays["model"].as_str(), needs["model"].as_str()), (Some("tube"), Some("rope")), "{said}");
+    assert!(number(&said, "/needs/error_m") + number(&said, "/known_m") <= 1e-2, "{said}");
+    let text = std::fs::read_to_string(folder.scene()).unwrap();
+    assert!(text.contains("model = \"rope\"") && !text.contains("self_contact") && !text.contains("pin ="), "{text}");
+    let fine = scene.replace("segments = 24", "segments = 96\nintegrator = \"bdf2\"");
+    holds(&folder, &fine.replace("dt_ms = 2.0", "dt_ms = 0.25").replace("every_ms = 10", "every_ms = 0.25"), 1e-2);
+}
+
+#[test]
+fn a_tool_that_meets_nobody_takes_the_longest_steps() {
+    let tool = "[[object]]\nname = \"tool\"\nmodel = \"instrument\"\nrate_hz = 200\n\
+                keyframe = [{ tip_m = [0, 1, 0] }, { at_s = 0.5, tip_m = [0.5, 1, 0] }]\n";
+    let folder = Folder::with(&format!("{TUBE}{tool}"));
+    let (code, said, errors) = fit(folder.scene(), &["--tolerance", "5e-3", "--seconds", "0.4", "--write"]);
+    assert_eq!(code, 0, "{errors}");
+    let [pays, needs] = ["pays", "needs"].map(|side| &said["objects"][1][side]);
+    assert_eq!(pays["model"].as_str(), Some("instrument"));
+    assert!(number(needs, "/dt_ms") >= 30.0 && number(needs, "/ms_per_s") < 0.2 * number(pays, "/ms_per_s"), "{said}");
+    let report = folder.lockstep(&["--seconds", "0.4"]);
+    assert_eq!(number(agent(&report, "tool"), "/dt_ms"), number(needs, "/dt_ms"));
 }
 
 #[test]

@@ -26,7 +26,7 @@ fn play(text: &str, frames: u64) -> Outcome {
     play_headless(session(text), plan, &mut |_, _| true).expect("nothing that can fail")
 }
 
-/// Tubes that swing between two nails before a camera, on a machine of so many cores that takes `unit_us` a segment and substep.
+/// Tubes that swing between two nails before a camera, on a machine of so many cores that takes `unit_us` a segment and solve.
 fn strands(tubes: u32, cores: u32, unit_us: f64) -> String {
     let mut text = format!(
         "[target]\nframe_hz = 60.0\npolicy = \"adaptive\"\n[camera]\neye_m = [0, -1.6, 0.3]\nlook_at_m = [0, 0, 0.2]\n\

@@ -68,20 +68,17 @@ impl Doubling {
         again.ties.extend_from_slice(ties);
     }
 
-    /// A step that is to be made again has ended at `now`, in `setting`'s substeps: it is, in twice as many. Returns how many more that
-    /// were.
-    pub fn end(&mut self, stepper: &mut Stepper, now: &Config, setting: &Setting<'_>) -> u32 {
-        let Some(again) = self.again.as_deref_mut() else { return 0 };
+    /// A step that is to be made again has ended at `now`, in `setting`'s substeps: it is, in twice as many.
+    pub fn end(&mut self, stepper: &mut Stepper, now: &Config, setting: &Setting<'_>) {
+        let Some(again) = self.again.as_deref_mut() else { return };
         let touching = stepper.contacts.is_touching();
         let setting = Setting { substeps: 2 * setting.substeps, ..*setting };
-        let Some(taken) = again.step(stepper, &setting) else {
-            self.watch.give_up();
-            return 0;
-        };
+        if !again.step(stepper, &setting) {
+            return self.watch.give_up();
+        }
         if self.watch.made_twice(setting.dt) {
             self.watch.learn(farthest(&now.x, &again.state.x), order(setting.integrator, touching));
         }
-        taken
     }
 }
 
@@ -91,8 +88,8 @@ impl Again {
         self.state.x.len() == now.x.len()
     }
 
-    /// Goes on by a step, with the stepper of the tube but for what that remembers; `None` where there is no next state.
-    fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> Option<u32> {
+    /// Goes on by a step, with the stepper of the tube but for what that remembers; whether there is a next state.
+    fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> bool {
         let Self { state, past, factor, company, ties } = self;
         let mut lend = |stepper: &mut Stepper| {
             std::mem::swap(&mut stepper.factor, factor);
@@ -104,7 +101,7 @@ impl Again {
         let taken = stepper.step(state, setting, ties);
         lend(stepper);
         stepper.span_s = span;
-        taken.ok()
+        taken.is_ok()
     }
 }
 

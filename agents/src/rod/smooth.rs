@@ -60,6 +60,7 @@ impl Stepper {
             self.next.strain(scene.matter, scene.division);
             let iterate = Iterate { start: &start, at: &self.next, first: false };
             assemble(&scene, &iterate, &mut self.rows, &mut self.rhs);
+            self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 break;
             }
@@ -129,6 +130,7 @@ impl Stepper {
             fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
             fill_mean(&tangent, (now, &self.next), &mut self.rows, &mut self.rhs);
             hold_ends(scene.matter, &mut self.rows, &mut self.rhs);
+            self.solves += 1;
             if self.factor.factor(&self.rows).is_err() {
                 return false;
             }

@@ -77,6 +77,8 @@ pub struct Stepper {
     pushed_j: f64,
     /// The length of the substep that ended last, seconds.
     pub(super) span_s: f64,
+    /// Systems factored since the step began, iterations and substeps that were tried in vain among them: its work.
+    pub(super) solves: u32,
 }
 
 /// What became of a trial substep.
@@ -250,6 +252,7 @@ impl Stepper {
     fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
         self.touch(now, scene, first);

@@ -209,16 +209,14 @@ impl Tube {
         self.stepper.contacts = contacts;
     }
 
-    /// Makes a step of `dt` seconds in so many substeps again where it is its turn; how many more that took.
-    fn double(&mut self, (dt, substeps): (f64, u32)) -> u32 {
+    /// Makes a step of `dt` seconds in so many substeps again where it is its turn.
+    fn double(&mut self, (dt, substeps): (f64, u32)) {
         if !self.doubling.is_on() {
-            return 0;
+            return;
         }
         let mut doubling = std::mem::take(&mut self.doubling);
-        let taken =
-            self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
+        self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
         self.doubling = doubling;
-        taken
     }
 
     fn write_grips(&mut self, dt: f64) {
@@ -312,10 +310,11 @@ impl Agent for Tube {
         self.widen(around.time + dt);
         let watched = self.stepper.company.is_watched();
         let before = self.begin_watch(watched);
+        self.stepper.solves = 0;
         self.doubling.begin((self.steps, around.me), (&self.now, &self.ties), &self.stepper);
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
-        let doubled = self.double((dt_s, substeps));
+        self.double((dt_s, substeps));
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
         self.end_watch(before, dt_s);
@@ -323,7 +322,7 @@ impl Agent for Tube {
         self.time = around.time + dt;
         self.steps += 1;
         self.at_rest = self.watch_rest(dt_s);
-        let work = self.segments() as f64 * f64::from(substeps + doubled);
+        let work = self.segments() as f64 * f64::from(self.stepper.solves);
         Ok(StepReport { work, substeps, at_rest: self.at_rest })
     }
 

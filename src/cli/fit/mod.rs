@@ -1,10 +1,11 @@
 //! `fit`: the cheapest steps, divisions and integrators with which a scene's points stay where its converged answer has them.
 //!
-//! In: a scene, a tolerance. Out: a table of what is paid and what is needed, sentences on what a simpler model would do, and with
+//! In: a scene, a tolerance. Out: a table of what is paid and what is needed, words on what a simpler model would do, and with
 //! `--write` the scene. Never here: how a search goes ([`crate::fit`]), how a scene is played ([`crate::frame`]).
 
 mod limits;
 mod objects;
+mod roped;
 mod simpler;
 mod task;
 mod told;
@@ -18,6 +19,7 @@ use crate::fit::{Converged, Found, Search, Setting, Trial, converge};
 use crate::scene::{Source, builtin, load};
 use anyhow::Context;
 use objects::Object;
+use simpler::Simpler;
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -38,8 +40,8 @@ struct Fitted {
     need: Found,
     /// Measured CPU of each object, seconds a simulated second: now, and as is needed.
     cpu_s: [Vec<f64>; 2],
-    /// What a simpler model would do.
-    notes: Vec<String>,
+    /// What a simpler model would do, object by object.
+    simpler: Vec<Option<Simpler>>,
 }
 
 /// Fits a scene.
@@ -134,13 +136,14 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let choices = task.choices();
     let trials_max = args.runs;
     let mut attempt = |settings: &[Setting]| task.attempt(settings, &answer.paths);
-    let need =
+    let mut need =
         Search { choices: &choices, tolerance_m: room_m, trials_max, attempt: &mut attempt }.run(settings, trial);
     task.failure()?;
-    let cpu_s = [task.cpu(&now), task.cpu(&need.settings)];
-    let notes = simpler::notes(task, &answer, &need, room_m);
+    let paid_s = task.cpu(&now);
+    let simpler = simpler::find(task, &mut need, &simpler::Limits { answer: &answer, room_m, trials_max });
+    let cpu_s = [paid_s, task.cpu(&need.settings)];
     task.failure()?;
-    Ok(Outcome::Fitted(Fitted { known_m: answer.error_m, now: (now, present), need, cpu_s, notes }))
+    Ok(Outcome::Fitted(Fitted { known_m: answer.error_m, now: (now, present), need, cpu_s, simpler }))
 }
 
 /// The coarsest settings that hold by halving alone: as the scene is, with a method of second order, or ever finer.

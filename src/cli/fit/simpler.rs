@@ -1,33 +1,51 @@
 //! When a simpler model would do.
 //!
-//! In: a scene at the settings that were found. Out: sentences. Never here: any change of the scene.
+//! In: a scene at the settings that were found. Out: a word and a sentence for every object that one would do for; tubes that are
+//! cheaper as ropes become ropes. Never here: any other change of the scene.
 
 use super::length;
-use super::task::Task;
-use crate::fit::{Converged, Found, Path, Setting, farthest_m};
-use crate::frame::{Played, slacken};
+use super::task::{Task, is_free};
+use crate::fit::{Choice, Converged, Found, Path, Search, Setting};
+use crate::frame::Played;
 use crate::scene::Spec;
 
 /// What moves by less than this share of the tolerance does not move.
 const STILL: f64 = 0.01;
 /// A rope is tried with the steps of the tube, and with steps so many times shorter.
-const SHORTER: [f64; 2] = [1.0, 4.0];
+const SHORTER: [f64; 3] = [1.0, 2.0, 4.0];
+/// The most pieces of a rope.
+const PIECES_MAX: u32 = 2047;
 
-/// One sentence for every object that a simpler model would do for.
-pub(super) fn notes(task: &mut Task<'_>, answer: &Converged, need: &Found, room_m: f64) -> Vec<String> {
+/// What to say of an object.
+pub(super) struct Simpler {
+    /// For the table.
+    pub(super) word: &'static str,
+    /// In full.
+    pub(super) note: String,
+}
+
+/// A search for ropes: the answer, how far from it points may be, and how many trials there are in all.
+pub(super) struct Limits<'a> {
+    pub(super) answer: &'a Converged,
+    pub(super) room_m: f64,
+    pub(super) trials_max: u32,
+}
+
+/// What a simpler model would do, object by object; `need` is what is needed of the models that are left.
+pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -> Vec<Option<Simpler>> {
     let Some(played) = task.play(&need.settings) else { return Vec::new() };
-    let mut notes = Vec::new();
-    for object in 0..task.objects.len() {
-        let paths = paths(task, &played, object);
-        let still = !paths.is_empty() && paths.iter().all(|path| path.extent_m() <= STILL * room_m);
-        let note = if still {
-            Some(resting(task, object))
-        } else {
-            flying(task, &played, (object, room_m)).or_else(|| roping(task, answer, (object, room_m), &need.settings))
-        };
-        notes.extend(note);
+    let plain = |object: usize| {
+        own(task, object)
+            .or_else(|| resting(task, &played, (object, limits.room_m)))
+            .or_else(|| flying(task, &played, (object, limits.room_m)))
+    };
+    let mut simpler: Vec<_> = (0..task.objects.len()).map(plain).collect();
+    for (object, told) in simpler.iter_mut().enumerate() {
+        if told.is_none() {
+            *told = slack(task, object, need, limits);
+        }
     }
-    notes
+    simpler
 }
 
 /// The paths of an object's points.
@@ -37,61 +55,92 @@ fn paths(task: &Task<'_>, played: &Played, object: usize) -> Vec<Path> {
     all.filter(|(point, _)| agents.contains(&point.agent)).map(|(_, path)| path.clone()).collect()
 }
 
+/// What to say of what may not be chosen.
+fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
+    let tolerance_m = task.member(object).tolerance_m?;
+    let (name, held) = (&task.objects[object].name, length(tolerance_m));
+    let note = format!("`{name}` holds an error of {held} by itself: its steps and segments are not chosen here");
+    Some(Simpler { word: "its own choice", note })
+}
+
 /// What to say of what does not move.
-fn resting(task: &Task<'_>, object: usize) -> String {
+fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
+    let paths = paths(task, played, object);
+    let still = !paths.is_empty() && paths.iter().all(|path| path.extent_m() <= STILL * room_m);
     let (name, seconds) = (&task.objects[object].name, task.seconds);
-    match task.member(object).spec {
+    let note = match task.member(object).spec {
         Spec::Rigid(_) => format!("`{name}` does not move in {seconds} s: with `fixed = true` it needs no agent"),
         _ => format!("`{name}` does not move in {seconds} s: a fixed object of its shape needs no agent"),
-    }
+    };
+    still.then_some(Simpler { word: "fixed: no agent", note })
 }
 
 /// What to say of a body that nothing touches.
-fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<String> {
+fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
     let agents = &task.objects[object].agents;
     let paired = played.pairs.iter().any(|(a, b)| agents.contains(a) || agents.contains(b));
     let jointed = spec.joints.iter().any(|joint| agents.iter().any(|agent| joint.holds(*agent)));
     let flies = paths(task, played, object).iter().all(|path| path.from_flight_m(spec.gravity) <= STILL * room_m);
-    (!paired && !jointed && flies).then(|| {
-        let (name, seconds) = (&task.objects[object].name, task.seconds);
-        format!(
-            "nothing touches `{name}` in {seconds} s: it needs no contact solver, and its flight is exact at any step"
-        )
-    })
+    let (name, seconds) = (&task.objects[object].name, task.seconds);
+    let note = format!(
+        "nothing touches `{name}` in {seconds} s: it needs no contact solver, and its flight is exact at any step"
+    );
+    (!paired && !jointed && flies).then_some(Simpler { word: "flight: no solver", note })
 }
 
-/// What to say of a tube that does no more than a rope.
-fn roping(
-    task: &mut Task<'_>,
-    answer: &Converged,
-    (object, room_m): (usize, f64),
-    settings: &[Setting],
-) -> Option<String> {
-    if !matches!(task.member(object).spec, Spec::Tube(_)) {
+/// Tries a tube as a rope, and makes it one where that is cheaper; what to say where it would do.
+fn slack(task: &mut Task<'_>, object: usize, need: &mut Found, limits: &Limits<'_>) -> Option<Simpler> {
+    if !matches!(task.member(object).spec, Spec::Tube(_)) || !is_free(task.member(object)) {
         return None;
     }
+    let tubes = task.scene.clone();
+    let rope = if task.slacken(object) { as_rope(task, object, need, limits) } else { None };
+    let Some(rope) = rope else {
+        task.scene = tubes;
+        return None;
+    };
+    let cheaper = rope.trial.cost_s() < need.trial.cost_s();
+    let Setting { dt_s, pieces, .. } = rope.settings[object];
+    let [as_rope_ms, as_tube_ms] = [&rope, &*need].map(|found| found.trial.costs_s[object] * 1e3);
+    let note = format!(
+        "`{}` neither twists nor bends stiffly enough to matter: `model = \"rope\"` with {pieces} segments and {:.3} ms costs {as_rope_ms:.3} ms a second, the tube {as_tube_ms:.3} ms{}",
+        task.objects[object].name,
+        dt_s * 1e3,
+        if cheaper { "" } else { ", so it stays one" },
+    );
+    if cheaper {
+        *need = rope;
+    } else {
+        task.scene = tubes;
+        need.tried = rope.tried;
+    }
+    Some(Simpler { word: "rope", note })
+}
+
+/// The cheapest rope that holds, all else as it is.
+fn as_rope(task: &mut Task<'_>, object: usize, need: &Found, limits: &Limits<'_>) -> Option<Found> {
+    let (mut tried, mut start) = (need.tried, None);
     for shorter in SHORTER {
-        let mut settings = settings.to_vec();
-        settings[object].dt_s /= shorter;
-        let mut scene = task.scene_at(&settings);
-        let agents = task.objects[object].agents.clone();
-        if !agents.iter().all(|agent| slacken(&mut scene, *agent)) {
-            return None;
-        }
-        let played = task.play_scene(&scene)?;
-        let error_m = farthest_m(&played.paths[..task.held], &answer.paths);
-        if played.parked.is_none() && error_m <= room_m {
-            let Setting { dt_s, pieces, .. } = settings[object];
-            let cost_s: f64 = agents.iter().map(|agent| played.costs_s[agent.0 as usize]).sum();
-            return Some(format!(
-                "`{}` neither twists nor bends stiffly enough to matter: `model = \"rope\"` with {pieces} segments and {:.3} ms errs by {} and costs {:.3} ms a second",
-                task.objects[object].name,
-                dt_s * 1e3,
-                length(error_m),
-                cost_s * 1e3
-            ));
+        let mut settings = need.settings.clone();
+        let Setting { dt_s, pieces, .. } = settings[object];
+        settings[object] = Setting { dt_s: dt_s / shorter, pieces: pieces.min(PIECES_MAX), method: 0 };
+        let trial = task.attempt(&settings, &limits.answer.paths)?;
+        tried += 1;
+        if trial.error_m <= limits.room_m {
+            start = Some((settings, trial));
+            break;
         }
     }
-    None
+    let (settings, trial) = start?;
+    let mut choices = task.choices();
+    for (other, choice) in choices.iter_mut().enumerate().filter(|(other, _)| *other != object) {
+        let Setting { dt_s, pieces, .. } = settings[other];
+        *choice = Choice { dt_max_s: dt_s, pieces_min: pieces, methods: Vec::new() };
+    }
+    let mut attempt = |settings: &[Setting]| task.attempt(settings, &limits.answer.paths);
+    let (tolerance_m, trials_max) = (limits.room_m, limits.trials_max.saturating_sub(tried));
+    let search = Search { choices: &choices, tolerance_m, trials_max, attempt: &mut attempt };
+    let found = search.run(settings, trial);
+    Some(Found { tried: tried + found.tried, cut_short: need.cut_short || found.cut_short, ..found })
 }

@@ -9,7 +9,7 @@ use super::super::progress::Bar;
 use super::names;
 use super::objects::Object;
 use crate::fit::{Choice, Path, Setting, Trial, farthest_m};
-use crate::frame::{Played, Point, SessionError, apply, method_of, play_points, setting_of};
+use crate::frame::{Played, Point, SessionError, apply, method_of, play_points, setting_of, slacken, solve_prices};
 use crate::scene::{Member, Scene, Spec};
 use metachron_agents::AgentId;
 use metachron_agents::rod::Integrator;
@@ -25,6 +25,9 @@ const PIECES_MAX: [u32; 2] = [4096, 64];
 
 /// A scene under fit.
 pub(super) struct Task<'a> {
+    /// As it was read.
+    pub(super) first: Scene,
+    /// With the models that were chosen.
     pub(super) scene: Scene,
     pub(super) objects: Vec<Object>,
     /// All points: first those that are held, then some of every other agent, for what is said of it.
@@ -36,6 +39,8 @@ pub(super) struct Task<'a> {
     bar: Option<Bar>,
     pub(super) runs: Cell<u32>,
     runs_max: u32,
+    /// What a solve of every integrator costs beside one of implicit Euler, as measured on this machine.
+    pub(super) prices: Vec<f64>,
     failed: Option<SessionError>,
     parked: Option<String>,
 }
@@ -59,7 +64,8 @@ impl<'a> Task<'a> {
         points.extend(scene.agents.iter().flat_map(points_of));
         let (seconds, runs_max) = (args.seconds, args.runs);
         let (bar, runs, failed, parked) = (Some(bar), Cell::new(0), None, None);
-        Ok(Self { scene, objects, points, held, seconds, stopped, bar, runs, runs_max, failed, parked })
+        let (first, prices) = (scene.clone(), solve_prices());
+        Ok(Self { first, scene, objects, points, held, seconds, stopped, bar, runs, runs_max, prices, failed, parked })
     }
 
     /// Takes the progress off the screen.
@@ -86,6 +92,11 @@ impl<'a> Task<'a> {
     /// The first agent of an object: all of them are alike.
     pub(super) fn member(&self, object: usize) -> &Member {
         &self.scene.agents[self.objects[object].agents[0].0 as usize]
+    }
+
+    /// The same as it was read.
+    pub(super) fn first_member(&self, object: usize) -> &Member {
+        &self.first.agents[self.objects[object].agents[0].0 as usize]
     }
 
     /// The settings that the scene has.
@@ -127,7 +138,26 @@ impl<'a> Task<'a> {
         let played = self.play(settings)?;
         let apart_m = farthest_m(&played.paths[..self.held], answer);
         let error_m = if played.parked.is_some() { f64::INFINITY } else { apart_m };
-        Some(Trial { error_m, costs_s: self.sums(&played.costs_s) })
+        let costs_s = self.sums(&played.costs_s).into_iter().enumerate();
+        let costs_s = costs_s.map(|(object, cost_s)| cost_s * self.price(object, settings[object].method)).collect();
+        Some(Trial { error_m, costs_s })
+    }
+
+    /// What a solve of an object costs by a method, beside one of the declared machine.
+    fn price(&self, object: usize, method: usize) -> f64 {
+        let tube = matches!(self.member(object).spec, Spec::Tube(_));
+        let price = self.prices.get(method).filter(|price| tube && price.is_finite());
+        price.copied().unwrap_or(1.0)
+    }
+
+    /// Makes a rope of a tube; `false` where none can be made of it.
+    pub(super) fn slacken(&mut self, object: usize) -> bool {
+        let mut scene = self.scene.clone();
+        let can = self.objects[object].agents.iter().all(|agent| slacken(&mut scene, *agent));
+        if can {
+            self.scene = scene;
+        }
+        can
     }
 
     /// Measured CPU of every object, seconds a simulated second.
@@ -148,17 +178,13 @@ impl<'a> Task<'a> {
 
     /// Plays the scene at these settings to its end.
     pub(super) fn play(&mut self, settings: &[Setting]) -> Option<Played> {
-        self.play_scene(&self.scene_at(settings))
-    }
-
-    /// Plays a scene like this one.
-    pub(super) fn play_scene(&mut self, scene: &Scene) -> Option<Played> {
+        let scene = self.scene_at(settings);
         let runs = self.runs.get() + 1;
         self.runs.set(runs);
         let done = f64::from(runs) / f64::from(self.runs_max.max(1));
         self.bar.iter().for_each(|bar| bar.tell(done, format!("run {runs}")));
         let stopped = self.stopped;
-        match play_points(scene, &self.points, self.seconds, &mut || !stopped.load(Ordering::Relaxed)) {
+        match play_points(&scene, &self.points, self.seconds, &mut || !stopped.load(Ordering::Relaxed)) {
             Ok(played) => played,
             Err(error) => {
                 self.failed.get_or_insert(error);
@@ -178,6 +204,7 @@ impl<'a> Task<'a> {
             }
             let tube = matches!(member.spec, Spec::Tube(_));
             let methods = Integrator::ALL.into_iter().filter(|one| tube && *one != Integrator::Xpbd).map(method_of);
+            let methods = methods.filter(|method| self.prices[*method].is_finite());
             let line = tube || member.spec.model() == "rope";
             Choice { dt_max_s, pieces_min: PIECES_MIN[usize::from(!line)], methods: methods.collect() }
         };
@@ -191,9 +218,10 @@ impl<'a> Task<'a> {
     }
 }
 
-/// Whether anything of an agent may be chosen: tools follow their script, and who holds an error chooses by itself.
+/// Whether anything of an agent may be chosen: what has no matter has no answer, and who holds an error chooses by itself.
+/// A tool keeps to its script at any step, but what it holds and pushes is told of it once a step.
 pub(super) fn is_free(member: &Member) -> bool {
-    member.tolerance_m.is_none() && matches!(member.spec, Spec::Tube(_) | Spec::Soft(_) | Spec::Rigid(_))
+    member.tolerance_m.is_none() && !matches!(member.spec, Spec::Synthetic(_))
 }
 
 /// Points of an agent that say where all of it is.

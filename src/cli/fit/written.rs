@@ -3,9 +3,9 @@
 //! In: a scene file and settings. Out: the same file with other steps, segments and integrators. Never here: what they should be.
 
 use super::super::output::BadInput;
-use super::Fitted;
 use super::objects::{name, tables};
 use super::task::Task;
+use super::{Fitted, roped};
 use crate::fit::Setting;
 use crate::frame::cells_of;
 use crate::scene::{Member, Source, Spec, load};
@@ -34,20 +34,22 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
     let scene = task.scene_at(&fitted.need.settings);
     let mut changes = 0;
     for (object, (now, need)) in fitted.now.0.iter().zip(&fitted.need.settings).enumerate() {
-        if now == need {
+        let becomes_rope = task.first_member(object).spec.model() != task.member(object).spec.model();
+        if now == need && !becomes_rope {
             continue;
         }
         let wanted = &task.objects[object];
         let member = &scene.agents[wanted.agents[0].0 as usize];
         let table = tables(&mut document).find(|table| name(table) == Some(&wanted.name));
         let table = table.ok_or_else(|| format!("`{}` has no table `[[object]]` of its own", wanted.name))?;
-        changes += put(table, member, (now, need));
+        changes += put_dt(table, (now, need));
+        changes += if becomes_rope { roped::put(table, member) } else { put(table, member, (now, need)) };
     }
     Ok((document.to_string(), changes))
 }
 
-/// Puts a setting into an object's table; how many keys that changed.
-fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
+/// Puts a step into an object's table; how many keys that changed.
+fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
     let mut changes = 0;
     if need.dt_s != now.dt_s {
         let dt_ms = tidy(need.dt_s * 1e3);
@@ -59,6 +61,12 @@ fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) ->
             changes += set(table, "dt_ms", dt_ms.into());
         }
     }
+    changes
+}
+
+/// Puts a division and a method into an object's table; how many keys that changed.
+fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
+    let mut changes = 0;
     if need.pieces != now.pieces {
         changes += set(table, "segments", segments(member));
     }
@@ -80,7 +88,7 @@ fn segments(member: &Member) -> Value {
 }
 
 /// Gives a key its value; what is written around the old one stays.
-fn set(table: &mut Table, key: &str, value: Value) -> usize {
+pub(super) fn set(table: &mut Table, key: &str, value: Value) -> usize {
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {
             let decor = old.decor().clone();
@@ -93,6 +101,6 @@ fn set(table: &mut Table, key: &str, value: Value) -> usize {
 }
 
 /// Six digits, so that 0.1 + 0.2 is 0.3.
-fn tidy(value: f64) -> f64 {
+pub(super) fn tidy(value: f64) -> f64 {
     format!("{value:.6}").parse().unwrap_or(value)
 }

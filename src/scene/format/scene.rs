@@ -322,7 +322,7 @@ pub struct ShadingCostFile {
 pub struct ModelCostFile {
     /// Microseconds a step, 0 … 1e9.
     pub base_us: Option<f64>,
-    /// Microseconds a unit of work (tube: a segment and substep; synthetic: a declared microsecond; others: a step), 0 … 1e9.
+    /// Microseconds a unit of work (tube: a segment of a system solved, one a substep or more; synthetic: a declared microsecond; others: a step), 0 … 1e9.
     pub unit_us: Option<f64>,
 }
 

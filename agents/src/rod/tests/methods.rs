@@ -175,3 +175,23 @@ fn an_explicit_tube_that_stretches_on_its_way_takes_shorter_substeps_and_hangs_a
     assert!(substeps > 3000, "{substeps} substeps in 3000 steps");
     assert!(apart_m < 1e-7, "{apart_m} m"); // what is left of the swing after 6 s: 1.2e-9 measured
 }
+
+#[test]
+fn the_work_of_a_step_is_what_was_solved_for_it() {
+    // solves a substep: one, or as often as the rule iterates (at least twice, six and twelve times at most)
+    for (integrator, least, most) in [
+        (Integrator::SymplecticEuler, 1.0, 1.0),
+        (Integrator::Xpbd, 1.0, 1.0),
+        (Integrator::ImplicitEuler, 1.0, 1.0),
+        (Integrator::Bdf2, 2.0, 6.0),
+        (Integrator::EnergyMomentum, 2.0, 12.0),
+    ] {
+        let spec = TubeSpec { integrator, gravity: DVec3::NEG_Z * 9.81, ..reference_spec(1e5, 16) };
+        let mut tube = Tube::new(TubeSpec { pin: [true, false], ..spec }).unwrap();
+        for _ in 0..40 {
+            let report = tube.step(millis(0.2), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+            let solves = report.work / 16.0 / f64::from(report.substeps);
+            assert!((least..=most).contains(&solves), "{}: {solves} solves a substep", integrator.name());
+        }
+    }
+}
