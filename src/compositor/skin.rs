@@ -1,7 +1,7 @@
 //! Soft bodies in the picture: skins of triangles that move, and ropes as tubes.
 //!
-//! In: vertices as a snapshot shows them, and what joins them. Out: corners with smooth normals for one mesh of the frame; a framed
-//! curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
+//! In: vertices as a snapshot shows them, and what joins them. Out: corners with normals for one mesh of the frame, smooth but at the
+//! sharp edges of solids; a framed curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
 
 use super::level::Shading;
 use super::picture::MeshCorner;
@@ -13,6 +13,10 @@ use metachron_agents::{CurveState, SoftState};
 pub const ROPE_LEVEL: u8 = 2;
 /// A sheet is drawn at least this thick, as a share of its edges: thinner, its two faces would fight for the same depths.
 const THIN_SHARE: f64 = 0.01;
+
+/// Triangles of a solid that share a vertex are shaded as one surface where the cosine between them is at least this, 60°: the bends of
+/// a soft body are smooth, the edges of its shape are edges.
+const SMOOTH_COS: f64 = 0.5;
 
 /// The corners and triangles of all skins of a frame.
 #[derive(Debug, Clone, Default)]
@@ -51,10 +55,31 @@ pub(super) struct SkinWish {
     pub edges: bool,
 }
 
+/// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others stand behind all vertices.
+#[derive(Debug, Default)]
+struct Faces {
+    all: Vec<Face>,
+    /// Corners of each triangle, by face.
+    triangles: Vec<[u32; 3]>,
+}
+
+/// One surface at a vertex.
+#[derive(Debug, Clone, Copy)]
+struct Face {
+    vertex: u32,
+    /// The normal of its first triangle; zero before that is known.
+    first: DVec3,
+    /// The normals of its triangles, added by area.
+    sum: DVec3,
+    /// The next surface at this vertex.
+    next: Option<u32>,
+}
+
 /// Room to work in.
 #[derive(Debug, Default)]
 pub(super) struct SkinRoom {
     normals: Vec<DVec3>,
+    faces: Faces,
     /// How many triangles each edge of a sheet has: those with one are its rim.
     rim: Vec<[u32; 2]>,
 }
@@ -71,17 +96,23 @@ impl Skins {
     /// Adds the skin of a body that is drawn by an instance, with its sides where edges are drawn.
     pub(super) fn add(&mut self, form: &SurfaceForm, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
         let SkinWish { origin, instance, shading, edges } = wish;
-        room.find_normals(form, soft);
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
         let corner = |x: &DVec3, n: DVec3| MeshCorner {
             core: (*x - origin).as_vec3().to_array(),
             normal: n.as_vec3().to_array(),
             uv: [0.0; 2],
         };
-        let both = || soft.positions.iter().zip(&room.normals);
-        self.corners.extend(both().map(|(x, n)| corner(x, *n)));
-        self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
-        if !form.closed {
+        if form.closed {
+            room.faces.find(form, soft);
+            let normal = |face: &Face| face.sum.normalize_or(DVec3::Z);
+            let faces = room.faces.all.iter();
+            self.corners.extend(faces.map(|face| corner(&soft.positions[face.vertex as usize], normal(face))));
+            self.triangles.extend(room.faces.triangles.iter().map(|t| t.map(|face| first + face)));
+        } else {
+            room.find_normals(form, soft);
+            let both = || soft.positions.iter().zip(&room.normals);
+            self.corners.extend(both().map(|(x, n)| corner(x, *n)));
+            self.triangles.extend(form.triangles.iter().map(|t| t.map(|vertex| first + vertex)));
             let back = first + soft.positions.len() as u32;
             self.corners.extend(both().map(|(x, n)| corner(x, -*n)));
             self.triangles.extend(form.triangles.iter().map(|&[a, b, c]| [back + a, back + c, back + b]));
@@ -95,6 +126,44 @@ impl Skins {
             self.sides.extend(all.flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
         }
         self.runs.push(SkinRun { triangles: (from, self.triangles.len() as u32 - from), instance, shading });
+    }
+}
+
+impl Faces {
+    fn find(&mut self, form: &SurfaceForm, soft: &SoftState) {
+        let empty = |vertex| Face { vertex, first: DVec3::ZERO, sum: DVec3::ZERO, next: None };
+        self.all.clear();
+        self.all.extend((0..soft.positions.len() as u32).map(empty));
+        self.triangles.clear();
+        for triangle in form.triangles.iter() {
+            let [a, b, c] = triangle.map(|vertex| soft.positions[vertex as usize]);
+            let normal = (b - a).cross(c - a);
+            let faces = triangle.map(|vertex| self.face(vertex, normal.normalize_or_zero()));
+            faces.iter().for_each(|face| self.all[*face as usize].sum += normal);
+            self.triangles.push(faces);
+        }
+    }
+
+    /// The surface at `vertex` that a triangle with this normal belongs to; a triangle without one, to the first.
+    fn face(&mut self, vertex: u32, normal: DVec3) -> u32 {
+        let mut at = vertex;
+        loop {
+            let face = &mut self.all[at as usize];
+            if face.first == DVec3::ZERO {
+                face.first = normal;
+            }
+            if normal == DVec3::ZERO || face.first.dot(normal) >= SMOOTH_COS {
+                return at;
+            }
+            match face.next {
+                Some(next) => at = next,
+                None => break,
+            }
+        }
+        let new = self.all.len() as u32;
+        self.all[at as usize].next = Some(new);
+        self.all.push(Face { vertex, first: normal, sum: DVec3::ZERO, next: None });
+        new
     }
 }
 
@@ -189,6 +258,43 @@ mod tests {
         });
         let volume: f64 = volumes.sum();
         assert!((volume - 0.02).abs() < 1e-8, "{volume}"); // 1 m² by 2 cm, in single precision
+    }
+
+    /// A cube of one cell, each side of two triangles, whose top side is turned about the y axis.
+    fn cube(turn_rad: f64) -> (SurfaceForm, SoftState) {
+        let quads = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
+        let triangles: Vec<[u32; 3]> = quads.iter().flat_map(|&[a, b, c, d]| [[a, b, c], [a, c, d]]).collect();
+        let form = SurfaceForm {
+            vertices: (0..8).collect(),
+            edges: [].into(),
+            triangles: triangles.into(),
+            radius_m: 0.0,
+            edge_m: 1.0,
+            closed: true,
+        };
+        let bit = |k: u32, b: u32| f64::from(k >> b & 1);
+        let top = |x: f64, z: f64| z * (1.0 + x * turn_rad.tan());
+        let positions = (0..8).map(|k| DVec3::new(bit(k, 0), bit(k, 1), top(bit(k, 0), bit(k, 2)))).collect();
+        (form, SoftState { velocities: vec![DVec3::ZERO; 8], positions })
+    }
+
+    #[test]
+    fn a_solid_is_smooth_within_its_sides_and_sharp_at_its_edges() {
+        let (form, soft) = cube(0.3);
+        let (mut skins, mut room) = (Skins::default(), SkinRoom::default());
+        let wish = SkinWish { origin: DVec3::ZERO, instance: 0, shading: Shading::PerPixel, edges: false };
+        skins.add(&form, &soft, wish, &mut room);
+        assert_eq!(skins.corners.len(), 24, "three sides meet at each of eight vertices");
+        for triangle in &skins.triangles {
+            let corners = triangle.map(|corner| &skins.corners[corner as usize]);
+            let [a, b, c] = corners.map(|corner| glam::Vec3::from(corner.core));
+            let flat = (b - a).cross(c - a).normalize();
+            assert!(corners.iter().all(|corner| flat.dot(corner.normal.into()) > 1.0 - 1e-6), "a side is flat");
+        }
+        // the room remembers nothing of the body before
+        skins.clear();
+        skins.add(&form, &soft, wish, &mut room);
+        assert_eq!((skins.corners.len(), skins.triangles.len()), (24, 12));
     }
 
     #[test]
