@@ -172,7 +172,18 @@ fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
         setup.device_descriptor = std::sync::Arc::new(super::super::offscreen::device_descriptor);
     }
     let renderer = eframe::Renderer::Wgpu;
-    NativeOptions { viewport, wgpu_options, renderer, persist_window: size.is_none(), ..NativeOptions::default() }
+    // a size that is given wins over the one that the window was closed with, which is restored before this is asked
+    let sized = move |size: [f32; 2]| -> eframe::WindowBuilderHook {
+        Box::new(move |builder| builder.with_inner_size(size).with_maximized(false).with_fullscreen(false))
+    };
+    NativeOptions {
+        viewport,
+        wgpu_options,
+        renderer,
+        persist_window: size.is_none(),
+        window_builder: size.map(sized),
+        ..NativeOptions::default()
+    }
 }
 
 /// The application inside eframe.
@@ -363,6 +374,14 @@ impl eframe::App for Shell<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_size_that_is_given_wins_over_the_one_that_is_restored() {
+        let restored = || egui::ViewportBuilder::default().with_inner_size([1000.0, 700.0]).with_maximized(true);
+        let built = native_options("tube", Some([800.0, 600.0])).window_builder.unwrap()(restored());
+        assert_eq!((built.inner_size, built.maximized), (Some([800.0, 600.0].into()), Some(false)));
+        assert!(native_options("tube", None).window_builder.is_none());
+    }
 
     #[test]
     fn pictures_keep_their_beat_and_a_stall_starts_a_new_one() {
