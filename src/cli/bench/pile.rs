@@ -8,9 +8,8 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
-use super::super::progress::Bar;
 use super::machine::{others_cpu, own_cpu};
-use super::subject::Subject;
+use super::subject::{Subject, Watch};
 use crate::compositor::{Size, Style};
 use crate::frame::{Drawing, End, Headless, Session, play_headless};
 use crate::runtime::AgentStats;
@@ -59,17 +58,19 @@ impl Subject for Pile {
     type Row = Row;
     const NAME: &'static str = "pile";
 
-    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
-        bar.tell(0.0, "one rapier3d world".to_owned());
-        let plain = plain(&scene, sim_s, Settings::Own)?;
-        bar.tell(0.2, "one rapier3d world, settings of an island".to_owned());
-        let alike = self::plain(&scene, sim_s, Settings::Island)?;
-        bar.tell(0.4, "agents in virtual time".to_owned());
-        let lockstep = agents(&scene, ExecutorKind::Lockstep, sim_s)?;
-        bar.tell(0.6, "agents in a pool".to_owned());
-        let pool = agents(&scene, ExecutorKind::Pool, sim_s)?;
+        let cases: [(&str, &dyn Fn() -> anyhow::Result<Row>); 4] = [
+            ("one rapier3d world", &|| plain(&scene, sim_s, Settings::Own)),
+            ("one rapier3d world, settings of an island", &|| plain(&scene, sim_s, Settings::Island)),
+            ("agents in virtual time", &|| agents(&scene, ExecutorKind::Lockstep, sim_s)),
+            ("agents in a pool", &|| agents(&scene, ExecutorKind::Pool, sim_s)),
+        ];
+        let told = cases.iter().zip(0_u32..);
+        let wanted = told.take_while(|((words, _), at)| watch.goes_on(0.2 * f64::from(*at), (*words).to_owned()));
+        let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
+        let Some(plain) = rows.first().cloned() else { return Ok(rows) };
         let whole = plain.steps_per_cpu_s;
         let others = OTHERS.map(|(who, steps)| Row {
             who: who.to_owned(),
@@ -77,8 +78,7 @@ impl Subject for Pile {
             steps_per_cpu_s: steps,
             ..plain.clone()
         });
-        let rows = [plain, alike, lockstep, pool].into_iter().chain(others);
-        Ok(rows.map(|row| Row { share: row.steps_per_cpu_s / whole, ..row }).collect())
+        Ok(rows.into_iter().chain(others).map(|row| Row { share: row.steps_per_cpu_s / whole, ..row }).collect())
     }
 
     fn table(rows: &[Row]) -> Table {

@@ -5,8 +5,7 @@
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::table::Table;
-use super::super::progress::Bar;
-use super::subject::Subject;
+use super::subject::{Subject, Watch};
 use crate::compositor::{Drawn, Gpu, RendererOptions, Shading, benchmark};
 use crate::control::AREAS_PX;
 use anyhow::Context;
@@ -34,9 +33,11 @@ impl Subject for Render {
     type Row = Row;
     const NAME: &'static str = "render";
 
-    fn measure(_args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
+    fn measure(_args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
         let gpu = Gpu::headless().context("there is no adapter to measure")?;
-        bar.tell(0.0, gpu.describe());
+        if !watch.goes_on(0.0, gpu.describe()) {
+            return Ok(Vec::new());
+        }
         let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX)?;
         Ok(drawn.iter().map(|drawn| row(&gpu.describe(), drawn)).collect())
     }

@@ -6,11 +6,10 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
-use super::super::progress::Bar;
 use super::bare::step;
 use super::cast::{ROD_SEGMENTS, rod};
 use super::machine::own_cpu;
-use super::subject::Subject;
+use super::subject::{Subject, Watch};
 use glam::DVec3;
 use metachron_agents::SimSpan;
 use serde::{Deserialize, Serialize};
@@ -44,16 +43,14 @@ impl Subject for Rod {
     type Row = Row;
     const NAME: &'static str = "rod";
 
-    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
         let span = Duration::from_secs_f64(args.seconds.unwrap_or(SPANS_S[usize::from(args.quick)]));
         let cases = [false, true].into_iter().flat_map(|contact| SEGMENTS.map(|segments| (segments, contact)));
         let cases: Vec<_> = cases.collect();
         let total = cases.len() as f64;
-        let told = cases.into_iter().enumerate().map(|(at, case)| {
-            bar.tell(at as f64 / total, format!("{} segments", case.0));
-            measure(case, span)
-        });
-        told.collect()
+        let told = cases.into_iter().enumerate();
+        let wanted = told.take_while(|(at, case)| watch.goes_on(*at as f64 / total, format!("{} segments", case.0)));
+        wanted.map(|(_, case)| measure(case, span)).collect()
     }
 
     fn table(rows: &[Row]) -> Table {

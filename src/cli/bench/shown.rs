@@ -6,11 +6,10 @@ use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;
-use super::super::output::message;
-use super::super::progress::Bar;
+use super::super::output::{BadInput, message};
 use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
 use super::cast::Model;
-use super::subject::Subject;
+use super::subject::{Subject, Watch};
 use crate::runtime::Priority;
 use std::time::Duration;
 
@@ -24,16 +23,23 @@ impl Subject for Agents {
     type Row = Row;
     const NAME: &'static str = "agents";
 
-    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Row>> {
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
         let granted = Priority::Realtime.ask();
         let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
         let all = cases(args.quick).into_iter();
         let chosen: Vec<_> = all.filter(|case| wanted(args, case) && possible(case)).collect();
+        if chosen.is_empty() {
+            let why =
+                "no case is of that executor, that model and so few agents: the least have 1 agent, with --quick 10";
+            return Err(BadInput(why.to_owned()).into());
+        }
         let span = args.seconds.map_or(SPANS[usize::from(args.quick)], Duration::from_secs_f64);
         let mut rows = Vec::with_capacity(chosen.len());
         for (at, case) in chosen.iter().enumerate() {
             let words = format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
-            bar.tell(at as f64 / chosen.len() as f64, words);
+            if !watch.goes_on(at as f64 / chosen.len() as f64, words) {
+                break;
+            }
             rows.push(measure(case, span)?);
         }
         if let Err(refused) = granted

@@ -5,13 +5,15 @@
 use super::super::Exit;
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{self, Figure};
-use super::super::chart::prepared;
 use super::super::chart::table::Table;
-use super::super::output::data;
+use super::super::chart::{prepared, stopper};
+use super::super::output::{data, message};
 use super::super::progress::Bar;
 use anyhow::Context;
 use serde::Serialize;
 use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Something that can be measured.
 pub(super) trait Subject {
@@ -20,8 +22,8 @@ pub(super) trait Subject {
     /// Its name on the command line; the files are called after it.
     const NAME: &'static str;
 
-    /// Measures what is asked for.
-    fn measure(args: &BenchArgs, bar: &Bar) -> anyhow::Result<Vec<Self::Row>>;
+    /// Measures what is asked for, case by case as long as `watch` says to go on: the rows that are finished.
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Self::Row>>;
 
     /// The table that is printed.
     fn table(rows: &[Self::Row]) -> Table;
@@ -30,19 +32,42 @@ pub(super) trait Subject {
     fn figure(rows: &[Self::Row]) -> Figure;
 }
 
+/// Who follows a benchmark: it is told how far that is, and says whether to go on.
+pub(super) struct Watch {
+    bar: Bar,
+    stopped: Arc<AtomicBool>,
+}
+
+impl Watch {
+    /// Tells of a case that is about to be measured: the share that is done, and words beside it. `false`: measure no more.
+    pub(super) fn goes_on(&self, done: f64, words: String) -> bool {
+        self.bar.tell(done, words);
+        !self.stopped.load(Ordering::Relaxed)
+    }
+}
+
 /// Measures a subject, and tells what came out.
 pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
+    let stopped = stopper()?;
     let folder = prepared(&args.out)?;
-    let bar = Bar::new(S::NAME, args.quiet);
-    let rows = S::measure(args, &bar)?;
-    drop(bar);
+    let watch = Watch { bar: Bar::new(S::NAME, args.quiet), stopped: Arc::clone(&stopped) };
+    let rows = S::measure(args, &watch)?;
+    drop(watch);
+    let interrupted = stopped.load(Ordering::Relaxed);
+    if interrupted && rows.is_empty() {
+        message("interrupted before a row was finished: nothing was written");
+        return Ok(Exit::Interrupted);
+    }
     write::<S>(folder, &rows)?;
     if args.json {
         data(&format!("{}\n", json::<S>(&rows)?))?;
     } else if !args.quiet {
         data(&S::table(&rows).text())?;
     }
-    Ok(Exit::Ok)
+    if interrupted {
+        message("interrupted: the finished rows are written");
+    }
+    Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
 }
 
 /// Writes the files of `rows`.

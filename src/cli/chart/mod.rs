@@ -196,7 +196,7 @@ pub(super) fn prepared(folder: &Path) -> anyhow::Result<&Path> {
 }
 
 /// A flag that Ctrl-C raises; pressed again, the program ends at once.
-fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
+pub(super) fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
     let (stopped, presses) = (Arc::new(AtomicBool::new(false)), AtomicU32::new(0));
     let flag = Arc::clone(&stopped);
     ctrlc::set_handler(move || {
