@@ -17,6 +17,8 @@ const LISTED_MAX: usize = 20;
 pub(super) struct Checker<'d, 't> {
     document: &'d Document<'t>,
     problems: Vec<Problem>,
+    /// Names of objects that could not be read.
+    unread: Vec<String>,
 }
 
 /// The dotted path of a table, with what people call it.
@@ -80,7 +82,7 @@ impl Display for Allowed {
 
 impl<'d, 't> Checker<'d, 't> {
     pub(super) fn new(document: &'d Document<'t>) -> Self {
-        Self { document, problems: Vec::new() }
+        Self { document, problems: Vec::new(), unread: Vec::new() }
     }
 
     pub(super) fn document(&self) -> &'d Document<'t> {
@@ -89,6 +91,11 @@ impl<'d, 't> Checker<'d, 't> {
 
     pub(super) fn finish(self) -> Vec<Problem> {
         self.problems
+    }
+
+    /// An object of this name could not be read, which is told: that others name it is no problem of theirs.
+    pub(super) fn unread(&mut self, name: &str) {
+        self.unread.push(name.to_owned());
     }
 
     /// How many problems there are so far.
@@ -146,7 +153,7 @@ impl<'d, 't> Checker<'d, 't> {
         (*allowed.range.start(), *allowed.range.end())
     }
 
-    /// Which of `known` the reference `name` means.
+    /// Whether `name` is one of `known`; if it is neither that nor an object that could not be read, that is told.
     pub(super) fn reference<'n>(
         &mut self,
         place: &Place,
@@ -156,6 +163,11 @@ impl<'d, 't> Checker<'d, 't> {
     ) -> bool {
         if known.clone().any(|n| n == name) {
             return true;
+        }
+        // of an object on a grid, its copies are named
+        let is_copy = |of: &str| name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
+        if self.unread.iter().any(|unread| is_copy(unread)) {
+            return false;
         }
         let span = self.document.locate(&place.key(key));
         let list = known.clone().take(LISTED_MAX).map(|n| format!("`{n}`")).collect::<Vec<_>>().join(", ");

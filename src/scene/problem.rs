@@ -175,7 +175,8 @@ fn plain_words(message: &str) -> (String, Option<String>) {
     if let Some(key) = found.strip_prefix("missing field ") {
         return (format!("the key {key} is missing"), Some(format!("expected {key} in this table")));
     }
-    (found.replace("unknown variant", "unknown value"), expected)
+    // serde's name of the type that a huge whole number was read as
+    (found.replace("unknown variant", "unknown value").replace(" as i128", "").replace(" as u128", ""), expected)
 }
 
 fn plain_type(expected: &str) -> String {

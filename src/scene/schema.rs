@@ -2,6 +2,7 @@
 //!
 //! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys; a schema cannot say them all.
 
+use super::build::AGENTS_MAX;
 use super::format::{
     CommonFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SceneFile, SheetFile, SolidFile, SyntheticFile,
     TreeFile, TubeFile,
@@ -30,7 +31,7 @@ pub fn json_schema() -> Value {
     root["title"] = json!("metachron scene");
     let properties = &mut root["properties"];
     properties["object"] = json!({
-        "description": "The objects; at most 1000 that move.",
+        "description": format!("The objects; at most {AGENTS_MAX} that move."),
         "type": "array",
         "items": { "oneOf": MODELS.map(|m| json!({ "$ref": format!("#/$defs/{m}") })) },
     });

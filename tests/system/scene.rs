@@ -383,6 +383,8 @@ fn the_schema_accepts_every_built_in_scene_and_refuses_what_the_program_refuses(
 #[test]
 fn the_schema_explains_every_key() {
     let schema = json_schema();
+    let objects = schema["properties"]["object"]["description"].as_str().unwrap();
+    assert!(objects.contains("at most 10000"), "{objects}");
     for model in metachron::scene::format::MODELS {
         for (key, inner) in schema["$defs"][model]["properties"].as_object().unwrap() {
             assert!(key == "model" || inner["description"].is_string(), "{model}.{key}");

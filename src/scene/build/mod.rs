@@ -26,7 +26,7 @@ pub(super) use common::world_faults;
 pub(super) use coupling::couplings;
 pub(super) use group::groups;
 pub(super) use joint::joints;
-pub(super) use object::{Around, Names, Objects, read_objects};
+pub(super) use object::{AGENTS_MAX, Around, Names, Objects, read_objects};
 pub(super) use stage::{camera, machine, probes, target};
 
 /// Coordinates of a scene stay within this, metres: past it a millimetre is lost in 32-bit drawing.

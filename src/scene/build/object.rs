@@ -27,7 +27,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 /// Most agents of a scene: each that can be touched remembers something of every other one.
-const AGENTS_MAX: usize = 10_000;
+pub(in crate::scene) const AGENTS_MAX: usize = 10_000;
 /// Most fixed objects of a scene.
 pub(super) const OBSTACLES_MAX: usize = 10_000;
 /// Longest name, in characters.
@@ -176,7 +176,16 @@ pub(in crate::scene) fn read_objects(
         c.push(Problem::new(list.span(), found).expecting("expected tables under `[[object]]`"));
         return Objects::default();
     };
-    let mut entries: Vec<Entry> = items.iter().enumerate().filter_map(|(i, item)| read_entry(c, i, item)).collect();
+    let mut read = |(i, item)| {
+        let entry = read_entry(c, i, item);
+        if entry.is_none()
+            && let Some(name) = item.get_ref().as_table().and_then(|table| table.get("name")?.get_ref().as_str())
+        {
+            c.unread(name);
+        }
+        entry
+    };
+    let mut entries: Vec<Entry> = items.iter().enumerate().filter_map(&mut read).collect();
     for entry in &mut entries {
         if let ModelFile::Rigid(file) = &entry.model {
             entry.fixed = rigid::is_fixed(c, &entry.place, file);

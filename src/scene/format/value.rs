@@ -1,5 +1,6 @@
 //! Values that a scene writes in more than one way.
 
+use metachron_agents::N_MAX;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};
@@ -43,7 +44,7 @@ impl<T: Copy> OneOrRange<T> {
 /// A number type that [`OneOrRange`] reads: how it comes from TOML's integers and floats.
 pub trait Number: Sized {
     /// What the error calls it.
-    const NAME: &'static str;
+    fn name() -> String;
     /// The value of a TOML integer, if it has one.
     fn from_integer(value: i64) -> Option<Self>;
     /// The value of a TOML float, if it has one.
@@ -51,7 +52,9 @@ pub trait Number: Sized {
 }
 
 impl Number for f64 {
-    const NAME: &'static str = "a number, or a range [least, greatest]";
+    fn name() -> String {
+        "a number, or a range [least, greatest]".to_owned()
+    }
     fn from_integer(value: i64) -> Option<Self> {
         Some(value as Self)
     }
@@ -60,8 +63,11 @@ impl Number for f64 {
     }
 }
 
+/// Levels of primitives alone are written so.
 impl Number for u8 {
-    const NAME: &'static str = "a whole number from 0 to 255, or a range [least, greatest]";
+    fn name() -> String {
+        format!("a whole number from 0 to {N_MAX}, or a range [least, greatest]")
+    }
     fn from_integer(value: i64) -> Option<Self> {
         Self::try_from(value).ok()
     }
@@ -82,7 +88,7 @@ impl<'de, T: Number + Deserialize<'de>> Visitor<'de> for OneOrRangeVisitor<T> {
     type Value = OneOrRange<T>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(T::NAME)
+        f.write_str(&T::name())
     }
 
     fn visit_i64<E: Error>(self, value: i64) -> Result<Self::Value, E> {
