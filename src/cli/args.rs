@@ -153,6 +153,9 @@ pub struct GenerateArgs {
     /// Write it here, not to standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
+    /// Overwrite the file that is there
+    #[arg(long, requires = "out")]
+    pub force: bool,
 }
 
 /// A word of `--style`.
@@ -312,7 +315,7 @@ pub struct FitArgs {
     /// Simulated seconds that are compared, 0.01 to 1000
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = fit_seconds)]
     pub seconds: f64,
-    /// No more runs of the scene than this in the search
+    /// No more runs of the scene than this, whatever they are for
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub runs: u32,
     /// Write what was found into the scene file; every other line stays as it is

@@ -5,6 +5,7 @@
 use super::Exit;
 use super::args::GenerateArgs;
 use super::output::{BadInput, data, message};
+use super::tune::gains::check_place;
 use crate::scene::papers::{Choices, Paper};
 use anyhow::Context;
 
@@ -19,6 +20,7 @@ pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
     match &args.out {
         None => data(&text)?,
         Some(path) => {
+            check_place(path, "--out", args.force)?;
             let refused = |why: std::io::Error| BadInput(format!("{} cannot be written: {why}", path.display()));
             std::fs::write(path, text).map_err(refused)?;
             message(&format!("scene: {}", path.display()));

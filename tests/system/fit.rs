@@ -280,3 +280,13 @@ fn a_step_past_the_limit_of_an_explicit_integrator_is_told_before_the_run() {
         }
     }
 }
+
+#[test]
+fn no_more_runs_are_made_than_are_asked_for() {
+    let folder = Folder::with(TUBE);
+    let fixed = ["--tolerance", "5e-3", "--seconds", "0.2", "--runs"];
+    let (code, said, errors) = fit(folder.scene(), &[&fixed[..], &["14"]].concat());
+    assert!(code == 0 && number(&said, "/runs") <= 14.0, "{said} {errors}");
+    let (code, _, errors) = fit(folder.scene(), &[&fixed[..], &["3"]].concat());
+    assert!(code == 1 && errors.contains("3 runs are too few"), "{errors}");
+}

@@ -27,6 +27,8 @@ use task::Task;
 
 /// Step and spacing are halved so often at most for the converged answer.
 const LEVELS_MAX: u32 = 4;
+/// Runs that are kept for after the search, and for why there was none: CPU before and after, and what simpler models come to.
+const AFTER_SEARCH: u32 = 3;
 /// The converged answer is to be known to this share of the tolerance.
 const KNOWN: f64 = 0.2;
 
@@ -116,25 +118,23 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let found = converge(LEVELS_MAX, KNOWN * tolerance_m, &mut |level| task.reference(level));
     task.failure()?;
     let Some(answer) = found else {
-        return Ok(if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(task.lost()) });
+        return Ok(if task.left() == 0 { too_few(task, args) } else { ended(task, |task| task.lost()) });
     };
     let room_m = tolerance_m - answer.error_m;
     let present = task.attempt(&now, &answer.paths);
     task.failure()?;
-    let Some(present) = present else { return Ok(Outcome::Interrupted) };
+    let Some(present) = present else { return Ok(too_few(task, args)) };
     let mut best = f64::INFINITY;
     let start = start(task, &answer, room_m, &mut best);
     task.failure()?;
+    if task.left() < AFTER_SEARCH {
+        return Ok(too_few(task, args));
+    }
     let Some((settings, trial)) = start else {
-        let stopped = task.is_stopped();
-        return Ok(if stopped {
-            Outcome::Interrupted
-        } else {
-            Outcome::OutOfReach(limits::told(task, &answer, (tolerance_m, best)))
-        });
+        return Ok(ended(task, |task| limits::told(task, &answer, (tolerance_m, best))));
     };
     let choices = task.choices();
-    let trials_max = args.runs;
+    let trials_max = task.left() - AFTER_SEARCH;
     let mut attempt = |settings: &[Setting]| task.attempt(settings, &answer.paths);
     let mut need =
         Search { choices: &choices, tolerance_m: room_m, trials_max, attempt: &mut attempt }.run(settings, trial);
@@ -144,6 +144,17 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let cpu_s = [paid_s, task.cpu(&need.settings)];
     task.failure()?;
     Ok(Outcome::Fitted(Fitted { known_m: answer.error_m, now: (now, present), need, cpu_s, simpler }))
+}
+
+/// Why there is no answer, unless the user wanted an end.
+fn ended<'a>(task: &mut Task<'a>, told: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
+    if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(told(task)) }
+}
+
+/// The runs were over before anything was found.
+fn too_few(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
+    let what = "runs are too few to find the converged answer and settings that hold: give more with --runs";
+    ended(task, |_| format!("{} {what}", args.runs))
 }
 
 /// The coarsest settings that hold by halving alone: as the scene is, with a method of second order, or ever finer.

@@ -176,8 +176,16 @@ impl<'a> Task<'a> {
         scene
     }
 
-    /// Plays the scene at these settings to its end.
+    /// How many runs are left.
+    pub(super) fn left(&self) -> u32 {
+        self.runs_max - self.runs.get()
+    }
+
+    /// Plays the scene at these settings to its end; `None` where the user wants an end, no run is left, or it failed.
     pub(super) fn play(&mut self, settings: &[Setting]) -> Option<Played> {
+        if self.left() == 0 {
+            return None;
+        }
         let scene = self.scene_at(settings);
         let runs = self.runs.get() + 1;
         self.runs.set(runs);

@@ -141,7 +141,7 @@ pub(super) fn fragment(law: Law, comment: &str) -> String {
 }
 
 /// Refuses a place for the fragment that is taken, or in a folder that is not there.
-pub(super) fn check_place(path: &Path, force: bool) -> anyhow::Result<()> {
+pub(in crate::cli) fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if folder.is_some_and(|f| !f.is_dir()) {
         return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -150,7 +150,7 @@ pub(super) fn check_place(path: &Path, force: bool) -> anyhow::Result<()> {
         return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
     }
     if path.exists() && !force {
-        let why = format!("{} is there already; --force overwrites it, --gains FILE names another", path.display());
+        let why = format!("{} is there already; --force overwrites it, {flag} FILE names another", path.display());
         return Err(BadInput(why).into());
     }
     Ok(())

@@ -69,7 +69,7 @@ pub(super) fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
     let given = args.analyse.as_deref().map(|text| gains::parsed(text, scene.target.frame_hz)).transpose()?;
     let fragment = args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", stem(&args.scene))));
     if given.is_none() {
-        gains::check_place(&fragment, args.force)?;
+        gains::check_place(&fragment, "--gains", args.force)?;
     }
     let stopped = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stopped);
