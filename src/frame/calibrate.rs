@@ -10,7 +10,7 @@ use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
 /// Another number wherever the benchmark or what it draws with changes.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// A file of the cache.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
