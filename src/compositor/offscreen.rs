@@ -40,11 +40,11 @@ impl Lost {
 pub enum GpuError {
     /// No adapter of any backend. Runs without pictures are not affected.
     #[error(
-        "no graphics adapter found (tried Vulkan, then OpenGL: {detail}). Mesa's software driver is enough: on Debian or \
-         Ubuntu `apt-get install mesa-vulkan-drivers`, on Fedora `dnf install mesa-vulkan-drivers`"
+        "no graphics adapter was found. Mesa's software driver is enough: on Debian or Ubuntu \
+         `apt-get install mesa-vulkan-drivers`, on Fedora `dnf install mesa-vulkan-drivers` ({detail})"
     )]
     NoAdapter {
-        /// What wgpu says.
+        /// What wgpu says, in short.
         detail: String,
     },
     /// An adapter was found and would not open.
@@ -112,7 +112,7 @@ impl Gpu {
         let descriptor =
             wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() }.with_env();
         let instance = wgpu::Instance::new(wgpu::InstanceDescriptor { backends, ..descriptor });
-        let adapter = pollster::block_on(choose(&instance, backends))?;
+        let adapter = pollster::block_on(choose(&instance))?;
         let info = adapter.get_info();
         let descriptor = device_descriptor(&adapter);
         let opened = pollster::block_on(adapter.request_device(&descriptor));
@@ -144,17 +144,27 @@ pub(super) fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescript
     }
 }
 
-async fn choose(instance: &wgpu::Instance, backends: wgpu::Backends) -> Result<wgpu::Adapter, GpuError> {
+async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
     if std::env::var("WGPU_ADAPTER_NAME").is_ok() {
         let named = wgpu::util::initialize_adapter_from_env(instance, None).await;
-        return named.map_err(|error| GpuError::NoAdapter { detail: error.to_string() });
+        return named.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) });
     }
     let options = wgpu::RequestAdapterOptions {
         power_preference: wgpu::PowerPreference::from_env().unwrap_or(wgpu::PowerPreference::HighPerformance),
         ..Default::default()
     };
     let found = instance.request_adapter(&options).await;
-    found.map_err(|error| GpuError::NoAdapter { detail: format!("{backends:?}: {error}") })
+    found.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) })
+}
+
+/// So much of a library's words as fits on a line or two.
+fn shortened(words: &str) -> String {
+    const MOST: usize = 160;
+    let line = words.lines().next().unwrap_or_default();
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{} …", line[..end].trim_end()),
+        None => line.to_owned(),
+    }
 }
 
 /// A picture in memory, to be looked at or written.
