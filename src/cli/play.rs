@@ -4,7 +4,7 @@
 
 use super::report::{
     AgentReport, BudgetReport, CouplingError, CouplingReport, OracleReport, OverlapReport, ProbeReport, Quantiles,
-    Report, summarise, summarise_choices,
+    Report, summarise, summarise_choices, summarise_undrawn,
 };
 use super::run::{Played, Request, RunLength, Step};
 use crate::compositor::viewer::WindowError;
@@ -14,10 +14,11 @@ use crate::frame::{
     WindowFailure, WindowPlan, consult_oracle, play_headless, play_in_window,
 };
 use crate::runtime::{AgentState, Spread};
+use crate::scene::format::ExecutorKind;
 use crate::scene::{Overlap, Scene};
 use metachron_agents::AgentId;
 use metachron_budget::Bound;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Told of every frame; answers whether to go on.
 type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
@@ -31,6 +32,8 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// What the models, the executor or the adapter refuse.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
+    // nothing happens before somebody can see it: opening an adapter takes seconds where a processor draws
+    session.hold();
     if request.oracle {
         session.keep_trace();
     }
@@ -71,7 +74,7 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
 fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
     let size = Size { width, height };
-    let drawing = drawing(&session, png.is_some(), size)?;
+    let drawing = drawing(&session, request.png.as_deref(), png.is_some(), size)?;
     let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
     let end = match request.headless_end() {
         RunLength::Frames(frames) => End::Frames(frames),
@@ -92,18 +95,25 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
     Ok(played)
 }
 
-/// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter.
-fn drawing(session: &Session, picture: bool, size: Size) -> anyhow::Result<Drawing> {
+/// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter. Without one there is
+/// no run where the user has asked for a picture by name.
+fn drawing(session: &Session, asked: Option<&Path>, picture: bool, size: Size) -> anyhow::Result<Drawing> {
     if session.is_virtual() && !picture {
         return Ok(Drawing::Nothing);
     }
     let gpu = match Gpu::headless() {
         Ok(gpu) => gpu,
-        Err(error @ GpuError::NoAdapter { .. }) => {
+        Err(error @ GpuError::NoAdapter { .. }) if asked.is_none() => {
             super::output::message(&format!("nothing is drawn: {error}"));
             return Ok(Drawing::Nothing);
         }
-        Err(error) => return Err(error.into()),
+        Err(error) => {
+            let error = anyhow::Error::from(error);
+            return Err(match asked {
+                Some(path) => error.context(format!("the picture {} cannot be drawn", path.display())),
+                None => error,
+            });
+        }
     };
     if session.is_virtual() {
         return Ok(Drawing::Last(Box::new(Offscreen::new(gpu, size, RendererOptions::STILL)?)));
@@ -118,8 +128,14 @@ fn step(record: &FrameRecord, done: Option<f64>) -> Step {
 
 fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
     let warm = outcome.warm_up.min(outcome.frames.len().saturating_sub(1));
-    let summary = summarise(&outcome.frames[warm..], outcome.target_ms);
-    let spent_share = (!outcome.frames.is_empty()).then(|| summary.frame_ms.mean / outcome.target_ms);
+    let frames = &outcome.frames[warm..];
+    let mut summary = summarise(frames, outcome.target_ms);
+    let mut choices = summarise_choices(frames);
+    let declared = scene.executor == ExecutorKind::Lockstep;
+    if outcome.adapter.is_none() && !declared {
+        (summary, choices) = (summarise_undrawn(frames), choices.undrawn());
+    }
+    let spent_share = summary.frame_ms.map(|work| work.mean / outcome.target_ms);
     let report = Report {
         scene: outcome.scene,
         policy: outcome.policy.to_owned(),
@@ -137,14 +153,11 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
         overlaps: scene.overlaps().iter().map(|one| overlap(scene, one)).collect(),
         oracle: None,
-        budget: BudgetReport {
-            spent_share,
-            clamped: outcome.clamp,
-            choices: summarise_choices(&outcome.frames[warm..]),
-        },
+        budget: BudgetReport { spent_share, clamped: outcome.clamp, choices },
         probes: outcome.probes.iter().map(probe).collect(),
     };
-    Played { report, frames: outcome.frames, no_window: None, picture, interrupted: outcome.interrupted }
+    let (unpriced, interrupted) = (outcome.unpriced, outcome.interrupted);
+    Played { report, frames: outcome.frames, no_window: None, picture, unpriced, interrupted }
 }
 
 fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {

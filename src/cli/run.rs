@@ -70,6 +70,8 @@ pub struct Played {
     pub no_window: Option<String>,
     /// The picture that was written.
     pub picture: Option<PathBuf>,
+    /// Whether levels were chosen by the usual prices of drawing, because there was no time to measure the adapter's.
+    pub unpriced: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
@@ -196,7 +198,42 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
             return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
         }
     }
+    check_apart(args)
+}
+
+/// No output may overwrite another one, or what is read.
+fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
+    let scene = Path::new(&args.scene);
+    let files = [
+        ("the scene", Some(scene).filter(|path| path.is_file())),
+        ("--gains", args.gains.as_deref()),
+        ("--report", args.report.as_deref().filter(|path| *path != Path::new("-"))),
+        ("--png", args.png.as_deref()),
+        ("--frames-csv", args.frames_csv.as_deref()),
+    ];
+    let places: Vec<_> =
+        files.iter().filter_map(|(what, path)| Some((*what, (*path)?, place(path.as_ref()?)?))).collect();
+    for (k, (what, path, at)) in places.iter().enumerate().skip(1) {
+        // what is read may be read twice
+        let before = places[..k].iter().find(|(_, _, other)| other == at && !["the scene", "--gains"].contains(what));
+        if let Some((other, ..)) = before {
+            let why =
+                format!("{what} {} would overwrite {other}, which is the same file; name another", path.display());
+            return Err(BadInput(why).into());
+        }
+    }
     Ok(())
+}
+
+/// Where a file is or would be, by whatever way it is named; `None` of devices, which take everything.
+fn place(path: &Path) -> Option<PathBuf> {
+    match path.canonicalize() {
+        Ok(there) => there.is_file().then_some(there),
+        Err(_) => {
+            let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
+            Some(folder.canonicalize().ok()?.join(path.file_name()?))
+        }
+    }
 }
 
 fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
@@ -218,6 +255,9 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     }
     if let Some(why) = played.no_window.as_ref().filter(|_| !args.quiet) {
         message(&format!("ran without a window: {why}"));
+    }
+    if played.unpriced && !args.quiet {
+        message("note: what drawing costs here could not be measured in three seconds: the usual prices were taken");
     }
     if let Some(path) = &played.picture {
         message(&format!("picture: {}", path.display()));

@@ -7,9 +7,7 @@ use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
 use super::session::{Finished, Session};
 use crate::compositor::{Camera, Offscreen, RendererOptions, Size, Style};
-use crate::runtime::Drive;
 use std::path::PathBuf;
-use std::time::Duration;
 
 /// When a run ends.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,15 +52,9 @@ pub fn play_headless(
     mut plan: Headless,
     go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
 ) -> Result<Outcome, SessionError> {
-    if let Drawing::Every(screen) = &plan.drawing {
-        // nothing happens before it can be drawn
-        session.drive(Drive::Pause);
-        let gpu = screen.gpu();
-        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
-        session.drive(Drive::Run);
-    }
+    prepare(&mut session, &mut plan)?;
     let period = session.period();
-    let mut due = Duration::ZERO;
+    let mut due = session.now();
     let mut interrupted = false;
     loop {
         session.wait_until(due);
@@ -74,12 +66,30 @@ pub fn play_headless(
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
     }
+    // the picture shows the end of the run, however long it takes
+    session.hold();
     write_picture(&mut session, &mut plan)?;
     let adapter = match &plan.drawing {
         Drawing::Every(gpu) | Drawing::Last(gpu) => Some(gpu.gpu().describe()),
         Drawing::Nothing => None,
     };
     Ok(session.end(adapter, interrupted))
+}
+
+/// Nothing happens before it can be drawn: prices are known and a first picture, which makes pipelines and buffers, is finished
+/// before real time begins. Virtual time stands still meanwhile by itself.
+fn prepare(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
+    session.hold();
+    if let Drawing::Every(screen) = &mut plan.drawing {
+        let gpu = screen.gpu().clone();
+        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu));
+        let camera = session.scene_camera();
+        session.compose(&camera, plan.size, plan.style, None);
+        screen.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+        session.pass_over();
+    }
+    session.begin();
+    Ok(())
 }
 
 fn share_done(session: &Session, end: End) -> f64 {

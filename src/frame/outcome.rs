@@ -118,6 +118,8 @@ pub struct Outcome {
     pub probes: Vec<ProbeOutcome>,
     /// Says that the controller rested on a limit at the end, and on which.
     pub clamp: Option<String>,
+    /// Whether what drawing costs on the adapter could not be measured, so that the usual prices were taken.
+    pub unpriced: bool,
     /// Whether the user ended the run before its end.
     pub interrupted: bool,
 }

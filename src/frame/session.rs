@@ -53,6 +53,8 @@ pub struct Session {
     warm_up: usize,
     finished: u64,
     keep: usize,
+    /// Whether the usual prices of drawing stand in for the adapter's.
+    unpriced: bool,
 }
 
 /// What a finished frame took.
@@ -134,6 +136,7 @@ impl Session {
             warm_up: 0,
             finished: 0,
             keep: usize::MAX,
+            unpriced: false,
             scene,
         })
     }
@@ -205,11 +208,10 @@ impl Session {
     /// `on_processor`: it is a processor that draws.
     pub(super) fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
         self.shares_processor |= on_processor;
-        if self.control.policy().predicts()
-            && !self.is_virtual()
-            && let Some(prices) = calibrate::prices(adapter, open)
-        {
-            self.control.set_prices(prices);
+        if self.control.policy().predicts() && !self.is_virtual() {
+            let prices = calibrate::prices(adapter, open);
+            self.unpriced = prices.is_none();
+            prices.into_iter().for_each(|prices| self.control.set_prices(prices));
         }
     }
 
@@ -305,6 +307,20 @@ impl Session {
     /// Waits until the wall time `until`, the agents going on meanwhile.
     pub fn wait_until(&mut self, until: Duration) {
         self.run.wait_until(until);
+    }
+
+    /// Lets real time wait for [`Session::begin`]. Virtual time passes only where somebody waits for it.
+    pub fn hold(&mut self) {
+        if !self.is_virtual() {
+            self.run.drive(Drive::Pause);
+        }
+    }
+
+    /// Lets real time pass that [`Session::hold`] keeps waiting.
+    pub fn begin(&mut self) {
+        if !self.is_virtual() {
+            self.run.drive(Drive::Run);
+        }
     }
 
     /// Changes the flow of time.
@@ -413,6 +429,7 @@ impl Session {
             couplings: self.couplings.all().to_vec(),
             trace: self.trace,
             clamp,
+            unpriced: self.unpriced,
             interrupted,
         }
     }

@@ -51,16 +51,13 @@ pub enum WindowFailure {
 /// hidden are no part of it, and of a run without an end at least the newest [`FRAMES_KEPT`] are.
 ///
 /// # Errors
-/// [`WindowFailure::NoWindow`] gives the session back.
+/// [`WindowFailure::NoWindow`] gives the session back, its time standing still.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut show = WindowShow::new(session, plan, go_on);
     match run_window(&mut show, &options) {
         Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
-        Err(error) => {
-            show.begin();
-            Err(WindowFailure::NoWindow(Box::new(show.session), error))
-        }
+        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
     }
 }
 

@@ -171,6 +171,9 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--json", "--report", "-"], "choose one"),
         (&["run", "--headless", "--png", "-"], "--png -"),
         (&["run", "--headless", "--frames-csv", "-"], "name a file"),
+        (&["run", "--headless", "--report", "a.x", "--png", "./a.x"], "--png ./a.x would overwrite --report"),
+        (&["run", "--headless", "--png", "a.x", "--frames-csv", "a.x"], "would overwrite --png"),
+        (&["bench", "agents", "--agents", "0", "--out", "target"], "no case"),
         (&["check"], "SCENE"),
     ] {
         let done = metachron(arguments);
@@ -184,6 +187,38 @@ fn an_override_that_is_wrong_is_shown_like_a_line_of_the_scene() {
     let done = metachron(&["run", "pendulum", "--headless", "--set", "object.ball.radius_m=-1"]);
     assert_eq!(code(&done), 2);
     assert!(err(&done).contains("object.ball.radius_m\" = -1"), "{}", err(&done));
+    let done = metachron(&["check", "pendulum", "--set", "object.ball.radius_m=x"]);
+    let said = err(&done);
+    assert!(said.contains("expected a number") && !said.contains("does not exist"), "{said}");
+    let done = metachron(&["check", "pendulum", "--set", "object.ball.n=-1"]);
+    assert!(err(&done).contains("a whole number from 0 to 10"), "{}", err(&done));
+    let done = metachron(&["check", "pendulum", "--set", "object.ball.radius_m=99999999999999999999"]);
+    assert!(code(&done) == 2 && !err(&done).contains("i128"), "{}", err(&done));
     let done = metachron(&["check", "pendulum", "--set", "object.bell.radius_m=1"]);
     assert!(err(&done).contains("`object` has no entry `bell`"), "{}", err(&done));
+}
+
+/// Interrupts a benchmark as soon as its folder is there, which is after Ctrl-C can be caught.
+#[cfg(unix)]
+#[test]
+fn an_interrupted_benchmark_keeps_the_rows_that_are_finished() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("rod");
+    let arguments = ["bench", "rod", "--quick", "-q", "--out", out.to_str().unwrap()];
+    let mut child = std::process::Command::new(env!("CARGO_BIN_EXE_metachron"))
+        .args(arguments)
+        .stderr(std::process::Stdio::piped())
+        .spawn()
+        .unwrap();
+    while !out.is_dir() {
+        assert!(child.try_wait().unwrap().is_none(), "it ended by itself");
+        std::thread::yield_now();
+    }
+    let interrupt = format!("kill -INT {}", child.id());
+    assert!(std::process::Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
+    let done = child.wait_with_output().unwrap();
+    assert_eq!(code(&done), 130, "{}", err(&done));
+    let kept = std::fs::read_to_string(out.join("rod.csv")).map_or(0, |text| text.lines().count() - 1);
+    let words = if kept == 0 { "nothing was written" } else { "the finished rows are written" };
+    assert!(kept < 12 && err(&done).contains(words), "{kept} rows: {}", err(&done));
 }

@@ -6,7 +6,7 @@ use super::frames::Spread;
 use crate::frame::FrameRecord;
 use serde::Serialize;
 
-/// What the choices of a run's frames say together.
+/// What the choices of a run's frames say together; `None` in it where there was no frame that says anything of it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ChoiceSummary {
     /// Mean of the value of a choice over its bound; `None` of a policy without a certificate.
@@ -14,33 +14,32 @@ pub struct ChoiceSummary {
     /// The certificate: 19 of 20 choices are proven to be worth at least all but this part of the best.
     pub certificate: Option<f64>,
     /// Levels that changed, an object and frame in view.
-    pub level_changes: f64,
+    pub level_changes: Option<f64>,
     /// Levels that changed back within three frames, an object and frame in view.
-    pub reversals: f64,
+    pub reversals: Option<f64>,
     /// 19 of 20 frames took what was predicted to within this part of it; `None` of a policy that predicts nothing.
     pub model_error: Option<f64>,
     /// Gathering states and finding what is seen.
-    pub cull_ms: Spread,
+    pub cull_ms: Option<Spread>,
     /// Choosing levels.
-    pub select_ms: Spread,
+    pub select_ms: Option<Spread>,
     /// Making the picture and drawing it.
-    pub draw_ms: Spread,
+    pub draw_ms: Option<Spread>,
     /// From where the camera was read to the finished picture.
-    pub lag_ms: Spread,
+    pub lag_ms: Option<Spread>,
     /// Objects in view that were left out for want of time, all frames together.
-    pub holes: u64,
+    pub holes: Option<u64>,
 }
 
 /// The choices of `frames`.
 #[must_use]
 pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
     let spread = |of: fn(&FrameRecord) -> f64| Spread::of(frames.iter().map(of));
-    let some = |of: fn(&FrameRecord) -> Option<f64>| {
-        let all: Vec<f64> = frames.iter().filter_map(of).collect();
-        (!all.is_empty()).then(|| Spread::of(all))
-    };
+    let some = |of: fn(&FrameRecord) -> Option<f64>| Spread::of(frames.iter().filter_map(of));
+    let any = !frames.is_empty();
     let seen = frames.iter().map(|row| row.objects).sum::<u64>().max(1) as f64;
-    let share = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| f64::from(of(row))).sum::<f64>() / seen;
+    let total = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| u64::from(of(row))).sum::<u64>();
+    let share = |of| any.then(|| total(of) as f64 / seen);
     ChoiceSummary {
         value_over_bound: some(|row| row.value_over_bound).map(|s| s.mean),
         certificate: some(|row| row.value_over_bound.map(|part| 1.0 - part)).map(|s| s.p95),
@@ -51,7 +50,15 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
         select_ms: spread(|row| row.select_ms),
         draw_ms: spread(|row| row.draw_ms),
         lag_ms: spread(|row| row.lag_ms),
-        holes: frames.iter().map(|row| u64::from(row.holes)).sum(),
+        holes: any.then(|| total(|row| row.holes)),
+    }
+}
+
+impl ChoiceSummary {
+    /// The same of frames that nothing drew and whose cost nobody declared: what drawing took is not known of them.
+    #[must_use]
+    pub fn undrawn(self) -> Self {
+        Self { model_error: None, draw_ms: None, lag_ms: None, ..self }
     }
 }
 
@@ -74,12 +81,17 @@ mod tests {
         };
         let frames: Vec<_> = (1..=100).map(frame).collect();
         let summary = summarise_choices(&frames);
-        assert_eq!((summary.level_changes, summary.reversals, summary.holes), (50.0 / 1000.0, 1.0 / 1000.0, 300));
+        assert_eq!(
+            (summary.level_changes, summary.reversals, summary.holes),
+            (Some(50.0 / 1000.0), Some(1.0 / 1000.0), Some(300))
+        );
         let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-9;
         assert!(near(summary.model_error, 0.095) && near(summary.certificate, 95e-4), "{summary:?}");
         assert!(near(summary.value_over_bound, 1.0 - 50.5e-4));
-        assert_eq!((summary.lag_ms.p99, summary.lag_ms.max), (99.0, 100.0));
+        assert_eq!(summary.lag_ms.map(|s| (s.p99, s.max)), Some((99.0, 100.0)));
         let none = summarise_choices(&[FrameRecord::default()]);
         assert_eq!((none.value_over_bound, none.certificate, none.model_error), (None, None, None));
+        let none = summarise_choices(&[]);
+        assert_eq!((none.level_changes, none.holes, none.cull_ms), (None, None, None));
     }
 }

@@ -41,35 +41,35 @@ pub struct Spread {
 /// What the frames of a run say together.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameSummary {
-    /// Work of the frames.
-    pub frame_ms: Spread,
+    /// Work of the frames; `None` where none was made, or nothing drew them and their cost was not declared either.
+    pub frame_ms: Option<Spread>,
     /// The adapter's own time; `None` where it has no time stamps or nothing was drawn.
     pub gpu_ms: Option<Spread>,
-    /// Paced distance between frames.
-    pub interval_ms: Spread,
+    /// Paced distance between frames; `None` without any.
+    pub interval_ms: Option<Spread>,
     /// Standard deviation of x over binding frames; `None` without any.
     pub binding_stddev: Option<f64>,
     /// Mean of |x − 1| over binding frames; `None` without any.
     pub avg_err: Option<f64>,
-    /// Share of frames with x above 1.05.
-    pub missed_share: f64,
+    /// Share of frames with x above 1.05; `None` where `frame_ms` is.
+    pub missed_share: Option<f64>,
     /// First frame after which the median of 9 frames stays within 6 % of the later mean for 20 frames; `None` if never.
     pub settle_frames: Option<u64>,
 }
 
 impl Spread {
-    /// The spread of `values`; zeros where there are none. Values that are no numbers are left out.
+    /// The spread of `values`; `None` where there are none. Values that are no numbers are left out.
     #[must_use]
-    pub fn of(values: impl IntoIterator<Item = f64>) -> Self {
+    pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
         if sorted.is_empty() {
-            return Self::default();
+            return None;
         }
         sorted.sort_by(f64::total_cmp);
         let (mean, stddev) = mean_and_stddev(&sorted);
         // nearest rank: the least value that so many percent do not exceed
         let rank = |p: f64| sorted[((p * sorted.len() as f64).ceil() as usize).clamp(1, sorted.len()) - 1];
-        Self {
+        Some(Self {
             mean,
             stddev,
             min: sorted[0],
@@ -77,7 +77,7 @@ impl Spread {
             p95: rank(0.95),
             p99: rank(0.99),
             max: sorted[sorted.len() - 1],
-        }
+        })
     }
 }
 
@@ -103,16 +103,19 @@ pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
     };
     FrameSummary {
         frame_ms: Spread::of(frames.iter().map(|row| row.frame_ms)),
-        gpu_ms: frames
-            .iter()
-            .any(|row| row.gpu_ms.is_some())
-            .then(|| Spread::of(frames.iter().filter_map(|row| row.gpu_ms))),
+        gpu_ms: Spread::of(frames.iter().filter_map(|row| row.gpu_ms)),
         interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)),
         binding_stddev,
         avg_err,
-        missed_share: if x.is_empty() { 0.0 } else { missed as f64 / x.len() as f64 },
+        missed_share: (!x.is_empty()).then(|| missed as f64 / x.len() as f64),
         settle_frames: settle(&x),
     }
+}
+
+/// The same of `frames` that nothing drew and whose cost nobody declared: only when they came is known of them.
+#[must_use]
+pub fn summarise_undrawn(frames: &[FrameRecord]) -> FrameSummary {
+    FrameSummary { interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)), ..summarise(&[], 1.0) }
 }
 
 /// The first frame after which the running median stays near the later mean.
@@ -152,7 +155,7 @@ mod tests {
 
     #[test]
     fn percentiles_are_values_that_were_measured() {
-        let spread = Spread::of((1..=100).map(f64::from));
+        let spread = Spread::of((1..=100).map(f64::from)).unwrap();
         assert_eq!((spread.min, spread.p50, spread.p95, spread.p99, spread.max), (1.0, 50.0, 95.0, 99.0, 100.0));
         assert_eq!(spread.mean, 50.5);
         // of 1 … n: sqrt((n² - 1)/12); sums of a hundred terms round in the last digits
@@ -162,7 +165,7 @@ mod tests {
     #[test]
     fn a_miss_is_more_than_five_percent_over() {
         let summary = summarise(&rows([10.0, 10.5, 10.51, 20.0], 0.0), 10.0);
-        assert_eq!(summary.missed_share, 0.5);
+        assert_eq!(summary.missed_share, Some(0.5));
     }
 
     #[test]
@@ -194,16 +197,20 @@ mod tests {
     }
 
     #[test]
-    fn no_frames_give_zeros_and_nothing() {
+    fn what_no_frame_measured_is_no_number() {
         let summary = summarise(&[], 10.0);
-        assert_eq!((summary.frame_ms, summary.missed_share, summary.settle_frames), (Spread::default(), 0.0, None));
+        assert_eq!((summary.frame_ms, summary.interval_ms, summary.missed_share), (None, None, None));
+        let undrawn = summarise_undrawn(&[FrameRecord { interval_ms: 20.0, ..FrameRecord::default() }]);
+        assert_eq!((undrawn.frame_ms, undrawn.missed_share, undrawn.settle_frames), (None, None, None));
+        assert_eq!(undrawn.interval_ms.map(|s| s.max), Some(20.0));
     }
 
     proptest! {
         #[test]
         fn the_order_of_percentiles_holds_for_any_values(values in proptest::collection::vec(any::<f64>(), 0..60)) {
-            let s = Spread::of(values.iter().copied());
-            prop_assert!(s.min <= s.p50 && s.p50 <= s.p95 && s.p95 <= s.p99 && s.p99 <= s.max);
+            if let Some(s) = Spread::of(values.iter().copied()) {
+                prop_assert!(s.min <= s.p50 && s.p50 <= s.p95 && s.p95 <= s.p99 && s.p99 <= s.max);
+            }
             let _ = summarise(&rows(values, 1.0), 1.0);
         }
     }

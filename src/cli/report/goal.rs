@@ -141,6 +141,8 @@ fn find<'v>(root: &'v Value, path: &str, any: bool) -> Result<&'v Value, GoalErr
     let mut here = root;
     for part in path.split('.') {
         let next = match here {
+            // nothing was measured of the whole table
+            Value::Null if !any => return Ok(here),
             Value::Object(table) => table.get(part),
             Value::Array(list) if any => list.first(),
             Value::Array(list) => {
@@ -174,13 +176,14 @@ fn unknown(path: &str, part: &str, here: &Value) -> GoalError {
 
 #[cfg(test)]
 mod tests {
+    use super::super::{Spread, summarise, summarise_choices};
     use super::*;
     use proptest::prelude::*;
 
     fn report() -> Report {
         let mut report = Report::template();
-        report.summary.missed_share = 0.02;
-        report.summary.frame_ms.p99 = 40.0;
+        report.summary.missed_share = Some(0.02);
+        report.summary.frame_ms = Some(Spread { p99: 40.0, ..Spread::default() });
         report.agents[0].name = "intestine".to_owned();
         report.agents[0].rate_hz = 200.0;
         report
@@ -203,6 +206,20 @@ mod tests {
     #[test]
     fn a_number_that_was_not_measured_is_no_success() {
         assert_eq!(judge("binding_stddev>0.035"), Verdict::NotMeasured);
+    }
+
+    #[test]
+    fn no_goal_on_frames_is_kept_by_a_run_without_any() {
+        let mut report = report();
+        report.summary = summarise(&[], 1.0);
+        report.budget.choices = summarise_choices(&[]);
+        let paths = ["frame_ms.p99", "interval_ms.max", "missed_share", "gpu_ms.p99", "settle_frames", "avg_err"];
+        let choices =
+            ["level_changes", "reversals", "holes", "cull_ms.max", "draw_ms.p99"].map(|p| format!("budget.{p}"));
+        for path in paths.map(str::to_owned).iter().chain(&choices) {
+            let goal: Goal = format!("{path}>1").parse().unwrap();
+            assert_eq!(goal.judge(&report), Ok(Verdict::NotMeasured), "{path}");
+        }
     }
 
     #[test]

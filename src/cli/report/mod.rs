@@ -8,7 +8,7 @@ mod goal;
 mod summary;
 
 pub use choices::{ChoiceSummary, summarise_choices};
-pub use frames::{FrameSummary, Spread, summarise};
+pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
 pub use goal::{Goal, GoalError, Verdict};
 
 use serde::Serialize;
@@ -195,7 +195,7 @@ pub struct CouplingError {
 /// How the frame budget was spent.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct BudgetReport {
-    /// Mean frame work as a share of the target; `None` without frames.
+    /// Mean frame work as a share of the target; `None` where `frame_ms` is.
     pub spent_share: Option<f64>,
     /// On which limit the control rested at the end, in words; `None` where it did not.
     pub clamped: Option<String>,
@@ -224,7 +224,8 @@ impl Report {
     /// A report with one of everything, to tell names that exist from names that do not.
     #[must_use]
     fn template() -> Self {
-        let summary = summarise(&[crate::frame::FrameRecord::default()], 1.0);
+        let frame = crate::frame::FrameRecord { gpu_ms: Some(0.0), ..Default::default() };
+        let summary = summarise(&[frame], 1.0);
         let name = String::new;
         let oracle = OracleReport { couplings: vec![CouplingError::default()], ..OracleReport::default() };
         Self {
@@ -244,7 +245,7 @@ impl Report {
             couplings: vec![CouplingReport::default()],
             overlaps: vec![OverlapReport::default()],
             oracle: Some(oracle),
-            budget: BudgetReport::default(),
+            budget: BudgetReport { choices: summarise_choices(&[frame]), ..BudgetReport::default() },
             probes: vec![ProbeReport::default()],
         }
     }

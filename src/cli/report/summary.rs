@@ -1,6 +1,6 @@
 //! The report as a table for people.
 
-use super::{AgentReport, ChoiceSummary, CouplingReport, OracleReport, Report};
+use super::{AgentReport, ChoiceSummary, CouplingReport, FrameSummary, OracleReport, Report, Spread};
 use std::fmt::Write;
 
 impl Report {
@@ -11,15 +11,7 @@ impl Report {
         let Self { scene, policy, executor, frames, sim_s, wall_s, cpu_s, target_ms, summary, .. } = self;
         let _ =
             writeln!(out, "{scene}: {frames} frames, {sim_s:.2} s simulated in {wall_s:.2} s ({executor}, {policy})");
-        let work = &summary.frame_ms;
-        let _ = writeln!(
-            out,
-            "frame  {:.2} ms mean, {:.2} p99, {:.2} max, target {target_ms:.2}; {:.2} % late",
-            work.mean,
-            work.p99,
-            work.max,
-            summary.missed_share * 100.0
-        );
+        frame_line(&mut out, summary, *target_ms);
         let adapter = self.adapter.as_deref().unwrap_or("nothing was drawn");
         let _ = writeln!(out, "drawn by  {adapter}; agents' CPU {cpu_s:.2} s; state {}", self.state_hash);
         choices_line(&mut out, &self.budget.choices);
@@ -41,11 +33,27 @@ impl Report {
     }
 }
 
+fn frame_line(out: &mut String, summary: &FrameSummary, target_ms: f64) {
+    let (Some(work), Some(missed)) = (&summary.frame_ms, summary.missed_share) else {
+        let _ = writeln!(out, "frame  not measured: no frame was drawn, and none has a declared cost");
+        return;
+    };
+    let Spread { mean, p99, max, .. } = work;
+    let late = 100.0 * missed;
+    let _ =
+        writeln!(out, "frame  {mean:.2} ms mean, {p99:.2} p99, {max:.2} max, target {target_ms:.2}; {late:.2} % late");
+}
+
 fn choices_line(out: &mut String, choices: &ChoiceSummary) {
     let ChoiceSummary { level_changes, reversals, cull_ms, select_ms, draw_ms, .. } = choices;
-    let (cull, select, draw) = (cull_ms.mean, select_ms.mean, draw_ms.mean);
-    let _ = write!(out, "cull {cull:.2} ms, select {select:.3}, draw {draw:.2}; ");
-    let _ = write!(out, "{:.2} % of levels change, {:.2} % back", 100.0 * level_changes, 100.0 * reversals);
+    let (Some(cull), Some(select)) = (cull_ms, select_ms) else { return };
+    let _ = write!(out, "cull {:.2} ms, select {:.3}", cull.mean, select.mean);
+    if let Some(draw) = draw_ms {
+        let _ = write!(out, ", draw {:.2}", draw.mean);
+    }
+    if let (Some(change), Some(back)) = (level_changes, reversals) {
+        let _ = write!(out, "; {:.2} % of levels change, {:.2} % back", 100.0 * change, 100.0 * back);
+    }
     if let Some(error) = choices.model_error {
         let _ = write!(out, "; predicted to {:.1} %", 100.0 * error);
     }

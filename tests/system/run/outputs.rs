@@ -121,3 +121,58 @@ fn the_environment_says_headless_as_environments_do() {
         assert!(traces(windowed) > 0, "{windowed}: without a display a run leaves its report");
     }
 }
+
+#[test]
+fn no_output_overwrites_the_scene_and_no_generated_scene_a_file() {
+    let scene = Folder::with(BALL);
+    let before = std::fs::read_to_string(scene.scene()).unwrap();
+    for flag in ["--report", "--png", "--frames-csv"] {
+        let done = metachron(&["run", scene.scene(), "--headless", flag, scene.scene()]);
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.code() == Some(2) && said.contains("would overwrite the scene"), "{said}");
+    }
+    let generate = |more: &[&str]| metachron(&[&["generate", "domes", "--out", scene.scene()], more].concat());
+    let refused = generate(&[]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8(refused.stderr).unwrap().contains("--force overwrites it"));
+    assert_eq!(std::fs::read_to_string(scene.scene()).unwrap(), before);
+    assert_eq!(generate(&["--force"]).status.code(), Some(0));
+    assert_ne!(std::fs::read_to_string(scene.scene()).unwrap(), before);
+}
+
+/// The program where no adapter can be found.
+fn blind(arguments: &[&str]) -> std::process::Output {
+    let mut command = program();
+    command
+        .env("VK_ICD_FILENAMES", "/nonexistent")
+        .env("VK_DRIVER_FILES", "/nonexistent")
+        .env("WGPU_BACKEND", "vulkan");
+    command.args(arguments).output().unwrap()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn without_an_adapter_a_picture_is_refused_and_frame_times_are_not_judged() {
+    let scene = Folder::with(BALL);
+    let path = scene.file("last.png");
+    let fixed = ["run", scene.scene(), "--headless", "--frames", "3"];
+    let done = blind(&[&fixed[..], &["--png", &path]].concat());
+    let said = String::from_utf8(done.stderr).unwrap();
+    assert!(done.status.code() == Some(1) && said.contains("cannot be drawn"), "{said}");
+    assert!(said.find("Mesa").unwrap() < said.find("No suitable").unwrap(), "advice first: {said}");
+    assert!(!std::path::Path::new(&path).exists());
+    assert_eq!(blind(&fixed).status.code(), Some(0), "without a picture none is needed");
+    for goal in ["frame_ms.p99>1000", "missed_share>0.5", "gpu_ms.max>1000"] {
+        let done = blind(&[&fixed[..], &["--fail-on", goal]].concat());
+        let said = String::from_utf8(done.stderr).unwrap();
+        assert!(done.status.code() == Some(4) && said.contains("was not measured"), "{goal}: {said}");
+    }
+}
+
+#[test]
+fn a_run_begins_when_its_first_picture_is_there() {
+    let scene = Folder::with(BALL);
+    // far shorter than pipelines take to be made, where there is an adapter
+    let report = report_of(scene.scene(), &["--seconds", "0.02"]);
+    assert!(report["frames"].as_u64().unwrap() >= 1 && number(&report, "/sim_s") >= 0.02, "{report}");
+}
