@@ -118,7 +118,7 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let found = converge(LEVELS_MAX, KNOWN * tolerance_m, &mut |level| task.reference(level));
     task.failure()?;
     let Some(answer) = found else {
-        return Ok(if task.left() == 0 { too_few(task, args) } else { ended(task, |task| task.lost()) });
+        return Ok(if task.left() <= 1 { too_few(task, args) } else { ended(task, |task| task.lost()) });
     };
     let room_m = tolerance_m - answer.error_m;
     let present = task.attempt(&now, &answer.paths);

@@ -133,8 +133,12 @@ impl<'a> Task<'a> {
         Some(played.paths)
     }
 
-    /// What settings come to against the converged answer; `None` where the run was stopped.
+    /// What settings come to against the converged answer; `None` where the run was stopped, or only the last run is left, which is
+    /// kept for what is found.
     pub(super) fn attempt(&mut self, settings: &[Setting], answer: &[Path]) -> Option<Trial> {
+        if self.left() <= 1 {
+            return None;
+        }
         let played = self.play(settings)?;
         let apart_m = farthest_m(&played.paths[..self.held], answer);
         let error_m = if played.parked.is_some() { f64::INFINITY } else { apart_m };
