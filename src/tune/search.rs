@@ -1,12 +1,11 @@
-//! The gains that do best: a coarse grid and what a relay gives, then Nelder and Mead's simplex from the best of it (NM65).
+//! The gains that do best: a coarse grid, then Nelder and Mead's simplex from the best of it (NM65).
 //!
 //! In: a plant, a target, how much to play. Out: the best verdict so far, whenever it is stopped. Deterministic.
 //! Never here: what good is ([`super::judge`] says).
 
 use super::contender::Contender;
 use super::plant::Plant;
-use super::relay::relay_gains;
-use super::trials::{Extent, Verdict, judge, nearest, speeds_in_reach};
+use super::trials::{Extent, Verdict, judge};
 use crate::control::Law;
 use argmin::core::{CostFunction, Error, Executor};
 use argmin::solver::neldermead::NelderMead;
@@ -100,19 +99,6 @@ impl Family {
             all.iter().flat_map(with).collect()
         })
     }
-
-    /// Where a search of `plant` begins: the grid, and what a relay gives at each of its margins where a relay tunes such a law.
-    fn starts(self, plant: &Plant, target_hz: f64) -> Vec<Vec<f64>> {
-        let mut starts = self.candidates();
-        if self == Self::Pi {
-            let plant = plant.on(nearest(&speeds_in_reach(plant, target_hz)));
-            starts.extend(self.grid()[1].iter().filter_map(|margin| match relay_gains(&plant, target_hz, *margin)? {
-                Law::Corrected { kappa, lead, margin } => Some([kappa, margin, lead].map(libm::log).to_vec()),
-                Law::Printed { .. } => None,
-            }));
-        }
-        starts
-    }
 }
 
 /// The state of a search that the solver's cost function shares.
@@ -148,11 +134,11 @@ impl Judging<'_, '_> {
 /// Looks for the gains of `family` that do best; `None` where not one candidate was judged.
 #[must_use]
 pub fn search(search: &mut Search<'_>, family: Family) -> Option<Found> {
-    let starts = family.starts(search.plant, search.target_hz);
-    let expected = starts.len() as f64 + TRIES * family.iterations() as f64;
+    let grid = family.candidates();
+    let expected = grid.len() as f64 + TRIES * family.iterations() as f64;
     let mut judging = Judging { search, family, best: None, tried: Vec::new(), expected, interrupted: false };
     let mut corner = None::<(Vec<f64>, f64)>;
-    for at in starts {
+    for at in grid {
         let Some(objective) = judging.cost(&at) else { break };
         if corner.as_ref().is_none_or(|(_, held)| objective < *held) {
             corner = Some((at, objective));
@@ -228,17 +214,6 @@ mod tests {
             panic!("the corrected law was looked at")
         };
         assert!((0.005..0.1).contains(&margin), "{margin}");
-    }
-
-    #[test]
-    fn no_relay_of_the_margins_tried_does_better_than_what_is_found() {
-        let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
-        let extent = Extent { seeds: 1, millis: 1500, threads: None };
-        let found = found(Family::Pi, usize::MAX);
-        for margin in Family::Pi.grid()[1] {
-            let law = relay_gains(&plant, 30.0, *margin).unwrap();
-            assert!(found.best.objective <= judge(&plant, law, 30.0, extent).objective, "{law:?}");
-        }
     }
 
     #[test]

@@ -80,18 +80,13 @@ pub fn speeds_in_reach(plant: &Plant, target_hz: f64) -> Vec<f64> {
     SPEEDS.into_iter().filter(|&speed| plant.reach(speed).holds(1.0 / target_hz)).collect()
 }
 
-/// Of `speeds` the one nearest to the machine's own; 1 where there is none.
-pub(super) fn nearest(speeds: &[f64]) -> f64 {
-    let far = |speed: f64| libm::fabs(libm::log(speed));
-    speeds.iter().copied().min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0)
-}
-
 /// Judges `contender` on `plant` at `target_hz`.
 #[must_use]
 pub fn judge(plant: &Plant, contender: impl Into<Contender>, target_hz: f64, extent: Extent) -> Verdict {
     let contender = contender.into();
     let asked = speeds_in_reach(plant, target_hz);
-    let own = nearest(&asked);
+    let far = |speed: f64| libm::fabs(libm::log(speed));
+    let own = asked.iter().copied().min_by(|a, b| far(*a).total_cmp(&far(*b))).unwrap_or(1.0);
     let seconds = 1e-3 * extent.millis as f64;
     let calm =
         |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(contender, target_hz) };
