@@ -77,7 +77,7 @@ pub struct Stepper {
     pushed_j: f64,
     /// The length of the substep that ended last, seconds.
     pub(super) span_s: f64,
-    /// Systems factored since the step began, iterations and substeps that were tried in vain among them: its work.
+    /// Systems factored since the step began for the substeps that stand, iterations among them: its work.
     pub(super) solves: u32,
 }
 
@@ -112,8 +112,9 @@ impl Stepper {
                 integrator: setting.integrator,
             };
             let stretched = span.1 * now.stretch > setting.longest_s && size > 1;
+            let solves = self.solves;
             if stretched || self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
-                size /= 2;
+                (self.solves, size) = (solves, size / 2);
                 continue;
             }
             self.accept(now, ties, span);
