@@ -72,13 +72,13 @@ impl RigidBody {
     /// Notes what fixed solids gave in a step of `dt` that began at `start`: all that neither gravity nor others did, without
     /// what only carried the weight. That they go on to give: others expect it ([`RigidBody::support`]).
     pub(super) fn note_borne(&mut self, start: SimTime, dt: SimSpan) {
-        let fall = self.gravity * dt.as_secs_f64();
+        let dt_s = dt.as_secs_f64();
+        let fall = self.gravity * dt_s;
         let change = self.motion.velocity - self.begun - self.coupled - fall;
         let weight = (-fall.dot(change) / change.length_squared()).max(0.0);
         let blow = 1.0 - weight;
         let is_blow = self.ties.is_empty() && blow * change.length() > CHANGED_M_S;
         let alone = self.coupled == DVec3::ZERO;
-        let dt_s = dt.as_secs_f64();
         let free = self.begun_at.0 + (self.begun + fall * 0.5) * dt_s;
         // with others about, when in the step it was given is not known: in the middle
         let way = if alone { self.motion.position - free } else { change * (0.5 * dt_s) };

@@ -31,7 +31,7 @@ const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
 pub enum Lesson {
     /// κ has moved towards it.
     Learned,
-    /// It was too far away to be believed, for now.
+    /// It was too far away to be believed, unless more follow on its side.
     Outlier,
     /// It was the third too far away on the same side: κ has jumped.
     NewRegime,

@@ -26,8 +26,14 @@ pub(super) fn floor() -> Obstacle {
 
 /// A box of half height 2 cm, 10 cm long and wide, with its middle at `position`.
 pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody {
-    RigidBody::new(RigidSpec {
-        solid: Solid::Box { half_extents_m: DVec3::new(0.05, 0.05, 0.02) },
+    let solid = Solid::Box { half_extents_m: DVec3::new(0.05, 0.05, 0.02) };
+    RigidBody::new(dropped(solid, mass_kg, position, gravity)).unwrap()
+}
+
+/// A solid that is let go at `position`, above a floor where there is gravity.
+pub(super) fn dropped(solid: Solid, mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidSpec {
+    RigidSpec {
+        solid,
         position,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,
@@ -39,8 +45,7 @@ pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody 
         obstacles: if gravity == DVec3::ZERO { Arc::from([]) } else { Arc::from([floor()]) },
         joints: Arc::from([]),
         sleep: false,
-    })
-    .unwrap()
+    }
 }
 
 fn lowest_over(stage: &Stage, tube: AgentId, block: AgentId) -> f64 {

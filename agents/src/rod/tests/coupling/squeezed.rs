@@ -3,14 +3,14 @@
 //! The floor has stopped it by the time it hears what the tube gave: taken on top of that, it would be thrown back higher than it fell.
 
 use super::super::reference_spec;
-use super::bodies::floor;
+use super::bodies::{self, floor};
 use super::meetings::{GRAVITY, RADIUS};
 use crate::coupling::harness::{Faults, Stage};
-use crate::rigid::{RigidBody, RigidSpec};
+use crate::rigid::RigidBody;
 use crate::rod::{Tube, TubeSpec};
 use crate::shape::Solid;
 use crate::{AgentId, Body};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use std::sync::Arc;
 
 const BALL_M: f64 = 0.1;
@@ -23,20 +23,7 @@ fn height_m(stage: &Stage, ball: AgentId) -> f64 {
 /// How high the ball rises after it was lowest, and how high it lies in the end, at such rates of the tube and the ball, metres.
 fn dropped(rates: (f64, f64), faults: Faults) -> (f64, f64) {
     let mut stage = Stage::new(faults);
-    let spec = RigidSpec {
-        solid: Solid::Ball { radius_m: BALL_M },
-        position: DVec3::Z * 0.5,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg: 1.0,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: GRAVITY,
-        obstacles: Arc::from([floor()]),
-        joints: Arc::from([]),
-        sleep: false,
-    };
+    let spec = bodies::dropped(Solid::Ball { radius_m: BALL_M }, 1.0, DVec3::Z * 0.5, GRAVITY);
     let path_m = vec![DVec3::new(-0.5, 0.0, 0.1), DVec3::new(0.5, 0.0, 0.1)];
     let base = TubeSpec { friction: 0.5, clamp: [true; 2], obstacles: Arc::from([floor()]), ..reference_spec(1e6, 30) };
     stage.add(Tube::new(TubeSpec { path_m, gravity: GRAVITY, ..base }).unwrap(), rates.0);
