@@ -11,6 +11,7 @@
 //! the energy that a push-out adds is work from outside and belongs to the energy check of the substep.
 
 mod band;
+mod block;
 mod calm;
 mod check;
 mod company;

@@ -1,7 +1,8 @@
-//! Symmetric 3×3 matrices: six numbers, and the few products that the band solver needs.
+//! Symmetric 3×3 matrices: six numbers.
 //!
 //! Never here: anything but arithmetic.
 
+use super::block::Symmetric;
 use glam::{DMat3, DVec3};
 use std::ops::{Add, AddAssign, Mul};
 
@@ -51,42 +52,11 @@ impl Sym3 {
         DMat3::from_cols(DVec3::new(d.x, o.z, o.y), DVec3::new(o.z, d.y, o.x), DVec3::new(o.y, o.x, d.z))
     }
 
-    /// self · other.
-    #[inline]
-    pub fn times(&self, other: &Self) -> DMat3 {
-        other.after(&self.full())
-    }
-
-    /// m · self.
-    #[inline]
-    pub fn after(&self, m: &DMat3) -> DMat3 {
-        let Self { d, o } = *self;
-        let (x, y, z) = (m.x_axis, m.y_axis, m.z_axis);
-        DMat3::from_cols(x * d.x + y * o.z + z * o.y, x * o.z + y * d.y + z * o.x, x * o.y + y * o.x + z * d.z)
-    }
-
-    /// self − a bᵀ, for an a bᵀ that is known to be symmetric.
-    #[inline]
-    pub fn minus_product(&self, a: &DMat3, b: &DMat3) -> Self {
-        let (ax, ay, az) = (a.x_axis, a.y_axis, a.z_axis);
-        let (bx, by, bz) = (b.x_axis, b.y_axis, b.z_axis);
-        let d = self.d - (ax * bx + ay * by + az * bz);
-        let entry = |i: usize, j: usize| ax[i] * bx[j] + ay[i] * by[j] + az[i] * bz[j];
-        Self { d, o: self.o - DVec3::new(entry(1, 2), entry(0, 2), entry(0, 1)) }
-    }
-
-    /// The inverse, by cofactors; `None` where the matrix is not positive definite or not finite.
+    /// The inverse; `None` where the matrix is not positive definite or not finite.
     #[inline]
     pub fn inverse(&self) -> Option<Self> {
-        let Self { d, o } = *self;
-        let c = DVec3::new(d.y * d.z - o.x * o.x, d.x * d.z - o.y * o.y, d.x * d.y - o.z * o.z);
-        let e = DVec3::new(o.y * o.z - d.x * o.x, o.x * o.z - d.y * o.y, o.x * o.y - d.z * o.z);
-        let det = d.x * c.x + o.z * e.z + o.y * e.y;
-        let positive = d.x > 0.0 && c.z > 0.0 && det > 0.0 && det < f64::INFINITY;
-        positive.then(|| {
-            let scale = 1.0 / det;
-            Self { d: c * scale, o: e * scale }
-        })
+        let (inverse, minors) = Symmetric::from(*self).inverse();
+        minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY).then(|| inverse.into())
     }
 }
 
@@ -133,9 +103,8 @@ mod tests {
     #[test]
     fn the_inverse_undoes_the_matrix() {
         let m = Sym3::diagonal(DVec3::new(2.0, 3.0, 4.0)) + Sym3::outer(DVec3::new(1.0, -2.0, 0.5), 0.7);
-        let product = m.times(&m.inverse().unwrap());
+        let product = m.full() * m.inverse().unwrap().full();
         assert!((product - DMat3::IDENTITY).abs_diff_eq(DMat3::ZERO, 1e-14), "{product}"); // condition 3
-        assert_eq!(m.minus_product(&m.full(), &DMat3::IDENTITY), Sym3::default());
         assert_eq!(Sym3::diagonal(DVec3::new(1.0, 1.0, -1.0)).inverse(), None);
     }
 }

@@ -5,7 +5,7 @@
 
 use glam::{DQuat, DVec3};
 
-/// Below this square of the half angle the five terms of [`exp`] err by less than 1 ulp.
+/// Below this square of the half angle the five terms and more of [`exp`] err by less than 1 ulp.
 const EXP_SERIES_MAX: f64 = 0.02;
 /// Below this square of the half angle's sine the eight terms of [`log`] err by less than 1 ulp.
 const LOG_SERIES_MAX: f64 = 0.01;
@@ -16,8 +16,9 @@ const SHARE_SERIES_MAX: f64 = 0.1;
 pub fn exp(phi: DVec3) -> DQuat {
     let a2 = 0.25 * phi.length_squared();
     let (sinc, cos) = if a2 < EXP_SERIES_MAX {
-        let sinc = 1.0 - a2 / 6.0 * (1.0 - a2 / 20.0 * (1.0 - a2 / 42.0 * (1.0 - a2 / 72.0)));
-        let cos = 1.0 - a2 / 2.0 * (1.0 - a2 / 12.0 * (1.0 - a2 / 30.0 * (1.0 - a2 / 56.0 * (1.0 - a2 / 90.0))));
+        const SINC: [f64; 5] = [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5_040.0, 1.0 / 362_880.0];
+        const COS: [f64; 6] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0];
+        let (sinc, cos) = (polynomial(&SINC, a2), polynomial(&COS, a2));
         (sinc, cos)
     } else {
         let a = a2.sqrt();
@@ -35,7 +36,7 @@ pub fn log(q: DQuat) -> DVec3 {
     if s2 < LOG_SERIES_MAX {
         const C: [f64; 8] =
             [1.0, 1.0 / 6.0, 3.0 / 40.0, 5.0 / 112.0, 35.0 / 1152.0, 63.0 / 2816.0, 231.0 / 13312.0, 143.0 / 10240.0];
-        return v * (2.0 * C.iter().rev().fold(0.0, |sum, c| sum * s2 + c));
+        return v * (2.0 * polynomial(&C, s2));
     }
     let s = s2.sqrt();
     v * (2.0 * libm::atan2(s, w) / s)
@@ -45,10 +46,16 @@ pub fn log(q: DQuat) -> DVec3 {
 pub fn bend_share(theta2: f64) -> f64 {
     if theta2 < SHARE_SERIES_MAX {
         const C: [f64; 5] = [1.0 / 12.0, 1.0 / 720.0, 1.0 / 30_240.0, 1.0 / 1_209_600.0, 1.0 / 47_900_160.0];
-        return C.iter().rev().fold(0.0, |sum, c| sum * theta2 + c);
+        return polynomial(&C, theta2);
     }
     let half = 0.5 * theta2.sqrt();
     (1.0 - half * libm::cos(half) / libm::sin(half)) / theta2
+}
+
+/// Σ c_i x^i.
+#[inline]
+fn polynomial(c: &[f64], x: f64) -> f64 {
+    c.iter().rev().fold(0.0, |sum, c| sum * x + c)
 }
 
 /// The third axis of the frame `q`: the axial director.

@@ -47,7 +47,7 @@ fn second_order_methods_follow_the_swinging_cable() {
         let (rms, least, most, substeps) = swing_error(&mut swinging(integrator, 32, 4));
         let name = integrator.name();
         println!("{name}: RMS {rms:e} m, energy {least:e} … {most:e}, {substeps} substeps a step");
-        // the issue's bounds; 4.4e-4 m is what 32 links leave of space alone (`link_chain_error_vs_extrapolated`)
+        // the wanted bounds; 4.4e-4 m is what 32 links leave of space alone (`link_chain_error_vs_extrapolated`)
         assert!(rms <= 5e-4, "{name}: {rms} m");
         assert!(least >= -loses && most <= 1e-6, "{name}: energy from {least} to {most}");
     }
@@ -60,7 +60,7 @@ fn the_energy_momentum_rule_keeps_the_energy_of_a_swing_for_ten_seconds() {
     for _ in 0..1000 {
         run(&mut tube, 10.0, 0.01);
         let change = (tube.energy_j() - start) / scale;
-        // the issue allows a loss of 5e-3; the iteration's rest adds up over 4000 substeps and more
+        // a loss of 5e-3 is allowed; the iteration's rest adds up over 4000 substeps and more
         assert!(change.abs() < 1e-5, "{change} of the energy");
     }
 }

@@ -33,7 +33,7 @@ fn tip_error(case: &str, young_pa: f64, segments: usize, dt_ms: f64) -> f64 {
 fn a_clamped_tube_hangs_as_the_reference_does() {
     for (case, young_pa) in [("soft", 1e6), ("firm", 1e7)] {
         let error = tip_error(case, young_pa, 64, 10.0);
-        assert!(error <= 5e-4, "{case}: {error}"); // the bound; 3.8e-4 and less is the static floor of 64 segments
+        assert!(error <= 5e-4, "{case}: {error}"); // the wanted bound; 3.8e-4 and less is the static floor of 64 segments
     }
 }
 

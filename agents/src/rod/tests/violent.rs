@@ -109,5 +109,5 @@ fn comes_back(integrator: Integrator, (young_pa, dt_ms): (f64, f64)) {
     run(&mut thrown, dt_ms, 20.0);
     let error = (thrown.state().x[32] - rest).length();
     let name = integrator.name();
-    assert!(error < 1e-5, "{name}, E {young_pa:e}, dt {dt_ms} ms: {error} m"); // the bound, per length of 1 m
+    assert!(error < 1e-5, "{name}, E {young_pa:e}, dt {dt_ms} ms: {error} m"); // the wanted bound, per length of 1 m
 }

@@ -54,7 +54,7 @@ const SECONDS: f64 = 3.0;
 const REST_S: f64 = 2.5;
 /// Past this many times the energy of the start nothing more is to be learnt.
 const BLOWN_UP: f64 = 1e6;
-/// Limits of the issue.
+/// What is wanted.
 const RAW_MAX: f64 = 1.3;
 const COMMON_MAX: f64 = 1.01;
 const MOMENTUM_MAX: f64 = 0.005;
