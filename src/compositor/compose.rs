@@ -1,9 +1,10 @@
 //! Makes the picture: every visible object at the level asked for, as flat arrays.
 //!
 //! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: which level is right, the GPU.
-//! A tube that the camera does not see stays in the picture for its shadow.
+//! What the camera does not see is in the picture where it stands in the light of what it sees: for its shadow.
 
-use super::gather::{Form, Look, Material, Stage};
+use super::column::LightColumn;
+use super::gather::{Form, Look, Material, Stage, Track};
 use super::level::{Level, Shading};
 use super::picture::{
     Colouring, MeshKey, Picture, SkinSample, SolidInstance, Style, TubeRun, age_colour, detail_colour,
@@ -63,6 +64,8 @@ impl Stage {
         picture.origin = camera.target_m.round();
         scratch.solids.clear();
         self.find_focus(camera, &mut picture);
+        let column = LightColumn::of(&picture);
+        self.tracks.iter_mut().for_each(|track| track.shows = track.seen || track.shades(&column));
         self.add_tubes(levels, &mut picture, &mut scratch);
         let mut allowance = self.allowance(levels);
         for (number, track) in self.tracks.iter_mut().enumerate() {
@@ -70,7 +73,7 @@ impl Stage {
             if at.triangles == 0 || !track.seen {
                 track.glide = None;
             }
-            if at.triangles > 0 {
+            if at.triangles > 0 && track.shows {
                 add_solid(track, at, &picture, (&mut scratch.solids, &mut allowance));
             }
         }
@@ -119,7 +122,7 @@ impl Stage {
     fn add_tubes(&mut self, levels: &[Level], picture: &mut Picture, scratch: &mut Scratch) {
         scratch.tubes.clear();
         let long = |form: &Form| matches!(form, Form::Tube | Form::Rope { .. });
-        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| long(&t.actor.form));
+        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| t.shows && long(&t.actor.form));
         let drawn = tubes.map(|(number, _)| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
         let tracks = &self.tracks;
         let level_of = |n: u8, number: usize| {
@@ -166,7 +169,7 @@ impl Stage {
         for (number, track) in self.tracks.iter().enumerate() {
             let (Form::Skin(form), Body::Soft(soft)) = (&track.actor.form, &track.pose) else { continue };
             let at = level(levels, number);
-            if at.triangles == 0 {
+            if at.triangles == 0 || !track.shows {
                 continue;
             }
             let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
@@ -193,6 +196,13 @@ impl Stage {
             let ball = instance(point - picture.origin, DQuat::IDENTITY, size, paint);
             solids.push((kind(Shading::PerPixel, MeshKey::Primitive(Primitive::Ball, 2)), ball));
         }
+    }
+}
+
+impl Track {
+    /// Whether it may throw a shadow on what is seen.
+    fn shades(&self, column: &LightColumn) -> bool {
+        column.holds(self.bounds.centre, self.bounds.radius_m)
     }
 }
 
@@ -375,5 +385,10 @@ mod tests {
         stage.survey(&away, SIZE);
         let picture = stage.compose(&away, &[], Style::default(), None);
         assert!(!picture.tubes[0].shown);
+        let aside = camera.eye() + camera.right() * 50.0;
+        let far = Camera::looking(aside, aside - camera.forward(), camera.fov_y_rad);
+        stage.survey(&far, SIZE);
+        let picture = stage.compose(&far, &[], Style::default(), None);
+        assert!(picture.tubes.is_empty() && picture.instances.is_empty(), "its shadow falls on nothing that is seen");
     }
 }

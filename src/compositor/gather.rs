@@ -126,6 +126,8 @@ pub(super) struct Track {
     pub age_s: f64,
     pub bounds: Bounds,
     pub seen: bool,
+    /// Whether the picture needs it: it is seen, or may throw a shadow on what is.
+    pub shows: bool,
     pub skeleton: Skeleton,
     /// At which ε the skeleton was made of the pose; `None` where it was made of another one.
     pub cut_m: Option<f64>,
@@ -261,6 +263,7 @@ impl Track {
             age_s: 0.0,
             bounds: Bounds::default(),
             seen: true,
+            shows: true,
             skeleton: Skeleton::default(),
             cut_m: None,
             glide: None,

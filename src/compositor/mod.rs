@@ -5,6 +5,7 @@
 //! for, [`Renderer::render`] draws it. [`Stage`] needs no GPU; [`Offscreen`] needs no window.
 
 mod benchmark;
+mod column;
 mod compose;
 mod draw;
 mod gather;
@@ -33,4 +34,4 @@ pub use pick::Hit;
 pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
 pub use skin::{ROPE_LEVEL, SkinRun, Skins};
 pub use survey::Seen;
-pub use view::{Camera, Ray, Size};
+pub use view::{Camera, Frustum, Ray, Size};

@@ -3,7 +3,7 @@
 //! In: posed objects and a camera. Out: one [`Seen`] an actor. Never here: levels.
 
 use super::gather::{Form, Stage, Track};
-use super::view::{Camera, Size};
+use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
 use metachron_agents::{AgentId, Body, CurveState};
 
@@ -39,9 +39,9 @@ impl Stage {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
         self.eye = eye;
-        let mut looks = 0;
+        let (frustum, mut looks) = (camera.frustum(size), 0);
         for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
-            let view = look(track, camera, size);
+            let view = look(track, camera, (size, &frustum));
             (track.seen, track.fresh) = (view.visible, false);
             match self.found.get_mut(at) {
                 Some(before) => *before = view,
@@ -69,10 +69,10 @@ impl Stage {
     }
 }
 
-fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
+fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Seen {
     let bounds = track.bounds;
     let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
-    let visible = !unseen && camera.sees(bounds.centre, bounds.radius_m, size);
+    let visible = !unseen && frustum.sees(bounds.centre, bounds.radius_m);
     let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
     let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
     let (area, speed_m_s, tube_m) = match &track.pose {
@@ -80,7 +80,7 @@ fn look(track: &Track, camera: &Camera, size: Size) -> Seen {
         Body::Curve(curve) => {
             let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
             let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
-            (curve_pixels(curve, camera, size), speed, tube_measures(curve))
+            (curve_pixels(curve, camera, (size, frustum)), speed, tube_measures(curve))
         }
         Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
         Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
@@ -113,20 +113,22 @@ fn half_diagonal_px(size: Size) -> f64 {
 }
 
 /// Area of a tube on the screen: of each segment its projected length times its projected width.
-fn curve_pixels(curve: &CurveState, camera: &Camera, size: Size) -> f64 {
-    let (eye, forward) = (camera.eye(), camera.forward());
+fn curve_pixels(curve: &CurveState, camera: &Camera, (size, frustum): (Size, &Frustum)) -> f64 {
+    let (eye, forward, near_m) = (camera.eye(), camera.forward(), camera.near_m());
+    // pixels that a metre takes across the view at a depth of a metre
+    let pixels_m = camera.pixels_per_metre(1.0, size);
     let segment = |i: usize| {
         let (a, b) = (curve.positions[i], curve.positions[i + 1]);
         let middle = 0.5 * (a + b) - eye;
         let depth = middle.dot(forward);
         let radius = curve.radii_m[i];
-        if depth < camera.near_m() || !camera.sees(middle + eye, radius, size) {
+        if depth < near_m || !frustum.sees(middle + eye, radius) {
             return 0.0;
         }
         let (chord, sight) = (b - a, middle.normalize());
         let width = 2.0 * radius;
         let length = (chord - sight * chord.dot(sight)).length();
-        let scale = camera.pixels_per_metre(depth, size);
+        let scale = pixels_m / depth;
         length * width * scale * scale
     };
     (0..curve.positions.len().saturating_sub(1)).map(segment).sum()

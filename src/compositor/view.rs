@@ -216,16 +216,36 @@ impl Camera {
         Ray { origin: self.eye(), direction }
     }
 
+    /// What of space is in a picture of this size.
+    #[must_use]
+    pub fn frustum(&self, size: Size) -> Frustum {
+        let tan_y = (0.5 * self.fov_y_rad).tan();
+        let tan_x = tan_y * size.aspect();
+        let (forward, side) = (self.forward(), |across: DVec3, tan: f64| (across, tan, (1.0 + tan * tan).sqrt()));
+        let sides = [side(self.right(), tan_x), side(self.up(), tan_y)];
+        Frustum { eye: self.eye(), forward, near_m: self.near_m(), sides }
+    }
+}
+
+/// The part of space that a camera has in its picture.
+#[derive(Debug, Clone, Copy)]
+pub struct Frustum {
+    eye: DVec3,
+    forward: DVec3,
+    near_m: f64,
+    /// Right and up: the direction, the tangent of half the angle of view that way, and one over its cosine.
+    sides: [(DVec3, f64, f64); 2],
+}
+
+impl Frustum {
     /// Whether a ball may be seen: it is not wholly outside any side of the view.
     #[must_use]
-    pub fn sees(&self, centre_m: DVec3, radius_m: f64, size: Size) -> bool {
-        let from_eye = centre_m - self.eye();
-        let (tan_y, aspect) = ((0.5 * self.fov_y_rad).tan(), size.aspect());
-        let depth = from_eye.dot(self.forward());
-        let beside = |off: f64, tan: f64| (off.abs() - depth * tan) / (1.0 + tan * tan).sqrt() > radius_m;
-        depth + radius_m > self.near_m()
-            && !beside(from_eye.dot(self.right()), tan_y * aspect)
-            && !beside(from_eye.dot(self.up()), tan_y)
+    pub fn sees(&self, centre_m: DVec3, radius_m: f64) -> bool {
+        let from_eye = centre_m - self.eye;
+        let depth = from_eye.dot(self.forward);
+        let beside =
+            |&(across, tan, secant): &(DVec3, f64, f64)| from_eye.dot(across).abs() - depth * tan > radius_m * secant;
+        depth + radius_m > self.near_m && !self.sides.iter().any(beside)
     }
 }
 
@@ -288,10 +308,11 @@ mod tests {
     fn what_is_framed_is_seen_and_what_lies_behind_is_not() {
         let mut camera = camera();
         camera.show(DVec3::ZERO, 0.5, SIZE);
-        assert!(camera.sees(DVec3::ZERO, 0.5, SIZE));
+        assert!(camera.frustum(SIZE).sees(DVec3::ZERO, 0.5));
         let side = camera.right() * (3.0 * camera.distance_m);
-        assert!(!camera.sees(side, 0.5, SIZE) && camera.sees(side, 4.0 * camera.distance_m, SIZE));
-        assert!(!camera.sees(camera.eye() - camera.forward(), 0.5, SIZE));
+        let view = camera.frustum(SIZE);
+        assert!(!view.sees(side, 0.5) && view.sees(side, 4.0 * camera.distance_m));
+        assert!(!view.sees(camera.eye() - camera.forward(), 0.5));
         let top = camera.project(camera.up() * 0.5, SIZE).unwrap().0;
         assert!(top.y > 0.0 && top.y < 60.0, "{top}");
     }

@@ -17,7 +17,7 @@ use super::switchboard::Switchboard;
 use super::times::Times;
 use super::turn::{Actor, Rhythm};
 use super::watch::{Trace, Watch};
-use metachron_agents::coupling::{Law, Link};
+use metachron_agents::coupling::{Form, FormKind, Law, Link};
 use metachron_agents::{Agent, AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
@@ -210,11 +210,14 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
 /// What is known of all from the start, and everybody's writer.
 fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
-    let seated = forms.iter().flatten().count() > 1 || spawns.iter().any(|spawn| spawn.together.is_some());
+    // only rigid bodies can lead, and be led
+    let rigid = |form: &Option<Arc<Form>>| form.as_ref().is_some_and(|form| matches!(form.kind, FormKind::Solid(_)));
+    let led = forms.iter().filter(|form| rigid(form)).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
     let mut all = Vec::with_capacity(spawns.len());
     for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
         let writer = SlotWriter::new(Snapshot::default());
+        let seated = led && rigid(&form);
         let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
         writers.push(writer);
         all.push(Peer { shared, form, laws: Vec::new() });
@@ -295,5 +298,40 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         unsettled: Duration::ZERO,
         served: SimTime::ZERO,
         owed: SimSpan::ZERO,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use metachron_agents::rigid::{RigidBody, RigidSpec};
+    use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
+    use metachron_agents::shape::Solid;
+
+    fn ball() -> AgentSpawn {
+        let spec = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 1.0);
+        AgentSpawn::alone("ball", Box::new(RigidBody::new(spec).unwrap()), 100.0)
+    }
+
+    fn tube() -> AgentSpawn {
+        let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 0.5 };
+        let spec = TubeSpec::free(vec![DVec3::ZERO, DVec3::X], Section::hollow(0.015, 0.002, material), 8);
+        AgentSpawn::alone("tube", Box::new(Tube::new(spec).unwrap()), 100.0)
+    }
+
+    /// Whether there is a crowd to look around in, and how many agents have seats for others.
+    fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
+        let board = Arc::new(Switchboard::new(spawns.len()));
+        let (peers, _) = peers(&mut spawns, &board);
+        (peers.crowd.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
+    }
+
+    #[test]
+    fn what_a_scene_does_not_need_is_not_set_up() {
+        assert_eq!(set_up(vec![ball()]), (false, 0));
+        assert_eq!(set_up(vec![tube()]), (false, 0));
+        assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 0));
+        assert_eq!(set_up(vec![tube(), ball(), ball()]), (true, 2));
     }
 }

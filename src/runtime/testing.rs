@@ -4,11 +4,13 @@ use super::pool::Pool;
 use super::spawn::AgentSpawn;
 use super::{Clock, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site};
+use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site, SolidForm};
+use metachron_agents::shape::Solid;
 use metachron_agents::{
     Agent, AgentId, Body, Bounds, Companion, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime,
     Snapshot, StepError, StepReport, Surroundings,
 };
+use rapier3d::geometry::SharedShape;
 use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
@@ -254,7 +256,12 @@ impl Agent for Dummy {
     }
 
     fn form(&self) -> Option<Arc<Form>> {
-        self.ball.map(|_| Arc::new(Form { kind: FormKind::Chain { held_ends: 0 }, friction: 0.0, restitution: 0.0 }))
+        self.ball.map(|(radius_m, _)| {
+            let solid = Solid::Ball { radius_m };
+            let shape = SharedShape::ball(radius_m as f32);
+            let kind = FormKind::Solid(SolidForm { solid, shape, com_local: DVec3::ZERO, radius_m });
+            Arc::new(Form { kind, friction: 0.0, restitution: 0.0 })
+        })
     }
 
     fn lead(

@@ -3,7 +3,7 @@
 
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 use crate::play::{Folder, program};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron::runtime::{
     AgentHandle, AgentSpawn, AgentState, Command, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads,
     state_hash,
@@ -20,20 +20,9 @@ const AWAKE: usize = 10;
 /// A ball without weight at a place of a lattice of metres; one that may sleep stands still, the others turn where they are.
 fn ball(number: usize, sleeps: bool) -> AgentSpawn {
     let place = |k: usize| DVec3::new((k % 10) as f64, (k / 10 % 10) as f64, (k / 100) as f64);
-    let spec = RigidSpec {
-        solid: Solid::Ball { radius_m: 0.1 },
-        position: place(number),
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: if sleeps { DVec3::ZERO } else { DVec3::new(1.0, 2.0, 3.0) },
-        mass_kg: 1.0,
-        restitution: 0.5,
-        friction: 0.5,
-        gravity: DVec3::ZERO,
-        obstacles: Arc::new([]),
-        joints: Arc::new([]),
-        sleep: sleeps,
-    };
+    let free = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, place(number), 1.0);
+    let spin = if sleeps { DVec3::ZERO } else { DVec3::new(1.0, 2.0, 3.0) };
+    let spec = RigidSpec { spin, sleep: sleeps, ..free };
     AgentSpawn::alone(format!("ball {number}"), Box::new(RigidBody::new(spec).unwrap()), 100.0)
 }
 

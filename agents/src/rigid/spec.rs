@@ -77,6 +77,26 @@ pub enum RigidError {
 pub(super) const REACH_MAX: f64 = 1e6;
 
 impl RigidSpec {
+    /// A solid of `mass_kg` at `position` that nothing acts on: still, no gravity, no obstacle, no joint, friction 0.5, no bounce;
+    /// it never rests.
+    #[must_use]
+    pub fn free(solid: Solid, position: DVec3, mass_kg: f64) -> Self {
+        Self {
+            solid,
+            position,
+            rotation: DQuat::IDENTITY,
+            velocity: DVec3::ZERO,
+            spin: DVec3::ZERO,
+            mass_kg,
+            restitution: 0.0,
+            friction: 0.5,
+            gravity: DVec3::ZERO,
+            obstacles: Arc::new([]),
+            joints: Arc::new([]),
+            sleep: false,
+        }
+    }
+
     /// Whether every number is in its range.
     pub(super) fn check(&self) -> Result<(), RigidError> {
         if matches!(self.solid, Solid::Plane) {

@@ -33,20 +33,7 @@ fn floor(friction: f64) -> Obstacle {
 }
 
 fn spec(solid: Solid, position: DVec3) -> RigidSpec {
-    RigidSpec {
-        solid,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg: 0.5,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: UP * -G,
-        obstacles: Arc::new([]),
-        joints: Arc::new([]),
-        sleep: true,
-    }
+    RigidSpec { gravity: UP * -G, sleep: true, ..RigidSpec::free(solid, position, 0.5) }
 }
 
 fn ball(height: f64, restitution: f64) -> RigidSpec {

@@ -4,7 +4,7 @@
 
 use crate::runtime::AgentSpawn;
 use anyhow::Context;
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_agents::rigid::{RigidBody, RigidSpec};
 use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
 use metachron_agents::shape::Solid;
@@ -13,7 +13,6 @@ use metachron_agents::{
     Agent, N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, Surroundings,
 };
 use serde::{Deserialize, Serialize};
-use std::sync::Arc;
 
 /// What an agent is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -90,20 +89,8 @@ pub(super) fn rod(place: DVec3, segments: usize, self_contact: bool) -> anyhow::
 }
 
 fn ball(place: DVec3) -> anyhow::Result<RigidBody> {
-    let spec = RigidSpec {
-        solid: Solid::Ball { radius_m: 0.1 },
-        position: place,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::Z,
-        spin: DVec3::new(1.0, 2.0, 3.0),
-        mass_kg: 1.0,
-        restitution: 0.5,
-        friction: 0.5,
-        gravity: DVec3::ZERO,
-        obstacles: Arc::new([]),
-        joints: Arc::new([]),
-        sleep: false,
-    };
+    let ball = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, place, 1.0);
+    let spec = RigidSpec { velocity: DVec3::Z, spin: DVec3::new(1.0, 2.0, 3.0), ..ball };
     RigidBody::new(spec).context("the ball")
 }
 

@@ -2,6 +2,7 @@
 //!
 //! In: a picture and a camera. Out: one uniform block. Never here: the GPU.
 
+use super::super::column::{LIGHT, LightColumn};
 use super::super::picture::{Colouring, FloorDraw, Picture};
 use super::super::view::{Camera, Size};
 use bytemuck::{Pod, Zeroable};
@@ -26,14 +27,8 @@ pub struct Globals {
     materials: [[f32; 4]; 8],
 }
 
-/// Towards the key light: over the left shoulder of who stands at −y.
-const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
-
 /// Direction of the lamp's long side, roughly.
 const LAMP_SIDE: DVec3 = DVec3::new(0.79, 0.61, 0.0);
-
-/// How far the shadow's depths reach towards the light and away from it, in radii of the focus: shafts stand high.
-const REACH: (f64, f64) = (2.5, 1.5);
 
 /// Two rows a material, in the order of `Material`: wrap, reflectance, width and gain of the sharp lobe; width and gain of the
 /// broad lobe, mirror, metal. Widths are squares of the roughness.
@@ -112,55 +107,35 @@ pub fn floor_fills(picture: &Picture, camera: &Camera, size: Size) -> bool {
     })
 }
 
-/// The square column of light whose depths the shadow map holds.
+/// The column of light as a map of so many texels holds it.
 struct LightFrame {
-    /// Towards the light, and the map's sides.
-    light: DVec3,
-    right: DVec3,
-    up: DVec3,
-    /// The middle of the map in world axes: across in whole texels, so that shadows do not crawl; along at the focus.
+    column: LightColumn,
+    /// The middle of the map in world axes: across in whole texels, so that shadows do not crawl.
     middle: DVec3,
-    /// Half the map's width, metres.
-    half_m: f64,
     texel_m: f64,
-    /// What the depths span, metres, and the part of it that lies towards the light.
+    /// What the depths span, metres.
     range_m: f64,
-    towards_m: f64,
 }
 
 impl LightFrame {
     fn new(picture: &Picture, shadow_px: u32) -> Self {
-        let light = LIGHT.normalize();
-        let right = DVec3::Z.cross(light).normalize();
-        let up = light.cross(right);
-        let (low, high) = picture.shadowed_m;
-        let (centre, extents) = (0.5 * (low + high), 0.5 * (high - low));
-        let half = extents.dot(right.abs()).max(extents.dot(up.abs()));
-        // in steps of a tenth, so that shadows do not crawl with every move
-        let half_m = 1.1_f64.powf((half.max(1e-3).ln() / 1.1_f64.ln()).ceil());
-        let texel_m = 2.0 * half_m / f64::from(shadow_px);
-        let snapped = |axis: DVec3| (centre.dot(axis) / texel_m).round() * texel_m;
-        Self {
-            light,
-            right,
-            up,
-            middle: right * snapped(right) + up * snapped(up) + light * picture.focus_m.dot(light),
-            half_m,
-            texel_m,
-            range_m: (REACH.0 + REACH.1) * picture.focus_radius_m,
-            towards_m: REACH.0 * picture.focus_radius_m,
-        }
+        let column = LightColumn::of(picture);
+        let texel_m = 2.0 * column.half_m / f64::from(shadow_px);
+        let snapped = |axis: DVec3| axis * ((column.middle.dot(axis) / texel_m).round() * texel_m);
+        let along = column.light * column.middle.dot(column.light);
+        let middle = snapped(column.right) + snapped(column.up) + along;
+        Self { column, middle, texel_m, range_m: column.reach_m.0 + column.reach_m.1 }
     }
 
     /// From positions relative to `origin` to the shadow map's texture coordinates and depths.
     fn projection(&self, origin: DVec3) -> DMat4 {
-        let middle = self.middle - origin;
+        let (middle, column) = (self.middle - origin, &self.column);
         let row = |axis: DVec3, scale: f64, offset: f64| (axis * scale).extend(offset - axis.dot(middle) * scale);
-        let scale = 0.5 / self.half_m;
+        let scale = 0.5 / column.half_m;
         DMat4::from_cols(
-            row(self.right, scale, 0.5),
-            row(self.up, -scale, 0.5),
-            row(self.light, -1.0 / self.range_m, self.towards_m / self.range_m),
+            row(column.right, scale, 0.5),
+            row(column.up, -scale, 0.5),
+            row(column.light, -1.0 / self.range_m, column.reach_m.0 / self.range_m),
             DVec4::W,
         )
         .transpose()
@@ -168,14 +143,15 @@ impl LightFrame {
 
     /// What the column cuts out of the floor; a floor that light only grazes is not followed into the distance.
     fn patch(&self, floor: &FloorDraw, origin: DVec3) -> Patch {
-        let slope = self.light.dot(floor.normal);
-        let along = if slope > GRAZING { self.light / slope } else { floor.normal };
+        let LightColumn { light, right, up, half_m, .. } = self.column;
+        let slope = light.dot(floor.normal);
+        let along = if slope > GRAZING { light / slope } else { floor.normal };
         let slide = |v: DVec3| v - along * v.dot(floor.normal);
         let centre = self.middle - origin;
         Patch {
             centre: centre - along * (centre - floor.point).dot(floor.normal),
-            x: slide(self.right) * (2.0 * self.half_m),
-            y: slide(-self.up) * (2.0 * self.half_m),
+            x: slide(right) * (2.0 * half_m),
+            y: slide(-up) * (2.0 * half_m),
         }
     }
 }
@@ -203,6 +179,7 @@ impl Patch {
 
 #[cfg(test)]
 mod tests {
+    use super::super::super::column::REACH;
     use super::*;
 
     fn picture() -> Picture {
@@ -226,7 +203,7 @@ mod tests {
         // snapped to whole texels: at most half a texel off
         assert!((at.x - 0.5).abs() <= 0.5 / 1024.0 + 1e-12 && (at.y - 0.5).abs() <= 0.5 / 1024.0 + 1e-12, "{at}");
         assert!((at.z - REACH.0 / (REACH.0 + REACH.1)).abs() < 1e-12, "{at}");
-        let nearer = projection.transform_point3(picture.focus_m - picture.origin + frame.light * 0.7);
+        let nearer = projection.transform_point3(picture.focus_m - picture.origin + frame.column.light * 0.7);
         assert!(nearer.z < at.z);
         let (low, high) = picture.shadowed_m;
         for i in 0..8 {

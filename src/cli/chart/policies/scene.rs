@@ -70,7 +70,8 @@ pub(super) struct Seen {
 impl Scene {
     /// Everything that may be in the picture, in the order of the things.
     pub(super) fn seen(&self, camera: &Camera) -> Vec<Seen> {
-        let in_view = |t: &&Thing| camera.sees(t.centre_m, t.radius_m, SCREEN);
+        let view = camera.frustum(SCREEN);
+        let in_view = |t: &&Thing| view.sees(t.centre_m, t.radius_m);
         self.things.iter().enumerate().filter(|(_, t)| in_view(t)).map(|(i, t)| self.look(camera, i, t)).collect()
     }
 
