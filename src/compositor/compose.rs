@@ -43,6 +43,8 @@ pub struct Hand {
 /// Lists that are filled anew every frame.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
+    /// The actors that the picture needs: who is seen, and who may throw a shadow on what is.
+    shown: Vec<usize>,
     solids: Solids,
     tubes: Vec<(u8, usize)>,
     skins: SkinRoom,
@@ -64,26 +66,24 @@ impl Stage {
         picture.origin = camera.target_m.round();
         scratch.solids.clear();
         self.find_focus(camera, &mut picture);
-        let column = LightColumn::of(&picture);
-        self.tracks.iter_mut().for_each(|track| track.shows = track.seen || track.shades(&column));
+        self.find_shown(&picture, &mut scratch.shown);
         self.add_tubes(levels, &mut picture, &mut scratch);
-        let mut allowance = self.allowance(levels);
-        for (number, track) in self.tracks.iter_mut().enumerate() {
-            let at = level(levels, number);
-            if at.triangles == 0 || !track.seen {
-                track.glide = None;
-            }
-            if at.triangles > 0 && track.shows {
+        let mut allowance = self.allowance(levels, &scratch.shown);
+        for &number in &scratch.shown {
+            let (track, at) = (&mut self.tracks[number], level(levels, number));
+            if at.triangles > 0 {
                 add_solid(track, at, &picture, (&mut scratch.solids, &mut allowance));
+            } else {
+                track.glide = None;
             }
         }
         self.props.iter().for_each(|prop| add_prop(prop, &mut picture, &mut scratch.solids));
-        self.add_grasps(&picture, &mut scratch.solids);
+        self.add_grasps(&picture, &mut scratch);
         if let Some((from, to)) = hand.and_then(|hand| Some((self.place(hand.object, hand.anchor)?, hand.target))) {
             add_spring(from, to, SPRING_SHARE * camera.distance_m, &mut picture);
         }
         sort_solids(&mut scratch.solids, &mut picture);
-        self.add_skins(levels, &mut picture, &mut scratch.skins);
+        self.add_skins(levels, &mut picture, &mut scratch);
         self.picture = picture;
         self.scratch = scratch;
         &self.picture
@@ -118,13 +118,21 @@ impl Stage {
         picture.shadowed_m = if found { (tight[0], tight[1]) } else { around(picture.focus_m, picture.focus_radius_m) };
     }
 
+    /// Finds who is seen or stands in the light of what is.
+    fn find_shown(&self, picture: &Picture, shown: &mut Vec<usize>) {
+        let column = LightColumn::of(picture);
+        let needed = |track: &Track| track.seen || column.holds(track.bounds.centre, track.bounds.radius_m);
+        shown.clear();
+        shown.extend(self.tracks.iter().enumerate().filter(|(_, track)| needed(track)).map(|(number, _)| number));
+    }
+
     /// Cuts every tube into its intervals, tubes of one level side by side.
     fn add_tubes(&mut self, levels: &[Level], picture: &mut Picture, scratch: &mut Scratch) {
         scratch.tubes.clear();
         let long = |form: &Form| matches!(form, Form::Tube | Form::Rope { .. });
-        let tubes = self.tracks.iter().enumerate().filter(|(_, t)| t.shows && long(&t.actor.form));
-        let drawn = tubes.map(|(number, _)| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
         let tracks = &self.tracks;
+        let tubes = scratch.shown.iter().filter(|&&number| long(&tracks[number].actor.form));
+        let drawn = tubes.map(|&number| (level(levels, number), number)).filter(|(at, _)| at.triangles > 0);
         let level_of = |n: u8, number: usize| {
             if matches!(tracks[number].actor.form, Form::Rope { .. }) { ROPE_LEVEL } else { n }
         };
@@ -165,11 +173,12 @@ impl Stage {
     }
 
     /// The skins of soft bodies, each with an instance of its own for its colour.
-    fn add_skins(&self, levels: &[Level], picture: &mut Picture, room: &mut SkinRoom) {
-        for (number, track) in self.tracks.iter().enumerate() {
+    fn add_skins(&self, levels: &[Level], picture: &mut Picture, Scratch { shown, skins: room, .. }: &mut Scratch) {
+        for &number in &*shown {
+            let track = &self.tracks[number];
             let (Form::Skin(form), Body::Soft(soft)) = (&track.actor.form, &track.pose) else { continue };
             let at = level(levels, number);
-            if at.triangles == 0 || !track.shows {
+            if at.triangles == 0 {
                 continue;
             }
             let paint = Paint::of(track.actor.look, tint(picture.style, at, track.age_s));
@@ -183,8 +192,8 @@ impl Stage {
     }
 
     /// A small ball at every point that is held, from white to red by the force.
-    fn add_grasps(&self, picture: &Picture, solids: &mut Solids) {
-        for track in &self.tracks {
+    fn add_grasps(&self, picture: &Picture, Scratch { shown, solids, .. }: &mut Scratch) {
+        for track in shown.iter().map(|&number| &self.tracks[number]) {
             let (Body::Tool(tool), Form::Tool(shape)) = (&track.pose, &track.actor.form) else { continue };
             let Some(grasp) = tool.grasp else { continue };
             let Some(point) = self.place(grasp.target, grasp.anchor) else { continue };
@@ -196,13 +205,6 @@ impl Stage {
             let ball = instance(point - picture.origin, DQuat::IDENTITY, size, paint);
             solids.push((kind(Shading::PerPixel, MeshKey::Primitive(Primitive::Ball, 2)), ball));
         }
-    }
-}
-
-impl Track {
-    /// Whether it may throw a shadow on what is seen.
-    fn shades(&self, column: &LightColumn) -> bool {
-        column.holds(self.bounds.centre, self.bounds.radius_m)
     }
 }
 

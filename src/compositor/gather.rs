@@ -103,6 +103,8 @@ pub struct Stage {
     pub(super) scratch: super::compose::Scratch,
     /// What the last survey found, and by whose eye.
     pub(super) found: Vec<Seen>,
+    /// The actors that it looked at.
+    pub(super) looked: Vec<usize>,
     pub(super) eye: Option<(Camera, Size)>,
     /// Over how many frames meshes change their cut.
     pub(super) glide_frames: u8,
@@ -126,8 +128,6 @@ pub(super) struct Track {
     pub age_s: f64,
     pub bounds: Bounds,
     pub seen: bool,
-    /// Whether the picture needs it: it is seen, or may throw a shadow on what is.
-    pub shows: bool,
     pub skeleton: Skeleton,
     /// At which ε the skeleton was made of the pose; `None` where it was made of another one.
     pub cut_m: Option<f64>,
@@ -263,7 +263,6 @@ impl Track {
             age_s: 0.0,
             bounds: Bounds::default(),
             seen: true,
-            shows: true,
             skeleton: Skeleton::default(),
             cut_m: None,
             glide: None,

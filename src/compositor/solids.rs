@@ -3,7 +3,7 @@
 //! In: objects as they are posed, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, which level is right.
 
 use super::compose::{Paint, instance, level, tint};
-use super::gather::{Form, Material, PropShape, Stage, Track};
+use super::gather::{Actor, Form, Material, PropShape, Stage, Track};
 use super::glide::{Allowance, Glide};
 use super::level::{Level, Shading};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
@@ -32,12 +32,14 @@ impl Stage {
     }
 
     /// What gliding may cost in the next picture.
-    pub(super) fn allowance(&self, levels: &[Level]) -> Allowance {
+    pub(super) fn allowance(&self, levels: &[Level], shown: &[usize]) -> Allowance {
         if self.glide_frames < 2 {
             return Allowance { step: 1.0, triangles: 0.0 };
         }
-        let asked = self.tracks.iter().enumerate().map(|(number, track)| match &track.actor.form {
-            Form::Scenery(Model::Mesh(tom), _) if track.seen => level(levels, number).triangles.min(tom.range().1),
+        let asked = shown.iter().map(|&number| match &self.tracks[number] {
+            Track { actor: Actor { form: Form::Scenery(Model::Mesh(tom), _), .. }, seen: true, .. } => {
+                level(levels, number).triangles.min(tom.range().1)
+            }
             _ => 0,
         });
         let triangles = GLIDE_SHARE * asked.map(f64::from).sum::<f64>();

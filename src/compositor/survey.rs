@@ -34,22 +34,31 @@ pub struct Seen {
 
 impl Stage {
     /// Finds what the camera sees ([`Stage::seen`]). What stays as it is before a camera that stays where it is is not looked at
-    /// again; says how many were looked at. Keeps for [`Stage::compose`] who is visible.
-    pub fn survey(&mut self, camera: &Camera, size: Size) -> usize {
+    /// again ([`Stage::looked`] says what was). Keeps for [`Stage::compose`] who is visible.
+    pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
         self.eye = eye;
-        let (frustum, mut looks) = (camera.frustum(size), 0);
+        let frustum = camera.frustum(size);
+        self.looked.clear();
         for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
             let view = look(track, camera, (size, &frustum));
             (track.seen, track.fresh) = (view.visible, false);
+            if !track.seen {
+                track.glide = None;
+            }
             match self.found.get_mut(at) {
                 Some(before) => *before = view,
                 None => self.found.push(view),
             }
-            looks += 1;
+            self.looked.push(at);
         }
-        looks
+    }
+
+    /// The numbers of the actors that the last [`Stage::survey`] looked at, rising.
+    #[must_use]
+    pub fn looked(&self) -> &[usize] {
+        &self.looked
     }
 
     /// What the last [`Stage::survey`] found, one entry an actor in their order.
@@ -181,7 +190,8 @@ mod tests {
             (0..10).for_each(|id| stage.see(AgentId(id), &state(id, ms), true));
             news.iter().for_each(|id| stage.see(AgentId(*id), &state(*id, ms), false));
             let posed = stage.pose(SimTime::from_nanos(ms * 1_000_000), States::Interpolate);
-            let looks = stage.survey(&camera(x), SIZE);
+            stage.survey(&camera(x), SIZE);
+            let looks = stage.looked().len();
             plain.survey(&camera(x), SIZE);
             let same = |(a, b): (&Seen, &Seen)| a.id.0 < 10 || a.id.0 == 700 || a == b;
             assert!(stage.seen().len() == 1010 && stage.seen().iter().zip(plain.seen()).all(same));

@@ -81,8 +81,13 @@ impl Ladders {
         self.new.clear();
         for (at, (view, span)) in views.iter().enumerate() {
             let before = self.all.get(at).map(|ladder| ladder.key);
+            let known = before.filter(|before| before.id == view.id);
+            // what nobody sees keeps what it had
+            if known.is_some() && !view.visible {
+                continue;
+            }
             let key = Key::of(view, (steps, raise), before);
-            if before.is_some_and(|before| before.id == key.id && (!view.visible || before.is_same(&key))) {
+            if known.is_some_and(|known| known.is_same(&key)) {
                 continue;
             }
             self.made += 1;

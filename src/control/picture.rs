@@ -214,9 +214,13 @@ impl PictureControl {
 
     /// Keeps what is in view with its polygons, its speed smoothed.
     fn look(&mut self, objects: &[ObjectView]) {
-        self.views.clear();
+        self.views.truncate(objects.len());
         self.speeds.resize(objects.len(), (AgentId(0), None));
-        for (object, (of, held)) in objects.iter().zip(&mut self.speeds) {
+        for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {
+            // what stays out of sight as it is has no speed and the polygons that it had
+            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|(known, _)| known == object) {
+                continue;
+            }
             let mut view = *object;
             if *of != view.id || !view.visible {
                 (*of, *held) = (view.id, None);
@@ -226,7 +230,11 @@ impl PictureControl {
                 view.speed_px_s = held.map_or(now, |before| before + SPEED_NEWS * (now - before));
                 *held = Some(view.speed_px_s);
             }
-            self.views.push((view, Span::of(&view)));
+            let seen = (view, Span::of(&view));
+            match self.views.get_mut(at) {
+                Some(place) => *place = seen,
+                None => self.views.push(seen),
+            }
         }
     }
 

@@ -316,22 +316,33 @@ pub(super) fn law(target: &scene::Target) -> Law {
     }
 }
 
-/// Everything on the stage as control wants to know it, in the order of its actors.
-pub(super) fn views<'a>(seen: &'a [Seen], scene: &'a Scene) -> impl Iterator<Item = ObjectView> + 'a {
+/// Brings `views`, everything on the stage as control wants to know it in the order of its actors, up to date with those that were
+/// `looked` at.
+pub(super) fn renew(views: &mut Vec<ObjectView>, seen: &[Seen], looked: &[usize], scene: &Scene) {
+    if views.len() != seen.len() {
+        views.clear();
+        views.extend((0..seen.len()).map(|at| view_at(at, &seen[at], scene)));
+        return;
+    }
+    for &at in looked {
+        views[at] = view_at(at, &seen[at], scene);
+    }
+}
+
+/// Actors are agents, then scenery, then groups.
+fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
     let (agents, members) = (scene.agents.len(), scene.scenery.len());
-    let (moving, still) = seen.split_at(agents.min(seen.len()));
-    let (single, groups) = still.split_at(members.min(still.len()));
-    let moving = moving.iter().zip(&scene.agents).map(|(seen, member)| view(seen, member));
-    let single = single.iter().zip(&scene.scenery).map(|(seen, it)| {
+    if let Some(member) = scene.agents.get(at) {
+        return view(seen, member);
+    }
+    if let Some(it) = scene.scenery.get(at - agents) {
         let (least, most) = it.model.range();
-        still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most })
-    });
-    let groups = groups.iter().zip(&scene.groups).map(move |(seen, group)| {
-        let members = (agents + group.members.start, group.members.len());
-        let proxy_triangles = group.proxy.model.range().1;
-        still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, proxy_triangles })
-    });
-    moving.chain(single).chain(groups)
+        return still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most });
+    }
+    let group = &scene.groups[at - agents - members];
+    let members = (agents + group.members.start, group.members.len());
+    let proxy_triangles = group.proxy.model.range().1;
+    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, proxy_triangles })
 }
 
 fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
@@ -388,8 +399,8 @@ pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
         control::Shading::Textured => compositor::Shading::Textured,
         control::Shading::Shadowed => compositor::Shading::Shadowed,
     };
-    // a cast of floats saturates
-    let detail = control::detail(view, demand) as f32;
+    // a cast of floats saturates; the detail colours what is seen
+    let detail = if view.visible { control::detail(view, demand) as f32 } else { 0.0 };
     Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
 }
 

@@ -468,8 +468,7 @@ impl Session {
     }
 
     fn choose(&mut self, size: Size) {
-        self.views.clear();
-        self.views.extend(cast::views(self.stage.seen(), &self.scene));
+        cast::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
         // what is in the picture besides hardly changes from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         self.buy();
