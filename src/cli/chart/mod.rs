@@ -17,6 +17,7 @@ mod stability;
 mod stage;
 mod sweep;
 pub(super) mod table;
+mod timing;
 
 use super::Exit;
 use super::args::{ChartArgs, Subject};

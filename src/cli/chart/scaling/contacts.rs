@@ -1,8 +1,8 @@
 //! What a step of a tube that lies folded on itself costs by its contacts, free and held by a tool.
 
 use super::super::experiment::Finding;
+use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row};
-use super::timing::{floor_us, least_us};
 use super::tubes::{folded, holding, step};
 use metachron_agents::SimSpan;
 use std::time::Duration;
@@ -52,15 +52,15 @@ impl Growth for Contacts {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let us = |case: &str, size: u32| {
             let row = rows.iter().find(|row| row.case == case && row.size == size);
-            row.map_or(f64::NAN, |row| row.point().1)
+            row.map_or(f64::NAN, Row::us_for_goals)
         };
         let mut list = vec![Finding::at_most(
-            "100 segments on themselves: µs a step of 4 ms (10,000 a second)",
+            "100 segments on themselves: µs a step of 4 ms by calibration (10,000 a second)",
             us(FREE, 100),
             100.0,
         )];
         if rows.iter().any(|row| row.size == 400) {
-            let claim = "400 segments on themselves in a grasp: µs a step of 1 ms (1 kHz)";
+            let claim = "400 segments on themselves in a grasp: µs a step of 1 ms by calibration (1 kHz)";
             list.push(Finding::at_most(claim, us(HELD, 400), 1000.0));
         }
         list

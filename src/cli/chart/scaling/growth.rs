@@ -6,6 +6,7 @@ use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::power::exponent;
 use super::super::table::Table;
+use super::super::timing::{as_for_goals, calibration_us};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -64,6 +65,8 @@ pub(in super::super) struct Row {
     pub(super) count: Option<f64>,
     pub(super) us: Option<f64>,
     pub(super) floor_us: Option<f64>,
+    /// The calibration measured beside it ([`calibration_us`]).
+    pub(super) calibration_us: Option<f64>,
 }
 
 impl Row {
@@ -86,6 +89,16 @@ impl Row {
         let (count, us) = self.point();
         us * 1e3 / count
     }
+
+    /// Microseconds as they would be where goals were set.
+    pub(super) fn us_for_goals(&self) -> f64 {
+        as_for_goals(self.point().1, self.calibration_us)
+    }
+
+    /// Nanoseconds each, likewise.
+    pub(super) fn ns_each_for_goals(&self) -> f64 {
+        as_for_goals(self.ns_each(), self.calibration_us)
+    }
 }
 
 /// The diagram of a question.
@@ -106,7 +119,8 @@ impl<G: Growth> Experiment for Scaling<G> {
         let cost = G::measure(case);
         let number = |of: fn(&Cost) -> f64| cost.as_ref().map(of).filter(|number| number.is_finite());
         let Case { case, size } = case.clone();
-        Row { case, size, count: number(|c| c.count), us: number(|c| c.us), floor_us: number(|c| c.floor_us) }
+        let (count, us, floor_us) = (number(|c| c.count), number(|c| c.us), number(|c| c.floor_us));
+        Row { case, size, count, us, floor_us, calibration_us: calibration_us() }
     }
 
     fn case_of(row: &Row) -> Case {
@@ -203,6 +217,7 @@ mod tests {
             count: Some(f64::from(size)),
             us: Some(us),
             floor_us: Some(1.0),
+            calibration_us: None,
         };
         // a fixed cost below 100, proportional from there on
         let rows = [row(1, 50.0), row(10, 50.0), row(100, 100.0), row(1000, 1000.0)];

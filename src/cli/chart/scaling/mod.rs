@@ -5,5 +5,4 @@ pub(super) mod contacts;
 pub(super) mod growth;
 pub(super) mod segments;
 pub(super) mod sleepers;
-mod timing;
 mod tubes;

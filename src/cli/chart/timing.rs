@@ -1,4 +1,4 @@
-//! What a call costs at least, and what nothing that touches the same memory can be faster than.
+//! What a call costs at least, what nothing that touches the same memory can be faster than, and how fast the machine is.
 //!
 //! In: a call, or a number of bytes. Out: CPU time. Never here: what the call does.
 
@@ -12,7 +12,7 @@ const BATCH: Duration = Duration::from_micros(500);
 /// CPU time of one call in the fastest of many batches, over about `span`, microseconds; none where a call fails.
 ///
 /// What a shared machine adds is never negative, so the least is nearest to the call's own.
-pub(super) fn least_us(span: Duration, mut call: impl FnMut() -> Option<()>) -> Option<f64> {
+pub(in super::super) fn least_us(span: Duration, mut call: impl FnMut() -> Option<()>) -> Option<f64> {
     let start = ThreadTime::now();
     call()?;
     let once = start.elapsed().max(Duration::from_nanos(100));
@@ -29,7 +29,7 @@ pub(super) fn least_us(span: Duration, mut call: impl FnMut() -> Option<()>) -> 
 }
 
 /// CPU time of a plain loop that reads and writes every number in so many bytes once, microseconds.
-pub(super) fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
+pub(in super::super) fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
     let mut memory = vec![1.0_f64; bytes / size_of::<f64>()];
     least_us(span, || {
         for x in black_box(&mut memory[..]) {
@@ -37,6 +37,27 @@ pub(super) fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
         }
         Some(())
     })
+}
+
+/// What [`calibration_us`] is on the machine for which goals were set, two cores of a virtual AMD EPYC, microseconds.
+const GOALS_US: f64 = 0.88;
+
+/// CPU time of a thousand multiplications and additions that wait for each other, microseconds: a clock for whatever is measured
+/// beside it.
+pub(in super::super) fn calibration_us() -> Option<f64> {
+    const SPAN: Duration = Duration::from_millis(2);
+    let mut x = 1_u64;
+    least_us(SPAN, || {
+        for _ in 0..1000 {
+            x = black_box(x.wrapping_mul(0x5851_f42d_4c95_7f2d).wrapping_add(1));
+        }
+        Some(())
+    })
+}
+
+/// What a time would be on the machine for which goals were set, by the calibration measured beside it; NaN where there is none.
+pub(in super::super) fn as_for_goals(time: f64, calibration_us: Option<f64>) -> f64 {
+    time * GOALS_US / calibration_us.unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -49,5 +70,11 @@ mod tests {
         let [few, many] = [1 << 12, 10 << 12].map(|bytes| floor_us(bytes, span).unwrap());
         assert!(few > 0.0 && many > 2.0 * few, "{few} {many}");
         assert_eq!(least_us(span, || None), None);
+    }
+
+    #[test]
+    fn a_machine_half_as_fast_is_not_blamed_for_it() {
+        assert!((as_for_goals(3.0, Some(2.0 * GOALS_US)) - 1.5).abs() < 1e-12);
+        assert!(as_for_goals(3.0, None).is_nan() && calibration_us().is_some_and(|us| us > 0.0));
     }
 }
