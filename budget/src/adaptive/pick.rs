@@ -5,7 +5,7 @@
 //!
 //! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
 //! leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the steps of the one bucket that does
-//! not fit whole are sorted. Where the price is not near the last one, all steps are near. So the answer is the one of a full sort,
+//! not fit whole are sorted, and those that fit are taken. Where the price is not near the last one, all steps are near. So the answer is the one of a full sort,
 //! without its time.
 
 use alloc::vec::Vec;
@@ -20,7 +20,7 @@ const BITS: u32 = 3;
 const OCTAVES: u64 = 192;
 const BUCKETS: usize = (OCTAVES << BITS) as usize;
 
-/// Fewer objects than this go on after the first step that does not fit: with few, large steps much would stay unspent.
+/// Fewer objects than this go on below the bucket in which the budget ends: with few, large steps much would stay unspent.
 const FEW: usize = 32;
 
 /// What a choice came to.
@@ -119,9 +119,9 @@ struct Near(f64, f64);
 impl Near {
     const ALL: Self = Self(0.0, f64::INFINITY);
 
-    /// A fifth of the last price up and down; where all was had, all is taken again.
+    /// A fifth of the last price up and down, to the bottom of a bucket; where all was had, all is taken again.
     fn to(price: f64) -> Self {
-        Self(price / 1.2, 1.2 * price)
+        Self(bottom(bucket(price / 1.2)), 1.2 * price)
     }
 
     /// The buckets that it reaches into.
@@ -249,20 +249,24 @@ impl Picker {
         self.edge.sort_unstable_by(|a, b| b.merit.total_cmp(&a.merit).then(place(a).cmp(&place(b))));
     }
 
-    /// Takes the steps on the edge until one does not fit; its gain per tick.
+    /// Takes the steps on the edge that fit; the gain per tick of the first that does not. Those after it are worth nearly as much, and
+    /// one large step must not keep them all out; but of its object nothing more is taken.
     fn take_edge(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) -> f64 {
+        let mut lambda = 0.0;
         for edge in &self.edge {
             let object = &menu.objects()[edge.object as usize];
             let step = &menu.steps_of(object)[usize::from(edge.step)];
-            if !picked.take(terms, object, step) {
-                return step.slope * terms.worth(object)[0];
+            let taken = &mut self.taken[edge.object as usize];
+            if *taken == edge.step && picked.take(terms, object, step) {
+                *taken += 1;
+            } else if lambda == 0.0 {
+                lambda = step.slope * terms.worth(object)[0];
             }
-            self.taken[edge.object as usize] = edge.step + 1;
         }
-        0.0
+        lambda
     }
 
-    /// After the first step that does not fit: of every object, best first, the next steps that do.
+    /// Below the bucket in which the budget ends: of every object, best first, the next steps that do.
     fn go_on(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) {
         self.edge.clear();
         for (i, object) in menu.objects().iter().enumerate() {
@@ -301,9 +305,16 @@ impl Picker {
     }
 }
 
+/// The exponent and the top bits of the mantissa of what falls into the lowest bucket but for what is below that.
+const LOWEST: u64 = (1023 - OCTAVES / 2) << BITS;
+
+/// The least merit that falls into a bucket.
+fn bottom(bucket: usize) -> f64 {
+    if bucket > 0 { f64::from_bits((LOWEST + bucket as u64) << (52 - BITS)) } else { 0.0 }
+}
+
 /// Where a merit falls: by its exponent and the top bits of its mantissa. It is not NaN, and not below 0.
 fn bucket(merit: f64) -> usize {
-    const LOWEST: u64 = (1023 - OCTAVES / 2) << BITS;
     let top = merit.to_bits() >> (52 - BITS);
     top.saturating_sub(LOWEST).min(BUCKETS as u64 - 1) as usize
 }
