@@ -4,8 +4,11 @@
 //! One loop variable climbs two stairs: first ε grows to its coarsest, then dt to its longest; it comes down the other way.
 //! Theory: `docs/theory/control.md`, eq. 17 … 19.
 
+mod full_load;
+
+use full_load::{FullLoad, IN_A_ROW};
 use metachron_budget::Bound;
-use metachron_budget::log_law::{Gains, LogLaw, Rest};
+use metachron_budget::log_law::LESSON_MAX;
 
 /// What a turn took.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -48,11 +51,14 @@ const WINDOW_S: f64 = 0.25;
 /// … and of at least this many turns.
 const WINDOW_TURNS: u32 = 8;
 
-/// A turn of more than this many times the last window's mean counts as this many: the scheduler's hiccups are not the agent's.
-const SPIKE: f64 = 4.0;
+/// A turn of more than this many times the mean of the last windows counts as this many: the scheduler's hiccups are not the agent's.
+const SPIKE: f64 = 8.0;
 
-/// Later than this, real over wanted period, an agent is late whatever its own work is.
+/// Later than this, real over wanted period, an agent is kept late by others, where its own work does not account for it.
 const LATE: f64 = 1.03;
+
+/// κ: the share of such a lateness (of logarithms) that one demand removes.
+const KAPPA: f64 = 0.5;
 
 /// Least |Δ ln| of a demand: re-meshing costs accuracy, 10 % of ε are not worth it.
 const RETUNE_MIN: f64 = 0.095;
@@ -60,11 +66,15 @@ const RETUNE_MIN: f64 = 0.095;
 /// Windows without lateness before anything gets finer: a second at first, doubled whenever that turns out to have been too soon.
 const PATIENCE: (u32, u32) = (4, 128);
 
-/// The most that one demand refines, ln 1.25: who was kept late by others finds out cheaply that they still are there.
+/// The most that one demand refines who was kept late by others, ln 1.25: it finds out cheaply that they still are there.
 const REFINE_MAX: f64 = 0.223;
+/// … and else the part of the way that it goes.
+const REFINE_PART: f64 = 0.5;
 
-/// Dead between 80 % and 105 % of the share: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
-const GAINS: Gains = Gains { kappa: 0.5, lead: 0.0, early: 0.223, late: 0.049 };
+/// The dead zone of ln(load/share), 80 % … 105 %: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
+const DEAD: (f64, f64) = (-0.223, 0.049);
+/// Where in it an agent is sent.
+const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
 
 #[derive(Debug, Clone, Copy, Default)]
 struct Window {
@@ -72,6 +82,8 @@ struct Window {
     span_s: f64,
     work_s: f64,
     wanted_s: f64,
+    /// Of the work what did not fit into its own turn's period.
+    over_s: f64,
     late: f64,
 }
 
@@ -79,24 +91,26 @@ struct Window {
 #[derive(Debug, Clone)]
 pub struct RateControl {
     limits: RateLimits,
-    law: LogLaw,
-    /// ln(coarsest ε / finest ε): where the first stair ends.
+    /// ln(coarsest ε / finest ε): where the first stair ends; and where the second does.
     landing: f64,
+    top: f64,
     window: Window,
-    /// Mean work of a turn in the last window.
-    usual_s: Option<f64>,
-    /// What it would take of a core at its finest, by the last window.
-    full_load: Option<f64>,
-    /// The loop variable at the last demand.
+    full: FullLoad,
+    /// Where on the stairs it belongs, as far as is known.
+    aim: f64,
+    /// The same at the last demand.
     asked: f64,
     /// ln(ε that somebody may tell from a finer one / finest ε), from 0.
     plain: f64,
     /// Where on the stairs the agent was last sent.
     sent: f64,
+    /// Windows in a row in which others kept it late, and in which they did not.
+    late: usize,
     calm: u32,
     patience: u32,
     /// The loop variable before the last demand, if that was for something finer and has not proved itself yet.
     refined_from: Option<f64>,
+    rest: Option<Bound>,
 }
 
 impl RateControl {
@@ -110,24 +124,26 @@ impl RateControl {
             RateLimits { share: if limits.share > 0.0 { limits.share.clamp(0.01, 1.0) } else { 1.0 }, ..limits };
         Self {
             limits,
-            law: LogLaw::new(GAINS, (0.0, top), start),
             landing,
+            top,
             window: Window::default(),
-            usual_s: None,
-            full_load: None,
+            full: FullLoad::default(),
+            aim: start,
             asked: start,
             plain: 0.0,
             sent: start,
+            late: 0,
             calm: 0,
             patience: PATIENCE.0,
             refined_from: None,
+            rest: None,
         }
     }
 
     /// Whether there is anything to steer: fixed values switch it off.
     #[must_use]
     pub fn steers(&self) -> bool {
-        self.law.range().1 > 0.0
+        self.top > 0.0
     }
 
     /// Changes the share of its period that the agent's work may take: 0.001 … 1; anything else is ignored.
@@ -156,17 +172,17 @@ impl RateControl {
         self.asked.max(self.plain)
     }
 
-    /// What the agent would take of a core at its finest ε and the rate that is wanted, from 0; `None` before anything was measured.
-    /// Work falls as 1/ε and as 1/dt.
+    /// What the agent would take of a core at its finest ε and the rate that is wanted, from 0, in the mean of the last windows; `None`
+    /// before anything was measured. Work falls as 1/ε and as 1/dt.
     #[must_use]
     pub fn full_load(&self) -> Option<f64> {
-        self.full_load
+        self.full.mean()
     }
 
     /// The least part of that load that it can do with, 0 … 1: at its coarsest ε and longest dt.
     #[must_use]
     pub fn least_part(&self) -> f64 {
-        libm::exp(-self.law.range().1)
+        libm::exp(-self.top)
     }
 
     /// Learns what a turn took; gives a demand when it is time for another dt or ε.
@@ -175,9 +191,7 @@ impl RateControl {
             return None;
         }
         let window = std::mem::take(&mut self.window);
-        self.usual_s = Some(window.work_s / f64::from(window.turns));
-        // on both stairs the load falls as e⁻ᶻ
-        self.full_load = Some(window.work_s / window.wanted_s * libm::exp(self.sent));
+        self.note(&window);
         self.learn(&window);
         self.demand_if_worth_it()
     }
@@ -193,59 +207,81 @@ impl RateControl {
         if !(wanted_s.is_finite() && wanted_s > 0.0) {
             return false;
         }
+        let usual_s = self.full.mean().map_or(f64::INFINITY, |load| load * libm::exp(-self.sent) * wanted_s);
+        let work_s = turn.work_s.min(SPIKE * usual_s);
         let window = &mut self.window;
         window.turns += 1;
         window.span_s += turn.real_period_s.max(wanted_s);
-        window.work_s += self.usual_s.map_or(turn.work_s, |usual| turn.work_s.min(SPIKE * usual));
+        window.work_s += work_s;
+        window.over_s += (work_s - wanted_s).max(0.0);
         window.wanted_s += wanted_s;
         window.late += turn.real_period_s / wanted_s;
         window.span_s >= WINDOW_S && window.turns >= WINDOW_TURNS
     }
 
-    /// t/T = max(work / (share · period), real period / wanted where that is late) (control.md, eq. 17).
-    fn learn(&mut self, window: &Window) {
-        let load = window.work_s / (self.limits.share * window.wanted_s);
-        let lateness = window.late / f64::from(window.turns);
-        let ratio = if lateness > LATE { load.max(lateness) } else { load };
-        let eased = self.sent > self.asked;
-        if ratio > 1.0 + GAINS.late {
-            self.calm = 0;
-            if eased {
-                self.law.set_value(self.sent);
-            }
-            self.law.observe(ratio, None);
-            self.take_back();
-            return;
-        }
-        if eased {
-            // what it does with less work says nothing of what it could bear
-            return;
-        }
-        self.calm = self.calm.saturating_add(1);
-        if self.calm >= 2 * self.patience && self.refined_from.take().is_some() {
-            self.patience = (self.patience / 2).max(PATIENCE.0);
-        }
-        if self.calm >= self.patience || ratio > (-GAINS.early).exp() {
-            self.law.observe(ratio, None);
-            self.law.set_value(self.law.value().max(self.asked - REFINE_MAX));
+    /// On both stairs the load falls as e⁻ᶻ (control.md, eq. 18). What an agent does with less work than it may says nothing of what it
+    /// could bear, where that is known.
+    fn note(&mut self, window: &Window) {
+        let load = window.work_s / window.wanted_s;
+        let eased = self.sent > self.asked && load <= self.limits.share * libm::exp(DEAD.1);
+        if !eased || self.full.mean().is_none() {
+            self.full.note(load * libm::exp(self.sent));
         }
     }
 
-    /// Late: what was refined last was too much, is taken back, and tried again after twice as long.
-    fn take_back(&mut self) {
+    /// Where the agent belongs by its own work, and by what others leave it (control.md, eq. 19).
+    fn learn(&mut self, window: &Window) {
+        let lateness = window.late / f64::from(window.turns) - window.over_s / window.wanted_s;
+        self.late = if lateness > LATE { self.late + 1 } else { 0 };
+        self.calm = if self.late > 0 { 0 } else { self.calm.saturating_add(1) };
+        if self.late >= IN_A_ROW {
+            self.give_way(lateness);
+        }
+        if self.calm >= 2 * self.patience && self.refined_from.take().is_some() {
+            self.patience = (self.patience / 2).max(PATIENCE.0);
+        }
+        let Some(full) = self.full.mean() else { return };
+        let wish = libm::log(full / self.limits.share);
+        let eased = self.sent > self.asked;
+        let from = if eased { self.sent } else { self.aim };
+        let step = wish - from;
+        self.rest = match () {
+            () if wish > self.top + DEAD.1 => Some(Bound::Coarsest),
+            () if self.asked == 0.0 && step < DEAD.0 => Some(Bound::Finest),
+            () => None,
+        };
+        if step > DEAD.1 {
+            // not onto the second stair where the first will do
+            let end = if wish <= self.landing + DEAD.1 { self.landing } else { self.top };
+            self.aim = (wish - MIDDLE).min(end);
+        } else if step < DEAD.0 && !eased {
+            self.rise(wish - MIDDLE);
+        }
+    }
+
+    /// Kept late by others: what was refined last was too much, is taken back, and tried again after twice as long.
+    fn give_way(&mut self, lateness: f64) {
+        self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(LESSON_MAX)).min(self.top);
         if let Some(before) = self.refined_from.take() {
             self.patience = (2 * self.patience).min(PATIENCE.1);
-            self.law.set_value(self.law.value().max(before));
+            self.aim = self.aim.max(before);
+        }
+    }
+
+    /// With time to spare: finer, once others have kept it late for long enough no more.
+    fn rise(&mut self, to: f64) {
+        if self.calm >= self.patience {
+            let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.asked - to) } else { 0.0 };
+            self.aim = to.max(self.asked - part.max(REFINE_MAX)).max(0.0);
         }
     }
 
     fn demand_if_worth_it(&mut self) -> Option<RateDemand> {
-        let (value, held) = (self.law.value(), self.asked);
-        if self.is_worth_it(held, value) {
-            if value < held {
-                (self.refined_from, self.calm) = (Some(held), 0);
+        if self.is_worth_it(self.asked, self.aim) {
+            if self.aim < self.asked {
+                (self.refined_from, self.calm) = (Some(self.asked), 0);
             }
-            self.asked = value;
+            self.asked = self.aim;
         }
         if !self.is_worth_it(self.sent, self.held()) {
             return None;
@@ -255,11 +291,10 @@ impl RateControl {
     }
 
     fn is_worth_it(&self, from: f64, to: f64) -> bool {
-        let (least, most) = self.law.range();
-        to != from && ((to - from).abs() >= RETUNE_MIN || to <= least || to >= most)
+        to != from && ((to - from).abs() >= RETUNE_MIN || to <= 0.0 || to >= self.top)
     }
 
-    /// What is asked for at present (control.md, eq. 18).
+    /// What is asked for at present (control.md, eq. 17).
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
@@ -271,7 +306,7 @@ impl RateControl {
     /// The end at which the agent rests: finest with time to spare, or coarsest and still late.
     #[must_use]
     pub fn rest(&self) -> Option<Bound> {
-        if let Rest::Clamped(bound) = self.law.rest() { Some(bound) } else { None }
+        self.rest
     }
 }
 

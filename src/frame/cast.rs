@@ -189,6 +189,7 @@ pub(super) fn machine(scene: &Scene) -> Machine {
     machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
     machine.spikes = wish.spikes.unwrap_or(machine.spikes);
     machine.load.clone_from(&wish.load);
+    machine.step_load.clone_from(&wish.step_load);
     machine.seed = wish.seed.unwrap_or(machine.seed);
     machine
 }

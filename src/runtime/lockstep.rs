@@ -165,7 +165,8 @@ impl Lockstep {
         match actor.begin(&self.timeline, self.now) {
             Some(Effort { work, steps }) => {
                 let model = actor.shared.model;
-                let seconds = f64::from(steps) * self.machine.step_s(model, work, whose as u64, life.turns);
+                let step_s = self.machine.step_s(model, work, whose as u64, life.turns);
+                let seconds = f64::from(steps) * step_s * self.machine.slower(self.now);
                 self.cores.start(whose as u32, duration(seconds));
                 life.turns += 1;
                 life.phase = Phase::Busy(self.now);

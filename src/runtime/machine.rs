@@ -23,6 +23,8 @@ pub struct Machine {
     pub spikes: f64,
     /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time, before the first once.
     pub load: Vec<(f64, f64)>,
+    /// The same of a step.
+    pub step_load: Vec<(f64, f64)>,
     /// Which noise: equal seeds give equal runs.
     pub seed: u64,
 }
@@ -98,6 +100,7 @@ impl Machine {
             wander_sd: 0.0,
             spikes: 0.0,
             load: Vec::new(),
+            step_load: Vec::new(),
             seed: 1,
         }
     }
@@ -130,12 +133,13 @@ impl Machine {
     #[must_use]
     pub fn frame_time(&self, seconds: f64, count: u64, at: Duration) -> Duration {
         let spike = if uniform(self.seed, SPIKE_STREAM, count) < sound(self.spikes) { SPIKE } else { 1.0 };
-        duration(seconds * self.load(at.as_secs_f64()) * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
+        duration(seconds * factor(&self.load, at) * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
     }
 
-    /// How many times its declared time a frame takes that begins after so many wall seconds.
-    fn load(&self, wall_s: f64) -> f64 {
-        self.load.iter().take_while(|(at_s, _)| *at_s <= wall_s).last().map_or(1.0, |(_, factor)| *factor)
+    /// How many times its declared time a step takes that begins `at`.
+    #[must_use]
+    pub fn slower(&self, at: Duration) -> f64 {
+        factor(&self.step_load, at)
     }
 
     /// A log-normal factor of mean 1 whose logarithm keeps nine tenths of itself from one frame to the next: the sum of what
@@ -191,6 +195,11 @@ const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
 
 const fn price_of_objects(setup_us: f64, triangle_us: f64) -> ObjectPrice {
     ObjectPrice { setup_us, triangle_us, vertex_us: 0.0, pixel_ns: 0.0 }
+}
+
+/// The factor that holds at a time.
+fn factor(load: &[(f64, f64)], at: Duration) -> f64 {
+    load.iter().take_while(|(at_s, _)| *at_s <= at.as_secs_f64()).last().map_or(1.0, |(_, factor)| *factor)
 }
 
 /// `x`, or zero where it is negative or no number: a price is never a debt.
@@ -284,6 +293,9 @@ mod tests {
         let took = |at_ms: u64| machine.frame_time(0.01, 0, Duration::from_millis(at_ms)).as_secs_f64();
         let expected = [(0, 0.01), (999, 0.01), (1000, 0.025), (2999, 0.025), (3000, 0.005), (9000, 0.005)];
         assert!(expected.iter().all(|&(at_ms, s)| (took(at_ms) - s).abs() < 1e-9));
+        let machine = Machine { step_load: machine.load, ..Machine::default() };
+        let slower = [0, 1000, 2999, 3000].map(|at_ms| machine.slower(Duration::from_millis(at_ms)));
+        assert_eq!(slower, [1.0, 2.5, 2.5, 0.5]);
     }
 
     #[test]

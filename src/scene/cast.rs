@@ -153,6 +153,8 @@ pub struct Machine {
     pub spikes: Option<f64>,
     /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time.
     pub load: Vec<(f64, f64)>,
+    /// The same of a step.
+    pub step_load: Vec<(f64, f64)>,
     /// Seed of the noise.
     pub seed: Option<u64>,
 }

@@ -26,11 +26,12 @@ fn play(text: &str, frames: u64) -> Outcome {
     play_headless(session(text), plan, &mut |_, _| true).expect("nothing that can fail")
 }
 
-/// Tubes that swing between two nails before a camera, on a machine of so many cores that takes `unit_us` a segment and solve.
-fn strands(tubes: u32, cores: u32, unit_us: f64) -> String {
+/// Tubes that swing between two nails before a camera, on a machine of so many cores that takes `unit_us` a segment and solve, and has
+/// `more` to do.
+fn strands(tubes: u32, cores: u32, unit_us: f64, more: &str) -> String {
     let mut text = format!(
         "[target]\nframe_hz = 60.0\npolicy = \"adaptive\"\n[camera]\neye_m = [0, -1.6, 0.3]\nlook_at_m = [0, 0, 0.2]\n\
-         [machine]\ncores = {cores}\ndraw_triangle_us = 3.0\n[machine.step.tube]\nunit_us = {unit_us}\n"
+         [machine]\ncores = {cores}\ndraw_triangle_us = 3.0\n{more}\n[machine.step.tube]\nunit_us = {unit_us}\n"
     );
     for k in 0..tubes {
         let z = 0.1 * f64::from(k);
@@ -56,7 +57,7 @@ fn came_to(outcome: &Outcome) -> (f64, f64) {
 #[test]
 fn steps_that_get_four_times_as_dear_are_paid_for_by_steps_and_by_the_picture() {
     // next to nothing; two cores; eight: of two that draw as well
-    let [light, dear, dearest] = [0.05, 50.0, 200.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us), 480)));
+    let [light, dear, dearest] = [0.05, 50.0, 200.0].map(|unit_us| came_to(&play(&strands(2, 2, unit_us, ""), 480)));
     let told = format!("{light:?} {dear:?} {dearest:?}");
     assert!((light.0 / 0.005 - 1.0).abs() < 0.01, "{told}");
     assert!(dearest.0 > 1.3 * dear.0 && dear.0 > 1.05 * light.0, "steps: {told}");
@@ -67,10 +68,41 @@ fn steps_that_get_four_times_as_dear_are_paid_for_by_steps_and_by_the_picture() 
 
 #[test]
 fn where_there_is_time_for_all_nothing_is_shared_out() {
-    let [few, many] = [4, 64].map(|cores| play(&strands(2, cores, 0.25), 120));
+    let [few, many] = [4, 64].map(|cores| play(&strands(2, cores, 0.25, ""), 120));
     assert_eq!(few.state_hash, many.state_hash);
     let picture = |outcome: &Outcome| outcome.frames.iter().map(|row| (row.triangles, row.changes)).collect::<Vec<_>>();
     assert_eq!(picture(&few), picture(&many));
+}
+
+/// Until 8 s, in every `every_s` seconds, steps take six times as long for a tenth of them.
+fn bursts(every_s: f64) -> String {
+    let entry = |at_s: f64, factor: f64| format!("{{ at_s = {at_s:.3}, factor = {factor:?} }}");
+    let one = |k: u32| {
+        let at_s = 0.01 + every_s * f64::from(k);
+        [entry(at_s, 6.0), entry(at_s + 0.1 * every_s, 1.0)].join(", ")
+    };
+    let all: Vec<String> = (0..(8.0 / every_s) as u32).map(one).collect();
+    format!("step_load = [{}]", all.join(", "))
+}
+
+#[test]
+fn steps_whose_work_comes_in_bursts_give_way_to_its_mean_and_come_back() {
+    let played = |more: &str, frames| play(&strands(2, 2, 50.0, more), frames);
+    let late = |outcome: &Outcome| outcome.frames.iter().filter(|row| row.frame_ms > 1.05 * outcome.target_ms).count();
+    let calm = [480, 960].map(|frames| played("", frames));
+    for every_s in [0.3, 2.0] {
+        let more = bursts(every_s);
+        let [during, after] = [480, 960].map(|frames| played(&more, frames));
+        let told = format!("every {every_s} s: {:?}, {:?}", came_to(&during), came_to(&after));
+        // all work is half as much again
+        assert!(came_to(&during).0 < 1.5 * came_to(&calm[0]).0, "{told}");
+        assert!(came_to(&after).0 < 1.2 * came_to(&calm[1]).0, "{told}");
+        assert!(came_to(&after).1 > 0.9 * came_to(&calm[1]).1, "{told}");
+        // no more frames than there are bursts
+        assert!(late(&during) < late(&calm[0]) + 48, "{told}: {} of {} late", late(&during), late(&calm[0]));
+        let mean_ms = during.frames[240..].iter().map(|row| row.frame_ms).sum::<f64>() / 240.0;
+        assert!(mean_ms < during.target_ms, "{told}: {mean_ms}");
+    }
 }
 
 /// Meshes around which a camera turns once in 4 s, with more in the target's table.

@@ -9,10 +9,20 @@ fn limits() -> RateLimits {
 }
 
 /// The dead zone of the load is 0.8 … 1.05; a demand that is not worth it leaves the rest.
+/// Work that comes in bursts: in every `every_s` seconds until `until_s` turns take `times` as long for `for_s`.
+#[derive(Clone, Copy)]
+struct Bursts {
+    every_s: f64,
+    for_s: f64,
+    times: f64,
+    until_s: f64,
+}
+
 /// An agent alone on a core: a turn of `full_s` at the finest ε, and periods that its work makes longer.
 struct Agent {
     control: RateControl,
     full_s: f64,
+    bursts: Option<Bursts>,
     now: RateDemand,
     time_s: f64,
     demands: Vec<(f64, RateDemand)>,
@@ -21,11 +31,14 @@ struct Agent {
 impl Agent {
     fn new(full_s: f64) -> Self {
         let now = RateDemand { dt_s: PERIOD_S, eps_m: Some(0.005) };
-        Self { control: RateControl::new(limits(), now.eps_m), full_s, now, time_s: 0.0, demands: Vec::new() }
+        let control = RateControl::new(limits(), now.eps_m);
+        Self { control, full_s, bursts: None, now, time_s: 0.0, demands: Vec::new() }
     }
 
     fn work_s(&self) -> f64 {
-        self.full_s * 0.005 / self.now.eps_m.unwrap()
+        let in_one = |b: &Bursts| self.time_s < b.until_s && self.time_s % b.every_s < b.for_s;
+        let times = self.bursts.filter(in_one).map_or(1.0, |b| b.times);
+        times * self.full_s * 0.005 / self.now.eps_m.unwrap()
     }
 
     fn run(&mut self, seconds: f64) {
@@ -194,4 +207,61 @@ fn an_agent_that_is_late_out_of_sight_still_slows_down() {
     agent.control.set_plain(0.01);
     agent.run(20.0);
     assert!(agent.load() < 1.06 && agent.now.eps_m.unwrap() > 0.01, "{:?}", agent.now);
+}
+
+/// Bursts that last for a turn or for half a second, every fifth of a second to every four, and how many times the mean of all work is
+/// that between them.
+const BURSTS: [(Bursts, f64); 5] = {
+    const fn bursts(every_s: f64, for_s: f64, times: f64) -> (Bursts, f64) {
+        (Bursts { every_s, for_s, times, until_s: 60.0 }, 1.0 + (times - 1.0) * for_s / every_s)
+    }
+    [
+        bursts(0.2, 0.02, 5.0),
+        bursts(1.0, 0.1, 5.0),
+        bursts(2.0, 0.25, 5.0),
+        bursts(4.0, 0.4, 5.0),
+        bursts(4.0, 0.05, 8.0),
+    ]
+};
+
+#[test]
+fn bursts_that_go_on_are_paid_for_by_their_mean() {
+    for (bursts, mean) in BURSTS {
+        let mut agent = Agent { bursts: Some(bursts), ..Agent::new(0.7 * PERIOD_S) };
+        agent.run(30.0);
+        agent.demands.clear();
+        agent.run(29.0);
+        agent.bursts = None;
+        let load = mean * agent.load();
+        // the dead zone, and what a window more or less of bursts among sixteen makes
+        assert!((0.7..1.1).contains(&load), "every {} s: {load}", bursts.every_s);
+        assert!(agent.demands.is_empty(), "every {} s it comes to rest: {:?}", bursts.every_s, agent.demands);
+    }
+}
+
+#[test]
+fn after_bursts_an_agent_is_as_fine_as_before_within_ten_seconds() {
+    let mut calm = Agent::new(0.7 * PERIOD_S);
+    calm.run(30.0);
+    let long = Bursts { every_s: 1e9, for_s: 60.0, times: 6.0, until_s: 60.0 };
+    for bursts in BURSTS.map(|(bursts, _)| bursts).into_iter().chain([long]) {
+        let mut agent = Agent { bursts: Some(bursts), ..Agent::new(0.7 * PERIOD_S) };
+        agent.run(60.0);
+        let during = agent.now;
+        agent.run(10.0);
+        let load = agent.load();
+        assert!((0.8..=1.05).contains(&load), "every {} s: {during:?}, then {:?}", bursts.every_s, agent.now);
+        assert!(agent.now.dt_s == PERIOD_S && agent.now.eps_m.unwrap() < 1.3 * calm.now.eps_m.unwrap());
+    }
+}
+
+#[test]
+fn who_is_kept_late_by_the_bursts_of_others_now_and_then_stays_as_it_is() {
+    let mut control = RateControl::new(limits(), Some(0.005));
+    for turn in 0..20_000 {
+        // every second for a tenth of one
+        let real_period_s = if turn % 240 < 24 { 3.0 * PERIOD_S } else { PERIOD_S };
+        let measure = TurnMeasure { work_s: 0.4 * PERIOD_S, wanted_period_s: PERIOD_S, real_period_s, dt_s: PERIOD_S };
+        assert_eq!(control.after_turn(&measure), None, "turn {turn}");
+    }
 }

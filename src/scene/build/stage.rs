@@ -3,7 +3,7 @@
 use super::{Names, POSITION_MAX_M};
 use crate::scene::cast::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{CameraFile, CameraKeyFile, MODELS, MachineFile, ProbeFile, TargetFile};
+use crate::scene::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile};
 use crate::scene::problem::{Problem, did_you_mean};
 use glam::DVec3;
 use metachron_agents::SimSpan;
@@ -164,7 +164,8 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
     let seed = file.seed.map(u64::from);
     let steps = step_prices(c, &place.table("step"), file);
     let shading = object_costs(c, &place.table("shading"), file);
-    let load = load(c, &place, file);
+    let step_load = load(c, &place, ("step_load", &file.step_load));
+    let load = load(c, &place, ("load", &file.load));
     Machine {
         preset,
         cores,
@@ -178,20 +179,21 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
         wander,
         spikes,
         load,
+        step_load,
         seed,
     }
 }
 
 /// What else the machine has to do, as (seconds, factor).
-fn load(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(f64, f64)> {
-    if file.load.len() > LOADS_MAX {
+fn load(c: &mut Checker<'_, '_>, place: &Place, (key, entries): (&str, &[LoadFile])) -> Vec<(f64, f64)> {
+    if entries.len() > LOADS_MAX {
         let expected = format!("expected at most {LOADS_MAX}");
-        c.wrong(place, "load", format_args!("has {} entries", file.load.len()), expected);
+        c.wrong(place, key, format_args!("has {} entries", entries.len()), expected);
         return Vec::new();
     }
-    let mut steps: Vec<(f64, f64)> = Vec::with_capacity(file.load.len());
-    for (i, entry) in file.load.iter().enumerate() {
-        let place = place.entry("load", i);
+    let mut steps: Vec<(f64, f64)> = Vec::with_capacity(entries.len());
+    for (i, entry) in entries.iter().enumerate() {
+        let place = place.entry(key, i);
         let at_s = c.number(&place, "at_s", entry.at_s, &TIME);
         if let Some((before, _)) = steps.last().filter(|(before, _)| *before >= at_s) {
             let expected = format!("expected a time after the entry before, {before} s");

@@ -21,8 +21,8 @@ pub use instrument::{InstrumentFile, KeyframeFile};
 pub use joint::{JointFile, JointKind};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
-    CameraFile, CameraKeyFile, ExecutorKind, LawKind, MachineFile, ModelCostFile, PolicyKind, PriorityKind, ProbeFile,
-    SceneFile, StatesKind, TargetFile, ValueKind, WorldFile,
+    CameraFile, CameraKeyFile, ExecutorKind, LawKind, LoadFile, MachineFile, ModelCostFile, PolicyKind, PriorityKind,
+    ProbeFile, SceneFile, StatesKind, TargetFile, ValueKind, WorldFile,
 };
 pub use scenery::{GeneratorKind, GroupFile, MeshFile, ShadingKind, TreeFile, TreeLod};
 pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};

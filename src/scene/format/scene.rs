@@ -274,17 +274,21 @@ pub struct MachineFile {
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub load: Vec<LoadFile>,
+    /// What else it has to do while agents step, by rising time; at most 1000 entries.
+    #[serde(default)]
+    #[schemars(length(max = 1000))]
+    pub step_load: Vec<LoadFile>,
     /// Seed of the noise.
     pub seed: Option<u32>,
 }
 
-/// `[[machine.load]]`: from a time on every frame takes so many times what it is declared to.
+/// `[[machine.load]]` and `[[machine.step_load]]`: from a time on every frame, and every step, takes so many times what it is declared to.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFile {
     /// Wall seconds after the start, 0 … 1e6; above that of the entry before.
     pub at_s: f64,
-    /// The factor from then on, 0.01 … 100: 2.5 is a machine that draws 2.5 times as slowly, 0.4 one that draws 2.5 times as fast.
+    /// The factor from then on, 0.01 … 100: 2.5 is a machine that is 2.5 times as slow, 0.4 one that is 2.5 times as fast.
     pub factor: f64,
 }
 

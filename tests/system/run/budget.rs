@@ -83,9 +83,12 @@ fn spikes_come_as_often_as_declared() {
 
 #[test]
 fn prices_that_cannot_be_are_shown_where_they_stand() {
-    for (line, said) in
-        [("wander = -0.1", "wander"), ("spikes = 2.0", "spikes"), ("shading.flat.pixel_ns = -1.0", "pixel_ns")]
-    {
+    for (line, said) in [
+        ("wander = -0.1", "wander"),
+        ("spikes = 2.0", "spikes"),
+        ("shading.flat.pixel_ns = -1.0", "pixel_ns"),
+        ("step_load = [{ at_s = 1.0, factor = 0.0 }]", "factor"),
+    ] {
         let scene = Folder::with(&format!("[machine]\n{line}\n"));
         let done = crate::play::metachron(&["check", scene.scene()]);
         let text = String::from_utf8_lossy(&done.stderr).into_owned() + &String::from_utf8_lossy(&done.stdout);
