@@ -55,9 +55,10 @@ pub(in super::super) fn calibration_us() -> Option<f64> {
     })
 }
 
-/// What a time would be on the machine for which goals were set, by the calibration measured beside it; NaN where there is none.
-pub(in super::super) fn as_for_goals(time: f64, calibration_us: Option<f64>) -> f64 {
-    time * GOALS_US / calibration_us.unwrap_or(f64::NAN)
+/// By what times are multiplied to be those of the machine for which goals were set: by the least of the calibrations measured beside
+/// them, as what a shared machine adds is never negative. NaN where there is none.
+pub(in super::super) fn pace_for_goals(calibrations_us: impl Iterator<Item = Option<f64>>) -> f64 {
+    GOALS_US / calibrations_us.flatten().reduce(f64::min).unwrap_or(f64::NAN)
 }
 
 #[cfg(test)]
@@ -74,7 +75,8 @@ mod tests {
 
     #[test]
     fn a_machine_half_as_fast_is_not_blamed_for_it() {
-        assert!((as_for_goals(3.0, Some(2.0 * GOALS_US)) - 1.5).abs() < 1e-12);
-        assert!(as_for_goals(3.0, None).is_nan() && calibration_us().is_some_and(|us| us > 0.0));
+        let pace = pace_for_goals([None, Some(9.0 * GOALS_US), Some(2.0 * GOALS_US)].into_iter());
+        assert!((pace - 0.5).abs() < 1e-12, "{pace}");
+        assert!(pace_for_goals([None].into_iter()).is_nan() && calibration_us().is_some_and(|us| us > 0.0));
     }
 }

@@ -6,7 +6,7 @@ use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::power::exponent;
 use super::super::table::{Cell, Table};
-use super::super::timing::{as_for_goals, calibration_us};
+use super::super::timing::{calibration_us, pace_for_goals};
 use super::front::front;
 use super::peers;
 use super::play::Play;
@@ -85,8 +85,8 @@ impl Goal {
         asked().next()?;
         let size = if segments == 0 { String::new() } else { format!(", {segments} segments") };
         let claim = format!("{case}{size}: CPU ms a simulated second by calibration for an error of at most {error:e}");
-        let cost = |row: &Row| as_for_goals(row.cpu_ms_per_s, row.calibration_us);
-        Some(Finding::at_most(claim, cheapest(asked(), error, cost).unwrap_or(f64::NAN), cpu_ms_per_s))
+        let pace = pace_for_goals(rows.iter().map(|row| row.calibration_us));
+        Some(Finding::at_most(claim, cheapest(asked(), error).map_or(f64::NAN, |ms| ms * pace), cpu_ms_per_s))
     }
 }
 
@@ -160,8 +160,8 @@ impl<B: Benchmark> Experiment for Diagram<B> {
                     told(dt_order(&here), 2),
                     told(segment_order(&here), 2),
                     (best, 6).into(),
-                    told(cheapest(here.iter().copied(), 1e-3, |row| row.cpu_ms_per_s), 3),
-                    told(cheapest(here.iter().copied(), 1e-4, |row| row.cpu_ms_per_s), 3),
+                    told(cheapest(here.iter().copied(), 1e-3), 3),
+                    told(cheapest(here.iter().copied(), 1e-4), 3),
                 ]);
             }
         }
@@ -200,8 +200,8 @@ fn names(rows: &[Row], of: fn(&Row) -> &String) -> Vec<&str> {
 }
 
 /// The least cost of a run that errs by no more than `error`.
-fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64, cost: fn(&Row) -> f64) -> Option<f64> {
-    rows.filter(|r| r.error.is_some_and(|e| e <= error)).map(cost).min_by(f64::total_cmp)
+fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64) -> Option<f64> {
+    rows.filter(|r| r.error.is_some_and(|e| e <= error)).map(|r| r.cpu_ms_per_s).min_by(f64::total_cmp)
 }
 
 /// By which power of the substep errors fall, with the most segments.

@@ -2,7 +2,7 @@
 
 use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
-use super::growth::{Case, Cost, Growth, Row};
+use super::growth::{Case, Cost, Growth, Row, pace};
 use super::tubes::{folded, holding, step};
 use metachron_agents::SimSpan;
 use std::time::Duration;
@@ -52,7 +52,7 @@ impl Growth for Contacts {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let us = |case: &str, size: u32| {
             let row = rows.iter().find(|row| row.case == case && row.size == size);
-            row.map_or(f64::NAN, Row::us_for_goals)
+            pace(rows) * row.map_or(f64::NAN, |row| row.point().1)
         };
         let mut list = vec![Finding::at_most(
             "100 segments on themselves: µs a step of 4 ms by calibration (10,000 a second)",

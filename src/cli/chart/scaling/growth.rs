@@ -6,7 +6,7 @@ use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::power::exponent;
 use super::super::table::Table;
-use super::super::timing::{as_for_goals, calibration_us};
+use super::super::timing::{calibration_us, pace_for_goals};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
@@ -89,16 +89,11 @@ impl Row {
         let (count, us) = self.point();
         us * 1e3 / count
     }
+}
 
-    /// Microseconds as they would be where goals were set.
-    pub(super) fn us_for_goals(&self) -> f64 {
-        as_for_goals(self.point().1, self.calibration_us)
-    }
-
-    /// Nanoseconds each, likewise.
-    pub(super) fn ns_each_for_goals(&self) -> f64 {
-        as_for_goals(self.ns_each(), self.calibration_us)
-    }
+/// By what times are multiplied to be those of the machine for which goals were set.
+pub(super) fn pace(rows: &[Row]) -> f64 {
+    pace_for_goals(rows.iter().map(|row| row.calibration_us))
 }
 
 /// The diagram of a question.

@@ -3,7 +3,7 @@
 use super::super::accuracy::peers;
 use super::super::experiment::{Finding, worst};
 use super::super::timing::{floor_us, least_us};
-use super::growth::{Case, Cost, Growth, Row, power};
+use super::growth::{Case, Cost, Growth, Row, pace, power};
 use super::tubes::{holding, step, straight};
 use metachron_agents::SimSpan;
 use std::time::Duration;
@@ -55,7 +55,7 @@ impl Growth for Segments {
     fn findings(rows: &[Row]) -> Vec<Finding> {
         let (least, most) = CLAIMED;
         let inside = |row: &&Row| row.case == ALONE && (least..=most).contains(&f64::from(row.size));
-        let slowest = worst(rows.iter().filter(inside).map(Row::ns_each_for_goals));
+        let slowest = pace(rows) * worst(rows.iter().filter(inside).map(Row::ns_each));
         let range = format!("{least} … {most} segments");
         vec![
             Finding::at_most(format!("ns a segment and step by calibration, {range}, alone"), slowest, CLAIMED_NS),
