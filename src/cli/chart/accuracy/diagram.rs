@@ -233,7 +233,7 @@ fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
     engines.dedup();
     let dots = engines.iter().enumerate().map(|(k, engine)| Layer {
         label: (*engine).to_owned(),
-        colour: if k == 0 { Colour::Grey } else { Colour::LINES[Colour::LINES.len() - k.min(Colour::LINES.len())] },
+        colour: Colour::behind(k),
         mark: Mark::Dots(
             others.iter().filter(|peer| peer.peer == *engine).map(|peer| (peer.cpu_ms_per_s, peer.error)).collect(),
         ),

@@ -103,6 +103,14 @@ pub(in crate::cli) enum Colour {
 impl Colour {
     /// Colours for lines in the order they are taken.
     pub const LINES: [Self; 6] = [Self::Blue, Self::Red, Self::Green, Self::Orange, Self::Purple, Self::Sky];
+
+    /// The colour of number `k` of those that stand behind our own.
+    pub const fn behind(k: usize) -> Self {
+        match k {
+            0 => Self::Grey,
+            _ => Self::LINES[(Self::LINES.len() - 1) - (k - 1) % Self::LINES.len()],
+        }
+    }
 }
 
 /// The range that holds all numbers, with a little room; (0, 1) where there are none.

@@ -174,8 +174,7 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
     engines.dedup();
     for (k, engine) in engines.iter().enumerate() {
         let points = peers.iter().filter(|peer| peer.0 == *engine).map(|peer| (peer.1, peer.2)).collect();
-        let colour =
-            if k == 0 { Colour::Grey } else { Colour::LINES[Colour::LINES.len() - k.min(Colour::LINES.len())] };
+        let colour = Colour::behind(k);
         layers.push(Layer { label: (*engine).to_owned(), colour, mark: Mark::Dots(points) });
     }
     for (case, colour) in names(rows).into_iter().zip(Colour::LINES) {
