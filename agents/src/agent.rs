@@ -32,6 +32,12 @@ pub trait Agent: Send {
     /// from the start. No time passes.
     fn look(&mut self, _dt: SimSpan, _around: &Surroundings<'_>) {}
 
+    /// The step that it makes next where one of `dt` is wanted: a shorter one beside others whose motion within `dt` nobody
+    /// could foresee; never a longer one. Executors ask before every step.
+    fn longest_step(&self, dt: SimSpan, _around: &Surroundings<'_>) -> SimSpan {
+        dt
+    }
+
     /// The resolution the simulation holds; `None` for a model that has none.
     fn resolution(&self) -> Option<Resolution>;
 

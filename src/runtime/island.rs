@@ -18,7 +18,7 @@ pub(super) use seats::{Company, Seating, assign, empty_door, empty_rooms, move_i
 use super::account::Entry;
 use super::fellows::Fellows;
 use super::pace::{Start, Timeline};
-use super::turn::{Actor, Open, contained};
+use super::turn::{Actor, Made, Open, contained};
 use metachron_agents::{Companion, DT_MAX_S, SimSpan, SimTime, StepReport, Surroundings};
 use std::time::Duration;
 
@@ -57,9 +57,9 @@ impl Actor {
         let mut steps = 0;
         while self.pace.time() < time {
             let span = portion(time.since(self.pace.time()), self.pace.dt());
-            self.step(span)?;
-            self.write_snapshot(self.pace.time() + span, false)?;
-            self.pace.advance_by(span);
+            let Made { dt, .. } = self.step(span)?;
+            self.write_snapshot(self.pace.time() + dt, false)?;
+            self.pace.advance_by(dt);
             let work_s = self.shared.gauges.work_s.get();
             let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
             self.diary.write(&self.shared.gauges, &self.pace, entry);
@@ -72,14 +72,17 @@ impl Actor {
     ///
     /// An error leaves all as they were: they part, and this agent steps alone. After a panic nobody knows how they are: it is
     /// this agent's, and the others go on from where the next step finds them.
-    pub fn lead(&mut self, dt: SimSpan) -> Result<(StepReport, u32), String> {
+    pub fn lead(&mut self, dt: SimSpan) -> Result<(Made, u32), String> {
         let time = self.pace.time();
         let led = self.company.at(time).count() as u32;
         if led == 0 {
             return Ok((self.step(dt)?, 0));
         }
         match self.step_as_one(dt) {
-            Ok(report) => Ok((StepReport { work: report.work / f64::from(1 + led), ..report }, led)),
+            Ok(report) => {
+                let report = StepReport { work: report.work / f64::from(1 + led), ..report };
+                Ok((Made { report, dt }, led))
+            }
             Err(_) => {
                 self.scatter();
                 Ok((self.step(dt)?, 0))

@@ -25,6 +25,8 @@ const LAG_CAP_STEPS: u64 = 2;
 pub struct Pace {
     time: SimTime,
     dt: SimSpan,
+    /// What the agent makes of it, where that is less.
+    shorter: Option<SimSpan>,
     dropped: SimSpan,
     rested: SimSpan,
 }
@@ -42,7 +44,7 @@ impl Pace {
     /// A pace from `time` in steps of `dt` (above zero).
     #[must_use]
     pub const fn new(time: SimTime, dt: SimSpan) -> Self {
-        Self { time, dt, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
+        Self { time, dt, shorter: None, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
     }
 
     /// The agent's own time.
@@ -51,15 +53,26 @@ impl Pace {
         self.time
     }
 
-    /// The length of its next step.
+    /// The length of its steps: what is wanted, or the shorter one that it made last.
     #[must_use]
-    pub const fn dt(&self) -> SimSpan {
+    pub fn dt(&self) -> SimSpan {
+        self.shorter.map_or(self.dt, |shorter| shorter.min(self.dt))
+    }
+
+    /// The length of step that is wanted.
+    #[must_use]
+    pub const fn wanted(&self) -> SimSpan {
         self.dt
     }
 
-    /// Steps by `dt` (above zero) from now on.
+    /// Wants steps of `dt` (above zero) from now on.
     pub const fn set_dt(&mut self, dt: SimSpan) {
         self.dt = dt;
+    }
+
+    /// Where `wanted` was to be stepped by, the agent steps by `made` (above zero), which is not longer.
+    pub fn shorten(&mut self, wanted: SimSpan, made: SimSpan) {
+        self.shorter = (made < wanted).then_some(made);
     }
 
     /// Simulated time given up so far because it could not be made up.
@@ -85,7 +98,7 @@ impl Pace {
         let now = timeline.sim_at(wall);
         let lag = now.since(self.time);
         let late = timeline.wall_span(lag);
-        let steps = SimSpan::from_nanos(self.dt.as_nanos().saturating_mul(LAG_CAP_STEPS));
+        let steps = SimSpan::from_nanos(self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS));
         let mut dropped = SimSpan::ZERO;
         if late > LAG_CAP && late > timeline.wall_span(steps) {
             dropped = lag;
@@ -97,7 +110,7 @@ impl Pace {
 
     /// The step is done: the agent's time is a step further.
     pub fn advance(&mut self) {
-        self.advance_by(self.dt);
+        self.advance_by(self.dt());
     }
 
     /// A step of `span` is done, whatever was wanted.
@@ -216,6 +229,18 @@ mod tests {
         let mut pace = pace(200);
         assert_eq!(pace.begin(&line, ms(390)).dropped, SimSpan::ZERO);
         assert_eq!(pace.begin(&line, ms(401)).dropped, span_ms(401));
+    }
+
+    #[test]
+    fn a_shorter_step_than_is_wanted_is_the_step_until_the_next() {
+        let mut pace = pace(16);
+        pace.shorten(span_ms(16), span_ms(4));
+        assert_eq!((pace.dt(), pace.wanted()), (span_ms(4), span_ms(16)));
+        pace.set_dt(span_ms(2));
+        assert_eq!(pace.dt(), span_ms(2), "who wants less gets less");
+        pace.shorten(span_ms(2), span_ms(2));
+        pace.set_dt(span_ms(16));
+        assert_eq!(pace.dt(), span_ms(16));
     }
 
     #[test]

@@ -92,6 +92,8 @@ pub(super) struct Dummy {
     pub rest_from: Option<u64>,
     /// Fails at this step.
     pub fault: Option<(u64, Fault)>,
+    /// Up to this step it makes none longer than this.
+    pub short: Option<(u64, SimSpan)>,
     /// Whom it acts on, from which step on.
     pub touches: Option<(u64, AgentId)>,
     pub resolution: Resolution,
@@ -122,6 +124,7 @@ impl Dummy {
             work,
             rest_from: None,
             fault: None,
+            short: None,
             touches: None,
             resolution: Resolution { eps_m: 0.01, n: 1 },
             steps: 0,
@@ -218,6 +221,11 @@ impl Agent for Dummy {
         self.write_down(self.time, around);
         let at_rest = self.rest_from.is_some_and(|from| self.steps >= from);
         Ok(StepReport { work: self.work, substeps: 1, at_rest })
+    }
+
+    fn longest_step(&self, dt: SimSpan, _around: &Surroundings<'_>) -> SimSpan {
+        let shorter = self.short.filter(|(until, _)| self.steps < *until);
+        shorter.map_or(dt, |(_, span)| dt.min(span))
     }
 
     fn resolution(&self) -> Option<Resolution> {

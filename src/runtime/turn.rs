@@ -70,6 +70,14 @@ pub(super) struct Open {
     pub rests: bool,
 }
 
+/// A step that was made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Made {
+    pub report: StepReport,
+    /// How long it was: no longer than was wanted.
+    pub dt: SimSpan,
+}
+
 /// What a turn that has begun takes.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effort {
@@ -248,9 +256,11 @@ impl Actor {
         }
         let start = self.pace.begin(timeline, wall);
         let alone = self.gather(timeline, wall, &start);
-        let dt = self.faults.span(self.pace.dt(), self.id(), self.diary.steps());
+        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
-        let (report, led) = if self.company.is_empty() { (self.step(dt)?, 0) } else { self.lead(dt)? };
+        let (Made { report, dt }, led) =
+            if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };
+        self.pace.shorten(wanted, dt);
         let done = &self.shared.gauges.work;
         done.set(done.get() + report.work * f64::from(1 + led));
         let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
@@ -262,13 +272,15 @@ impl Actor {
         Ok((open, Effort { work: report.work, steps: 1 + led + alone }))
     }
 
-    /// Steps by itself.
-    pub fn step(&mut self, dt: SimSpan) -> Result<StepReport, String> {
+    /// Steps by itself, by `wanted` or what the agent makes of that.
+    pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
         let time = self.pace.time();
-        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, dt), &Fellows::default());
+        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, wanted), &Fellows::default());
         let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
         let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
-        self.agent.step(dt, &around).map_err(|e| e.to_string())
+        let dt = self.agent.longest_step(wanted, &around).min(wanted);
+        let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
+        Ok(Made { report, dt })
     }
 
     pub fn take_commands(&mut self) {

@@ -97,11 +97,15 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
         given += dj;
         carried += way;
     });
-    if let Some(stand) = member.snapshot.stand.filter(|stand| stand.bears(state.position, given)) {
+    let stand = member.snapshot.stand;
+    if let Some(stand) = stand.filter(|stand| stand.bears(state.position, given)) {
         (given, carried) = (stand.leaves(given), stand.leaves(carried));
     }
-    state.velocity += given.linear * *inverse_mass;
-    state.position += carried.linear * *inverse_mass;
+    let all = [given.linear, carried.linear].map(|impulse| impulse * *inverse_mass);
+    let since_s = all[1].length() / all[0].length().max(f64::MIN_POSITIVE);
+    let [change, way] = stand.map_or(all, |stand| stand.lifted(all, since_s));
+    state.velocity += change;
+    state.position += way;
     state.spin += *inverse_inertia * given.angular;
     state.rotation = turned(state.rotation, *inverse_inertia * carried.angular);
     let a = member.snapshot.acceleration;

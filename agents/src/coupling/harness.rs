@@ -153,6 +153,7 @@ impl Stage {
         let actor = &mut self.actors[i];
         let around =
             Surroundings { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        let dt = actor.agent.longest_step(dt, &around);
         actor.agent.step(dt, &around).expect("a step that succeeds");
         actor.time += dt;
         let mut snapshot = Snapshot::default();

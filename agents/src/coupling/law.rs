@@ -1,6 +1,8 @@
 //! Who owns a pair of agents, and by which law the two act on each other.
 
+use super::beside::PART_MAX_S;
 use crate::{AgentId, Anchor};
+use std::cmp::Ordering;
 
 /// How two agents act on each other where they touch.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -60,12 +62,8 @@ pub struct Standing {
     pub held_ends: u8,
 }
 
-/// Below this rate a tube that falls does not own its pair with a held one that keeps another rate: it expects that one by one
-/// linear step of its own, and at 20 Hz on 1 kHz the two come to 1.6 times their energy.
-const FREE_MIN_HZ: f64 = 30.0;
-
 /// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the one
-/// with fewer held ends (where both keep 30 Hz or the same rate), else the faster, of equals the lower number. A tool is led and owns nothing.
+/// of two that keep the same rate beside each other (60 Hz at least) the one with fewer held ends, else the faster, of equals the lower number. A tool is led and owns nothing.
 ///
 /// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
 /// all how far one falls that nothing holds (docs/decisions/0012, 0013).
@@ -80,9 +78,11 @@ pub fn owns(me: Standing, other: Standing) -> bool {
     if soft(me) != soft(other) {
         return soft(me);
     }
-    let faster = me.rate_hz.total_cmp(&other.rate_hz);
-    let even = me.rate_hz == other.rate_hz || me.rate_hz.min(other.rate_hz) >= FREE_MIN_HZ;
-    let freer = if even { other.held_ends.cmp(&me.held_ends) } else { std::cmp::Ordering::Equal };
+    // two tubes beside each other step no slower than this
+    let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
+    let rate = |s: Standing| s.rate_hz.max(slowest);
+    let faster = rate(me).total_cmp(&rate(other));
+    let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
     tube(me).cmp(&tube(other)).then(freer).then(faster).then(other.id.cmp(&me.id)).is_gt()
 }
 
@@ -108,9 +108,10 @@ mod tests {
         assert!(owns(all[1], all[0]), "the faster");
         assert!(owns(all[0], all[2]) && owns(all[0], all[3]), "the tube, however slow");
         let held = Standing { held_ends: 2, ..all[1] };
-        assert!(owns(all[0], held) && !owns(held, all[0]), "the one that falls, though it is slower");
-        let slow = Standing { rate_hz: 20.0, ..all[0] };
-        assert!(owns(held, slow) && owns(slow, Standing { rate_hz: 20.0, ..held }), "too slow, but for its equal");
+        assert!(owns(held, all[0]) && owns(all[1], Standing { held_ends: 2, ..all[0] }), "the faster");
+        assert!(owns(all[1], held) && !owns(held, all[1]), "the one that falls, of equals");
+        let slow = |rate_hz| Standing { rate_hz, ..all[0] };
+        assert!(owns(slow(5.0), Standing { held_ends: 1, ..slow(60.0) }), "beside each other both keep 60 Hz");
         assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
     }
 }

@@ -5,6 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 5–7d: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
 mod deliver;
+mod ground;
 
 use super::sprung::{Lean, Sprung};
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, Twist, View};
@@ -28,6 +29,8 @@ pub struct Other {
     carried: Vec<DVec3>,
     age_s: f64,
     held: bool,
+    /// How far impulses have lifted it off what it stood on, metres, ≥ 0; `None` while none has.
+    height_m: Option<f64>,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
     /// What is expected of them after that: in how many seconds it begins, N and N·m.
@@ -71,7 +74,7 @@ impl Other {
         let snapshot = &neighbour.snapshot;
         self.neighbour = Some(neighbour.clone());
         self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
-        (self.age_s, self.lean) = (0.0, None);
+        (self.age_s, self.height_m, self.lean) = (0.0, None, None);
         self.coming.clear();
         self.lasting.clear();
         self.positions.clear();
@@ -197,7 +200,10 @@ impl Other {
     pub fn gain(&self, h: f64) -> Twist {
         match &self.lean {
             Some(lean) => lean.acceleration(h).map(|a| a * h),
-            None => [self.acceleration() * (0.5 * h), self.carried_by_others()[1] * (0.5 * h)],
+            None => {
+                let falling = self.fall(h).map_or(DVec3::ZERO, |fall| fall.normal * (fall.way_m / h - fall.speed_m_s));
+                [self.acceleration() * (0.5 * h) + falling, self.carried_by_others()[1] * (0.5 * h)]
+            }
         }
     }
 
@@ -360,6 +366,7 @@ impl Other {
         answer.clear();
         answer.extend_from_slice(impulses);
         self.respond(&mut answer);
+        self.leave(answer[0]);
         self.velocities.iter_mut().zip(&answer).for_each(|(v, dv)| *v += *dv);
         if let (Some(lean), [linear, angular]) = (&mut self.lean, &answer[..]) {
             lean.push([*linear, *angular], h > 0.0);
@@ -377,11 +384,15 @@ impl Other {
         }
         if self.positions.is_empty() {
             let (a, [_, turning]) = (self.acceleration(), self.carried_by_others());
+            let fall = self.fall(h);
             let Pose { centre, rotation } = &mut self.pose;
             *centre += self.velocities[0] * h + a * (0.5 * h * h);
             *rotation = turned(*rotation, self.velocities[1] * h + turning * (0.5 * h * h));
             self.velocities[0] += a * h;
             self.velocities[1] += turning * h;
+            if let Some(fall) = fall {
+                self.settle(&fall, h);
+            }
             self.receive(h);
             return;
         }

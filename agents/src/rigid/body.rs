@@ -3,6 +3,7 @@
 //! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::borne::Borne;
+use super::clearance::Fall;
 use super::company::Company;
 use super::hold::Hold;
 use super::island::{self, Island};
@@ -14,6 +15,7 @@ use super::sided::Sided;
 use super::ties::Ties;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
+use crate::coupling::beside::{self, bends};
 use crate::coupling::{Form, FormKind, SolidForm};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
@@ -56,6 +58,8 @@ pub struct RigidBody {
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
+    /// For how long it has stood, seconds.
+    pub(super) stood_s: f64,
     /// How springs hold it in contact that others own.
     pub(super) hold: Hold,
     pub(super) at_rest: bool,
@@ -124,6 +128,7 @@ impl RigidBody {
             borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
+            stood_s: 0.0,
             hold: Hold::default(),
             at_rest: false,
             calm_s: 0.0,
@@ -283,6 +288,16 @@ impl Agent for RigidBody {
             self.tell(around, dt_s);
             self.company.dismiss();
         }
+    }
+
+    /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one.
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
+        // what is caught this step may fall in the next
+        let soon_s = 2.0 * dt.as_secs_f64();
+        let lands = || !self.stays() && self.world.free_time(&self.motion, fall, soon_s) < soon_s;
+        let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
+        beside::longest_step(dt, around, || self.bounds(), |n| !n.owned && bends(n) && (owners > 1 || lands()))
     }
 
     fn resolution(&self) -> Option<Resolution> {

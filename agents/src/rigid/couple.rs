@@ -58,20 +58,35 @@ impl RigidBody {
             taken = Some((given + sum, carried + way));
         });
         if let Some((given, carried)) = taken {
-            let carried = self.spare(given, carried, around.time);
+            let since_s = carried.linear.length() / given.linear.length();
+            let [left, carried] = self.spare(given, carried, around.time);
             // what the ground bears carries nothing, and what is still to act lifts nothing off it
-            let stand = self.stand.filter(|stand| stand.bears(self.motion.position, given));
-            self.shift(stand.map_or(carried, |stand| stand.leaves(carried)));
+            let carried = match self.stand {
+                Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
+                Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
+                None => carried,
+            };
+            self.shift(carried);
             self.world.moved();
         }
     }
 
-    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; the way that is left.
-    fn spare(&mut self, given: Impulse, carried: Impulse, now: SimTime) -> Impulse {
+    /// Takes back what the ground carried of the weight of a body that was lifted off it `since_s` seconds ago, by what is left
+    /// of an impulse; as much of the way (eq. 7f).
+    fn rise(&mut self, stand: &Stand, (left, carried): (Impulse, Impulse), since_s: f64) -> Impulse {
+        let mass = self.spread.mass_kg;
+        let all = [left.linear, carried.linear].map(|impulse| impulse / mass);
+        let [change, way] = stand.lifted(all, if since_s.is_finite() { since_s } else { 0.0 });
+        self.motion.velocity += change - all[0];
+        Impulse { linear: way * mass, ..carried }
+    }
+
+    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both.
+    fn spare(&mut self, given: Impulse, carried: Impulse, now: SimTime) -> [Impulse; 2] {
         let [back, way] = self.borne.in_place_of(given, carried, now);
         self.motion.velocity -= back.linear / self.spread.mass_kg;
         self.motion.angular -= back.angular;
-        carried - way
+        [given - back, carried - way]
     }
 
     /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
@@ -108,7 +123,9 @@ impl RigidBody {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
+        let stood = self.stand.is_some();
         self.stand = if seen { self.feet() } else { None };
+        self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
         self.bear();
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received != DVec3::ZERO;
@@ -150,7 +167,7 @@ impl RigidBody {
 
     /// The places where it stands on fixed solids, where all of them are on one level.
     fn feet(&mut self) -> Option<Stand> {
-        let Self { motion, world, company, meeting, obstacles, .. } = self;
+        let Self { motion, world, company, meeting, obstacles, gravity, .. } = self;
         let (_, _, _, room, form) = company.split();
         let mine = placed(form, motion);
         let (mut normal, mut count) = (None, 0_u32);
@@ -167,11 +184,11 @@ impl RigidBody {
             }
         }
         let centre = sum / f64::from(count.max(1));
-        let normal = normal.filter(|normal| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
+        let normal: DVec3 = normal.filter(|normal: &DVec3| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
         let spread = (high - low) - normal * normal.dot(high - low);
         // a square of feet bears pushes as far as half its side, a triangle less; on one or two feet a body only balances
         let reach_m = if count > 2 { 0.25 * spread.length() } else { 0.05 * world.mover.radius_m };
-        Some(Stand { normal, centre, reach_m })
+        Some(Stand { normal, centre, reach_m, weight_m_s2: (-gravity.dot(normal)).max(0.0) })
     }
 
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
@@ -188,17 +205,27 @@ impl RigidBody {
         }
     }
 
-    /// Writes what others couple by.
-    pub(super) fn write_coupling(&self, into: &mut Snapshot) {
-        let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Bounds {
         let radius_m = self.world.mover.radius_m;
         let swing = radius_m * self.motion.spin(&self.spread).length();
-        into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
-        into.bounds = Some(Bounds {
+        Bounds {
             low: self.motion.position - radius_m,
             high: self.motion.position + radius_m,
             speed_m_s: self.motion.velocity.length() + swing,
-        });
+        }
+    }
+
+    /// Whether what it stands on will hold it up: nobody lifts it.
+    pub(super) fn stays(&self) -> bool {
+        self.stand.is_some_and(|stand| stand.normal.dot(self.received) <= 0.0)
+    }
+
+    /// Writes what others couple by.
+    pub(super) fn write_coupling(&self, into: &mut Snapshot) {
+        let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
+        into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
+        into.bounds = Some(self.bounds());
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
         into.sprung.set(self.hold.published());
         self.company.exchange.write(into);

@@ -11,21 +11,15 @@ use super::mate::Mate;
 use super::receive::Received;
 use super::sided::Sided;
 use super::tank::Tanks;
+use crate::coupling::beside::{may_touch, parts};
 use crate::coupling::touch::{TouchRoom, touches};
 use crate::coupling::{
     Contact, Exchange, Form, Impulse, Law, PairKind, PairState, Placed, Site, Touch, View, WAKE_M_S,
 };
-use crate::instrument::GRASP_BELOW;
-use crate::{AgentId, Body, Bounds, Neighbour, SimTime, Snapshot, Surroundings};
+use crate::{AgentId, Bounds, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
 use std::fmt;
 use std::sync::Arc;
-
-/// While somebody is near, a step falls into parts no longer than this, seconds: in a longer one a tube falls so far from
-/// where it began that its places of contact are no longer there (measured: 20 mm deep at 0.1 s, 0.01 mm at 1/60 s).
-const PART_MAX_S: f64 = 1.0 / 60.0;
-/// A step longer than [`PART_MAX_S`] by less than this is not divided.
-const SPLIT_SLACK: f64 = 1.01;
 
 /// The agents near one tube.
 #[derive(Clone, Default)]
@@ -134,7 +128,7 @@ impl Company {
         let Self { mates, count, exchange, tanks, .. } = self;
         for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
             let linked = around.links.iter().any(|link| link.other == neighbour.id);
-            let touched = Mate::may_touch(neighbour, around, bounds, dt);
+            let touched = may_touch(neighbour, around, bounds, dt);
             if !(linked || touched) {
                 continue;
             }
@@ -176,7 +170,7 @@ impl Company {
 
     /// Into how many parts a step of `dt` seconds falls while somebody is near enough to touch or linked.
     pub fn parts(&self, dt: f64) -> u32 {
-        if self.is_empty() { 1 } else { (dt / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32 }
+        if self.is_empty() { 1 } else { parts(dt) }
     }
 
     /// Appends the velocities that the others would have without this tube, in slots, on the mean of a substep `h`: what is
@@ -205,8 +199,9 @@ impl Company {
         let mates = &mut self.mates[..self.count];
         mates.iter_mut().for_each(Mate::begin);
         for (contact, impulse) in contacts {
-            let work_j = contact.slots.velocity(velocities).dot(*impulse);
-            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.spend(work_j));
+            let velocity = contact.slots.velocity(velocities);
+            let mate = mates.iter_mut().find(|mate| mate.is_of(contact));
+            mate.into_iter().for_each(|mate| mate.spend(contact, *impulse, velocity));
         }
     }
 
@@ -293,10 +288,4 @@ impl Company {
         let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
         into.touches.extend(woken.chain(self.knocks.iter().copied()));
     }
-}
-
-/// Whether a tool's jaws leave this tube alone: they hold it, or stand open so that it may come between them.
-pub fn is_let_in(neighbour: &Neighbour, me: AgentId) -> bool {
-    let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
-    tool.grasp.map_or(tool.jaw > GRASP_BELOW, |grasp| grasp.target == me)
 }

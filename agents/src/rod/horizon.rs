@@ -5,11 +5,11 @@
 
 use super::band::Factor;
 use super::config::Config;
-use super::publish::smooth;
 use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
 use super::tube::Tube;
 use crate::coupling::Law;
+use crate::coupling::beside::PART_MAX_S;
 use crate::{Body, Neighbour, Surroundings};
 use glam::DVec3;
 
@@ -40,7 +40,8 @@ impl Tube {
     /// Works out what slower owners may expect of a tube that has just made a step of `dt` seconds.
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
-        let steps_s = around.neighbours.iter().filter(|n| owns_it(n)).map(|n| n.step_s);
+        // beside this one it makes no longer steps
+        let steps_s = around.neighbours.iter().filter(|n| owns_it(n)).map(|n| n.step_s.min(PART_MAX_S));
         // to a faster one among them the tube must not look too heavy
         let span_s = steps_s.fold(f64::INFINITY, f64::min);
         if !(span_s.is_finite() && span_s > SLOWER * dt) {
@@ -67,12 +68,12 @@ impl Stepper {
         horizon.span_s = span_s;
         let changes = rhs.iter().step_by(2).zip(now.u.iter().step_by(2));
         gained.clear();
-        gained.extend(changes.map(|(then, v)| smooth((*then - *v) / span_s, matter.gravity)));
+        gained.extend(changes.map(|(then, v)| (*then - *v) / span_s));
     }
 }
 
-/// Whether a neighbour computes the contacts with this tube.
-fn owns_it(neighbour: &Neighbour) -> bool {
+/// Whether a neighbour computes the contacts with this tube, and expects it by its factor.
+pub fn owns_it(neighbour: &Neighbour) -> bool {
     let solves = matches!(neighbour.snapshot.body, Body::Curve(_) | Body::Soft(_)) && neighbour.law == Law::Ledger;
     solves && !neighbour.owned && neighbour.form.is_some()
 }

@@ -3,15 +3,12 @@
 //! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the tube's solve, entries in the ledger.
 //! Never here: the solve itself, the tube's own state. Theory: docs/theory/coupling.md.
 
-use super::company::is_let_in;
 use super::holds::Far;
 use super::tank::Tanks;
-use crate::coupling::{Contact, Exchange, FormKind, Law, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
-use crate::{Anchor, Bounds, Inertia, Neighbour, Surroundings};
+use crate::coupling::{Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
+use crate::{Anchor, Inertia, Neighbour, Surroundings};
 use glam::DVec3;
 
-/// A body may come faster by this than it was seen, m/s²: three times gravity.
-const SURPRISE_M_S2: f64 = 30.0;
 /// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
 const OTHERS_KEY: u64 = 1 << 63;
 /// Where the number of the other begins in a key.
@@ -42,23 +39,13 @@ pub struct Mate {
     work_j: f64,
     /// How much of push-out the pair's tank allows.
     fade: f64,
+    /// The substep tried, seconds.
+    span_s: f64,
     woken: bool,
     linked: bool,
 }
 
 impl Mate {
-    /// Whether a neighbour may come near enough to touch within `dt` seconds.
-    pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
-        let (Some(_), Some(there)) = (&neighbour.form, &neighbour.snapshot.bounds) else { return false };
-        if neighbour.law != Law::Ledger || !neighbour.snapshot.is_finite() || is_let_in(neighbour, around.me) {
-            return false;
-        }
-        let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
-        let way = bounds.speed_m_s * dt + (there.speed_m_s + SURPRISE_M_S2 * ahead) * ahead;
-        let apart = (there.low - bounds.high).max(bounds.low - there.high).max_element();
-        apart <= way
-    }
-
     /// Takes in a neighbour with whom it acts by the ledger; whether it is one that can be touched or held.
     pub fn meet(
         &mut self,
@@ -170,11 +157,17 @@ impl Mate {
         velocities: &[DVec3],
         into: &mut Vec<Contact>,
     ) {
+        self.span_s = h;
         for touch in touches {
-            let contact = self.contact(touch);
+            let mut contact = self.contact(touch);
             let closing = contact.slots.velocity(velocities).dot(contact.normal);
             if touch.gap_m + closing * h > slack_m {
                 continue;
+            }
+            let parting = -contact.bias_m_s(h);
+            if parting > 0.0 && closing < parting {
+                // who stands carries no weight of its own: whoever pushes it out does
+                contact.rebound_m_s = parting + self.other.lift_m_s(contact.normal, h);
             }
             if self.other.is_held() && closing < -WAKE_M_S {
                 self.other.wake();
@@ -264,9 +257,10 @@ impl Mate {
         (self.now, self.work_j) = (0, 0.0);
     }
 
-    /// Notes the work of one contact against the velocity after it, both sides', J.
-    pub fn spend(&mut self, work_j: f64) {
-        self.work_j += work_j;
+    /// Notes the work of one contact against the velocity after it, both sides', J: what only carries a weight does none.
+    pub fn spend(&mut self, contact: &Contact, impulse: DVec3, velocity: DVec3) {
+        let lift = if contact.rebound_m_s > 0.0 { self.other.lift_m_s(contact.normal, self.span_s) } else { 0.0 };
+        self.work_j += (velocity - contact.normal * lift).dot(impulse);
     }
 
     /// Notes what one contact did in a substep that stands.

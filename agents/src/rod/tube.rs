@@ -11,12 +11,14 @@ use super::contact::TubeContacts;
 use super::division::{self, Division};
 use super::doubling::Doubling;
 use super::holds::{NodeSpring, Tie, springs};
-use super::publish::smooth;
+use super::horizon::owns_it;
+use super::publish::{bounds, smooth};
 use super::remesh::Remesher;
 use super::rest::RestWatch;
 use super::skeleton::Skeleton;
 use super::step::{Lost, Setting, Stepper, energy};
 use super::{Section, TubeSpec};
+use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::{Form, FormKind};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
 use glam::{DMat3, DVec3};
@@ -241,12 +243,15 @@ impl Tube {
     }
 
     /// Works out what others may expect after a step of `dt` seconds.
-    fn end_watch(&mut self, before: Option<DVec3>, dt: f64) {
+    fn end_watch(&mut self, before: Option<DVec3>, around: &Surroundings<'_>, dt: f64) {
         let Some(before) = before else { return };
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
+        // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
+        let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(owns_it);
         for (a, u) in self.accelerations.iter_mut().zip(self.now.u.iter().step_by(2)) {
-            *a = smooth((*u - *a) / dt, gravity);
+            let gained = (*u - *a) / dt;
+            *a = if lasts { gained } else { smooth(gained, gravity) };
         }
     }
 
@@ -317,7 +322,7 @@ impl Agent for Tube {
         self.double((dt_s, substeps));
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);
-        self.end_watch(before, dt_s);
+        self.end_watch(before, around, dt_s);
         self.foresee(around, dt_s);
         self.time = around.time + dt;
         self.steps += 1;
@@ -328,6 +333,10 @@ impl Agent for Tube {
 
     fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
         self.foresee(around, dt.as_secs_f64());
+    }
+
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        beside::longest_step(dt, around, || bounds(&self.now, self.widest_m()), |n| has_a_say(n, around))
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -10,6 +10,7 @@ use super::holds::Tie;
 use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
+use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::{Form, FormKind, Law, Link};
 use crate::{
     Agent, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, Surroundings,
@@ -168,6 +169,10 @@ impl Agent for SoftBody {
         let (substeps, doubled) = self.advance(around, dt_s)?;
         self.settle(around, dt_s);
         Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })
+    }
+
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around))
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -5,6 +5,7 @@
 //! Theory: docs/theory/coupling.md; a soft body owns every pair but those with faster soft bodies.
 
 use super::holds::Tie;
+use crate::coupling::beside::may_touch;
 use crate::coupling::touch::{TouchRoom, touches};
 use crate::coupling::{Contact, Exchange, Impulse, PairKind, Placed, Site, Touch};
 use crate::rod::{Mate, Tanks};
@@ -71,7 +72,7 @@ impl Company {
         let Self { mates, count, exchange, tanks, .. } = self;
         for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
             let linked = around.links.iter().any(|link| link.other == neighbour.id);
-            let touched = Mate::may_touch(neighbour, around, bounds, dt);
+            let touched = may_touch(neighbour, around, bounds, dt);
             if !(linked || touched) {
                 continue;
             }
@@ -116,8 +117,9 @@ impl Company {
         let mates = &mut self.mates[..self.count];
         mates.iter_mut().for_each(Mate::begin);
         for (contact, impulse) in contacts {
-            let work_j = contact.slots.velocity(velocities).dot(*impulse);
-            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.spend(work_j));
+            let velocity = contact.slots.velocity(velocities);
+            let mate = mates.iter_mut().find(|mate| mate.is_of(contact));
+            mate.into_iter().for_each(|mate| mate.spend(contact, *impulse, velocity));
         }
     }
 

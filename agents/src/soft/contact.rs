@@ -13,6 +13,8 @@ use std::sync::Arc;
 
 /// When contacts are good enough: 10 µm/s, a tenth of what counts as rest.
 const SETTINGS: Settings = Settings { iterations: 40, tolerance_m_s: 1e-5 };
+/// The same of a body that others press on something fixed: a vertex under one five hundred times as heavy takes so many.
+const SQUEEZED: Settings = Settings { iterations: 300, ..SETTINGS };
 /// Contacts are foreseen this far beyond where they close within a substep, as a share of the mean edge.
 const SLACK_SHARE: f64 = 0.02;
 /// Where the number of a fixed solid stands in a key; the bit above tells agents from them.
@@ -78,7 +80,7 @@ impl Contacts {
             return;
         }
         company.extend(velocities, h);
-        self.find(positions, velocities, company, h);
+        let settings = self.find(positions, velocities, company, h);
         if self.list.is_empty() {
             self.solver.forget();
             velocities.truncate(own);
@@ -91,15 +93,15 @@ impl Contacts {
             company.respond(impulses);
         };
         let Self { list: contacts, mobilities, .. } = self;
-        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings: SETTINGS };
+        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings };
         self.solver.solve(&problem, velocities, &mut answer);
         company.watch(self.list.iter().zip(self.solver.impulses()), velocities);
         velocities.truncate(own);
         self.mobilities.truncate(own);
     }
 
-    /// Finds what may close within the substep.
-    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) {
+    /// Finds what may close within the substep, and says how well it is to be solved.
+    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
         let Self { form, walls, list, touches: places, room, slack_m, .. } = self;
         let here = Placed { form, view: View::Surface(positions) };
         let own = &velocities[..positions.len()];
@@ -119,7 +121,9 @@ impl Contacts {
                 }
             }
         }
+        let fixed = list.len();
         company.find(&here, (h, *slack_m, speed), velocities, (room, list));
+        if fixed > 0 && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 
     /// The contacts of the last substep and their impulses, N·s.

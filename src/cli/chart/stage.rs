@@ -147,6 +147,7 @@ impl Stage {
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
         let around = Surroundings { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
+        let dt = actor.agent.longest_step(dt, &around);
         actor.agent.step(dt, &around)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);

@@ -89,13 +89,13 @@ impl Worker {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
         let began = self.now;
-        actor.served += actor.pace.dt();
         let sitting = self.desk.sit(self.turns, actor.id());
         let begun = actor.begin(timeline, began);
         if !self.desk.rise(sitting) {
             self.given_up = true;
             return None;
         }
+        actor.served += actor.pace.dt();
         // the clock is read once a turn: what follows the step counts for the next one
         self.now = self.hall.clock.now();
         let wall = self.now.saturating_sub(began);

@@ -42,6 +42,7 @@ impl Other {
         if !sums.is_empty() {
             self.respond(&mut sums);
             self.respond(&mut carried);
+            [sums[0], carried[0]] = self.rise([sums[0], carried[0]]);
             self.velocities.iter_mut().zip(&sums).for_each(|(v, dv)| *v += *dv);
             if let (Some(lean), [dv, dw], [dx, dr]) = (&mut self.lean, &sums[..], &carried[..]) {
                 lean.deliver([*dv, *dw], [*dx, *dr]);
@@ -92,6 +93,7 @@ impl Other {
             if due {
                 let mut change = *impulse;
                 self.respond(&mut change);
+                self.leave(change[0]);
                 self.velocities[0] += change[0];
                 self.velocities[1] += change[1];
                 self.shift(&change.map(|change| change * -*after_s));

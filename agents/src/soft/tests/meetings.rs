@@ -9,7 +9,11 @@ use std::sync::Arc;
 const BALL_M: f64 = 0.03;
 
 fn ball(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> RigidBody {
-    RigidBody::new(RigidSpec {
+    RigidBody::new(ball_spec(mass_kg, position, velocity, gravity)).unwrap()
+}
+
+fn ball_spec(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> RigidSpec {
+    RigidSpec {
         solid: Solid::Ball { radius_m: BALL_M },
         position,
         rotation: DQuat::IDENTITY,
@@ -22,8 +26,7 @@ fn ball(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> Rigid
         obstacles: Arc::from([]),
         joints: Arc::from([]),
         sleep: false,
-    })
-    .unwrap()
+    }
 }
 
 /// A sheet of 30 cm held at all four edges, its middle at the origin.
@@ -202,5 +205,40 @@ fn a_soft_solid_lies_on_a_sheet_whoever_is_faster() {
         println!("{rates:?}: weight {weight} lowest {lowest} deep {deep}");
         assert!((weight - 1.0).abs() < 0.03, "{rates:?}: {weight} of the weight");
         assert!(lowest > -0.04 && deep < 5e-3, "{rates:?}: at {lowest}, {deep} m deep");
+    }
+}
+
+#[test]
+fn a_heavy_ball_comes_off_the_floor_under_the_sheet_that_it_fell_on() {
+    for (rates, mass_kg) in [((60.0, 60.0), 10.0), ((240.0, 60.0), 10.0), ((60.0, 240.0), 10.0), ((240.0, 30.0), 1.0)] {
+        let floor = Obstacle {
+            name: String::new(),
+            solid: Solid::Plane,
+            position: DVec3::ZERO,
+            rotation: DQuat::IDENTITY,
+            friction: 0.5,
+            restitution: 0.0,
+        };
+        let sheet = SoftSpec {
+            matter: SoftMatter { damping_per_s: 5.0, ..MATTER },
+            position: DVec3::new(-0.2, -0.2, 0.006),
+            gravity: G,
+            obstacles: [floor.clone()].into(),
+            ..spec(SoftShape::Sheet { size_m: [0.4, 0.4], thickness_m: 0.01, segments: [8, 8] })
+        };
+        let solid = Solid::Ball { radius_m: 0.1 };
+        let ball = RigidSpec { solid, obstacles: [floor].into(), ..ball_spec(mass_kg, DVec3::Z * 0.3, DVec3::ZERO, G) };
+        let mut stage = Stage::new(Faults::default());
+        let soft = stage.add(SoftBody::new(sheet).unwrap(), rates.0);
+        let body = stage.add(RigidBody::new(ball).unwrap(), rates.1);
+        stage.run(1.0, |_| {});
+        let (mut deep, mut low) = (0.0_f64, f64::INFINITY);
+        stage.run(3.0, |stage| {
+            deep = deep.max(stage.newest(soft).pairs.first().map_or(0.0, |pair| pair.penetration_m));
+            low = low.min(stage.settled(body, stage.newest(soft).time.as_secs_f64()).state.position.z - 0.1);
+        });
+        println!("{rates:?}, {mass_kg} kg: {deep:.1e} m deep, {low:.4} m above the floor");
+        assert!(deep < 5e-3, "{rates:?}, {mass_kg} kg: {deep} m deep");
+        assert!(low > 5e-3, "{rates:?}, {mass_kg} kg: {low} m above the floor");
     }
 }

@@ -18,7 +18,7 @@ const IDS: [AgentId; 3] = [AgentId(0), AgentId(1), AgentId(2)];
 /// Clocks agree to within this, seconds: sixtieths are not whole nanoseconds.
 const SAME_S: f64 = 1e-5;
 /// Rates of the tubes and of the block, Hz.
-const RATES: [[f64; 3]; 12] = [
+const RATES: [[f64; 3]; 16] = [
     [1000.0, 1000.0, 1000.0],
     [1000.0, 1000.0, 10.0],
     [100.0, 100.0, 1000.0],
@@ -28,6 +28,10 @@ const RATES: [[f64; 3]; 12] = [
     [500.0, 50.0, 25.0],
     [1000.0, 20.0, 1000.0],
     [10.0, 1000.0, 1000.0],
+    [1000.0, 10.0, 100.0],
+    [10.0, 1000.0, 10.0],
+    [1000.0, 60.0, 10.0],
+    [200.0, 5.0, 60.0],
     [20.0, 20.0, 1000.0],
     [10.0, 10.0, 1000.0],
     [10.0, 10.0, 10.0],

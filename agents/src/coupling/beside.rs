@@ -1,0 +1,72 @@
+//! How long a step may be beside others of whom nobody can foresee how they move within it.
+//!
+//! In: a step that is wanted, and who is near. Out: that step, or an equal part of it; who may be touched in it. Never here: the
+//! step itself. Theory: docs/theory/coupling.md, eq. 7g.
+
+use super::Law;
+use crate::instrument::GRASP_BELOW;
+use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings};
+
+/// Beside others a body that bends makes no longer substeps than this, seconds: in a longer one it falls so far from where it
+/// began that its places of contact are no longer there (measured: 20 mm deep at 0.1 s, 0.01 mm at 1/60 s).
+pub const PART_MAX_S: f64 = 1.0 / 60.0;
+/// A step longer than [`PART_MAX_S`] by less than this is not divided.
+const SPLIT_SLACK: f64 = 1.01;
+/// A body may come faster by this than it was seen, m/s²: three times gravity.
+const SURPRISE_M_S2: f64 = 30.0;
+
+/// Into how many parts a step of `dt_s` seconds falls.
+#[must_use]
+pub fn parts(dt_s: f64) -> u32 {
+    (dt_s / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32
+}
+
+/// One of these parts where any neighbour that may be touched in a step of `dt` is `wild`, else all of it. `bounds` are those of the
+/// body that looks; what decides is the step that is wanted and not the one that is made, so that the rule stays on.
+pub fn longest_step(
+    dt: SimSpan,
+    around: &Surroundings<'_>,
+    bounds: impl FnOnce() -> Bounds,
+    wild: impl Fn(&Neighbour) -> bool,
+) -> SimSpan {
+    let dt_s = dt.as_secs_f64();
+    let parts = parts(dt_s);
+    if parts == 1 || around.neighbours.is_empty() {
+        return dt;
+    }
+    let bounds = bounds();
+    let near = |n: &Neighbour| wild(n) && may_touch(n, around, &bounds, dt_s);
+    if around.neighbours.iter().any(near) { SimSpan::from_nanos(dt.as_nanos() / u64::from(parts)) } else { dt }
+}
+
+/// Whether a neighbour bends: how it moves within a step is known to itself alone.
+#[must_use]
+pub fn bends(neighbour: &Neighbour) -> bool {
+    matches!(neighbour.snapshot.body, Body::Curve(_) | Body::Soft(_))
+}
+
+/// Whether a neighbour bends, or moves as somebody else near here pushes it.
+#[must_use]
+pub fn has_a_say(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    let gives = |n: &Neighbour| n.id != neighbour.id && n.snapshot.given.iter().any(|l| l.with == neighbour.id);
+    bends(neighbour) || around.neighbours.iter().any(gives)
+}
+
+/// Whether a neighbour may come near enough to a body within `bounds` to touch it in the next `dt` seconds.
+#[must_use]
+pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
+    let (Some(_), Some(there)) = (&neighbour.form, &neighbour.snapshot.bounds) else { return false };
+    if neighbour.law != Law::Ledger || !neighbour.snapshot.is_finite() || is_let_in(neighbour, around.me) {
+        return false;
+    }
+    let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
+    let way = bounds.speed_m_s * dt + (there.speed_m_s + SURPRISE_M_S2 * ahead) * ahead;
+    let apart = (there.low - bounds.high).max(bounds.low - there.high).max_element();
+    apart <= way
+}
+
+/// Whether a tool's jaws leave `me` alone: they hold it, or stand open so that it may come between them.
+fn is_let_in(neighbour: &Neighbour, me: AgentId) -> bool {
+    let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
+    tool.grasp.map_or(tool.jaw > GRASP_BELOW, |grasp| grasp.target == me)
+}

@@ -1,0 +1,73 @@
+//! What another body stands on: it carries the body, and it cannot hold it down.
+//!
+//! In: how the body stands, and what impulses are expected to have lifted it by. Out: how it falls back. Never here: pushes
+//! towards the ground, which the body does not feel ([`Other::respond`]). Theory: docs/theory/coupling.md, eq. 7f.
+
+use super::Other;
+use crate::Stand;
+use glam::DVec3;
+
+/// How a body that was lifted off the ground moves along its normal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Fall {
+    pub normal: DVec3,
+    /// How fast it rises at first, m/s, and how much faster at the end.
+    pub speed_m_s: f64,
+    pub gain_m_s: f64,
+    /// How far it rises, metres.
+    pub way_m: f64,
+}
+
+impl Other {
+    /// How it falls in the next `h` seconds: `None` where it was not lifted off what it stands on, and where it stands on
+    /// nothing. Back on the ground it stays there.
+    pub(super) fn fall(&self, h: f64) -> Option<Fall> {
+        let (height_m, Stand { normal, weight_m_s2, .. }) = (self.height_m?, self.footing()?);
+        let speed_m_s = self.velocities[0].dot(normal);
+        if h <= 0.0 {
+            return None;
+        }
+        let way_m = speed_m_s * h - 0.5 * weight_m_s2 * h * h;
+        let lands = height_m + way_m <= 0.0;
+        let (way_m, gain_m_s) = if lands { (-height_m, -speed_m_s) } else { (way_m, -weight_m_s2 * h) };
+        Some(Fall { normal, speed_m_s, gain_m_s, way_m })
+    }
+
+    /// Corrects a motion of `h` seconds without weight by it.
+    pub(super) fn settle(&mut self, fall: &Fall, h: f64) {
+        self.pose.centre += fall.normal * (fall.way_m - fall.speed_m_s * h);
+        self.velocities[0] += fall.normal * fall.gain_m_s;
+        self.height_m = self.height_m.map(|height_m| height_m + fall.way_m).filter(|height_m| *height_m > 0.0);
+    }
+
+    /// An impulse has changed its velocity: it is lifted where that leads off the ground.
+    pub(super) fn leave(&mut self, change: DVec3) {
+        if self.footing().is_some_and(|stand| change.dot(stand.normal) > 0.0) {
+            self.height_m.get_or_insert(0.0);
+        }
+    }
+
+    /// What is left of a change of velocity and of the way that it has carried the body where both lift it off the ground.
+    pub(super) fn rise(&mut self, all: [DVec3; 2]) -> [DVec3; 2] {
+        let Some(stand) = self.footing() else { return all };
+        let since_s = all[1].length() / all[0].length().max(f64::MIN_POSITIVE);
+        let left = stand.lifted(all, since_s);
+        self.leave(left[0]);
+        self.height_m = self.height_m.map(|_| left[1].dot(stand.normal).max(0.0));
+        left
+    }
+
+    /// By how much faster than it is to move in the mean of the next `h` seconds a push along `normal` from it has to part it
+    /// from the ground that it stands on, m/s: its weight is on who lifts it.
+    #[must_use]
+    pub fn lift_m_s(&self, normal: DVec3, h: f64) -> f64 {
+        let stand = self.footing().filter(|_| self.fall(h).is_none());
+        stand.map_or(0.0, |stand| 0.5 * h * stand.weight_m_s2 * (-normal.dot(stand.normal)).max(0.0))
+    }
+
+    /// How it stands, where impulses may move it.
+    fn footing(&self) -> Option<Stand> {
+        let stand = self.neighbour.as_ref()?.snapshot.stand?;
+        (!self.held && self.lean.is_none()).then_some(stand)
+    }
+}
