@@ -210,11 +210,18 @@ impl Stage {
         state.position += state.velocity * left + newest.acceleration * (0.5 * left * left);
         state.velocity += newest.acceleration * left;
         state.rotation = DQuat::from_scaled_axis(state.spin * left) * state.rotation;
-        self.on_their_way(id, at, |sum, carried| {
-            state.velocity += sum.linear * inverse_mass;
-            state.position += carried.linear * inverse_mass;
-            state.spin += inverse_inertia * sum.angular;
+        let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
+        self.on_their_way(id, at, |sum, way| {
+            given += sum;
+            carried += way;
         });
+        // what it stands on bears its part at once
+        if let Some(stand) = newest.stand.filter(|stand| stand.bears(state.position, given)) {
+            (given, carried) = (stand.leaves(given), stand.leaves(carried));
+        }
+        state.velocity += given.linear * inverse_mass;
+        state.position += carried.linear * inverse_mass;
+        state.spin += inverse_inertia * given.angular;
         Settled { state, mass_kg: inverse_mass.recip(), inertia: inverse_inertia.inverse() }
     }
 

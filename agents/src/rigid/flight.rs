@@ -5,13 +5,15 @@
 
 use super::RigidBody;
 use super::clearance::{Ahead, Fall};
-use super::meeting::{Me, Scope};
+use super::meeting::{Me, Scope, Strike};
 use glam::DVec3;
 
 /// A touching body has left when it would fly for at least this long, seconds.
 const LEAVE_S: f64 = 4e-3;
 /// A flight shorter than this is a touch, seconds.
 const TOUCH_S: f64 = 1e-7;
+/// A blow of fixed solids that changes the velocity by less changes nothing, m/s.
+const CHANGED_M_S: f64 = 1e-3;
 /// After this many flights and blows within one part the contact solver carries the body to the part's end.
 const EVENTS_MAX: u32 = 64;
 
@@ -69,13 +71,15 @@ impl RigidBody {
     /// The blow of a touch, with others where `met`. Whether it changed anything.
     fn take_blow(&mut self, met: bool) -> Result<bool, &'static str> {
         self.steady = false;
-        if !met {
+        if !met && self.world.has_meshes() {
             return self.world.blow(&mut self.motion, &self.spread);
         }
-        let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
-        let changed = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles);
+        let before = self.motion.velocity;
+        let Self { motion, spread, world, company, meeting, obstacles, stand, received, .. } = self;
+        let strike = Strike { met, carried_m_s: if stand.is_some() { *received } else { DVec3::ZERO } };
+        let approached = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles, strike);
         self.world.flew();
-        Ok(changed)
+        Ok(approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S))
     }
 
     /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.

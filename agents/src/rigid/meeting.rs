@@ -31,6 +31,15 @@ pub(super) struct Scope {
     pub fixed: bool,
 }
 
+/// How a blow comes about.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Strike {
+    /// Whether others take part; fixed solids always do.
+    pub met: bool,
+    /// The velocity that a body was given while it stood, m/s: what it stands on carries that, and does not throw it back.
+    pub carried_m_s: DVec3,
+}
+
 /// What a press did.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Pressed {
@@ -80,9 +89,9 @@ const PRESS_M_S2: f64 = 1e-3;
 
 impl Meeting {
     /// The blow of a touch: no time passes. Whether anything approached.
-    pub(super) fn blow(&mut self, me: &mut Me<'_>, company: &mut Company, fixed: &Obstacles) -> bool {
+    pub(super) fn blow(&mut self, me: &mut Me<'_>, company: &mut Company, fixed: &Obstacles, strike: Strike) -> bool {
         self.lay_out(me, company, (0.0, DVec3::ZERO));
-        self.find_blows(me, company, fixed);
+        self.find_blows(me, company, fixed, strike);
         if self.found.iter().all(|found| found.approach_m_s <= 0.0) {
             return false;
         }

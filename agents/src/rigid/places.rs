@@ -4,7 +4,7 @@
 //! ([`super::meeting`]).
 
 use super::company::{Company, Guest, placed};
-use super::meeting::{Found, Me, Meeting};
+use super::meeting::{Found, Me, Meeting, Strike};
 use super::obstacles::Obstacles;
 use super::pair::RESERVE_M_S;
 use crate::coupling::touch::touches;
@@ -13,16 +13,20 @@ use glam::DVec3;
 
 /// A contact farther than this from closing within the part is left out, metres.
 const SLACK_M: f64 = 1e-5;
+/// What comes to a fixed solid more slowly than this does not bounce, m/s: else nothing would ever lie.
+const BOUNCE_M_S: f64 = 0.01;
 /// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by.
 const BOUND_SHARE: f64 = 2e-5;
 
 impl Meeting {
-    /// Places within the skin of everything, for a blow.
-    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &Obstacles) {
+    /// Places within the skin of everything that takes part, for a blow.
+    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &Obstacles, strike: Strike) {
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
         let past = BOUND_SHARE * me.mover.radius_m;
-        for (i, guest) in guests.iter().enumerate().filter(|(_, guest)| guest.touchable && !guest.is_chain()) {
+        for (i, guest) in
+            guests.iter().enumerate().filter(|(_, guest)| strike.met && guest.touchable && !guest.is_chain())
+        {
             let Some(it) = guest.other.placed() else { continue };
             touches(&mine, &it, 2.0 * guest.skin_m + past, room, &mut self.touches);
             let owed_j = guest.other.id().and_then(|id| pairs.get(id)).map_or(0.0, |pair| pair.owed_j());
@@ -32,7 +36,14 @@ impl Meeting {
         for (solid, skin) in fixed.iter(me.motion.position) {
             touches(&mine, &solid, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
             let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution), 0.0);
+            let from = self.found.len();
             self.take_up(me, None, law);
+            for found in &mut self.found[from..] {
+                let carried_m_s = -strike.carried_m_s.dot(found.contact.normal);
+                let thrown_m_s = found.approach_m_s - carried_m_s.max(0.0);
+                let bounces = thrown_m_s > BOUNCE_M_S;
+                found.contact.rebound_m_s = if bounces { law.1 * thrown_m_s } else { 0.0 };
+            }
         }
         for found in &mut self.found {
             (found.contact.gap_m, found.contact.age_s) = (0.0, 0.0);

@@ -9,6 +9,7 @@ use super::clearance::{Ahead, Fall, Fixed, Mover, pose};
 use super::mass::Spread;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
+use crate::shape::Solid;
 use glam::DVec3;
 use rapier3d::dynamics::{
     CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
@@ -32,6 +33,7 @@ pub(super) struct World {
     stale: bool,
     /// The solver remembers contacts from before a flight: they would be taken for lasting ones, which do not bounce.
     remembers: bool,
+    meshes: bool,
 }
 
 /// A blow is solved as if it lasted this long, seconds: long enough that a body at the skin's distance reaches the surface
@@ -59,6 +61,7 @@ impl World {
             sim.colliders.insert(collider(shape, obstacle.friction, obstacle.restitution).position(at));
             fixed.push((solid, obstacle.restitution.max(spec.restitution)));
         }
+        let meshes = spec.obstacles.iter().any(|obstacle| matches!(obstacle.solid, Solid::Mesh { .. }));
         let axes = spread.axes.as_quat();
         let properties = MassProperties::with_principal_inertia_frame(
             Vec3::ZERO,
@@ -75,7 +78,12 @@ impl World {
         let shape = collider(mover.shape.clone(), spec.friction, spec.restitution)
             .position(Pose::from_parts(-spread.com.as_vec3(), Rotation::IDENTITY));
         let (body, collider) = sim.insert(moving, shape);
-        Ok(Self { sim, body, collider, fixed, mover, stale: true, remembers: false })
+        Ok(Self { sim, body, collider, fixed, mover, stale: true, remembers: false, meshes })
+    }
+
+    /// Whether any of the fixed solids is a mesh: where a body meets it is known to the solver alone, which looks ahead.
+    pub(super) fn has_meshes(&self) -> bool {
+        self.meshes
     }
 
     /// Seconds of certainly free flight, at most `horizon`.

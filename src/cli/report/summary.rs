@@ -12,8 +12,8 @@ impl Report {
         let _ =
             writeln!(out, "{scene}: {frames} frames, {sim_s:.2} s simulated in {wall_s:.2} s ({executor}, {policy})");
         frame_line(&mut out, summary, *target_ms);
-        let adapter = self.adapter.as_deref().unwrap_or("nothing was drawn");
-        let _ = writeln!(out, "drawn by  {adapter}; agents' CPU {cpu_s:.2} s; state {}", self.state_hash);
+        let drawn = self.adapter.as_ref().map_or("not drawn".to_owned(), |adapter| format!("drawn by  {adapter}"));
+        let _ = writeln!(out, "{drawn}; agents' CPU {cpu_s:.2} s; state {}", self.state_hash);
         choices_line(&mut out, &self.budget.choices);
         if let Some(clamped) = &self.budget.clamped {
             let _ = writeln!(out, "note  {clamped}");

@@ -33,7 +33,7 @@ pub struct RigidFile {
     pub mass_kg: Option<f64>,
     /// Density, kg/m³, 1e-3 … 1e6. Default 1000 where no mass is given.
     pub density_kg_m3: Option<f64>,
-    /// Coefficient of restitution, 0 … 1. Default 0.2.
+    /// Coefficient of restitution, 0 … 1; of a pair the larger counts. Default 0.2.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub restitution: Option<f64>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.

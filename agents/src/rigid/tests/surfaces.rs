@@ -79,6 +79,31 @@ fn a_brick_that_slides_askew_keeps_its_pace_and_nearly_its_line() {
 }
 
 #[test]
+fn what_falls_flat_bounces_straight_up() {
+    let cylinder = Solid::Cylinder { radius_m: 0.1, half_height_m: 0.1 };
+    let turned = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    for (solid, rotation) in [(cube(0.1, UP).solid, DQuat::IDENTITY), (cylinder, turned)] {
+        for (e, dt) in [(0.5, 1.0 / 60.0), (0.5, 1.0 / 1000.0), (0.0, 1.0 / 240.0), (1.0, 1.0 / 240.0)] {
+            let start = spec(solid.clone(), UP * 1.1);
+            let start = RigidSpec { rotation, restitution: e, obstacles: [plate()].into(), ..start };
+            let mut body = RigidBody::new(start).unwrap();
+            let (mut rises, mut before, mut aside, mut landed) = (0.0_f64, 1.1, 0.0_f64, false);
+            // until shortly before it lands again
+            let fall_s = libm::sqrt(2.0 / G);
+            for _ in 0..((fall_s + 1.8 * e * fall_s + 0.02) / dt) as u32 {
+                step(&mut body, dt);
+                let at = state(&body).position;
+                landed |= at.z > before;
+                rises = if landed { rises.max(at.z - 0.1) } else { rises };
+                (before, aside) = (at.z, aside.max(at.truncate().length()));
+            }
+            assert!((rises - e * e).abs() < 2e-3, "e {e}, dt {dt}: {rises} m");
+            assert!(aside < 1e-4, "e {e}, dt {dt}: {aside} m aside");
+        }
+    }
+}
+
+#[test]
 fn a_thrown_cube_settles_alike_at_any_step() {
     for ground in [plate(), sheet()] {
         for dt in [0.002, 0.004, 0.016] {

@@ -81,13 +81,19 @@ fn written(value: f64) -> String {
         let text = format!("{value:.4}");
         return text.trim_end_matches('0').trim_end_matches('.').to_owned();
     }
-    let text = format!("{value:.0e}");
-    if text.contains("e") { text } else { format!("{value}") }
+    let text = format!("{value:.2e}");
+    let Some((mantissa, power)) = text.split_once('e') else { return text };
+    format!("{}e{power}", mantissa.trim_end_matches('0').trim_end_matches('.'))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn ticks_that_differ_are_written_differently() {
+        assert_eq!([1e5, 1.5e5, 2e-4, -3e6, 0.25].map(written), ["1e5", "1.5e5", "2e-4", "-3e6", "0.25"]);
+    }
 
     #[test]
     fn ticks_are_round_and_inside() {
