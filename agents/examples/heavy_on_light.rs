@@ -49,9 +49,9 @@ fn state(body: &RigidBody) -> RigidState {
 /// The widest gap between the links' ends, metres.
 fn stretch(bodies: &[RigidBody]) -> f64 {
     let (mut widest, mut end) = (0.0_f64, DVec3::ZERO);
-    for now in bodies.iter().map(state) {
-        widest = widest.max((now.position + now.rotation * DVec3::Z * 0.1).distance(end));
-        end = now.position - now.rotation * DVec3::Z * 0.1;
+    for body in bodies.iter().map(state) {
+        widest = widest.max((body.position + body.rotation * DVec3::Z * 0.1).distance(end));
+        end = body.position - body.rotation * DVec3::Z * 0.1;
     }
     widest
 }

@@ -9,20 +9,7 @@ use metachron_agents::{Agent, AgentId, Companion, SimSpan, SimTime, StepReport, 
 
 /// A body at rest at `position` that falls on what is around it, does not bounce and never sleeps.
 pub fn spec(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
-    RigidSpec {
-        solid,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: DVec3::Z * -9.81,
-        obstacles: [].into(),
-        joints: [].into(),
-        sleep: false,
-    }
+    RigidSpec { gravity: DVec3::Z * -9.81, ..RigidSpec::free(solid, position, mass_kg) }
 }
 
 /// The plane z = 0.

@@ -62,8 +62,9 @@ pub struct Standing {
     pub held_ends: u8,
 }
 
-/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the one
-/// of two that keep the same rate beside each other (60 Hz at least) the one with fewer held ends, else the faster, of equals the lower number. A tool is led and owns nothing.
+/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the faster, of two
+/// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends, of equals the lower number. A tool is led
+/// and owns nothing.
 ///
 /// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
 /// all how far one falls that nothing holds (docs/decisions/0012, 0013).

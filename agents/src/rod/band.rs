@@ -11,7 +11,7 @@ mod inverse;
 
 pub use inverse::InverseBlocks;
 
-use super::block::{Column, Matrix, Number, Symmetric};
+use super::block::{Column, Matrix, Number, Symmetric, positive};
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 use wide::f64x2;
@@ -259,12 +259,6 @@ impl Factor {
             *r = x.into();
         }
     }
-}
-
-/// Whether all are positive and finite.
-#[inline(always)]
-fn positive(minors: [f64; 3]) -> bool {
-    minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY)
 }
 
 /// Slot i and slot n − 1 − i, side by side.

@@ -150,6 +150,12 @@ impl<T: Number> Symmetric<T> {
     }
 }
 
+/// Whether what an inverse asks for is positive and finite.
+#[inline(always)]
+pub fn positive(minors: [f64; 3]) -> bool {
+    minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY)
+}
+
 impl Symmetric<f64> {
     /// The mean of the diagonal.
     #[inline]

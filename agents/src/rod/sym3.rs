@@ -2,7 +2,7 @@
 //!
 //! Never here: anything but arithmetic.
 
-use super::block::Symmetric;
+use super::block::{Symmetric, positive};
 use glam::{DMat3, DVec3};
 use std::ops::{Add, AddAssign, Mul};
 
@@ -56,7 +56,7 @@ impl Sym3 {
     #[inline]
     pub fn inverse(&self) -> Option<Self> {
         let (inverse, minors) = Symmetric::from(*self).inverse();
-        minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY).then(|| inverse.into())
+        positive(minors).then(|| inverse.into())
     }
 }
 

@@ -5,7 +5,7 @@
 
 use glam::{DQuat, DVec3};
 
-/// Below this square of the half angle the five terms and more of [`exp`] err by less than 1 ulp.
+/// Below this square of the half angle the terms of [`exp`] err by less than 1 ulp.
 const EXP_SERIES_MAX: f64 = 0.02;
 /// Below this square of the half angle's sine the eight terms of [`log`] err by less than 1 ulp.
 const LOG_SERIES_MAX: f64 = 0.01;
@@ -18,8 +18,7 @@ pub fn exp(phi: DVec3) -> DQuat {
     let (sinc, cos) = if a2 < EXP_SERIES_MAX {
         const SINC: [f64; 5] = [1.0, -1.0 / 6.0, 1.0 / 120.0, -1.0 / 5_040.0, 1.0 / 362_880.0];
         const COS: [f64; 6] = [1.0, -1.0 / 2.0, 1.0 / 24.0, -1.0 / 720.0, 1.0 / 40_320.0, -1.0 / 3_628_800.0];
-        let (sinc, cos) = (polynomial(&SINC, a2), polynomial(&COS, a2));
-        (sinc, cos)
+        (polynomial(&SINC, a2), polynomial(&COS, a2))
     } else {
         let a = a2.sqrt();
         (libm::sin(a) / a, libm::cos(a))

@@ -13,19 +13,19 @@ fn ball(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> Rigid
 }
 
 fn ball_spec(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> RigidSpec {
-    RigidSpec {
-        solid: Solid::Ball { radius_m: BALL_M },
-        position,
+    let free = RigidSpec::free(Solid::Ball { radius_m: BALL_M }, position, mass_kg);
+    RigidSpec { velocity, gravity, ..free }
+}
+
+/// A floor at z = 0.
+fn floor() -> Obstacle {
+    Obstacle {
+        name: String::new(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
         rotation: DQuat::IDENTITY,
-        velocity,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
         friction: 0.5,
-        gravity,
-        obstacles: Arc::from([]),
-        joints: Arc::from([]),
-        sleep: false,
+        restitution: 0.0,
     }
 }
 
@@ -129,21 +129,13 @@ fn free_bodies_and_a_ball_keep_their_momentum() {
 #[test]
 fn what_falls_on_the_ground_comes_to_rest() {
     for shape in all() {
-        let floor = Obstacle {
-            name: String::new(),
-            solid: Solid::Plane,
-            position: DVec3::ZERO,
-            rotation: DQuat::IDENTITY,
-            friction: 0.5,
-            restitution: 0.0,
-        };
         let radius_m = match shape {
             SoftShape::Sheet { thickness_m, .. } => 0.5 * thickness_m,
             SoftShape::Rope { radius_m, .. } => radius_m,
             _ => 0.0,
         };
         let spec = spec(shape.clone());
-        let made = SoftSpec { gravity: G, obstacles: [floor].into(), position: DVec3::Z * 0.15, sleep: true, ..spec };
+        let made = SoftSpec { gravity: G, obstacles: [floor()].into(), position: DVec3::Z * 0.15, sleep: true, ..spec };
         let mut body = SoftBody::new(made).unwrap();
         let slept = (0..1000).any(|_| {
             let around = Surroundings::alone(AgentId(0), SimTime::ZERO);
@@ -211,23 +203,16 @@ fn a_soft_solid_lies_on_a_sheet_whoever_is_faster() {
 #[test]
 fn a_heavy_ball_comes_off_the_floor_under_the_sheet_that_it_fell_on() {
     for (rates, mass_kg) in [((60.0, 60.0), 10.0), ((240.0, 60.0), 10.0), ((60.0, 240.0), 10.0), ((240.0, 30.0), 1.0)] {
-        let floor = Obstacle {
-            name: String::new(),
-            solid: Solid::Plane,
-            position: DVec3::ZERO,
-            rotation: DQuat::IDENTITY,
-            friction: 0.5,
-            restitution: 0.0,
-        };
         let sheet = SoftSpec {
             matter: SoftMatter { damping_per_s: 5.0, ..MATTER },
             position: DVec3::new(-0.2, -0.2, 0.006),
             gravity: G,
-            obstacles: [floor.clone()].into(),
+            obstacles: [floor()].into(),
             ..spec(SoftShape::Sheet { size_m: [0.4, 0.4], thickness_m: 0.01, segments: [8, 8] })
         };
         let solid = Solid::Ball { radius_m: 0.1 };
-        let ball = RigidSpec { solid, obstacles: [floor].into(), ..ball_spec(mass_kg, DVec3::Z * 0.3, DVec3::ZERO, G) };
+        let ball =
+            RigidSpec { solid, obstacles: [floor()].into(), ..ball_spec(mass_kg, DVec3::Z * 0.3, DVec3::ZERO, G) };
         let mut stage = Stage::new(Faults::default());
         let soft = stage.add(SoftBody::new(sheet).unwrap(), rates.0);
         let body = stage.add(RigidBody::new(ball).unwrap(), rates.1);

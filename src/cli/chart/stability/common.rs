@@ -1,6 +1,6 @@
 //! What the experiments of this room share: bodies without surprises, and loads.
 
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 use metachron_agents::rigid::RigidSpec;
 use metachron_agents::rod::{Material, Section, TubeSpec};
 use metachron_agents::shape::Solid;
@@ -17,20 +17,7 @@ pub(in super::super) fn plain_tube(path_m: Vec<DVec3>, radius_m: f64, segments: 
 
 /// A free rigid body at rest at `position`, no weight, no friction, no rebound.
 pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) -> RigidSpec {
-    RigidSpec {
-        solid,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
-        friction: 0.0,
-        gravity: DVec3::ZERO,
-        obstacles: [].into(),
-        joints: [].into(),
-        sleep: false,
-    }
+    RigidSpec { friction: 0.0, ..RigidSpec::free(solid, position, mass_kg) }
 }
 
 /// A constant force on the point of a tube at a rest arc length: a spring so soft and long that it does not notice motion.

@@ -32,20 +32,8 @@ pub(super) fn block(mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidBody 
 
 /// A solid that is let go at `position`, above a floor where there is gravity.
 pub(super) fn dropped(solid: Solid, mass_kg: f64, position: DVec3, gravity: DVec3) -> RigidSpec {
-    RigidSpec {
-        solid,
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity,
-        obstacles: if gravity == DVec3::ZERO { Arc::from([]) } else { Arc::from([floor()]) },
-        joints: Arc::from([]),
-        sleep: false,
-    }
+    let obstacles = if gravity == DVec3::ZERO { Arc::from([]) } else { Arc::from([floor()]) };
+    RigidSpec { gravity, obstacles, ..RigidSpec::free(solid, position, mass_kg) }
 }
 
 fn lowest_over(stage: &Stage, tube: AgentId, block: AgentId) -> f64 {

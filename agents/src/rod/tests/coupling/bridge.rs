@@ -10,7 +10,7 @@ use crate::rigid::{RigidBody, RigidSpec};
 use crate::rod::{Tube, TubeSpec};
 use crate::shape::Solid;
 use crate::{AgentId, SimTime};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
 
 const HALF: DVec3 = DVec3::new(0.06, 0.03, 0.02);
 const FALL_M: f64 = 0.005;
@@ -56,21 +56,9 @@ fn tube(x: f64) -> TubeSpec {
 }
 
 fn block(mass_kg: f64) -> RigidBody {
-    RigidBody::new(RigidSpec {
-        solid: Solid::Box { half_extents_m: HALF },
-        position: DVec3::Z * (HALF.z + RADIUS + FALL_M),
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg,
-        restitution: 0.0,
-        friction: 0.5,
-        gravity: GRAVITY,
-        obstacles: [].into(),
-        joints: [].into(),
-        sleep: false,
-    })
-    .unwrap()
+    let position = DVec3::Z * (HALF.z + RADIUS + FALL_M);
+    let free = RigidSpec::free(Solid::Box { half_extents_m: HALF }, position, mass_kg);
+    RigidBody::new(RigidSpec { gravity: GRAVITY, ..free }).unwrap()
 }
 
 /// The common time, where all clocks agree.
