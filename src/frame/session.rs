@@ -3,6 +3,7 @@
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
 
+mod choose;
 mod record;
 
 use super::calibrate;
@@ -14,13 +15,12 @@ use super::outcome::{AgentOutcome, FrameRecord, Outcome};
 use super::purse::Purse;
 use super::sight::Sight;
 use super::trace::Trace;
-use crate::compositor::{Camera, Gpu, Hand, Level, Picture, Size, Stage, States, Style};
-use crate::control::{Backdrop, FrameWork, Law, LevelDemand, ObjectView, PictureControl, Policy, Prices, Status};
+use crate::compositor::{Camera, Gpu, Level, Picture, Stage, States};
+use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
 use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
 use crate::scene::Scene;
 use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
 use metachron_agents::{AgentId, Body, Pull, SimTime};
-use metachron_budget::adaptive::joint::Drawing;
 use std::sync::Arc;
 use std::time::Duration;
 
@@ -333,37 +333,6 @@ impl Session {
         self.run.send(to, Command::Hand(pull))
     }
 
-    /// Takes the newest states, finds what `camera` sees of them, chooses levels and makes the picture.
-    pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
-        let started = self.now();
-        self.gather();
-        self.stage.survey(camera, size);
-        self.sight.look(started, self.stage.seen(), camera, size);
-        let culled = self.now();
-        self.chosen.cull = culled.saturating_sub(started);
-        self.choose(size);
-        let chosen = self.now();
-        let picture = self.stage.compose(camera, &self.levels, style, hand);
-        self.chosen.triangles = picture.triangles();
-        self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
-        self.chosen.select = chosen.saturating_sub(culled);
-        self.chosen.build = self.run.now().saturating_sub(chosen);
-        self.stage.picture()
-    }
-
-    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself.
-    pub fn spend_declared(&mut self, size: Size) {
-        let backdrop = Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles };
-        let prices = &self.declared;
-        let of = |(view, level): (&ObjectView, &LevelDemand)| {
-            let drawn = view.visible && level.polygons > 0.0;
-            if drawn { prices.object_s(level.shading, level.polygons, view.pixels) } else { 0.0 }
-        };
-        let objects_s: f64 = self.views.iter().zip(&self.control.last_plan().levels).map(of).sum();
-        let cost = self.machine.frame_time(prices.backdrop_s(backdrop) + objects_s, self.frames(), self.now());
-        self.run.spend(cost);
-    }
-
     /// Ends the frame that began at `started`.
     pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
         let Finished { work, skip, .. } = finished;
@@ -465,34 +434,6 @@ impl Session {
         if let Some(trace) = &mut self.trace {
             trace.note(&self.scene, self.reader.newest());
         }
-    }
-
-    fn choose(&mut self, size: Size) {
-        cast::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
-        // what is in the picture besides hardly changes from one frame to the next
-        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
-        self.buy();
-        self.control.set_cull(self.chosen.cull);
-        let plan = self.control.plan(&self.views);
-        self.levels.clear();
-        self.levels.extend(self.views.iter().zip(&plan.levels).map(cast::level));
-        self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
-        self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
-    }
-
-    /// Shares the processor out between agents and the picture, where it draws as well.
-    fn buy(&mut self) {
-        let wants = self.control.wants().filter(|_| self.shares_processor);
-        let Some((wants, lambda)) = wants else {
-            self.purse.close();
-            return self.control.set_reserve(0.0);
-        };
-        let period_s = 1.0 / self.control.target_hz();
-        let drawing = Drawing { wants, lambda };
-        let (cores, control) = (self.cores(), &self.control);
-        let limit_s = self.purse.settle((cores, period_s), drawing, &self.views, |at| control.weight(at));
-        let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
-        self.control.set_reserve(reserve_s);
     }
 }
 
