@@ -188,7 +188,7 @@ impl RigidBody {
         // the world that it shares moves it by parts at the speed of their ends
         self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
         self.steps += 1;
-        self.world.flew();
+        self.world.moved();
         self.hold.forget();
         self.borne.forget();
         self.settle(around, dt);
@@ -267,7 +267,7 @@ impl Agent for RigidBody {
             if let Err(what) = if leans { self.lean(h) } else { self.part(h) } {
                 (self.motion, self.touching) = (before, touching);
                 self.grips.clear();
-                self.world.flew();
+                self.world.moved();
                 return Err(StepError::Diverged { model: "rigid", dt_s, what: what.to_owned() });
             }
         }

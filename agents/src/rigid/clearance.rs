@@ -119,6 +119,11 @@ impl Mover {
         self.swing_m == 0.0
     }
 
+    /// Where the origin of the shape's axes is, for a body in this motion.
+    pub(super) fn origin(&self, motion: &Motion) -> DVec3 {
+        motion.position - motion.rotation * self.com
+    }
+
     /// The gap at which this body counts as touching, metres.
     pub(super) fn skin_m(&self) -> f64 {
         (SKIN_SHARE * self.radius_m).min(SKIN_MAX_M)
@@ -196,8 +201,7 @@ impl Fixed {
     fn gap(&self, mover: &Mover, motion: &Motion, reach: f64) -> Option<(DVec3, f64)> {
         // relative in double precision first: single precision then only sees small numbers where it matters
         let back = self.rotation.conjugate();
-        let origin = motion.position - motion.rotation * mover.com;
-        let relative = pose(back * (origin - self.position), back * motion.rotation);
+        let relative = pose(back * (mover.origin(motion) - self.position), back * motion.rotation);
         if self.bounds.is_none() {
             let height = f64::from(self.height(mover, &relative)?);
             return (height <= reach + mover.skin_m()).then(|| (self.rotation * DVec3::Z, height));

@@ -6,10 +6,9 @@
 
 use super::RigidBody;
 use super::clearance::Fall;
-use super::company::placed;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
-use crate::coupling::touch::touches;
+use super::obstacles::Mine;
 use crate::coupling::{Impulse, Law, Place};
 use crate::{AgentId, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
 use glam::DVec3;
@@ -169,11 +168,11 @@ impl RigidBody {
     fn feet(&mut self) -> Option<Stand> {
         let Self { motion, world, company, meeting, obstacles, gravity, .. } = self;
         let (_, _, _, room, form) = company.split();
-        let mine = placed(form, motion);
+        let mine = Mine { form, mover: &world.mover, motion };
         let (mut normal, mut count) = (None, 0_u32);
         let (mut low, mut high, mut sum) = (DVec3::INFINITY, DVec3::NEG_INFINITY, DVec3::ZERO);
-        for (solid, _) in obstacles.iter(motion.position) {
-            touches(&mine, &solid, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
+        for solid in obstacles.iter_mut() {
+            solid.touches(&mine, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
             for touch in &meeting.touches {
                 let first = *normal.get_or_insert(touch.normal);
                 let Place::Point(point) = touch.on_a else { return None };

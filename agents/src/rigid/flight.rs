@@ -28,7 +28,7 @@ impl RigidBody {
             let soonest = free[0].min(free[1]);
             let span = if self.touching && soonest < LEAVE_S {
                 let coming = ahead[0].coming_s.min(ahead[1].coming_s);
-                if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s)? {
+                if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s) {
                     continue;
                 }
                 // until then it stays in touch with what does not bounce
@@ -38,7 +38,7 @@ impl RigidBody {
             } else {
                 self.touching = soonest < left && soonest < TOUCH_S;
                 if self.touching {
-                    self.take_blow(free[1] < free[0])?;
+                    self.take_blow(free[1] < free[0]);
                     continue;
                 }
                 let span = soonest.min(left);
@@ -69,17 +69,14 @@ impl RigidBody {
     }
 
     /// The blow of a touch, with others where `met`. Whether it changed anything.
-    fn take_blow(&mut self, met: bool) -> Result<bool, &'static str> {
+    fn take_blow(&mut self, met: bool) -> bool {
         self.steady = false;
-        if !met && self.world.has_meshes() {
-            return self.world.blow(&mut self.motion, &self.spread);
-        }
         let before = self.motion.velocity;
         let Self { motion, spread, world, company, meeting, obstacles, stand, received, .. } = self;
         let strike = Strike { met, carried_m_s: if stand.is_some() { *received } else { DVec3::ZERO } };
         let approached = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles, strike);
-        self.world.flew();
-        Ok(approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S))
+        self.world.moved();
+        approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
     }
 
     /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.
@@ -98,7 +95,7 @@ impl RigidBody {
             self.motion.fly(&self.spread, gravity, h);
             self.company.go_on(h);
         }
-        self.world.flew();
+        self.world.moved();
     }
 
     /// Stays in contact for `h` seconds: with fixed solids where they are near, with others where `met`, or with both.
@@ -112,7 +109,7 @@ impl RigidBody {
             // others came near, but not near enough to touch
             self.motion.fly(&self.spread, gravity, h);
             self.company.go_on(h);
-            self.world.flew();
+            self.world.moved();
         }
         if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it was thrown out of reach") }
     }

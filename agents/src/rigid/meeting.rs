@@ -89,7 +89,13 @@ const PRESS_M_S2: f64 = 1e-3;
 
 impl Meeting {
     /// The blow of a touch: no time passes. Whether anything approached.
-    pub(super) fn blow(&mut self, me: &mut Me<'_>, company: &mut Company, fixed: &Obstacles, strike: Strike) -> bool {
+    pub(super) fn blow(
+        &mut self,
+        me: &mut Me<'_>,
+        company: &mut Company,
+        fixed: &mut Obstacles,
+        strike: Strike,
+    ) -> bool {
         self.lay_out(me, company, (0.0, DVec3::ZERO));
         self.find_blows(me, company, fixed, strike);
         if self.found.iter().all(|found| found.approach_m_s <= 0.0) {
@@ -141,7 +147,7 @@ impl Meeting {
         &mut self,
         me: &mut Me<'_>,
         company: &mut Company,
-        (fixed, scope): (&Obstacles, Scope),
+        (fixed, scope): (&mut Obstacles, Scope),
         (h, gravity): (f64, DVec3),
     ) -> Option<Pressed> {
         company.foresee_springs(h);

@@ -5,7 +5,7 @@
 
 use super::company::{Company, Guest, placed};
 use super::meeting::{Found, Me, Meeting, Strike};
-use super::obstacles::Obstacles;
+use super::obstacles::{Mine, Obstacles};
 use super::pair::RESERVE_M_S;
 use crate::coupling::touch::touches;
 use crate::coupling::{Contact, PUSH_OUT_SHARE, Place, Slots, Touch};
@@ -20,7 +20,7 @@ const BOUND_SHARE: f64 = 2e-5;
 
 impl Meeting {
     /// Places within the skin of everything that takes part, for a blow.
-    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &Obstacles, strike: Strike) {
+    pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &mut Obstacles, strike: Strike) {
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
         let past = BOUND_SHARE * me.mover.radius_m;
@@ -33,8 +33,10 @@ impl Meeting {
             let owed = 2.0 * owed_j / guest.reduced_kg(me.spread.mass_kg);
             self.take_up(me, Some((i, guest)), (guest.friction, guest.restitution, owed));
         }
-        for (solid, skin) in fixed.iter(me.motion.position) {
-            touches(&mine, &solid, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
+        let mine = Mine { form, mover: me.mover, motion: me.motion };
+        for solid in fixed.iter_mut() {
+            solid.touches(&mine, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
+            let skin = &solid.form;
             let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution), 0.0);
             let from = self.found.len();
             self.take_up(me, None, law);
@@ -85,17 +87,17 @@ impl Meeting {
         &mut self,
         me: &Me<'_>,
         company: &mut Company,
-        fixed: &Obstacles,
+        fixed: &mut Obstacles,
         (h, gravity): (f64, DVec3),
     ) {
         let (_, _, _, room, form) = company.split();
-        let mine = placed(form, me.motion);
+        let mine = Mine { form, mover: me.mover, motion: me.motion };
         let swing = self.before[1].length() * me.mover.swing_m;
         let reach = (me.motion.velocity.length() + swing + gravity.length() * h) * h + SLACK_M;
-        for (solid, skin) in fixed.iter(me.motion.position) {
-            touches(&mine, &solid, reach, room, &mut self.touches);
+        for solid in fixed.iter_mut() {
+            solid.touches(&mine, reach, room, &mut self.touches);
             let from = self.found.len();
-            self.take_up(me, None, ((form.friction * skin.friction).sqrt(), 0.0, 0.0));
+            self.take_up(me, None, ((form.friction * solid.form.friction).sqrt(), 0.0, 0.0));
             self.keep_closing(from, h);
         }
     }

@@ -1,6 +1,6 @@
 //! The contact solver of one body: a rapier3d world of its own, single precision.
 //!
-//! In: a [`Motion`] that touches something. Out: the motion after a blow or after a stretch of contact.
+//! In: a [`Motion`] that touches something. Out: the motion after a stretch of contact. Blows are [`super::meeting`]'s.
 //! Never here: free flight and the time of the touch ([`super::motion`], [`super::clearance`]), springs.
 //!
 //! A pair's friction is the geometric mean of both coefficients, its restitution the larger of both.
@@ -9,13 +9,12 @@ use super::clearance::{Ahead, Fall, Fixed, Mover, pose};
 use super::mass::Spread;
 use super::motion::Motion;
 use super::{RigidError, RigidSpec};
-use crate::shape::Solid;
 use glam::DVec3;
 use rapier3d::dynamics::{
     CoefficientCombineRule, FrictionModel, IntegrationParameters, MassProperties, RigidBodyBuilder, RigidBodyHandle,
     SpringCoefficients,
 };
-use rapier3d::geometry::{ColliderBuilder, ColliderHandle};
+use rapier3d::geometry::ColliderBuilder;
 use rapier3d::parry::math::{Pose, Rotation, Vec3};
 use rapier3d::parry::shape::SharedShape;
 use rapier3d::pipeline::PhysicsWorld;
@@ -24,23 +23,14 @@ use rapier3d::pipeline::PhysicsWorld;
 pub(super) struct World {
     sim: PhysicsWorld,
     body: RigidBodyHandle,
-    collider: ColliderHandle,
     /// The fixed solids, each with the restitution of the body's contact with it.
     fixed: Vec<(Fixed, f64)>,
     /// The moving shape.
     pub mover: Mover,
     /// The solver's copy of the motion is old: it must be told before the next contact.
     stale: bool,
-    /// The solver remembers contacts from before a flight: they would be taken for lasting ones, which do not bounce.
-    remembers: bool,
-    meshes: bool,
 }
 
-/// A blow is solved as if it lasted this long, seconds: long enough that a body at the skin's distance reaches the surface
-/// at any speed above 0.1 m/s, short enough that its arms do not turn.
-const BLOW_S: f32 = 1e-3;
-/// A blow that changes the velocity by less changes nothing, m/s.
-const CHANGED_M_S: f64 = 1e-3;
 /// Solver passes within a contact step; each is a small step of its own.
 pub(super) const PASSES: usize = 4;
 /// Natural frequency of a contact, Hz: rapier's 60 lets a resting box sag 5e-5 m, this 2e-6 m.
@@ -58,10 +48,10 @@ impl World {
             let solid = Fixed::new(&obstacle.solid, obstacle.position, obstacle.rotation)
                 .map_err(|source| RigidError::Obstacle { name: obstacle.name.clone(), source })?;
             let (shape, at) = solid.placed();
-            sim.colliders.insert(collider(shape, obstacle.friction, obstacle.restitution).position(at));
+            // what bounces is struck before: lasting contact does not
+            sim.colliders.insert(collider(shape, obstacle.friction, 0.0).position(at));
             fixed.push((solid, obstacle.restitution.max(spec.restitution)));
         }
-        let meshes = spec.obstacles.iter().any(|obstacle| matches!(obstacle.solid, Solid::Mesh { .. }));
         let axes = spread.axes.as_quat();
         let properties = MassProperties::with_principal_inertia_frame(
             Vec3::ZERO,
@@ -75,15 +65,10 @@ impl World {
             .can_sleep(false)
             .allow_fast_rotation(true)
             .gyroscopic_forces_enabled(true);
-        let shape = collider(mover.shape.clone(), spec.friction, spec.restitution)
+        let shape = collider(mover.shape.clone(), spec.friction, 0.0)
             .position(Pose::from_parts(-spread.com.as_vec3(), Rotation::IDENTITY));
-        let (body, collider) = sim.insert(moving, shape);
-        Ok(Self { sim, body, collider, fixed, mover, stale: true, remembers: false, meshes })
-    }
-
-    /// Whether any of the fixed solids is a mesh: where a body meets it is known to the solver alone, which looks ahead.
-    pub(super) fn has_meshes(&self) -> bool {
-        self.meshes
+        let (body, _) = sim.insert(moving, shape);
+        Ok(Self { sim, body, fixed, mover, stale: true })
     }
 
     /// Seconds of certainly free flight, at most `horizon`.
@@ -106,24 +91,9 @@ impl World {
         self.fixed.iter().map(|(solid, _)| solid.depth_m(&self.mover, motion)).fold(0.0, f64::max)
     }
 
-    /// The motion was changed from outside: by a spring, say.
+    /// The motion was changed from outside: by a flight, a blow or a spring.
     pub(super) fn moved(&mut self) {
         self.stale = true;
-    }
-
-    /// The body flew: what touched it before touches it no more.
-    pub(super) fn flew(&mut self) {
-        self.stale = true;
-        self.remembers = true;
-    }
-
-    /// Changes the velocities as the blow of a first touch does; no time passes and nothing moves. Whether it changed anything.
-    pub(super) fn blow(&mut self, motion: &mut Motion, spread: &Spread) -> Result<bool, &'static str> {
-        let before = *motion;
-        self.solve(motion, spread, BLOW_S, DVec3::ZERO)?;
-        (motion.position, motion.rotation) = (before.position, before.rotation);
-        self.stale = true;
-        Ok(motion.velocity.distance_squared(before.velocity) > CHANGED_M_S * CHANGED_M_S)
     }
 
     /// Advances a touching body by `h` seconds.
@@ -134,16 +104,12 @@ impl World {
         h: f64,
         gravity: DVec3,
     ) -> Result<(), &'static str> {
-        self.solve(motion, spread, h as f32, gravity)
-    }
-
-    fn solve(&mut self, motion: &mut Motion, spread: &Spread, h: f32, gravity: DVec3) -> Result<(), &'static str> {
         if !motion.is_sane(spread) {
             return Err("the motion is out of the contact solver's reach");
         }
         self.tell(motion, spread);
         self.sim.gravity = gravity.as_vec3();
-        self.sim.integration_parameters.dt = h;
+        self.sim.integration_parameters.dt = h as f32;
         self.sim.step();
         if !self.sim.quarantine().is_empty() {
             return Err("the contact solver lost the body");
@@ -161,9 +127,6 @@ impl World {
 
     /// Brings the solver's copy up to date.
     fn tell(&mut self, motion: &Motion, spread: &Spread) {
-        if self.remembers {
-            self.forget();
-        }
         if self.stale {
             let body = &mut self.sim.bodies[self.body];
             body.set_position(pose(motion.position, motion.rotation), true);
@@ -171,15 +134,6 @@ impl World {
             body.set_angvel(motion.spin(spread).as_vec3(), true);
             self.stale = false;
         }
-    }
-
-    /// Drops every remembered contact: the shape is away for a step of no length.
-    fn forget(&mut self) {
-        self.sim.colliders[self.collider].set_enabled(false);
-        self.sim.integration_parameters.dt = 0.0;
-        self.sim.step();
-        self.sim.colliders[self.collider].set_enabled(true);
-        self.remembers = false;
     }
 }
 

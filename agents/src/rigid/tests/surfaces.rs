@@ -1,6 +1,7 @@
 //! Rigid bodies on what they stand, slide, roll and bounce on, against closed forms.
 
 use super::*;
+use crate::coupling::harness::{Faults, Stage};
 
 /// A plate of 4 m by 4 m with its upper face at z = 0.
 fn plate() -> Obstacle {
@@ -13,6 +14,20 @@ fn sheet() -> Obstacle {
     let corners = [(-2.0, -2.0), (2.0, -2.0), (2.0, 2.0), (-2.0, 2.0)];
     let points_m = corners.iter().map(|&(x, y)| DVec3::new(x, y, 0.0)).collect();
     Obstacle { solid: Solid::Mesh { points_m, triangles: [[0, 1, 2], [0, 2, 3]].into() }, ..floor(0.5) }
+}
+
+/// The same face as squares of so many metres, each of two triangles.
+fn tiles(width_m: f64) -> Obstacle {
+    let count = (2.0 / width_m) as u32;
+    let at = |i: u32| (f64::from(i) - 0.37 * f64::from(count)) * width_m;
+    let points_m = (0..=count).flat_map(|i| (0..=count).map(move |j| DVec3::new(at(i), at(j), 0.0))).collect();
+    let corner = |i: u32, j: u32| i * (count + 1) + j;
+    let square = |i, j| {
+        let [a, b, c, d] = [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+        [[a, b, c], [a, c, d]]
+    };
+    let triangles = (0..count).flat_map(|i| (0..count).flat_map(move |j| square(i, j))).collect();
+    Obstacle { solid: Solid::Mesh { points_m, triangles }, ..floor(0.5) }
 }
 
 #[test]
@@ -82,10 +97,14 @@ fn a_brick_that_slides_askew_keeps_its_pace_and_nearly_its_line() {
 fn what_falls_flat_bounces_straight_up() {
     let cylinder = Solid::Cylinder { radius_m: 0.1, half_height_m: 0.1 };
     let turned = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
-    for (solid, rotation) in [(cube(0.1, UP).solid, DQuat::IDENTITY), (cylinder, turned)] {
+    let solids = [(cube(0.1, UP).solid, DQuat::IDENTITY), (cylinder, turned)];
+    let grounds = [plate(), sheet(), tiles(0.13), tiles(0.3)];
+    for ((solid, rotation), ground) in solids.iter().flat_map(|solid| grounds.iter().map(move |ground| (solid, ground)))
+    {
+        let (round, is_mesh) = (*rotation != DQuat::IDENTITY, matches!(ground.solid, Solid::Mesh { .. }));
         for (e, dt) in [(0.5, 1.0 / 60.0), (0.5, 1.0 / 1000.0), (0.0, 1.0 / 240.0), (1.0, 1.0 / 240.0)] {
             let start = spec(solid.clone(), UP * 1.1);
-            let start = RigidSpec { rotation, restitution: e, obstacles: [plate()].into(), ..start };
+            let start = RigidSpec { rotation: *rotation, restitution: e, obstacles: [ground.clone()].into(), ..start };
             let mut body = RigidBody::new(start).unwrap();
             let (mut rises, mut before, mut aside, mut landed) = (0.0_f64, 1.1, 0.0_f64, false);
             // until shortly before it lands again
@@ -97,9 +116,35 @@ fn what_falls_flat_bounces_straight_up() {
                 rises = if landed { rises.max(at.z - 0.1) } else { rises };
                 (before, aside) = (at.z, aside.max(at.truncate().length()));
             }
+            // the line that a round side stands on is up to 0.5 mm askew on a mesh: single precision
+            let allowed = if round && is_mesh { 0.03 } else { 1e-4 };
             assert!((rises - e * e).abs() < 2e-3, "e {e}, dt {dt}: {rises} m");
-            assert!(aside < 1e-4, "e {e}, dt {dt}: {aside} m aside");
+            assert!(aside < allowed, "{:?}, e {e}, dt {dt}: {aside} m aside", ground.solid);
         }
+    }
+}
+
+/// A trough of three open squares, 1.2 m wide inside, 1 m deep.
+fn trough() -> Obstacle {
+    let profile = [(-0.6, 1.0), (-0.6, 0.0), (0.6, 0.0), (0.6, 1.0)];
+    let points_m = [-1.0, 1.0].iter().flat_map(|&y| profile.map(|(x, z)| DVec3::new(x, y, z))).collect();
+    let square = |i: u32| [[i, i + 4, i + 5], [i, i + 5, i + 1]];
+    let triangles = (0..3).flat_map(square).map(|[a, b, c]| [a, c, b]).collect();
+    Obstacle { solid: Solid::Mesh { points_m, triangles }, ..floor(0.5) }
+}
+
+/// A mesh is hollow where it is hollow, also for a body that presses on another at the same time.
+#[test]
+fn cubes_pile_up_inside_a_trough() {
+    let mut stage = Stage::new(Faults::default());
+    let ids = [(0.1, 240.0), (0.35, 100.0)].map(|(height, hz)| {
+        let spec = RigidSpec { obstacles: [trough()].into(), ..cube(0.1, UP * height) };
+        stage.add(RigidBody::new(spec).unwrap(), hz)
+    });
+    stage.run(1.0, |_| ());
+    for (id, height) in ids.into_iter().zip([0.1, 0.3]) {
+        let at = stage.settled(id, 1.0).state.position;
+        assert!((at.z - height).abs() < 1e-3 && at.truncate().length() < 1e-3, "{at}");
     }
 }
 
