@@ -85,11 +85,7 @@ fn counted((count, what): (usize, &str)) -> String {
 }
 
 fn content(scene: &Scene) -> Content {
-    let row = |overlap: &Overlap| OverlapRow {
-        a: scene.name_of(overlap.a).to_owned(),
-        b: scene.name_of(overlap.b).to_owned(),
-        depth_m: overlap.depth_m,
-    };
+    let row = |Overlap { a, b, depth_m }| OverlapRow { a, b, depth_m };
     Content {
         agents: scene.agents.len(),
         fixed: scene.obstacles.len(),
@@ -97,7 +93,7 @@ fn content(scene: &Scene) -> Content {
         scenery: scene.scenery.len(),
         joints: scene.joints.len(),
         couplings: scene.couplings.len(),
-        overlaps: scene.overlaps().iter().map(row).collect(),
+        overlaps: scene.overlaps().into_iter().map(row).collect(),
     }
 }
 

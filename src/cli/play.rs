@@ -151,7 +151,11 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         summary,
         agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
-        overlaps: scene.overlaps().iter().map(|one| overlap(scene, one)).collect(),
+        overlaps: scene
+            .overlaps()
+            .into_iter()
+            .map(|Overlap { a, b, depth_m }| OverlapReport { a, b, depth_m })
+            .collect(),
         oracle: None,
         budget: BudgetReport { spent_share, clamped: outcome.clamp, choices },
         probes: outcome.probes.iter().map(probe).collect(),
@@ -221,11 +225,6 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
         force_max_n: coupling.force_max_n,
         parasitic_kg: coupling.parasitic_kg,
     }
-}
-
-fn overlap(scene: &Scene, overlap: &Overlap) -> OverlapReport {
-    let name = |id: AgentId| scene.name_of(id).to_owned();
-    OverlapReport { a: name(overlap.a), b: name(overlap.b), depth_m: overlap.depth_m }
 }
 
 fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {

@@ -1,6 +1,6 @@
-//! Agents that start against or inside each other.
+//! Agents that start against or inside each other or fixed solids.
 //!
-//! In: a scene. Out: every pair that overlaps where the two would touch, and how deep; every pair that lies at rest; every pair
+//! In: a scene. Out: all that overlap where they would touch, and how deep; every pair that lies at rest; every pair
 //! of rigid bodies so near that turning could make them touch.
 //! Never here: what is done about it.
 
@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use metachron_agents::coupling::touch::{TouchRoom, touches};
 use metachron_agents::coupling::{Form, FormKind, Law, Placed, SolidForm, Touch, View};
 use metachron_agents::rod::Tube;
-use metachron_agents::shape::ToolShape;
+use metachron_agents::shape::{Obstacle, Solid, ToolShape};
 use metachron_agents::soft::SoftBody;
 use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
 use std::collections::BTreeSet;
@@ -19,14 +19,16 @@ use std::collections::BTreeSet;
 const OVERLAP_MIN_M: f64 = 2e-5;
 /// Bodies no farther apart than this lie against each other, metres.
 const TOUCH_MAX_M: f64 = 1e-4;
+/// How far a plane's slab reaches past a figure, in sizes of it.
+const SLAB_SHARE: f64 = 4.0;
 
-/// Two agents that start inside each other.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// An agent that starts inside another or inside a fixed solid.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Overlap {
-    /// The lower number.
-    pub a: AgentId,
-    /// The higher.
-    pub b: AgentId,
+    /// Its name; of two agents that with the lower number.
+    pub a: String,
+    /// The other's.
+    pub b: String,
     /// How deep at the deepest place, metres.
     pub depth_m: f64,
 }
@@ -48,17 +50,39 @@ enum Pose {
 }
 
 impl Scene {
-    /// Every pair of agents that starts inside each other, in the order of their numbers.
+    /// All that starts inside each other: pairs of agents in the order of their numbers, then rigid ones inside fixed solids.
+    ///
+    /// What bends may be meant to be held there. Meshes are left out: what is inside one of them may be in its hollow.
     #[must_use]
     pub fn overlaps(&self) -> Vec<Overlap> {
-        let mut overlaps = Vec::new();
+        let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
-            let (a, b) = (one.id.min(two.id), one.id.max(two.id));
             if gap_m <= -OVERLAP_MIN_M {
-                overlaps.push(Overlap { a, b, depth_m: -gap_m });
+                pairs.push((one.id.min(two.id), one.id.max(two.id), -gap_m));
             }
         });
-        overlaps.sort_by_key(|overlap| (overlap.a, overlap.b));
+        pairs.sort_by_key(|&(a, b, _)| (a, b));
+        let name = |id: AgentId| self.name_of(id).to_owned();
+        let pairs = pairs.into_iter().map(|(a, b, depth_m)| Overlap { a: name(a), b: name(b), depth_m });
+        pairs.chain(self.fixed_overlaps()).collect()
+    }
+
+    /// The rigid agents that start inside fixed solids.
+    fn fixed_overlaps(&self) -> Vec<Overlap> {
+        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        let mut overlaps = Vec::new();
+        let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
+        for figure in rigid.filter_map(figure) {
+            for obstacle in self.obstacles.iter().filter(|obstacle| !matches!(obstacle.solid, Solid::Mesh { .. })) {
+                let Some(fixed) = figure.over(obstacle) else { continue };
+                touches(&figure.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
+                let depth_m = found.iter().map(|touch: &Touch| -touch.gap_m).fold(0.0, f64::max);
+                if depth_m >= OVERLAP_MIN_M {
+                    let (a, b) = (self.name_of(figure.id).to_owned(), obstacle.name.clone());
+                    overlaps.push(Overlap { a, b, depth_m });
+                }
+            }
+        }
         overlaps
     }
 
@@ -149,6 +173,29 @@ impl Scene {
 impl Figure {
     fn meets(&self, other: &Self, reach_m: f64) -> bool {
         self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
+    }
+
+    /// A fixed solid where it stands, if this may be inside it. A plane is a slab below this figure, as high as the plane.
+    fn over(&self, obstacle: &Obstacle) -> Option<Self> {
+        let rotation = obstacle.rotation.normalize();
+        let (middle, half) = ((self.low + self.high) * 0.5, (self.high - self.low) * 0.5);
+        let (solid, place) = if matches!(obstacle.solid, Solid::Plane) {
+            let up = rotation * DVec3::Z;
+            let height = up.dot(middle - obstacle.position);
+            if height > up.abs().dot(half) {
+                return None;
+            }
+            let deep = SLAB_SHARE * (half.length() + height.abs());
+            (Solid::Box { half_extents_m: DVec3::splat(deep) }, middle - up * (height + deep))
+        } else {
+            (obstacle.solid.clone(), obstacle.position)
+        };
+        let form = SolidForm::new(solid, DVec3::ZERO).ok()?;
+        let radius = DVec3::splat(form.radius_m);
+        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0 };
+        let fixed =
+            Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
+        self.meets(&fixed, 0.0).then_some(fixed)
     }
 
     fn placed(&self) -> Placed<'_> {

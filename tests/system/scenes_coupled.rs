@@ -147,6 +147,27 @@ fn agents_that_start_inside_each_other_are_named_and_play() {
 }
 
 #[test]
+fn agents_that_start_inside_fixed_solids_are_named() {
+    let fixed = |name: &str, shape: &str| {
+        format!("[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nfixed = true\nshape = {shape}\n")
+    };
+    // the balls have a radius of 0.1 m and stand at z = 0
+    let floor = fixed("floor", "\"plane\"\nposition_m = [0, 0, -0.08]");
+    let post = fixed("post", "\"cylinder\"\nradius_m = 0.05\nhalf_height_m = 0.5\nposition_m = [0.39, 0, 0]");
+    let folder = balls(0.1, &format!("{WEIGHTLESS}\n{floor}{post}"));
+    let check = metachron(&["check", "--json", folder.scene()]);
+    let rows: Value = serde_json::from_slice(&check.stdout).unwrap();
+    let overlaps = rows[0]["content"]["overlaps"].as_array().unwrap();
+    for (overlap, (a, b, depth_m)) in
+        overlaps.iter().zip([("left", "floor", 0.02), ("right", "floor", 0.02), ("right", "post", 0.06)])
+    {
+        assert_eq!((overlap["a"].as_str(), overlap["b"].as_str()), (Some(a), Some(b)));
+        assert!((number(overlap, "/depth_m") - depth_m).abs() < 1e-6, "{overlap}");
+    }
+    assert_eq!(overlaps.len(), 3);
+}
+
+#[test]
 fn the_oracle_tells_what_different_clocks_changed() {
     let report = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5", "--oracle"]);
     let oracle = &report["oracle"];

@@ -13,6 +13,7 @@ mod coupling;
 mod error;
 mod grip;
 mod hold;
+mod inside;
 mod lasting;
 mod laws;
 mod squeeze;

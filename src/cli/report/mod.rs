@@ -45,7 +45,7 @@ pub struct Report {
     pub agents: Vec<AgentReport>,
     /// What agents did to each other.
     pub couplings: Vec<CouplingReport>,
-    /// Agents that started inside each other.
+    /// Agents that started inside each other or fixed solids.
     pub overlaps: Vec<OverlapReport>,
     /// What different clocks changed, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -156,7 +156,7 @@ pub struct CouplingReport {
 pub struct OverlapReport {
     /// The first agent's name.
     pub a: String,
-    /// The second agent's name.
+    /// The second agent's name, or the fixed solid's.
     pub b: String,
     /// How deep, metres.
     pub depth_m: f64,
