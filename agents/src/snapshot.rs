@@ -3,7 +3,7 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
-use crate::coupling::{Impulse, Ledger, PairState, Sprung};
+use crate::coupling::{Impulse, Ledger, PairState, Rebound, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
 use crate::{AgentId, Rare, Resolution, SimTime};
@@ -40,6 +40,8 @@ pub struct Snapshot {
     pub stand: Option<Stand>,
     /// How springs on led points hold it; none where none do, or where nobody would have to know.
     pub sprung: Rare<Sprung>,
+    /// What fixed solids gave it in its last step: it was not there before, and late impulses may have spared it.
+    pub rebound: Rare<Rebound>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -380,6 +382,7 @@ impl Snapshot {
         self.stand = None;
         self.drift_m = 0.0;
         self.sprung.set(None);
+        self.rebound.set(None);
         self.pairs.clear();
         self.bonds.clear();
     }
@@ -390,6 +393,7 @@ impl Snapshot {
         self.body.is_finite()
             && self.acceleration.is_finite()
             && self.sprung.get().is_none_or(Sprung::is_finite)
+            && self.rebound.get().is_none_or(Rebound::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

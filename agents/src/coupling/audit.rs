@@ -97,6 +97,12 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
         given += dj;
         carried += way;
     });
+    if let Some(rebound) = member.snapshot.rebound.get() {
+        let by_then = Impulse { linear: carried.linear + given.linear * h, angular: DVec3::ZERO };
+        let [back, way] = rebound.part(rebound.spared_by([given, by_then], at), at);
+        // both are brought to the common time by the velocity
+        (given, carried) = (given - back, carried - way + back * h);
+    }
     let stand = member.snapshot.stand;
     if let Some(stand) = stand.filter(|stand| stand.bears(state.position, given)) {
         (given, carried) = (stand.leaves(given), stand.leaves(carried));

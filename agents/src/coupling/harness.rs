@@ -3,9 +3,10 @@
 //! In: agents, their rates, laws and links; faults on purpose. Out: their snapshots, and sums at a common time with the
 //! impulses that are still on their way. Never here: threads, pacing, wall time.
 
+use super::audit::{Member, settled};
 use super::{Impulse, Law, Link, Standing, acknowledged, owns};
-use crate::{Agent, AgentId, Body, Inertia, Neighbour, Pull, RigidState, SimSpan, SimTime, Snapshot, Surroundings};
-use glam::{DMat3, DQuat, DVec3};
+use crate::{Agent, AgentId, Inertia, Neighbour, Pull, RigidState, SimSpan, SimTime, Snapshot, Surroundings};
+use glam::{DMat3, DVec3};
 use std::sync::Arc;
 
 /// What goes wrong between agents.
@@ -199,29 +200,11 @@ impl Stage {
 
     /// A rigid body at `seconds`, with everything that is on its way to it.
     pub(crate) fn settled(&self, id: AgentId, seconds: f64) -> Settled {
-        let newest = self.newest(id);
-        let (Body::Rigid(mut state), Inertia::Rigid { inverse_mass, inverse_inertia }) =
-            (newest.body.clone(), newest.inertia.clone())
-        else {
-            panic!("a rigid body");
-        };
+        let Inertia::Rigid { inverse_mass, inverse_inertia } = self.newest(id).inertia else { panic!("a rigid body") };
+        let member = |id| Member { id, snapshot: self.newest(id), mass_per_length_kg_m: 0.0, rotary_kg_m: 0.0 };
+        let members: Vec<_> = (0..self.actors.len()).map(|i| member(AgentId(i as u32))).collect();
         let at = SimTime::ZERO + SimSpan::from_secs_f64(seconds).expect("a time");
-        let left = at.secs_after(newest.time);
-        state.position += state.velocity * left + newest.acceleration * (0.5 * left * left);
-        state.velocity += newest.acceleration * left;
-        state.rotation = DQuat::from_scaled_axis(state.spin * left) * state.rotation;
-        let (mut given, mut carried) = (Impulse::ZERO, Impulse::ZERO);
-        self.on_their_way(id, at, |sum, way| {
-            given += sum;
-            carried += way;
-        });
-        // what it stands on bears its part at once
-        if let Some(stand) = newest.stand.filter(|stand| stand.bears(state.position, given)) {
-            (given, carried) = (stand.leaves(given), stand.leaves(carried));
-        }
-        state.velocity += given.linear * inverse_mass;
-        state.position += carried.linear * inverse_mass;
-        state.spin += inverse_inertia * given.angular;
+        let state = settled(&member(id), &members, at).expect("a rigid body");
         Settled { state, mass_kg: inverse_mass.recip(), inertia: inverse_inertia.inverse() }
     }
 

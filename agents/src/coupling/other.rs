@@ -9,7 +9,7 @@ mod ground;
 
 use super::sprung::{Lean, Sprung};
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, Twist, View};
-use crate::{AgentId, Anchor, Body, Inertia, Neighbour, SimTime, Surroundings, ToolState};
+use crate::{AgentId, Anchor, Body, Inertia, Neighbour, Surroundings, ToolState};
 use glam::{DMat3, DQuat, DVec3};
 use std::sync::Arc;
 
@@ -54,17 +54,24 @@ impl Default for Pose {
 }
 
 impl Other {
-    /// Takes in the newest state of `neighbour`, brought to `at`; whether it is one that can be touched or held.
+    /// Takes in the newest state of `neighbour`, brought to the time of `around`; whether it is one that can be touched or held.
+    /// A rigid body says `from` where it looks: what it stands in the way of has not been on the other side of it.
     ///
     /// Storage is used again: nothing is allocated once the sizes settle.
-    pub fn meet(&mut self, neighbour: &Neighbour, around: &Surroundings<'_>, exchange: &Exchange, at: SimTime) -> bool {
+    pub fn meet(
+        &mut self,
+        neighbour: &Neighbour,
+        around: &Surroundings<'_>,
+        exchange: &Exchange,
+        from: Option<DVec3>,
+    ) -> bool {
         let known = self.see(neighbour);
         if known {
             self.reckon();
-            self.age_s = at.secs_after(neighbour.snapshot.time);
+            self.age_s = around.time.secs_after(neighbour.snapshot.time);
             self.foresee(self.age_s);
             self.go_on(self.age_s);
-            self.deliver(neighbour, around, exchange, at);
+            self.deliver(neighbour, around, exchange, from);
         }
         known
     }
@@ -168,7 +175,7 @@ impl Other {
     pub fn stir(&mut self, around: &Surroundings<'_>, exchange: &Exchange) {
         let Some(neighbour) = self.neighbour.clone().filter(|n| self.held && n.snapshot.at_rest) else { return };
         self.wake();
-        self.deliver(&neighbour, around, exchange, around.time);
+        self.deliver(&neighbour, around, exchange, None);
         let moves = self.velocities.iter().step_by(self.stride()).any(|v| v.length_squared() > WAKE_M_S * WAKE_M_S);
         self.held = self.held || !moves;
     }

@@ -283,7 +283,7 @@ impl Agent for RigidBody {
     /// Tells how springs hold it before it has moved.
     fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
         if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
-            self.company.gather(around, &self.world.mover, &[]);
+            self.company.gather(around, (&self.world.mover, &self.motion), &[]);
             self.ties.gather(around, &self.company);
             self.tell(around, dt_s);
             self.company.dismiss();

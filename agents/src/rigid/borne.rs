@@ -4,7 +4,7 @@
 //! given, had they come in time. Never here: contacts, ledgers. Theory: docs/theory/coupling.md, eq. 4d.
 
 use super::RigidBody;
-use crate::coupling::Impulse;
+use crate::coupling::{Impulse, Rebound, since_s, spared};
 use crate::{SimSpan, SimTime};
 use glam::DVec3;
 
@@ -12,17 +12,9 @@ use glam::DVec3;
 #[derive(Default)]
 pub(super) struct Borne {
     /// The steps in which they gave something.
-    steps: Vec<Blow>,
-}
-
-/// What fixed solids gave in one step.
-#[derive(Debug, Clone, Copy)]
-struct Blow {
-    /// The end of the step.
-    end: SimTime,
-    given: Impulse,
-    /// How far that had carried the body by then, kg·m.
-    carried: DVec3,
+    steps: Vec<Rebound>,
+    /// The last step, where they gave something in it.
+    newest: Option<Rebound>,
 }
 
 /// An impulse that comes later than this is no part of the same blow, seconds.
@@ -32,32 +24,33 @@ const CHANGED_M_S: f64 = 1e-6;
 
 impl Borne {
     /// Notes what fixed solids gave in a step, where they gave something.
-    fn note(&mut self, blow: Blow) {
-        self.steps.retain(|before| blow.end.secs_after(before.end) < FORGET_S);
-        if blow.given != Impulse::ZERO {
-            self.steps.push(blow);
-        }
+    fn note(&mut self, rebound: Rebound) {
+        self.steps.retain(|before| rebound.end.secs_after(before.end) < FORGET_S);
+        self.newest = (rebound.given != Impulse::ZERO).then_some(rebound);
+        self.steps.extend(self.newest);
+    }
+
+    /// What they gave in the last step.
+    pub(super) const fn newest(&self) -> Option<Rebound> {
+        self.newest
     }
 
     /// Takes out what fixed solids gave in place of `late`, an impulse that comes at `now` and has been carrying the body by
     /// `carried` kg·m since it was given: as much of what they gave since then as points its way, and how far that has carried
     /// the body by now.
     pub(super) fn in_place_of(&mut self, late: Impulse, carried: Impulse, now: SimTime) -> [Impulse; 2] {
-        // what is given evenly over a time began twice as long ago as it acts in the mean
-        let since_s = 2.0 * carried.linear.length() / late.linear.length();
-        let recent = |blow: &Blow| now.secs_after(blow.end) < since_s;
-        let (mut all, mut way) = (Impulse::ZERO, DVec3::ZERO);
-        for blow in self.steps.iter().filter(|blow| recent(blow)) {
-            all += blow.given;
-            way += blow.carried + blow.given.linear * now.secs_after(blow.end);
+        let since_s = since_s(late, carried);
+        let recent = |step: &Rebound| step.age_s(now) < since_s;
+        let (mut all, mut way, mut met_n_s) = (Impulse::ZERO, DVec3::ZERO, 0.0);
+        for step in self.steps.iter().filter(|step| recent(step)) {
+            met_n_s += step.met_n_s;
+            all += step.given;
+            way += step.way(now);
         }
-        let share = late.linear.dot(all.linear) / all.linear.length_squared();
-        if share.is_nan() || share <= 0.0 {
-            return [Impulse::ZERO; 2];
-        }
-        let share = share.min(1.0);
-        for blow in self.steps.iter_mut().filter(|blow| recent(blow)) {
-            (blow.given, blow.carried) = (blow.given * (1.0 - share), blow.carried * (1.0 - share));
+        let share = spared(late, (all, met_n_s));
+        for step in self.steps.iter_mut().filter(|step| recent(step)) {
+            let left = 1.0 - share;
+            (step.given, step.carried, step.met_n_s) = (step.given * left, step.carried * left, step.met_n_s * left);
         }
         [all * share, Impulse { linear: way * share, angular: DVec3::ZERO }]
     }
@@ -65,6 +58,7 @@ impl Borne {
     /// The body moved with others, in a world that they share: what held it up is not known apart.
     pub(super) fn forget(&mut self) {
         self.steps.clear();
+        self.newest = None;
     }
 }
 
@@ -75,8 +69,8 @@ impl RigidBody {
         let dt_s = dt.as_secs_f64();
         let fall = self.gravity * dt_s;
         let change = self.motion.velocity - self.begun - self.coupled - fall;
-        let weight = (-fall.dot(change) / change.length_squared()).max(0.0);
-        let blow = 1.0 - weight;
+        let carries = (-fall.dot(change) / change.length_squared()).max(0.0);
+        let blow = if self.steady { 1.0 - carries } else { 1.0 };
         let is_blow = self.ties.is_empty() && blow * change.length() > CHANGED_M_S;
         let alone = self.coupled == DVec3::ZERO;
         let free = self.begun_at.0 + (self.begun + fall * 0.5) * dt_s;
@@ -86,11 +80,12 @@ impl RigidBody {
             linear: change * self.spread.mass_kg,
             angular: if alone { self.motion.angular - self.begun_at.1 } else { DVec3::ZERO },
         };
-        self.borne.note(Blow {
-            end: start + dt,
-            given: if is_blow { given * blow } else { Impulse::ZERO },
-            carried: way * (blow * self.spread.mass_kg),
-        });
+        let given = if is_blow { given * blow } else { Impulse::ZERO };
+        let mut rebound = Rebound { end: start + dt, given, carried: way * (blow * self.spread.mass_kg), met_n_s: 0.0 };
+        let came = self.begun + self.gravity * -rebound.age_s(start);
+        let size = given.linear.length();
+        rebound.met_n_s = (-came.dot(given.linear.normalize_or_zero()) * self.spread.mass_kg).clamp(0.5 * size, size);
+        self.borne.note(rebound);
     }
 }
 
@@ -102,10 +97,10 @@ mod tests {
         Impulse { linear: DVec3::Z * size, angular: DVec3::X * size }
     }
 
-    /// 3 N·s, given 2 ms before the end of a step at 0.1 s.
+    /// 3 N·s that stopped it 2 ms before the end of a step at 0.1 s.
     fn landed() -> Borne {
         let mut borne = Borne::default();
-        borne.note(Blow { end: at(0.10), given: up(3.0), carried: DVec3::Z * 0.006 });
+        borne.note(Rebound { end: at(0.10), given: up(3.0), carried: DVec3::Z * 0.006, met_n_s: 3.0 });
         borne
     }
 

@@ -85,7 +85,12 @@ impl Company {
     }
 
     /// Brings everybody that this body meets to the start of the step, but for `fellows`, by rising ids, who share its world.
-    pub(super) fn gather(&mut self, around: &Surroundings<'_>, mover: &Mover, fellows: &[AgentId]) {
+    pub(super) fn gather(
+        &mut self,
+        around: &Surroundings<'_>,
+        (mover, motion): (&Mover, &Motion),
+        fellows: &[AgentId],
+    ) {
         (self.me, self.count, self.after_s) = (around.me, 0, 0.0);
         for neighbour in around.neighbours {
             if fellows.binary_search(&neighbour.id).is_ok() || !is_met(neighbour, around) {
@@ -99,7 +104,7 @@ impl Company {
             let known = if stale {
                 guest.other.see(neighbour)
             } else {
-                guest.other.meet(neighbour, around, &self.exchange, around.time)
+                guest.other.meet(neighbour, around, &self.exchange, Some(motion.position))
             };
             if known {
                 guest.learn(neighbour, &self.form, mover);

@@ -39,7 +39,7 @@ impl RigidBody {
             self.take(around, dt);
         }
         self.received = self.motion.velocity - before;
-        self.company.gather(around, &self.world.mover, fellows);
+        self.company.gather(around, (&self.world.mover, &self.motion), fellows);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
         self.begun_at = (self.motion.position, self.motion.angular);
         self.held_up = !fellows.is_empty();
@@ -227,6 +227,7 @@ impl RigidBody {
         into.bounds = Some(self.bounds());
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
         into.sprung.set(self.hold.published());
+        into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
         self.company.exchange.write(into);
         into.touches.clear();
         into.bonds.clear();

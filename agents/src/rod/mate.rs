@@ -72,7 +72,7 @@ impl Mate {
         let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
         let other = std::mem::take(&mut self.other);
         *self = Self { other, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
-        if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, around.time) }
+        if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, None) }
     }
 
     /// Friction coefficient of the pair.

@@ -5,8 +5,8 @@
 //! Theory: docs/theory/coupling.md, eq. 5–6b.
 
 use super::Other;
-use crate::coupling::{Exchange, Impulse, Ledger, Site, Twist, acknowledged};
-use crate::{AgentId, Body, DT_MAX_S, Neighbour, SimTime, Surroundings};
+use crate::coupling::{Exchange, Impulse, Ledger, Rebound, Site, Twist, acknowledged};
+use crate::{AgentId, Body, DT_MAX_S, Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
 
 /// What begins within so many seconds has begun: clocks count whole nanoseconds.
@@ -28,8 +28,9 @@ impl Other {
         neighbour: &Neighbour,
         around: &Surroundings<'_>,
         exchange: &Exchange,
-        at: SimTime,
+        from: Option<DVec3>,
     ) {
+        let at = around.time;
         let [mut sums, mut carried] = [&mut self.answer, &mut self.carried].map(std::mem::take);
         sums.clear();
         carried.clear();
@@ -37,6 +38,9 @@ impl Other {
         exchange.in_flight(around.me, neighbour, at, |site, sum, moved| flight.add(site, sum, moved));
         if matches!(neighbour.snapshot.body, Body::Rigid(_)) && self.lean.is_none() {
             self.share(&mut flight, around, at);
+        }
+        if let Some(rebound) = neighbour.snapshot.rebound.get().filter(|_| !self.held && self.lean.is_none()) {
+            flight.leave_out(rebound, (at, self.pose.centre, from));
         }
         let Flight { mut sums, mut carried, .. } = flight;
         if !sums.is_empty() {
@@ -123,6 +127,23 @@ fn given(giver: &Neighbour, to: AgentId) -> Option<&Ledger> {
 }
 
 impl Flight<'_> {
+    /// Takes out what fixed solids would not have given a rigid body (eq. 4d), and what they gave it only after `at`, where it was
+    /// on its way to whoever sees it `from` there and only comes back (eq. 5a).
+    fn leave_out(&mut self, rebound: &Rebound, (at, centre, from): (SimTime, DVec3, Option<DVec3>)) {
+        let of = |slots: &[DVec3]| match *slots {
+            [linear, angular, ..] => Impulse { linear, angular },
+            _ => Impulse::ZERO,
+        };
+        let Inertia::Rigid { inverse_mass, .. } = self.to.snapshot.inertia else { return };
+        let before = centre - rebound.way(at) * inverse_mass;
+        let comes = rebound.age_s(at) < 0.0 && from.is_some_and(|from| (before - from).dot(rebound.given.linear) > 0.0);
+        let share = if comes { 1.0 } else { rebound.spared_by([of(&self.sums), of(&self.carried)], at) };
+        let [given, way] = rebound.part(share, at);
+        if given != Impulse::ZERO {
+            self.add(Site::Whole, -given, -way);
+        }
+    }
+
     fn add(&mut self, site: Site, sum: Impulse, moved: Impulse) {
         let Self { to, slots, sums, carried } = self;
         if sums.is_empty() {

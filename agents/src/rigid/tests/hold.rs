@@ -72,7 +72,7 @@ impl Held {
     fn expected(&self) -> (DVec3, DVec3, DVec3) {
         let mut other = Other::default();
         let seen = Neighbour::seen(ME, Arc::new(self.snapshot()));
-        assert!(other.meet(&seen, &Surroundings::alone(OWNER, self.owner_time), &self.owner, self.owner_time));
+        assert!(other.meet(&seen, &Surroundings::alone(OWNER, self.owner_time), &self.owner, None));
         let (place, _) = other.point(Anchor::Local(DVec3::ZERO)).unwrap();
         (place, other.velocities()[0], other.velocities()[1])
     }
