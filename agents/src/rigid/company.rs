@@ -31,9 +31,22 @@ pub(super) struct Company {
     pub after_s: f64,
     /// Bodies at rest that own the contact with this one, and that it is about to touch.
     pub knocks: Vec<AgentId>,
+    /// How long the step is, and what pulls the body together with others meanwhile.
+    pub span: Span,
     guests: Vec<Guest>,
     /// How many of `guests` are in use; the rest is storage.
     count: usize,
+}
+
+/// A step, as bounces within it need it.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Span {
+    /// Seconds.
+    pub dt_s: f64,
+    /// What pulls at everybody, m/s².
+    pub gravity: DVec3,
+    /// Whether something holds the body up.
+    pub held: bool,
 }
 
 /// An agent that is met in this step.
@@ -79,6 +92,7 @@ impl Company {
             me: AgentId(0),
             after_s: 0.0,
             knocks: Vec::new(),
+            span: Span::default(),
             guests: Vec::new(),
             count: 0,
         }
@@ -214,10 +228,11 @@ impl Company {
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.
     pub(super) fn ahead(&mut self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Ahead {
-        let Self { guests, count, room, form, .. } = self;
+        let Self { guests, count, room, form, span, .. } = self;
         let (me, mut ahead) = (placed(form, motion), Ahead::clear(horizon));
         for guest in guests[..*count].iter().filter(|guest| guest.touchable && !guest.chain) {
-            ahead.add(guest.approach(&me, (mover, motion, fall), horizon, room), guest.restitution);
+            let approach = guest.approach(&me, (mover, motion, fall), horizon, room);
+            ahead.add(approach, guest.restitution_at(approach.1, span));
         }
         ahead
     }
@@ -331,6 +346,14 @@ impl Guest {
             return slots.iter().step_by(2).map(|v| v.length()).fold(0.0, f64::max);
         }
         slots[0].length() + slots[1].length() * if self.radius_m.is_finite() { self.radius_m } else { 0.0 }
+    }
+
+    /// The restitution of a touch at `closing_m_s`. A hop from which gravity would have the two back within a step of `span` is
+    /// none: a body that bounced in each of its steps would never press on what it lies on.
+    pub(super) fn restitution_at(&self, closing_m_s: f64, span: &Span) -> f64 {
+        let held = span.held || self.other.acceleration().distance(span.gravity) > HELD_M_S2;
+        let hop_m_s = 2.0 * self.restitution * closing_m_s;
+        if held && hop_m_s < span.gravity.length() * span.dt_s { 0.0 } else { self.restitution }
     }
 
     /// Whether it is a tube.

@@ -6,6 +6,7 @@
 
 use super::RigidBody;
 use super::clearance::Fall;
+use super::company::Span;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
@@ -39,6 +40,8 @@ impl RigidBody {
             self.take(around, dt);
         }
         self.received = self.motion.velocity - before;
+        let held = self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
+        self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
         self.company.gather(around, (&self.world.mover, &self.motion), fellows);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
         self.begun_at = (self.motion.position, self.motion.angular);

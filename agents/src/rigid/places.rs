@@ -21,6 +21,7 @@ const BOUND_SHARE: f64 = 2e-5;
 impl Meeting {
     /// Places within the skin of everything that takes part, for a blow.
     pub(super) fn find_blows(&mut self, me: &Me<'_>, company: &mut Company, fixed: &mut Obstacles, strike: Strike) {
+        let span = company.span;
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
         let past = BOUND_SHARE * me.mover.radius_m;
@@ -31,20 +32,22 @@ impl Meeting {
             touches(&mine, &it, 2.0 * guest.skin_m + past, room, &mut self.touches);
             let owed_j = guest.other.id().and_then(|id| pairs.get(id)).map_or(0.0, |pair| pair.owed_j());
             let owed = 2.0 * owed_j / guest.reduced_kg(me.spread.mass_kg);
-            self.take_up(me, Some((i, guest)), (guest.friction, guest.restitution, owed));
+            let law = (guest.friction, |closing_m_s| guest.restitution_at(closing_m_s, &span), owed);
+            self.take_up(me, Some((i, guest)), law);
         }
         let mine = Mine { form, mover: me.mover, motion: me.motion };
         for solid in fixed.iter_mut() {
             solid.touches(&mine, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
             let skin = &solid.form;
-            let law = ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution), 0.0);
+            let (friction, restitution) =
+                ((form.friction * skin.friction).sqrt(), form.restitution.max(skin.restitution));
             let from = self.found.len();
-            self.take_up(me, None, law);
+            self.take_up(me, None, (friction, still, 0.0));
             for found in &mut self.found[from..] {
                 let carried_m_s = -strike.carried_m_s.dot(found.contact.normal);
                 let thrown_m_s = found.approach_m_s - carried_m_s.max(0.0);
                 let bounces = thrown_m_s > BOUNCE_M_S;
-                found.contact.rebound_m_s = if bounces { law.1 * thrown_m_s } else { 0.0 };
+                found.contact.rebound_m_s = if bounces { restitution * thrown_m_s } else { 0.0 };
             }
         }
         for found in &mut self.found {
@@ -70,7 +73,7 @@ impl Meeting {
             let closing = guest.approach_m_s(me.motion.velocity) + swing + pull * h;
             touches(&mine, &it, closing * h + SLACK_M, room, &mut self.touches);
             let from = self.found.len();
-            self.take_up(me, Some((i, guest)), (guest.friction, 0.0, 0.0));
+            self.take_up(me, Some((i, guest)), (guest.friction, still, 0.0));
             self.keep_closing(from, h);
             let pair = guest.other.id().and_then(|id| pairs.get(id));
             let pushed_m_s = pair.map_or(RESERVE_M_S, |pair| pair.push_out_m_s());
@@ -97,14 +100,19 @@ impl Meeting {
         for solid in fixed.iter_mut() {
             solid.touches(&mine, reach, room, &mut self.touches);
             let from = self.found.len();
-            self.take_up(me, None, ((form.friction * solid.form.friction).sqrt(), 0.0, 0.0));
+            self.take_up(me, None, ((form.friction * solid.form.friction).sqrt(), still, 0.0));
             self.keep_closing(from, h);
         }
     }
 
-    /// Turns the places that were found into contacts: with this friction and restitution, and with what a bounce has to pay
-    /// back, m²/s² of its speed.
-    fn take_up(&mut self, me: &Me<'_>, guest: Option<(usize, &Guest)>, (friction, bounce, owed): (f64, f64, f64)) {
+    /// Turns the places that were found into contacts: with this friction, with the restitution of an approach at so many m/s, and
+    /// with what a bounce has to pay back, m²/s² of its speed.
+    fn take_up(
+        &mut self,
+        me: &Me<'_>,
+        guest: Option<(usize, &Guest)>,
+        (friction, restitution, owed): (f64, impl Fn(f64) -> f64, f64),
+    ) {
         for touch in &self.touches {
             let mut slots = Slots::default();
             let (mine, theirs) = halfway(touch);
@@ -113,7 +121,7 @@ impl Meeting {
                 guest.other.join(&mut slots, self.bases[i], &theirs, (touch.normal, -1.0));
             }
             let approach_m_s = -slots.velocity(&self.velocities).dot(touch.normal);
-            let rebound = bounce * approach_m_s.max(0.0);
+            let rebound = restitution(approach_m_s) * approach_m_s.max(0.0);
             let rebound_m_s = (rebound * rebound - owed).max(0.0).sqrt();
             let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
             let key = mixed(touch.key ^ mixed(with));
@@ -131,6 +139,11 @@ impl Meeting {
             at <= from || found.contact.gap_m - found.approach_m_s * h < SLACK_M
         });
     }
+}
+
+/// The restitution of what presses.
+const fn still(_: f64) -> f64 {
+    0.0
 }
 
 /// Both sides' places, brought to the middle of the gap: force and torque then balance exactly.

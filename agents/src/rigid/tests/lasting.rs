@@ -313,3 +313,30 @@ fn boxes_that_start_on_each_other_are_bonded_at_once_and_colliding_ones_are_not(
     let ids = [(stage.add(thrown(-0.1, 1.0), 240.0)), stage.add(thrown(0.1, -1.0), 60.0)];
     stage.run(0.5, |stage| assert!(ids.iter().all(|id| stage.newest(*id).bonds.is_empty())));
 }
+
+/// Gravity would have a bounce of these speeds back within a step: a body that bounced in each of its steps would never press on
+/// what it lies on, and sink.
+#[test]
+fn a_box_that_bounces_a_little_comes_to_lie_on_another() {
+    for rates in [[240.0, 240.0], [60.0, 60.0], [240.0, 60.0], [60.0, 240.0], [1000.0, 100.0]] {
+        for restitution in [0.0, 0.2, 0.5] {
+            let mut stage = Stage::new(Faults::default());
+            let body = |spec: RigidSpec| {
+                RigidBody::new(RigidSpec { mass_kg: 1.0, restitution, obstacles: [floor(0.5)].into(), ..spec }).unwrap()
+            };
+            let low = stage.add(body(cube(0.1, UP * 0.1)), rates[0]);
+            let high = stage.add(body(cube(0.2, UP * 0.42)), rates[1]);
+            let mut deepest = 0.0_f64;
+            stage.run(3.0, |stage| {
+                let owner = if rates[1] > rates[0] { high } else { low };
+                let now = stage.newest(owner).time.as_secs_f64();
+                let apart = stage.settled(high, now).state.position.z - stage.settled(low, now).state.position.z - 0.3;
+                deepest = deepest.max(-apart);
+            });
+            let height = stage.settled(high, 3.0).state.position.z - 0.4;
+            let case = format!("{rates:?} Hz, e = {restitution}: {height} m high, {deepest} m deep");
+            println!("{case}");
+            assert!(height.abs() < 1e-3 && deepest < 2e-3, "{case}");
+        }
+    }
+}
