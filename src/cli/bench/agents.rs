@@ -47,6 +47,10 @@ pub(in crate::cli) struct Row {
     pub bare_us_per_step: f64,
     /// The same steps in a loop that sleeps to the same due times.
     pub sleeping_us_per_step: f64,
+    /// The same steps on a plain thread each that sleeps to the same due times, where agents have threads; and how many times
+    /// that an agent's step is.
+    pub thread_us_per_step: Option<f64>,
+    pub over_thread: Option<f64>,
     pub steps_per_s: f64,
     pub wanted_steps_per_s: f64,
     pub age_ms_p50: f64,
@@ -112,6 +116,8 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
 /// Measures one case for about `span` each for the loops and the run.
 pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
+    let on_threads = || bare::on_threads(case.model, case.agents, case.rate_hz, span / 2);
+    let thread_us_per_step = (case.executor == Executor::Threads).then(on_threads).transpose()?;
     let spawns = (0..case.agents).map(|k| anyhow::Ok(spawn(agent(case.model, k)?, k, case.rate_hz)));
     let spawns = spawns.collect::<Result<Vec<_>, _>>()?;
     let clock = Arc::new(SystemClock::new());
@@ -128,16 +134,19 @@ pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row
     let started = Instant::now();
     let stats = run.shutdown();
     let shutdown_ms = millis(started.elapsed());
+    let cpu_us_per_step = watched.per_step(watched.cpu.as_secs_f64() * 1e6);
     Ok(Row {
         executor: case.executor,
         model: case.model,
         realtime: case.priority == Priority::Realtime,
         agents: case.agents,
         rate_hz: case.rate_hz,
-        cpu_us_per_step: watched.per_step(watched.cpu.as_secs_f64() * 1e6),
+        cpu_us_per_step,
         cores: watched.cpu.as_secs_f64() / watched.wall.as_secs_f64(),
         bare_us_per_step: bare.free_us,
         sleeping_us_per_step: bare.paced_us,
+        thread_us_per_step,
+        over_thread: thread_us_per_step.map(|floor| cpu_us_per_step / floor),
         steps_per_s: watched.steps / watched.wall.as_secs_f64(),
         wanted_steps_per_s: stats.iter().map(|s| s.wanted_hz).sum(),
         age_ms_p50: 1e3 * among(&stats, 0.5, |s| s.age.p50_s),

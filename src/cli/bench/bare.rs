@@ -1,10 +1,12 @@
 //! The same steps without agents around them: what nothing can be faster than.
 //!
-//! In: a model, a number, a rate. Out: CPU time a step, of a loop that never sleeps and of one that sleeps to the same due times
-//! as the agents do. Never here: the runtime.
+//! In: a model, a number, a rate. Out: CPU time a step, of a loop that never sleeps, of one that sleeps to the same due times
+//! as the agents do, and of as many threads that each do. Never here: the runtime.
 
 use super::cast::{Model, agent, rate_hz};
 use super::machine::own_cpu;
+use crate::runtime::THREADS_MAX;
+use anyhow::Context;
 use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Surroundings};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -57,6 +59,37 @@ fn paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> an
         now = start.elapsed();
     }
     Ok(micros(own_cpu() - cpu) / steps.max(1) as f64)
+}
+
+/// CPU time a step, microseconds, of as many threads as agents, no more than [`THREADS_MAX`]: each sleeps to the due times of
+/// one agent, makes its bare step, and nothing else. No agent on a thread of its own can take less than the switches of these.
+pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duration) -> anyhow::Result<f64> {
+    let agents = (0..count.min(THREADS_MAX)).map(|k| agent(model, k)).collect::<Result<Vec<_>, _>>()?;
+    let start = Instant::now();
+    let spent = thread::scope(|scope| {
+        let lives = agents.into_iter().enumerate().map(|(k, mut agent)| {
+            let life = move || alone(&mut *agent, period(k, mean_hz), start, span);
+            thread::Builder::new().name(format!("bare:{k}")).spawn_scoped(scope, life)
+        });
+        let lives = lives.collect::<Result<Vec<_>, _>>().context("no thread to be had")?;
+        let ended = lives.into_iter().map(|life| life.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic)));
+        ended.collect::<anyhow::Result<Vec<_>>>()
+    })?;
+    let (cpu, steps) = spent.iter().fold((Duration::ZERO, 0), |(cpu, steps), one| (cpu + one.0, steps + one.1));
+    Ok(micros(cpu) / steps.max(1) as f64)
+}
+
+/// Steps of one agent at its due times until `span` after `start`: the CPU time of this thread, and how many those were.
+fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> anyhow::Result<(Duration, u64)> {
+    step(agent, dt)?;
+    let (cpu, mut due, mut steps) = (own_cpu(), start.elapsed(), 0);
+    while start.elapsed() < span {
+        thread::sleep(due.saturating_sub(start.elapsed()));
+        step(agent, dt)?;
+        steps += 1;
+        due += Duration::from_nanos(dt.as_nanos());
+    }
+    Ok((own_cpu() - cpu, steps))
 }
 
 /// A step of somebody who meets nobody.

@@ -77,6 +77,8 @@ fn table(rows: &[Row]) -> Table {
         "cores",
         "bare_us",
         "sleeping_us",
+        "thread_us",
+        "over_thread",
         "steps_per_s",
         "age_p99_ms",
         "late_p50_ms",
@@ -101,6 +103,8 @@ fn table(rows: &[Row]) -> Table {
             (row.cores, 3).into(),
             (row.bare_us_per_step, 2).into(),
             (row.sleeping_us_per_step, 2).into(),
+            (or_nan(row.thread_us_per_step), 2).into(),
+            (or_nan(row.over_thread), 2).into(),
             (row.steps_per_s, 0).into(),
             (row.age_ms_p99, 2).into(),
             (row.late_ms_p50, 2).into(),
@@ -180,6 +184,8 @@ mod tests {
     fn a_row_says_what_was_measured_and_the_files_hold_it() {
         let rows: Vec<_> = [Executor::Threads, Executor::Pool, Executor::Lockstep].map(|e| row(e, 3)).into();
         assert!(rows.iter().all(|row| row.steps_per_s > 0.0 && row.bare_us_per_step > 0.0), "{rows:?}");
+        let floors: Vec<_> = rows.iter().map(|row| row.thread_us_per_step.is_some_and(|floor| floor > 0.0)).collect();
+        assert_eq!(floors, [true, false, false], "a plain thread each stands beside threads alone");
         let folder = tempfile::tempdir().unwrap();
         write::<Agents>(folder.path(), &rows).unwrap();
         let read: Result<Vec<Row>, _> =

@@ -57,8 +57,12 @@ impl Cell {
     }
 }
 
-/// A number as people read it: what is too large or too small for `digits` after the point is written as a power of ten.
+/// A number as people read it: what is too large or too small for `digits` after the point is written as a power of ten, what is
+/// no number as a dash.
 fn readable(value: f64, digits: usize) -> String {
+    if value.is_nan() {
+        return "–".to_owned();
+    }
     let least = libm::exp10(-(digits as f64));
     if value == 0.0 || (least..1e6).contains(&value.abs()) || !value.is_finite() {
         format!("{value:.digits$}")

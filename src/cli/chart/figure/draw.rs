@@ -150,7 +150,11 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
     let colour = rgb(layer.colour);
     let line = colour.stroke_width(pen.px(2));
     let dot = pen.px(3);
-    match &layer.mark {
+    let mark = match &layer.mark {
+        Mark::Line(points) | Mark::Dashed(points) if finite(points).len() == 1 => &Mark::Dots(points.clone()),
+        mark => mark,
+    };
+    match mark {
         Mark::Line(points) => chart.draw_series(LineSeries::new(finite(points), line)).map_err(undrawn)?,
         Mark::Dashed(points) => {
             let dashes = DashedLineSeries::new(finite(points), pen.px(5), pen.px(4), line);
@@ -225,5 +229,22 @@ mod tests {
         assert_eq!(text.matches("<circle").count(), 2, "one dot that is a number, one in the legend");
         let picture = image::load_from_memory(&png(&figure).unwrap()).unwrap().to_rgb8();
         assert!(picture.pixels().any(|p| p.0 == [0x1f, 0x5f, 0xa8]));
+    }
+
+    #[test]
+    fn a_line_of_one_point_is_drawn_as_a_dot() {
+        let drawn = |points: &[(f64, f64)]| {
+            let layers = [Mark::Line(points.to_vec()), Mark::Dashed(points.to_vec())].map(|mark| Layer {
+                label: String::new(),
+                colour: Colour::Blue,
+                mark,
+            });
+            let axis = || Axis::linear("", 0.0, 1.0);
+            let panel = Panel { title: String::new(), x: axis(), y: axis(), layers: layers.into() };
+            let figure = Figure { title: String::new(), panels: vec![panel], columns: 1 };
+            svg(&figure).unwrap().matches("<circle").count()
+        };
+        assert_eq!(drawn(&[(0.5, 0.5), (f64::NAN, 0.1)]), 2, "what is no number is no second point");
+        assert_eq!(drawn(&[(0.5, 0.5), (0.7, 0.1)]), 0);
     }
 }

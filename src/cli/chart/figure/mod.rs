@@ -71,7 +71,7 @@ pub(in crate::cli) struct Layer {
 /// What a layer is made of. Values outside the axes are drawn at their edge; those that are not finite are left out.
 #[derive(Debug, Clone)]
 pub(in crate::cli) enum Mark {
-    /// A line through points: measured.
+    /// A line through points: measured. One point alone is drawn as a dot.
     Line(Vec<(f64, f64)>),
     /// A broken line through points: theory, or a limit.
     Dashed(Vec<(f64, f64)>),
