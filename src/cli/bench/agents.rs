@@ -155,7 +155,7 @@ pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row
         late_ms_p99: 1e3 * among(&stats, 0.99, |s| s.late.p99_s),
         dropped_ms: 1e3 * stats.iter().map(|s| s.dropped.as_secs_f64()).sum::<f64>() / stats.len().max(1) as f64,
         bytes_per_agent: before.zip(after).map(|(from, to)| (to - from).max(0.0) / case.agents as f64),
-        switches_per_step: watched.switches.map(|count| watched.per_step(count)),
+        switches_per_step: watched.switches_per_step,
         frame_late_ms_p99: 1e3 * share(watched.late_s, 0.99),
         read_ns_per_agent: 1e9 * share(watched.read_s, 0.5) / case.agents as f64,
         start_ms,
@@ -168,7 +168,7 @@ struct Watched {
     wall: Duration,
     cpu: Duration,
     steps: f64,
-    switches: Option<f64>,
+    switches_per_step: Option<f64>,
     late_s: Vec<f64>,
     read_s: Vec<f64>,
 }
@@ -189,18 +189,22 @@ fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
     while run.agents().iter().any(|agent| agent.steps() == 0) && began.elapsed() < WARM_UP {
         read(run, &mut reader, is_virtual, FRAME);
     }
-    let (from_cpu, from_steps, from_switches, from) = (cpu(), steps(run), switches(), Instant::now());
+    // to ask a thousand threads for their switches takes seconds on a busy machine: those are held against steps of their own
+    let from_switched = (switches(), steps(run));
+    let (from_cpu, from_steps, from) = (cpu(), steps(run), Instant::now());
     let (late_s, read_s) = read(run, &mut reader, is_virtual, span);
     let reading = if is_virtual { Duration::from_secs_f64(read_s.iter().sum()) } else { Duration::ZERO };
     reader.finish(run.agents());
-    Watched {
-        wall: from.elapsed(),
-        cpu: (cpu() - from_cpu).saturating_sub(reading),
-        steps: steps(run) - from_steps,
-        switches: switches().zip(from_switches).map(|(to, from)| (to - from).max(0.0)),
-        late_s,
-        read_s,
-    }
+    let (wall, cpu, made) = (from.elapsed(), (cpu() - from_cpu).saturating_sub(reading), steps(run) - from_steps);
+    let switched = (switches(), steps(run));
+    Watched { wall, cpu, steps: made, switches_per_step: rise(from_switched, switched), late_s, read_s }
+}
+
+/// By how much a count rose a step, from one moment to another: each a count and the steps that were made by then.
+fn rise(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
+    let count = to.0.zip(from.0).map(|(to, from)| (to - from).max(0.0))?;
+    let steps = to.1 - from.1;
+    Some(if steps > 0.0 { count / steps } else { f64::NAN })
 }
 
 /// Reads frame by frame: how late each frame began, and how long the reading took, seconds.

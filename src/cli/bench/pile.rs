@@ -1,7 +1,8 @@
 //! `bench pile`: a thousand boxes as agents that share worlds while they touch, beside one rapier3d world of the same boxes.
 //!
 //! In: the built-in scene `pile`. Out: rows of whole steps (every box by 1/240 s) a second of CPU time, each over the same
-//! simulated seconds: boxes that fall into a bin, and lie. Only what is really stepped counts, and the plain world never sleeps.
+//! simulated seconds: boxes that fall into a bin, and lie. Only what is really stepped counts, and nobody sleeps. Agents that gave
+//! up time are held against as many first steps of the plain world: boxes that fall cost less than a heap.
 //! It has rapier3d's own settings, and beside it those of an island. What was published of others for a thousand boxes follows.
 //! Never here: how agents find together.
 
@@ -50,9 +51,12 @@ pub(super) struct Row {
     pub dropped_s: f64,
     pub cpu_s: f64,
     pub steps_per_cpu_s: f64,
-    /// Of the plain world's.
+    /// Of the plain world's, over as many steps.
     pub share: f64,
 }
+
+/// CPU seconds that the plain world has used after each of its steps.
+type Spent = Vec<f64>;
 
 impl Subject for Pile {
     type Row = Row;
@@ -61,24 +65,29 @@ impl Subject for Pile {
     fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
         let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
         let scene = load(&Source::open("pile")?, &[])?;
-        let cases: [(&str, &dyn Fn() -> anyhow::Result<Row>); 4] = [
-            ("one rapier3d world", &|| plain(&scene, sim_s, Settings::Own)),
-            ("one rapier3d world, settings of an island", &|| plain(&scene, sim_s, Settings::Island)),
-            ("agents in virtual time", &|| agents(&scene, ExecutorKind::Lockstep, sim_s)),
-            ("agents in a pool", &|| agents(&scene, ExecutorKind::Pool, sim_s)),
+        let mut spent = Spent::new();
+        let cases: [(&str, &mut dyn FnMut() -> anyhow::Result<Row>); 4] = [
+            ("one rapier3d world", &mut || plain(&scene, sim_s, Settings::Own, &mut spent)),
+            ("one rapier3d world, settings of an island", &mut || {
+                plain(&scene, sim_s, Settings::Island, &mut Spent::new())
+            }),
+            ("agents in virtual time", &mut || agents(&scene, ExecutorKind::Lockstep, sim_s)),
+            ("agents in a pool", &mut || agents(&scene, ExecutorKind::Pool, sim_s)),
         ];
-        let told = cases.iter().zip(0_u32..);
+        let told = cases.into_iter().zip(0_u32..);
         let wanted = told.take_while(|((words, _), at)| watch.goes_on(0.2 * f64::from(*at), (*words).to_owned()));
         let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
         let Some(plain) = rows.first().cloned() else { return Ok(rows) };
-        let whole = plain.steps_per_cpu_s;
         let others = OTHERS.map(|(who, steps)| Row {
             who: who.to_owned(),
             here: false,
             steps_per_cpu_s: steps,
             ..plain.clone()
         });
-        Ok(rows.into_iter().chain(others).map(|row| Row { share: row.steps_per_cpu_s / whole, ..row }).collect())
+        let held = |row: Row, steps| Row { share: row.steps_per_cpu_s / first_steps_per_s(&spent, steps), ..row };
+        let here =
+            rows.into_iter().map(|row| (row.steps_per_cpu_s * row.cpu_s, row)).map(|(made, row)| held(row, made));
+        Ok(here.chain(others.map(|row| held(row, f64::INFINITY))).collect())
     }
 
     fn table(rows: &[Row]) -> Table {
@@ -115,6 +124,12 @@ impl Subject for Pile {
         };
         Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
     }
+}
+
+/// Steps a second of CPU time over so many first steps of those that `spent` tells of, or over all of them.
+fn first_steps_per_s(spent: &[f64], steps: f64) -> f64 {
+    let steps = (steps.round() as usize).clamp(1, spent.len().max(1));
+    spent.get(steps - 1).map_or(f64::NAN, |cpu_s| steps as f64 / cpu_s)
 }
 
 /// The scene's boxes as agents.
@@ -172,8 +187,8 @@ impl Settings {
 /// Half the diagonal of a box of the scene, metres.
 const BOX_RADIUS_M: f64 = 0.034_64;
 
-/// The same boxes in one world.
-fn plain(scene: &Scene, seconds: f64, settings: Settings) -> anyhow::Result<Row> {
+/// The same boxes in one world; what it has used after each step.
+fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> anyhow::Result<Row> {
     let mut world = PhysicsWorld { gravity: scene.gravity.as_vec3(), ..PhysicsWorld::default() };
     world.integration_parameters = settings.parameters();
     world.integration_parameters.dt = (1.0 / STEP_HZ) as f32;
@@ -189,8 +204,11 @@ fn plain(scene: &Scene, seconds: f64, settings: Settings) -> anyhow::Result<Row>
     }
     let steps = (seconds * STEP_HZ).round();
     let from = own_cpu();
-    (0..steps as u64).for_each(|_| world.step());
-    let cpu_s = (own_cpu() - from).as_secs_f64();
+    for _ in 0..steps as u64 {
+        world.step();
+        spent.push((own_cpu() - from).as_secs_f64());
+    }
+    let cpu_s = spent.last().copied().unwrap_or_default();
     let (sim_s, steps_per_cpu_s) = (steps / STEP_HZ, steps / cpu_s);
     let who = match settings {
         Settings::Own => "one rapier3d world".to_owned(),
@@ -235,9 +253,19 @@ mod tests {
     fn the_plain_world_holds_the_boxes_of_the_scene_and_they_fall() {
         let scene = load(&Source::open("pile").unwrap(), &[]).unwrap();
         for settings in [Settings::Own, Settings::Island] {
-            let row = plain(&scene, 0.02, settings).unwrap();
+            let mut spent = Spent::new();
+            let row = plain(&scene, 0.02, settings, &mut spent).unwrap();
+            assert!(spent.len() == 5 && spent.is_sorted());
             assert_eq!((row.boxes, row.here), (1000, true));
             assert!(row.steps_per_cpu_s > 0.0 && (row.sim_s - 5.0 / STEP_HZ).abs() < 1e-12);
         }
+    }
+
+    #[test]
+    fn who_made_fewer_steps_is_held_against_as_many_first_ones() {
+        let spent = [1.0, 2.0, 4.0, 8.0];
+        let shares = [0.0, 1.0, 2.2, 4.0, 9.0, f64::INFINITY].map(|steps| first_steps_per_s(&spent, steps));
+        assert_eq!(shares, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);
+        assert!(first_steps_per_s(&[], 1.0).is_nan());
     }
 }
