@@ -445,10 +445,25 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 }
 
 fn assignment(text: &str) -> Result<(String, String), String> {
-    match text.split_once('=') {
+    match equals_sign(text).map(|at| (&text[..at], &text[at + 1..])) {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
         _ => Err("expected KEY=VALUE, such as target.frame_hz=60".to_owned()),
     }
+}
+
+/// The sign between a key and its value: parts of the key that stand in quotes may hold others.
+fn equals_sign(text: &str) -> Option<usize> {
+    let (mut open, mut before) = (None, '.');
+    for (at, c) in text.char_indices() {
+        match (open, c) {
+            (None, '=') => return Some(at),
+            (None, '"' | '\'') if before == '.' => open = Some(c),
+            (Some(quote), c) if c == quote && before != '\\' => open = None,
+            _ => {}
+        }
+        before = c;
+    }
+    None
 }
 
 fn goal(text: &str) -> Result<Goal, String> {
@@ -463,6 +478,15 @@ mod tests {
     #[test]
     fn the_arguments_are_sound() {
         Cli::command().debug_assert();
+    }
+
+    #[test]
+    fn keys_in_quotes_may_hold_the_sign_that_ends_a_key() {
+        let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
+        assert_eq!(assignment("target.frame_hz = 60"), pair("target.frame_hz", "60"));
+        assert_eq!(assignment("object.\"a=b.c\".look='x=y'"), pair("object.\"a=b.c\".look", "'x=y'"));
+        assert_eq!(assignment("object.six\"inch.n=2"), pair("object.six\"inch.n", "2"));
+        assert!(assignment("=2").is_err() && assignment("'a=2").is_err());
     }
 
     #[test]

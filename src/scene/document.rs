@@ -51,16 +51,18 @@ impl<'t> Document<'t> {
     }
 
     fn set(&mut self, key: &Spanned<std::borrow::Cow<'t, str>>, value: Spanned<DeValue<'t>>) -> Result<(), Problem> {
-        let steps: Vec<&str> = key.get_ref().split('.').collect();
         let wrong = |what: String| {
-            Problem::new(key.span(), what).expecting("a dotted key such as `target.frame_hz` or `object.NAME.rate_hz`")
+            Problem::new(key.span(), what).expecting(
+                "a dotted key such as `target.frame_hz` or `object.NAME.rate_hz`; a name with a dot stands in quotes, \
+                 `object.\"NA.ME\".rate_hz`",
+            )
         };
-        if steps.iter().any(|s| s.trim().is_empty()) {
+        let steps = key_parts(key.get_ref());
+        let Some((last, path)) = steps.as_ref().and_then(|steps| steps.split_last()) else {
             return Err(wrong(format!("`{}` is not the key of a setting", key.get_ref())));
-        }
-        let (last, path) = steps.split_last().expect("split gives at least one part");
+        };
         let table = descend(&mut self.root, path, &key.span()).map_err(wrong)?;
-        table.insert(Spanned::new(key.span(), (*last).to_owned().into()), value);
+        table.insert(Spanned::new(key.span(), last.clone().into()), value);
         Ok(())
     }
 
@@ -97,18 +99,51 @@ fn locate(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
     Some(here.span())
 }
 
+/// The parts of a dotted key, where one in quotes may hold dots as in TOML; `None` where one is empty or a quote is left open.
+fn key_parts(key: &str) -> Option<Vec<String>> {
+    let (mut parts, mut rest) = (Vec::new(), key.trim());
+    loop {
+        let end = match rest.chars().next()? {
+            quote @ ('"' | '\'') => closing(rest, quote)?,
+            _ => rest.find('.').unwrap_or(rest.len()),
+        };
+        let (part, after) = rest.split_at(end);
+        parts.push(match DeValue::parse(part) {
+            Ok(value) if part.starts_with(['"', '\'']) => value.into_inner().as_str()?.to_owned(),
+            _ if part.trim().is_empty() => return None,
+            _ => part.to_owned(),
+        });
+        match after.strip_prefix('.') {
+            Some(next) => rest = next,
+            None => return after.is_empty().then_some(parts),
+        }
+    }
+}
+
+/// Where a text that begins with `quote` has its end, past the quote that closes it.
+fn closing(text: &str, quote: char) -> Option<usize> {
+    let mut escaped = false;
+    for (at, c) in text.char_indices().skip(1) {
+        if c == quote && !escaped {
+            return Some(at + 1);
+        }
+        escaped = c == '\\' && quote == '"' && !escaped;
+    }
+    None
+}
+
 /// The table that an override's path names, made where it is missing. In a list, the next part of the path names the entry.
 fn descend<'a, 't>(
     table: &'a mut DeTable<'t>,
-    path: &[&str],
+    path: &[String],
     span: &Range<usize>,
 ) -> Result<&'a mut DeTable<'t>, String> {
     let Some((step, rest)) = path.split_first() else { return Ok(table) };
-    if !table.contains_key(*step) {
+    if !table.contains_key(step.as_str()) {
         let empty = Spanned::new(span.clone(), DeValue::Table(DeTable::new()));
-        table.insert(Spanned::new(span.clone(), (*step).to_owned().into()), empty);
+        table.insert(Spanned::new(span.clone(), step.clone().into()), empty);
     }
-    let slot = table.get_mut(*step).ok_or_else(|| format!("`{step}` cannot be set"))?;
+    let slot = table.get_mut(step.as_str()).ok_or_else(|| format!("`{step}` cannot be set"))?;
     match slot.get_mut() {
         DeValue::Table(inner) => descend(inner, rest, span),
         DeValue::Array(items) => {
@@ -129,4 +164,28 @@ fn entry(items: &[Spanned<DeValue<'_>>], which: &str) -> Option<usize> {
     let name = |item: &Spanned<DeValue<'_>>| Some(item.get_ref().as_table()?.get("name")?.get_ref().as_str()? == which);
     let named = items.iter().position(|item| name(item) == Some(true));
     named.or_else(|| which.parse().ok().filter(|i: &usize| *i < items.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_with_dots_and_quotes_are_set_by_keys_in_quotes() {
+        let parts = |key: &str| key_parts(key).map(|parts| parts.join("|"));
+        let as_they_are =
+            [("target.frame_hz", "target|frame_hz"), ("object.big ball.rate_hz", "object|big ball|rate_hz")];
+        let in_quotes = [
+            (r#"object."v1.2".rate_hz"#, "object|v1.2|rate_hz"),
+            ("object.'a \"b\".c'.n", "object|a \"b\".c|n"),
+            (r#"object."a \"b\".c".n"#, "object|a \"b\".c|n"),
+            (r#"object.six"inch.n"#, "object|six\"inch|n"),
+        ];
+        for (key, want) in as_they_are.into_iter().chain(in_quotes) {
+            assert_eq!(parts(key).as_deref(), Some(want), "{key}");
+        }
+        for key in ["", ".", "a.", ".a", "a..b", "a.\"b", "\"a\"b.c", "a. .b"] {
+            assert_eq!(parts(key), None, "{key}");
+        }
+    }
 }

@@ -16,8 +16,8 @@ use metachron_agents::rigid::{Joint, JointKind};
 
 /// Most joints of a scene.
 const JOINTS_MAX: usize = 10_000;
-/// The name of the world in joints.
-const WORLD: &str = "world";
+/// The name of the world in joints: no object may have it.
+pub(super) const WORLD: &str = "world";
 
 /// What one end of a joint holds, and where that stands at the start.
 #[derive(Debug, Clone, Copy)]

@@ -2,6 +2,7 @@
 
 use super::common::{faults, levels, look, pace, tolerance, untolerated};
 use super::grid::{Copies, copies};
+use super::joint::WORLD;
 use super::{instrument, rigid, scenery, soft, synthetic, tube};
 use crate::scene::cast::{Look, Member, Scenery, Spec};
 use crate::scene::check::{Checker, Place};
@@ -287,6 +288,10 @@ fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
             let expected = format!("expected 1 … {NAME_MAX} characters that can be seen");
             c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a name", expected);
             continue;
+        }
+        if name == WORLD {
+            let what = format!("is `{WORLD}`, by which joints mean what does not move");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected another name");
         }
         let taken = (first..).zip(entry.copies.names(name)).filter_map(|(id, name)| {
             let before = names.0.insert(name.clone(), named(AgentId(id)));

@@ -206,13 +206,28 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid)
     }
     let density =
         c.number_or(place, "density_kg_m3", (file.density_kg_m3, DENSITY_DEFAULT_KG_M3), &allowed(1e-3..=1e6, "kg/m³"));
-    let mass = density * volume_m3(solid);
+    let volume = volume_m3(solid);
+    if is_flat(solid, volume) {
+        let what = format!(
+            "encloses {volume:.1e} m³, so that nothing is there to weigh: its triangles lie in one plane or do not close"
+        );
+        c.wrong(place, "file", what, "expected a closed surface, or `mass_kg`, or `fixed = true`");
+        return 1.0;
+    }
+    let mass = density * volume;
     if !MASS.contains(mass) {
         let what = format!("gives a mass of {mass:.3e} kg");
         c.wrong(place, "density_kg_m3", what, format!("expected a density that gives {MASS}; or set `mass_kg`"));
         return 1.0;
     }
     mass
+}
+
+/// Whether given triangles enclose next to nothing of the box around them: volumes are found in single precision.
+fn is_flat(solid: &Solid, volume: f64) -> bool {
+    let (Solid::Hull { points_m } | Solid::Mesh { points_m, .. }) = solid else { return false };
+    let corners = points_m.iter().copied().reduce(DVec3::min).zip(points_m.iter().copied().reduce(DVec3::max));
+    corners.is_none_or(|(low, high)| volume < 1e-7 * low.distance(high).powi(3))
 }
 
 /// The volume a solid encloses.
@@ -241,6 +256,37 @@ mod tests {
         // z goes to -y about x, then to -y about z by 90 degrees to x
         let turned = rotation(DVec3::new(90.0, 0.0, 90.0)) * DVec3::Z;
         assert!(turned.distance(DVec3::X) < 1e-15, "{turned}"); // two rotations, one ulp each
+    }
+
+    #[test]
+    fn triangles_in_one_plane_enclose_nothing_and_a_thin_plate_does() {
+        let plate = |height: f64| {
+            let corner = |i: i32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), height * f64::from(i >> 2));
+            let corners: Vec<DVec3> = (0..8).map(corner).collect();
+            let faces = [
+                [0, 2, 1],
+                [1, 2, 3],
+                [4, 5, 6],
+                [5, 7, 6],
+                [0, 1, 4],
+                [1, 5, 4],
+                [2, 6, 3],
+                [3, 6, 7],
+                [0, 4, 2],
+                [2, 4, 6],
+                [1, 3, 5],
+                [3, 7, 5],
+            ];
+            Solid::Mesh { points_m: corners.into(), triangles: faces.to_vec().into() }
+        };
+        let sheet = Solid::Mesh {
+            points_m: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y].into(),
+            triangles: vec![[0, 1, 2], [1, 3, 2]].into(),
+        };
+        assert!(is_flat(&sheet, volume_m3(&sheet)));
+        let thin = plate(1e-3);
+        assert!(!is_flat(&thin, volume_m3(&thin)), "{}", volume_m3(&thin));
+        assert!(!is_flat(&Solid::Plane, 0.0));
     }
 
     #[test]
