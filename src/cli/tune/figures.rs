@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 const SHOWN_S: f64 = 2.0;
 /// Cells of the map along α and along β.
 const CELLS: [usize; 2] = [24, 12];
-/// The map's α and β.
+/// The map's α and β, unless what was found needs more room.
 const ALPHA: (f64, f64) = (1e-6, 1e-1);
 const BETA: (f64, f64) = (0.05, 50.0);
 /// Seconds of a map cell's trial.
@@ -87,31 +87,39 @@ fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
     let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
+    let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
+        _ => None,
+    });
+    let found: Vec<_> = found.collect();
+    let (alphas, betas) = (around(ALPHA, found.iter().map(|at| at.0)), around(BETA, found.iter().map(|at| at.1)));
     let mut cells: [Vec<[f64; 4]>; 3] = Default::default();
     for column in 0..columns {
         for row in 0..rows {
-            let (a, b) = (step(ALPHA, columns, column), step(BETA, rows, row));
-            let (a_end, b_end) = (step(ALPHA, columns, column + 1), step(BETA, rows, row + 1));
+            let (a, b) = (step(alphas, columns, column), step(betas, rows, row));
+            let (a_end, b_end) = (step(alphas, columns, column + 1), step(betas, rows, row + 1));
             let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
             cells[kind(&plant, calm(on, law, 1.0, MAP_S))].push([a, a_end, b, b_end]);
         }
     }
     let [good, slow, swings] = cells;
-    let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
-        Contender::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
-        _ => None,
-    });
     Panel {
         title: "the printed law over its gains".to_owned(),
-        x: Axis::log("α", ALPHA.0, ALPHA.1),
-        y: Axis::log("β", BETA.0, BETA.1),
+        x: Axis::log("α", alphas.0, alphas.1),
+        y: Axis::log("β", betas.0, betas.1),
         layers: vec![
             layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
             layer("slower, or elsewhere", Colour::Sky, Mark::Cells(slow)),
             layer("swings for ever", Colour::Red, Mark::Cells(swings)),
-            layer("chosen", Colour::Blue, Mark::Dots(found.collect())),
+            layer("chosen", Colour::Blue, Mark::Dots(found)),
         ],
     }
+}
+
+/// A range that holds these values too, with half a decade of room about each.
+fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
+    const ROOM: f64 = 3.2;
+    values.fold(range, |(low, high), value| (low.min(value / ROOM), high.max(value * ROOM)))
 }
 
 /// 0: settles within a second from both starts; 1: later, or not; 2: swings.
@@ -148,5 +156,18 @@ fn misses(on: &Identified, tuned: &Tuned) -> Panel {
         x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
         y: Axis::linear("late frames, %", 0.0, 1.05 * high),
         layers,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_stands_inside_the_map() {
+        assert_eq!(around(BETA, [1.0].into_iter()), BETA);
+        let (low, high) = around(BETA, [50.0, 0.01].into_iter());
+        assert!(low < 0.004 && high > 150.0, "{low} {high}");
+        assert_eq!(around(ALPHA, std::iter::empty()), ALPHA);
     }
 }

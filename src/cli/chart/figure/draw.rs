@@ -115,6 +115,7 @@ fn draw_panel<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pe
     mesh.axis_style(BLACK.stroke_width(pen.px(1))).set_all_tick_mark_size(pen.px(4));
     mesh.label_style(pen.font(SMALL)).axis_desc_style(pen.font(SMALL + 1)).draw().map_err(undrawn)?;
     panel.layers.iter().try_for_each(|layer| draw_layer(&mut chart, layer, pen))?;
+    panel.layers.iter().try_for_each(|layer| draw_leaving(&mut chart, panel, layer, pen))?;
     draw_legend(area, panel, pen)
 }
 
@@ -172,6 +173,41 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
     Ok(())
 }
 
+/// An arrow at the border wherever a layer goes on beyond the axes: what stands there lies farther out.
+fn draw_leaving<D: DrawingBackend>(
+    chart: &mut Chart<'_, D>,
+    panel: &Panel,
+    layer: &Layer,
+    pen: Pen,
+) -> anyhow::Result<()> {
+    let (Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points)) = &layer.mark else { return Ok(()) };
+    let (long, half) = (pen.at(9), pen.at(4));
+    let arrows = leaving(points, panel).into_iter().map(|(at, [right, up])| {
+        // on the screen y points down; the tip lies on the border
+        let corner = |along: i32, across: i32| (-right * along + up * across, up * along + right * across);
+        EmptyElement::at(at)
+            + Polygon::new(vec![(0, 0), corner(long, half), corner(long, -half)], rgb(layer.colour).filled())
+    });
+    chart.draw_series(arrows).map_err(undrawn)?;
+    Ok(())
+}
+
+/// Where points go beyond the axes, once for each run beyond one border, and which way: (right, up) of −1, 0, 1.
+fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
+    let mut before = [0, 0];
+    let mut all = Vec::new();
+    for (x, y) in finite(points) {
+        let way = [panel.x.beyond(x), panel.y.beyond(y)];
+        // a point that is beyond both is told of by the border above or below
+        let told = if way[1] != 0 { [0, way[1]] } else { way };
+        if told != [0, 0] && told != before {
+            all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), told));
+        }
+        before = told;
+    }
+    all
+}
+
 /// The points that are numbers.
 fn finite(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
@@ -209,6 +245,25 @@ mod tests {
         // Greek and signs that the charts' labels need: each draws something of its own, none a missing glyph's nothing
         let counts = ["μ", "φ", "π", "²", "×", "≤", "Δ", "τ", "₁"].map(dark_pixels);
         assert!(counts.iter().all(|c| *c > 4), "{counts:?}");
+    }
+
+    #[test]
+    fn what_goes_beyond_the_axes_is_marked_once_a_run_at_the_border() {
+        let panel = |points: &[(f64, f64)]| {
+            let layers = vec![Layer { label: String::new(), colour: Colour::Red, mark: Mark::Line(points.to_vec()) }];
+            Panel { title: String::new(), x: Axis::linear("", 0.0, 1.0), y: Axis::log("", 0.1, 10.0), layers }
+        };
+        let points =
+            [(0.0, 1.0), (0.1, 20.0), (0.2, 90.0), (0.3, 10.0), (0.4, 0.01), (0.5, 11.0), (1.5, 1.0), (0.6, f64::NAN)];
+        let marks = leaving(&points, &panel(&points));
+        let wanted = [((0.1, 10.0), [0, 1]), ((0.4, 0.1), [0, -1]), ((0.5, 10.0), [0, 1]), ((1.0, 1.0), [1, 0])];
+        assert_eq!(marks, wanted);
+        assert_eq!(leaving(&[(0.0, 10.0 * (1.0 + 1e-12)), (1.0, 0.1)], &panel(&[])), [], "rounding");
+        let polygons = |points: &[(f64, f64)]| {
+            let figure = Figure { title: String::new(), panels: vec![panel(points)], columns: 1 };
+            svg(&figure).unwrap().matches("<polygon").count()
+        };
+        assert_eq!((polygons(&points), polygons(&[(0.0, 1.0), (1.0, 2.0)])), (4, 0));
     }
 
     #[test]

@@ -55,6 +55,12 @@ impl Axis {
     pub fn log(label: &'static str, low: f64, high: f64) -> Self {
         Self { label, low, high, log: true }
     }
+
+    /// Whether a value lies beyond the low end (−1) or the high end (1) of the axis by more than rounding, or on it (0).
+    pub(super) fn beyond(&self, value: f64) -> i32 {
+        let slack = 1e-9 * (self.high - self.low);
+        i32::from(value > self.high + slack) - i32::from(value < self.low - slack)
+    }
 }
 
 /// Something of one colour, with a label of its own in the legend (none where it is empty).
@@ -68,7 +74,7 @@ pub(in crate::cli) struct Layer {
     pub mark: Mark,
 }
 
-/// What a layer is made of. Values outside the axes are drawn at their edge; those that are not finite are left out.
+/// What a layer is made of. Values outside the axes are drawn at their edge, with an arrow that says so; those that are not finite are left out.
 #[derive(Debug, Clone)]
 pub(in crate::cli) enum Mark {
     /// A line through points: measured. One point alone is drawn as a dot.
