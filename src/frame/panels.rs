@@ -42,6 +42,7 @@ pub(super) struct Meter {
     since: (Duration, SimTime),
     cpu_s: Vec<f64>,
     shares: Vec<f64>,
+    dropped_s: Vec<f64>,
     real_time: f64,
 }
 
@@ -53,7 +54,13 @@ impl Meter {
     pub fn new(session: &Session) -> Self {
         let agents = session.agents().len();
         let since = (session.now(), session.sim_now());
-        Self { since, cpu_s: vec![0.0; agents], shares: vec![0.0; agents], real_time: 0.0 }
+        Self {
+            since,
+            cpu_s: vec![0.0; agents],
+            shares: vec![0.0; agents],
+            dropped_s: vec![0.0; agents],
+            real_time: 0.0,
+        }
     }
 
     fn read(&mut self, session: &Session) {
@@ -62,12 +69,16 @@ impl Meter {
         if wall_s < METER_EVERY.as_secs_f64() {
             return;
         }
+        let mut most_s = 0.0_f64;
         for (at, agent) in session.agents().iter().enumerate() {
-            let cpu_s = agent.cpu_s();
+            let (cpu_s, dropped_s) = (agent.cpu_s(), agent.stats().dropped.as_secs_f64());
+            most_s = most_s.max(dropped_s - self.dropped_s[at]);
+            self.dropped_s[at] = dropped_s;
             self.shares[at] = ((cpu_s - self.cpu_s[at]) / wall_s).clamp(0.0, 1.0);
             self.cpu_s[at] = cpu_s;
         }
-        self.real_time = sim.since(self.since.1).as_secs_f64() / wall_s;
+        // time that an agent drops passes on the clock and not for it
+        self.real_time = (sim.since(self.since.1).as_secs_f64() - most_s).max(0.0) / wall_s;
         self.since = (now, sim);
     }
 }

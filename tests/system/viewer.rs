@@ -190,6 +190,39 @@ fn transport_buttons_ask_for_what_they_say() {
     }
 }
 
+/// A window of this size.
+fn small(width: f32, height: f32) -> Harness<'static, World> {
+    let mut harness = window();
+    harness.set_size(egui::vec2(width, height));
+    harness.run_steps(3);
+    harness
+}
+
+#[test]
+fn panels_give_way_to_the_picture_in_a_small_window() {
+    for (width, height, side, table) in [
+        (420.0, 300.0, false, false),
+        (420.0, 700.0, false, true),
+        (900.0, 300.0, false, false),
+        (640.0, 420.0, true, true),
+    ] {
+        let harness = small(width, height);
+        let picture = harness.get_by_label("Picture").rect();
+        let told = format!("{width} × {height}: {picture:?}");
+        assert!(picture.left() >= 0.0 && picture.right() <= width && picture.bottom() <= height, "{told}");
+        let slider = harness.query_by_role_and_label(egui::Role::Slider, "Target rate");
+        assert_eq!(slider.is_some(), side, "{told}");
+        assert!(slider.is_none_or(|slider| !slider.rect().intersects(picture)), "{told}");
+        // what is no panel is the picture's
+        assert!(table || picture.height() > height - 80.0, "{told}");
+        assert!(picture.height() > 100.0 && picture.width() > 200.0, "{told}");
+        // the bar stands above it, and its ends do not meet
+        let (pause, rate) = (harness.get_by_label("Pause").rect(), harness.get_by_label_contains("fps").rect());
+        assert!(pause.right() <= rate.left() && rate.right() <= width, "{told}");
+        assert!(rate.bottom() <= picture.top() + 0.5, "{told}");
+    }
+}
+
 #[test]
 fn keys_ask_for_what_the_help_says() {
     let mut harness = window();

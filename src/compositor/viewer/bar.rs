@@ -12,26 +12,38 @@ use egui::{Align, Color32, Layout, RichText, Ui};
 
 /// In a bar of fewer points the name and the real-time factor give way to buttons.
 const WIDE: f32 = 800.0;
+/// In one of fewer than this the scene's name, the speed and the tools give way too: all have keys.
+const NARROW: f32 = 560.0;
+
+/// What the factor means.
+const REAL_TIME: &str = "Simulated time that was stepped for each second, by the agent that keeps up least: \
+                         what it cannot make up is dropped. The wanted speed is on the left";
 
 /// Draws the bar.
 pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command> {
     let mut commands = Vec::new();
     let palette = palette(ui);
     ui.horizontal_centered(|ui| {
-        let wide = ui.available_width() > WIDE;
+        let (wide, narrow) = (ui.available_width() > WIDE, ui.available_width() < NARROW);
         if wide {
             ui.label(RichText::new("metachron").strong().size(14.0));
         }
-        ui.add(egui::Label::new(RichText::new(&status.scene).size(14.0).color(palette.weak)).truncate());
+        if !narrow {
+            ui.add(egui::Label::new(RichText::new(&status.scene).size(14.0).color(palette.weak)).truncate());
+        }
         ui.add_space(if wide { 10.0 } else { 2.0 });
         transport(ui, status, &mut commands);
         ui.add_space(6.0);
-        speed(ui, status, &mut commands);
-        ui.add_space(10.0);
+        if !narrow {
+            speed(ui, status, &mut commands);
+            ui.add_space(10.0);
+        }
         clock(ui, status, wide, &palette);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            tools(ui, &mut commands);
-            ui.add_space(8.0);
+            if !narrow {
+                tools(ui, &mut commands);
+                ui.add_space(8.0);
+            }
             frame_rate(ui, status, summary, &palette);
         });
     });
@@ -66,7 +78,7 @@ fn clock(ui: &mut Ui, status: &Status, wide: bool, palette: &Palette) {
     let factor = format!("{:.2}× real time", status.real_time_factor);
     let behind = status.running && status.real_time_factor < 0.95 * status.speed;
     let color = if behind { palette.warn } else { palette.weak };
-    ui.label(RichText::new(factor).color(color)).on_hover_text("Measured; the wanted speed is on the left");
+    ui.label(RichText::new(factor).color(color)).on_hover_text(REAL_TIME);
 }
 
 fn frame_rate(ui: &mut Ui, status: &Status, summary: &FrameSummary, palette: &Palette) {

@@ -118,6 +118,10 @@ pub struct Viewer {
     notes: Vec<(f64, Message)>,
 }
 
+/// Below the bar panels need a room this high and this broad, points: in a smaller one the picture has all of it.
+const TALL: f32 = 340.0;
+const BROAD: f32 = 600.0;
+
 /// How long the window's own messages stay, seconds.
 const NOTE_S: f64 = 6.0;
 
@@ -185,6 +189,10 @@ impl Viewer {
         Panel::top("bar").exact_size(44.0).frame(frame(14, 0)).show(ui, |ui| {
             commands.extend(bar::show(ui, status, &summary));
         });
+        let room = ui.available_size();
+        if room.y < TALL {
+            return; // the picture and the bar are what fits
+        }
         Panel::bottom("agents").resizable(true).default_size(182.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
             match table::show(ui, status) {
                 Some(table::Press::Select(id)) => actions.push(Action::Select(Some(id))),
@@ -195,6 +203,9 @@ impl Viewer {
                 None => {}
             }
         });
+        if room.x < BROAD {
+            return;
+        }
         Panel::right("side").default_size(318.0).size_range(280.0..=460.0).frame(frame(14, 6)).show(ui, |ui| {
             actions.extend(side::show(ui, status, &self.history, &mut self.layout.looks));
         });

@@ -36,12 +36,25 @@ pub fn show(ui: &mut Ui, shares: &Shares) {
     ui.painter().vline(target, line(1.0).y_range(), (1.5, palette(ui).text));
     ui.horizontal_wrapped(|ui| {
         ui.spacing_mut().item_spacing.x = 6.0;
-        let parts = [("simulation", simulation), ("cull", cull), ("select", select), ("draw", draw), ("rest", rest)];
-        for ((name, part), colour) in parts.into_iter().zip(COLOURS) {
-            let text = format!("{name} {:.0} %", 100.0 * part);
-            ui.label(RichText::new(text).small().color(colour));
+        let parts = [simulation, cull, select, draw, rest];
+        for (((name, means), part), colour) in NAMES.into_iter().zip(parts).zip(COLOURS) {
+            ui.label(RichText::new(format!("{name} {}", told(part))).small().color(colour)).on_hover_text(means);
         }
     });
+}
+
+/// The parts and what they are.
+const NAMES: [(&str, &str); 5] = [
+    ("simulation", "What agents take of all cores"),
+    ("cull", "Taking the newest states and finding what is seen; 100 % is the time of a frame"),
+    ("select", "Choosing levels; 100 % is the time of a frame"),
+    ("draw", "Making the picture and drawing it; 100 % is the time of a frame"),
+    ("window", "Panels, and showing all of it on the screen; 100 % is the time of a frame"),
+];
+
+/// A part of a whole in percent, or as so many times the whole.
+fn told(part: f64) -> String {
+    if part < 2.0 { format!("{:.0} %", 100.0 * part) } else { format!("{part:.1}×") }
 }
 
 /// Parts side by side, in units of which `room` fill the line.
@@ -53,5 +66,15 @@ fn bar(ui: &Ui, line: Rect, parts: &[(f64, Color32)], room: f64) {
         let to = (from + line.width() * part as f32).min(line.right());
         ui.painter().rect_filled(Rect::from_x_y_ranges(from..=to, line.y_range()), 2.0, *colour);
         from = to;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_takes_many_frames_is_told_in_frames() {
+        assert_eq!([0.016, 1.2, 15.63].map(told), ["2 %", "120 %", "15.6×"]);
     }
 }

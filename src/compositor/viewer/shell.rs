@@ -100,12 +100,13 @@ pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<Window
     }
 }
 
+/// Where a display is named, in the order in which they are tried.
+const DISPLAYS: [&str; 3] = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
+
 /// Whether this system names a display at all: without one, winit's own error is hard to read.
 fn find_display() -> Result<(), WindowError> {
     let unix_desktop = cfg!(unix) && !cfg!(target_os = "macos");
-    let named = ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"]
-        .into_iter()
-        .any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+    let named = DISPLAYS.into_iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
     if unix_desktop && !named {
         return Err(WindowError::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".to_owned()));
     }
@@ -152,11 +153,21 @@ const LAYOUT: &str = "metachron layout";
 
 fn named_error(error: eframe::Error) -> WindowError {
     match error {
-        eframe::Error::Winit(error) => WindowError::NoDisplay(error.to_string()),
-        eframe::Error::WinitEventLoop(error) => WindowError::NoDisplay(error.to_string()),
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => {
+            WindowError::NoDisplay(unanswered(|key| std::env::var(key).ok()))
+        }
         eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
         other => WindowError::Failed(other.to_string()),
     }
+}
+
+/// Which display was asked for and does not answer: winit's own words name a line of its source.
+fn unanswered(read: impl Fn(&str) -> Option<String>) -> String {
+    let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
+    let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
+        return "the system gives no window".to_owned();
+    };
+    format!("`{value}`, which {key} names, does not answer; name one that does, or run with --headless")
 }
 
 fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
@@ -374,6 +385,13 @@ impl eframe::App for Shell<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_display_that_does_not_answer_is_named() {
+        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()));
+        assert!(told.starts_with("`:77`, which DISPLAY names,") && told.contains("--headless"), "{told}");
+        assert_eq!(unanswered(|_| None), "the system gives no window");
+    }
 
     #[test]
     fn a_size_that_is_given_wins_over_the_one_that_is_restored() {

@@ -185,7 +185,7 @@ pub struct Status {
     pub running: bool,
     /// Wanted simulated seconds for each second of wall time, > 0.
     pub speed: f64,
-    /// Measured simulated seconds for each second of wall time, ≥ 0.
+    /// Simulated seconds that were stepped for each second of wall time, by the agent that keeps up least, ≥ 0.
     pub real_time_factor: f64,
     /// Wanted frames per second, > 0.
     pub target_hz: f64,

@@ -172,3 +172,22 @@ fn a_run_without_an_end_forgets_its_oldest_frames() {
         assert!((10..20).contains(&outcome.frames.len()), "{} frames", outcome.frames.len());
     });
 }
+
+#[test]
+fn time_that_an_agent_drops_is_no_real_time() {
+    with_show(|show| {
+        (0..60).for_each(|_| frame(show, None));
+        let on_time = show.status().real_time_factor;
+        assert!((on_time - 1.0).abs() < 0.01, "{on_time}");
+    });
+    let mut plan = plan("pendulum");
+    // a step of 2.5 to 10 ms takes 20
+    plan.overrides.push(("machine.step.tube.base_us".to_owned(), "20000".to_owned()));
+    let session = Session::open(scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
+    let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
+    let show = &mut WindowShow::new(session, plan, &mut go_on);
+    (0..240).for_each(|_| frame(show, None));
+    let Status { real_time_factor, speed, agents, .. } = show.status();
+    assert!((0.3..0.7).contains(real_time_factor) && *speed == 1.0, "{real_time_factor}");
+    assert!(agents[0].dropped_s > 1.0 && agents[1].dropped_s == 0.0);
+}
