@@ -34,6 +34,9 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     let mut session = Session::open(request.scene.clone())?;
     // nothing happens before somebody can see it: opening an adapter takes seconds where a processor draws
     session.hold();
+    if !request.quiet {
+        session.tell_by(super::output::message);
+    }
     if request.oracle {
         session.keep_trace();
     }
@@ -145,6 +148,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         frames: outcome.finished,
         sim_s: outcome.sim_s,
         wall_s: outcome.wall_s,
+        start_up_s: outcome.start_up_s,
         cpu_s: outcome.cpu_s,
         state_hash: format!("{:016x}", outcome.state_hash),
         target_ms: outcome.target_ms,

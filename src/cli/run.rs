@@ -31,6 +31,8 @@ pub struct Request {
     pub scene: Scene,
     /// Where it came from, so that it can be read again.
     pub source: Source,
+    /// Whether nothing is said but what is asked for.
+    pub quiet: bool,
     /// What was laid over it, in rising precedence.
     pub overrides: Vec<(String, String)>,
     /// Whether a window is wanted; where none can be opened the run goes headless.
@@ -142,6 +144,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     Ok(Request {
         scene,
         source,
+        quiet: args.quiet,
         overrides,
         window: !args.headless,
         end,

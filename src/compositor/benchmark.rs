@@ -2,7 +2,7 @@
 //! RH05, §4.1).
 //!
 //! In: an adapter. Out: measured pictures. Never here: a fit, a file. It takes one or two seconds where a processor draws, and no
-//! picture is begun after three.
+//! picture is begun after three; what is left is for the next time.
 
 use super::draw::RendererOptions;
 use super::gather::{Actor, Form, Look, Material, Stage, States};
@@ -49,7 +49,7 @@ const TRIANGLES: [u32; 4] = [8, 32, 128, 512];
 const LEAST_PX: f64 = 100.0;
 /// … and are so many.
 const NUMBERS: usize = 2;
-/// No picture is begun this long after the start, shaders and all: what was measured until then is given.
+/// No picture is begun this long after the first: what was measured until then is given.
 const LONGEST: Duration = Duration::from_secs(3);
 /// Drawings of each picture after the first, which makes meshes and buffers …
 const DRAWINGS: usize = 5;
@@ -57,39 +57,65 @@ const DRAWINGS: usize = 5;
 const PICTURE: Duration = Duration::from_millis(60);
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
-/// Draws all pictures, or as many as there is time for: of each shading, balls whose triangles cover so many pixels each, the least
-/// and the greatest area first.
+/// What to draw: a picture of this size without an object, or balls of (shading, triangles, pixels) each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Ask {
+    Empty(Size),
+    Balls(Shading, u32, f64),
+}
+
+/// All pictures, in the order in which they are drawn: balls whose triangles cover the least and the greatest area first.
+fn asks(areas_px: &[f64]) -> Vec<Ask> {
+    let of = |area_px| {
+        numbers(area_px).flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(shading, triangles, pixels)))
+    };
+    EMPTY.into_iter().map(Ask::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
+}
+
+/// The part of all pictures that is left where so many are known, 0 … 1.
+#[must_use]
+pub fn benchmark_left(areas_px: &[f64], known: usize) -> f64 {
+    let all = asks(areas_px).len();
+    all.saturating_sub(known) as f64 / all.max(1) as f64
+}
+
+/// Draws all pictures, or as many as there is time for, without the first so many that are `known`.
 ///
 /// # Errors
 /// As [`Offscreen::new`] and [`Offscreen::render`].
-pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64]) -> Result<Vec<Drawn>, GpuError> {
+pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: usize) -> Result<Vec<Drawn>, GpuError> {
     let Ok(ball) = Tom::new(&generate(Generator::Sphere, 0, TRIANGLES[TRIANGLES.len() - 1])) else {
         return Ok(Vec::new());
     };
-    let (ball, begun) = (Arc::new(ball), Instant::now());
-    let mut drawn = Vec::new();
-    for size in EMPTY {
-        let mut screen = Offscreen::new(gpu.clone(), size, options)?;
-        let seconds = median(&mut screen, &mut Stage::new(Vec::new(), Vec::new()), 1.0, &[])?;
-        let (objects, polygons, pixels) = (0, 0.0, 0.0);
-        drawn.push(Drawn { picture_px: size.pixels(), objects, polygons, pixels, shading: Shading::PerPixel, seconds });
-    }
+    let ball = Arc::new(ball);
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
     // shaders are compiled where they are first drawn with: that is no part of what drawing takes
     for shading in SHADINGS {
         measure(&mut screen, &ball, (shading, TRIANGLES[0], SQUARES[0].1))?;
     }
-    for area_px in ends_first(areas_px) {
-        for (triangles, pixels) in numbers(area_px) {
-            for shading in SHADINGS {
-                if begun.elapsed() > LONGEST {
-                    return Ok(drawn);
-                }
-                drawn.push(measure(&mut screen, &ball, (shading, triangles, pixels))?);
-            }
+    let (begun, mut drawn) = (Instant::now(), Vec::new());
+    for ask in asks(areas_px).into_iter().skip(known) {
+        if begun.elapsed() > LONGEST {
+            break;
         }
+        drawn.push(match ask {
+            Ask::Balls(shading, triangles, pixels) => measure(&mut screen, &ball, (shading, triangles, pixels))?,
+            Ask::Empty(size) => {
+                screen = screen.resized(size)?;
+                let found = empty(&mut screen)?;
+                screen = screen.resized(SIZE)?;
+                found
+            }
+        });
     }
     Ok(drawn)
+}
+
+/// A picture without an object.
+fn empty(screen: &mut Offscreen) -> Result<Drawn, GpuError> {
+    let seconds = median(screen, &mut Stage::new(Vec::new(), Vec::new()), 1.0, &[])?;
+    let (picture_px, shading) = (screen.size().pixels(), Shading::PerPixel);
+    Ok(Drawn { picture_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
 }
 
 /// The first, the last, the second, the last but one and so on: what is measured until time runs out spans the whole.
@@ -174,6 +200,15 @@ fn place(id: u32, side: u32) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_known_is_not_drawn_again() {
+        let areas = [1.0, 16.0, 256.0];
+        let all = asks(&areas);
+        assert_eq!(all[..3], EMPTY.map(Ask::Empty));
+        assert!(all.len() > 20 && all[3..].iter().all(|ask| matches!(ask, Ask::Balls(..))));
+        assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
+    }
 
     #[test]
     fn areas_are_gone_through_from_both_ends() {

@@ -23,7 +23,7 @@ mod survey;
 mod view;
 pub mod viewer;
 
-pub use benchmark::{Drawn, benchmark};
+pub use benchmark::{Drawn, benchmark, benchmark_left};
 pub use compose::Hand;
 pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 pub use gather::{Actor, Form, Look, Material, Prop, Stage, States};

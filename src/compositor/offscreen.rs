@@ -190,6 +190,18 @@ impl Offscreen {
     /// [`GpuError::Draw`] where the device cannot do it or the size is beyond its limit.
     pub fn new(gpu: Gpu, size: Size, options: RendererOptions) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, options)?;
+        Self::with(gpu, renderer, size)
+    }
+
+    /// The same with another size: what the renderer has made for its adapter stays.
+    ///
+    /// # Errors
+    /// [`GpuError::Draw`] where the size is beyond the device's limit.
+    pub fn resized(self, size: Size) -> Result<Self, GpuError> {
+        Self::with(self.gpu, self.renderer, size)
+    }
+
+    fn with(gpu: Gpu, renderer: Renderer, size: Size) -> Result<Self, GpuError> {
         let max = gpu.device.limits().max_texture_dimension_2d;
         if size.width > max || size.height > max {
             return Err(DrawError::TooLarge { width: size.width, height: size.height, max }.into());

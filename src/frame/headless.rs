@@ -82,7 +82,7 @@ fn prepare(session: &mut Session, plan: &mut Headless) -> Result<(), SessionErro
     session.hold();
     if let Drawing::Every(screen) = &mut plan.drawing {
         let gpu = screen.gpu().clone();
-        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu));
+        session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu));
         let camera = session.scene_camera();
         session.compose(&camera, plan.size, plan.style, None);
         screen.render(session.picture(), &camera).map_err(SessionError::Draw)?;

@@ -102,7 +102,9 @@ pub struct Outcome {
     pub warm_up: usize,
     /// Simulated time, seconds.
     pub sim_s: f64,
-    /// Wall time, seconds; virtual in lockstep.
+    /// Wall time before real time began to pass, seconds: an adapter is opened and measured, a first picture drawn.
+    pub start_up_s: f64,
+    /// Wall time from then on, seconds; virtual in lockstep.
     pub wall_s: f64,
     /// CPU time of all agents' turns, seconds; really measured.
     pub cpu_s: f64,

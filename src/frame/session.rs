@@ -50,11 +50,15 @@ pub struct Session {
     lens: Option<(Duration, Camera)>,
     /// From reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
+    /// When real time began to pass.
+    begun: Duration,
     warm_up: usize,
     finished: u64,
     keep: usize,
     /// Whether the usual prices of drawing stand in for the adapter's.
     unpriced: bool,
+    /// Hears a line where the start takes its time.
+    tell: fn(&str),
 }
 
 /// What a finished frame took.
@@ -133,10 +137,12 @@ impl Session {
             last_start: None,
             lens: None,
             lag_s: 0.0,
+            begun: Duration::ZERO,
             warm_up: 0,
             finished: 0,
             keep: usize::MAX,
             unpriced: false,
+            tell: |_| {},
             scene,
         })
     }
@@ -204,12 +210,17 @@ impl Session {
         &mut self.control
     }
 
+    /// Says a line by `tell` where the start takes its time; else it says nothing.
+    pub fn tell_by(&mut self, tell: fn(&str)) {
+        self.tell = tell;
+    }
+
     /// Takes the prices of the adapter that draws, where they are known or can be measured; declared costs stay as they are.
     /// `on_processor`: it is a processor that draws.
-    pub(super) fn calibrate(&mut self, adapter: &str, on_processor: bool, open: impl FnOnce() -> Option<Gpu>) {
+    pub(super) fn calibrate(&mut self, (adapter, on_processor): (&str, bool), open: impl FnOnce() -> Option<Gpu>) {
         self.shares_processor |= on_processor;
         if self.control.policy().predicts() && !self.is_virtual() {
-            let prices = calibrate::prices(adapter, open);
+            let prices = calibrate::prices(adapter, open, self.tell);
             self.unpriced = prices.is_none();
             prices.into_iter().for_each(|prices| self.control.set_prices(prices));
         }
@@ -319,6 +330,7 @@ impl Session {
     /// Lets real time pass that [`Session::hold`] keeps waiting.
     pub fn begin(&mut self) {
         if !self.is_virtual() {
+            self.begun = self.now();
             self.run.drive(Drive::Run);
         }
     }
@@ -371,7 +383,7 @@ impl Session {
         let handles = self.run.agents().to_vec();
         let clamp = self.clamp();
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
-        let (wall_s, sim_s) = (self.now().as_secs_f64(), self.sim_now().as_secs_f64());
+        let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
         let stats = self.run.shutdown();
         let held = |at: usize| holding::held(&self.holdings, AgentId(at as u32));
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
@@ -386,6 +398,7 @@ impl Session {
             finished: self.finished,
             warm_up: self.warm_up,
             sim_s,
+            start_up_s: self.begun.as_secs_f64(),
             wall_s,
             cpu_s: stats.iter().map(|s| s.cpu_s).fold(0.0, |sum, s| sum + s), // an empty sum() is -0
             state_hash: runtime::state_hash(&handles),

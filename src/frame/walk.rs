@@ -28,7 +28,7 @@ impl Walk {
         let mut session = Session::open(scene)?;
         session.drive(Drive::Pause);
         let gpu = screen.gpu();
-        session.calibrate(&gpu.describe(), gpu.is_processor(), || Some(gpu.clone()));
+        session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu.clone()));
         Ok(Self { session, drawing: Drawing::Every(Box::new(screen)), length_s })
     }
 

@@ -167,8 +167,10 @@ impl<'a> WindowShow<'a> {
 
     /// Lets time pass for the first time, unless the user has said otherwise.
     fn begin(&mut self) {
-        if self.running {
-            self.session.drive(Drive::Run);
+        match (self.running, self.session.is_virtual()) {
+            (true, true) => self.session.drive(Drive::Run),
+            (true, false) => self.session.begin(),
+            (false, _) => {}
         }
     }
 
@@ -396,7 +398,7 @@ impl Show for WindowShow<'_> {
     fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
         self.adapter = Some(adapter.to_owned());
         // the same adapter without a window: the benchmark needs a device that nobody else draws with
-        self.session.calibrate(adapter, on_processor, || Gpu::headless().ok());
+        self.session.calibrate((adapter, on_processor), || Gpu::headless().ok());
     }
 
     fn ahead(&mut self, camera: Camera) -> Camera {

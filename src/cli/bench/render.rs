@@ -38,7 +38,7 @@ impl Subject for Render {
         if !watch.goes_on(0.0, gpu.describe()) {
             return Ok(Vec::new());
         }
-        let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX)?;
+        let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX, 0)?;
         Ok(drawn.iter().map(|drawn| row(&gpu.describe(), drawn)).collect())
     }
 

@@ -30,8 +30,10 @@ pub struct Report {
     pub frames: u64,
     /// Simulated seconds.
     pub sim_s: f64,
-    /// Seconds on the wall; in lockstep, of the virtual clock.
+    /// Seconds on the wall from the first step on; in lockstep, of the virtual clock.
     pub wall_s: f64,
+    /// Seconds before that: opening the adapter, measuring it, a first picture.
+    pub start_up_s: f64,
     /// CPU seconds of the agents' turns alone, really measured.
     pub cpu_s: f64,
     /// Hash of every agent's last state, 16 hexadecimal digits: equal hashes mean equal bits.
@@ -237,6 +239,7 @@ impl Report {
             frames: 0,
             sim_s: 0.0,
             wall_s: 0.0,
+            start_up_s: 0.0,
             cpu_s: 0.0,
             state_hash: name(),
             target_ms: 0.0,
@@ -266,6 +269,7 @@ mod tests {
             "/frames",
             "/sim_s",
             "/wall_s",
+            "/start_up_s",
             "/cpu_s",
             "/state_hash",
             "/target_ms",

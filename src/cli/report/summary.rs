@@ -55,12 +55,21 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
         let _ = write!(out, "; {:.2} % of levels change, {:.2} % back", 100.0 * change, 100.0 * back);
     }
     if let Some(error) = choices.model_error {
-        let _ = write!(out, "; predicted to {:.1} %", 100.0 * error);
+        let _ = write!(out, "; predictions {}", off_by(error));
     }
     if let Some(gap) = choices.certificate {
         let _ = write!(out, "; within {:.2} % of the best", 100.0 * gap);
     }
     let _ = writeln!(out);
+}
+
+/// How far off what policies foretell is, in 19 of 20 frames, as a part of what it was.
+fn off_by(error: f64) -> String {
+    if error < 1.0 {
+        format!("off by less than {:.1} % (19 of 20 frames)", 100.0 * error)
+    } else {
+        format!("useless: off by up to {error:.1} times what a frame took (19 of 20 frames)")
+    }
 }
 
 fn agent_row(out: &mut String, agent: &AgentReport) {

@@ -68,3 +68,24 @@ pub(super) fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome
     };
     scene.probes.iter().enumerate().filter_map(point).collect()
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scene::{self, Source};
+
+    #[test]
+    fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {
+        let text = b"format = 1\nexecutor = \"threads\"\n[[object]]\nname = \"idle\"\nmodel = \"synthetic\"\nrate_hz = 10.0\ncost_us = 10.0\n";
+        let scene = scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
+        let opened = std::time::Instant::now();
+        let mut session = Session::open(scene).unwrap();
+        session.hold();
+        let held = session.now() + Duration::from_millis(30);
+        session.wait_until(held);
+        session.begin();
+        let outcome = session.end(None, false);
+        let (start_up_s, wall_s) = (outcome.start_up_s, outcome.wall_s);
+        assert!(start_up_s >= 0.03 && wall_s <= opened.elapsed().as_secs_f64() - 0.03, "{start_up_s} s, {wall_s} s");
+    }
+}
