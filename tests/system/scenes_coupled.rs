@@ -167,6 +167,33 @@ fn agents_that_start_inside_fixed_solids_are_named() {
     assert_eq!(overlaps.len(), 3);
 }
 
+/// The slow light body gets in one piece what the fast heavy one gave it bit by bit, while it stood on the ground, which took it.
+#[test]
+fn what_falls_on_a_light_box_comes_to_lie_on_it_at_any_rates() {
+    let fall = |[light_kg, heavy_kg]: [f64; 2], [light_hz, heavy_hz]: [f64; 2]| {
+        let cube = |name: &str, half: f64, z: f64, kg: f64, hz: f64| {
+            format!(
+                "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [{half}, {half}, {half}]\n\
+                 mass_kg = {kg}\nposition_m = [0, 0, {z}]\nrate_hz = {hz}\n[[probe]]\nobject = \"{name}\"\n"
+            )
+        };
+        let ground = "[[object]]\nname = \"ground\"\nmodel = \"rigid\"\nshape = \"plane\"\n";
+        let boxes =
+            [cube("light", 0.1, 0.1, light_kg, light_hz), cube("heavy", 0.2, 0.42, heavy_kg, heavy_hz)].concat();
+        Folder::with(&format!("{ground}{boxes}")).lockstep(&["--seconds", "1"])
+    };
+    for masses in [[1.0, 1.0], [0.1, 10.0], [0.1, 100.0]] {
+        for rates in [[240.0, 240.0], [60.0, 240.0], [30.0, 480.0], [10.0, 1000.0], [1000.0, 10.0]] {
+            let report = fall(masses, rates);
+            for (k, height) in [0.1, 0.4].into_iter().enumerate() {
+                let at = point(&report, &format!("/probes/{k}/position_m"));
+                let off = (at[2] - height).abs().max(at[0].hypot(at[1]));
+                assert!(off < 1e-3, "{masses:?} kg, {rates:?} Hz: probe {k} at {at:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_oracle_tells_what_different_clocks_changed() {
     let report = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5", "--oracle"]);

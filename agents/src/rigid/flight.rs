@@ -71,12 +71,26 @@ impl RigidBody {
     /// The blow of a touch, with others where `met`. Whether it changed anything.
     fn take_blow(&mut self, met: bool) -> bool {
         self.steady = false;
+        let carried_m_s = if self.stand.is_some() { self.received } else { DVec3::ZERO };
         let before = self.motion.velocity;
-        let Self { motion, spread, world, company, meeting, obstacles, stand, received, .. } = self;
-        let strike = Strike { met, carried_m_s: if stand.is_some() { *received } else { DVec3::ZERO } };
+        let approached = self.strike(Strike { met, carried_m_s });
+        approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
+    }
+
+    /// A blow; whether anything approached.
+    fn strike(&mut self, strike: Strike) -> bool {
+        let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
         let approached = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles, strike);
         self.world.moved();
-        approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
+        approached
+    }
+
+    /// What the body was given while it stood has pressed it on the ground all the time: the ground has taken it, before a world
+    /// that it shares moves anybody.
+    pub(super) fn stand_fast(&mut self) {
+        if self.received != DVec3::ZERO && (self.touching || self.stand.is_some()) {
+            self.strike(Strike { met: false, carried_m_s: self.received });
+        }
     }
 
     /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.

@@ -219,6 +219,7 @@ impl Island {
             let (body, around) = crew.body(member.seat);
             self.before.push((body.motion, body.touching));
             body.begin(around, &self.fellows, dt_s);
+            body.stand_fast();
             member.motion = body.motion;
         }
     }
