@@ -19,10 +19,11 @@ const NEAR: f64 = 0.05;
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
-    /// κ, 0.01 … 0.99: the share of an error (of logarithms) that one lesson removes where all time is work that ε scales.
-    /// From 1 on, the loop rings when a measurement comes one frame late (control.md, eq. 8).
+    /// κ, 0.01 … 1.99: the share of an error (of logarithms) that one lesson removes where all time is work that ε scales.
+    /// Below 1 the loop is stable in every scene, also where a measurement comes one frame late; from there on where the share s of work that ε
+    /// scales keeps κ s below 1 (control.md, eq. 8).
     pub kappa: f64,
-    /// λ, 0 … 0.99: the share of an error's change that a lesson adds: a PI law, with κ as its integral part. 0 is the law of eq. 7.
+    /// λ, 0 … 1.99: the share of an error's change that a lesson adds: a PI law, with κ as its integral part. 0 is the law of eq. 7.
     pub lead: f64,
     /// ln(T/t) above which a frame was early enough to refine; ≥ 0.
     pub early: f64,
@@ -40,9 +41,9 @@ impl Default for Gains {
 
 impl Gains {
     fn sound(self) -> Self {
-        let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 0.99)) } else { Self::default().kappa };
+        let kappa = if self.kappa.is_finite() { within(self.kappa, (0.01, 1.99)) } else { Self::default().kappa };
         let width = |w: f64| if w.is_finite() { w.max(0.0) } else { 0.0 };
-        Self { kappa, lead: within(width(self.lead), (0.0, 0.99)), early: width(self.early), late: width(self.late) }
+        Self { kappa, lead: within(width(self.lead), (0.0, 1.99)), early: width(self.early), late: width(self.late) }
     }
 }
 
@@ -164,7 +165,7 @@ impl LogLaw {
         self.value = within(value, self.range);
     }
 
-    /// Takes other gains from the next lesson on; the value stays. κ is brought inside 0.01 … 0.99.
+    /// Takes other gains from the next lesson on; the value stays. κ is brought inside 0.01 … 1.99.
     pub fn set_gains(&mut self, gains: Gains) {
         self.gains = gains.sound();
     }

@@ -118,9 +118,9 @@ pub enum Law {
     },
     /// The law on the logarithm of the measured time (control.md, eq. 7).
     Corrected {
-        /// κ, 0.01 … 0.99: the share of an error that one frame removes.
+        /// κ, 0.01 … 1.99: the share of an error that one frame removes.
         kappa: f64,
-        /// λ, 0 … 0.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
+        /// λ, 0 … 1.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
         lead: f64,
         /// The share of the frame that is left free, 0 … 0.9: T_set = (1 − margin) T.
         margin: f64,

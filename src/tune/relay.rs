@@ -7,7 +7,7 @@ use crate::control::{FrameWork, Law, PictureControl, Policy};
 use std::time::Duration;
 
 /// Gains that the law takes.
-const GAINS: (f64, f64) = (0.01, 0.99);
+const GAINS: (f64, f64) = (0.01, 1.99);
 /// The relay moves ln ε by so much to either side.
 const HEIGHT: f64 = 0.2;
 /// Frames of the experiment, and those that are left out at its start.

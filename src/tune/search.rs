@@ -59,11 +59,11 @@ impl Family {
     /// Who is meant by the logarithms of its gains.
     fn contender(self, at: &[f64]) -> Contender {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
-        let (kappa, margin) = ((0.01, 0.99), (0.005, 0.5));
+        let (kappa, margin) = ((0.01, 1.99), (0.005, 0.5));
         match self {
             Self::Corrected => Law::Corrected { kappa: gain(0, kappa), lead: 0.0, margin: gain(1, margin) }.into(),
             Self::Pi => {
-                Law::Corrected { kappa: gain(0, kappa), lead: gain(2, (1e-3, 0.99)), margin: gain(1, margin) }.into()
+                Law::Corrected { kappa: gain(0, kappa), lead: gain(2, (1e-3, 1.99)), margin: gain(1, margin) }.into()
             }
             Self::Printed => Law::Printed { alpha: gain(0, (1e-9, 1.0)), beta: gain(1, (1e-6, 1e3)) }.into(),
             Self::Adaptive => Contender::Adaptive { margin: gain(0, margin) },
@@ -73,8 +73,8 @@ impl Family {
     /// Gains on the grid, one list for each gain.
     const fn grid(self) -> &'static [&'static [f64]] {
         match self {
-            Self::Corrected => &[&[0.15, 0.3, 0.5, 0.7], &[0.02, 0.04, 0.08, 0.16]],
-            Self::Pi => &[&[0.2, 0.4], &[0.02, 0.06], &[0.05, 0.15, 0.4]],
+            Self::Corrected => &[&[0.15, 0.3, 0.5, 0.9], &[0.02, 0.04, 0.08, 0.16]],
+            Self::Pi => &[&[0.2, 0.4, 1.0], &[0.02, 0.06], &[0.05, 0.3, 1.0]],
             Self::Printed => &[&[3e-6, 1e-5, 1e-4, 1e-3, 1e-2], &[1e-3, 0.5, 5.0]],
             Self::Adaptive => &[&[0.01, 0.03, 0.09]],
         }

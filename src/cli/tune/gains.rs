@@ -79,8 +79,8 @@ fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> 
         }
         "adaptive" => Contender::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
         _ => Law::Corrected {
-            kappa: gain("κ", "kappa", 0.5, (0.01, 0.99))?,
-            lead: gain("λ", "lead", lead, (0.0, 0.99))?,
+            kappa: gain("κ", "kappa", 0.5, (0.01, 1.99))?,
+            lead: gain("λ", "lead", lead, (0.0, 1.99))?,
             margin: gain(MARGIN, MARGIN, 0.1, (0.0, 0.9))?,
         }
         .into(),

@@ -36,8 +36,8 @@ pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile
     let gains = file.map_or_else(Gains::default, |f| Gains {
         alpha: gain("alpha", f.alpha, allowed(1e-9..=1.0, "")),
         beta: gain("beta", f.beta, allowed(1e-6..=1e3, "")),
-        kappa: gain("kappa", f.kappa, allowed(1e-3..=0.999, "")),
-        lead: gain("lead", f.lead, allowed(0.0..=0.99, "")),
+        kappa: gain("kappa", f.kappa, allowed(1e-3..=1.99, "")),
+        lead: gain("lead", f.lead, allowed(0.0..=1.99, "")),
         margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
     });
     Target {
