@@ -73,8 +73,8 @@ pub struct RigidBody {
     pub(super) island: Option<Box<Island>>,
     /// Whether a joint of the scene holds the body; known from its first step on.
     jointed: Option<bool>,
-    /// How deep it sank into anything in the last step of its island, metres; zero alone.
-    sunk_m: f64,
+    /// How deep it sank into anything in the last step of its island, metres; `None` alone.
+    sunk_m: Option<f64>,
     /// What its steps in contact and under springs do wrong in a tenth of a second, metres.
     drift_m: f64,
 }
@@ -138,7 +138,7 @@ impl RigidBody {
             scenery: (spec.obstacles, spec.joints),
             island: None,
             jointed: None,
-            sunk_m: 0.0,
+            sunk_m: None,
             drift_m: 0.0,
         };
         body.put_down();
@@ -184,7 +184,7 @@ impl RigidBody {
 
     /// Ends a step in which a shared world has moved it.
     pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
-        (self.touching, self.sunk_m, self.calm_s) = (touching, sunk_m, 0.0);
+        (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
         // the world that it shares moves it by parts at the speed of their ends
         self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
         self.steps += 1;
@@ -254,7 +254,7 @@ impl Agent for RigidBody {
         if self.is_jointed(around.me) {
             return island::lead(self, dt, around, &mut [], &mut Vec::new());
         }
-        (self.island, self.sunk_m) = (None, 0.0);
+        (self.island, self.sunk_m) = (None, None);
         let (before, touching) = (self.motion, self.touching);
         self.begin(around, &[], dt_s);
         if !self.hold.is_known() {
@@ -357,7 +357,8 @@ impl RigidBody {
     fn residual_m(&self) -> f64 {
         let size = self.motion.position.abs().max_element() + self.world.mover.radius_m;
         if self.touching {
-            self.world.depth_m(&self.motion).max(self.sunk_m) + size * f64::from(f32::EPSILON) + self.drift_m
+            let sunk_m = self.sunk_m.unwrap_or_else(|| self.world.depth_m(&self.motion));
+            sunk_m + size * f64::from(f32::EPSILON) + self.drift_m
         } else {
             size * f64::EPSILON + self.drift_m
         }

@@ -31,6 +31,8 @@ pub(super) struct Member {
     pub motion: Motion,
     /// Gravity of the part being solved, m/s²; zero where a spring's solution has it already.
     pub gravity: DVec3,
+    /// Nothing but gravity and the island moves it in this step: its body is asked for nothing between the parts.
+    pub alone: bool,
     /// Whether it touched anything in the last part.
     pub touching: bool,
     /// How deep it sank into anything in the last part, metres, ≥ 0.
@@ -51,6 +53,7 @@ impl Member {
             restitution: body.company.form.restitution,
             motion: body.motion,
             gravity: body.gravity,
+            alone: false,
             touching: body.touching,
             depth_m: 0.0,
             joined_s: 0.0,

@@ -123,12 +123,13 @@ impl Island {
         let (mut left, mut parts) = (dt_s, 0);
         while left > 0.0 {
             let count = (left / self.span_s()).ceil().max(1.0);
-            if let Err(what) = self.part(crew, left / count) {
+            let at_once = if self.goes_on() { count } else { 1.0 };
+            if let Err(what) = self.parts(crew, left / count, at_once as u32) {
                 self.undo(crew);
                 return Err(diverged(dt_s, what.to_owned()));
             }
-            left = if count > 1.0 { left - left / count } else { 0.0 };
-            parts += 1;
+            left = if count > at_once { left - at_once * left / count } else { 0.0 };
+            parts += at_once as u32;
         }
         self.watch(dt_s, apart);
         let at_rest = self.rest(crew, dt_s);
@@ -220,7 +221,8 @@ impl Island {
             self.before.push((body.motion, body.touching));
             body.begin(around, &self.fellows, dt_s);
             body.stand_fast();
-            member.motion = body.motion;
+            (member.motion, member.gravity) = (body.motion, body.gravity);
+            member.alone = body.ties.is_empty() && body.company.guests().is_empty();
         }
     }
 
@@ -233,9 +235,15 @@ impl Island {
         }
     }
 
-    /// Advances everybody by `h` seconds: springs pull, then all contacts and joints are solved at once.
-    fn part(&mut self, crew: &mut Crew<'_, '_>, h: f64) -> Result<(), &'static str> {
-        for member in &mut self.members {
+    /// Whether a pile may go on part after part: nothing else moves anybody meanwhile.
+    fn goes_on(&self) -> bool {
+        matches!(self.solver, Solver::Many(_)) && self.members.iter().all(|m| m.alone)
+    }
+
+    /// Advances everybody by so many `parts` of `h` seconds, one where not all are alone: springs pull, then all contacts and
+    /// joints are solved at once.
+    fn parts(&mut self, crew: &mut Crew<'_, '_>, h: f64, parts: u32) -> Result<(), &'static str> {
+        for member in self.members.iter_mut().filter(|m| !m.alone) {
             let body = crew.body(member.seat).0;
             body.motion = member.motion;
             let pulled = body.pull(h)?;
@@ -255,7 +263,7 @@ impl Island {
             self.go_many();
         }
         let Solver::Many(pile) = &mut self.solver else { return Ok(()) };
-        pile.advance((&mut self.members, &self.ground), self.gravity, h)
+        pile.advance((&mut self.members, &self.ground), self.gravity, (h, parts))
     }
 
     /// Everybody is as before the step.
@@ -301,13 +309,13 @@ impl Island {
     fn rest(&mut self, crew: &mut Crew<'_, '_>, dt_s: f64) -> bool {
         let jointed = !self.held.is_empty();
         let calm = self.members.iter().all(|member| {
-            let body = crew.body(member.seat).0;
             let still = member.motion.velocity == DVec3::ZERO && member.motion.angular == DVec3::ZERO;
             let held = (member.touching || jointed) && member.speed_m_s() < CALM_M_S;
-            body.may_sleep
-                && body.ties.is_empty()
-                && body.company.is_calm(CALM_M_S)
-                && (held || (still && self.gravity == DVec3::ZERO))
+            // the bodies are asked last: most heaps are not calm, and a look at every one of them is dear
+            (held || (still && self.gravity == DVec3::ZERO)) && {
+                let body = crew.body(member.seat).0;
+                body.may_sleep && body.ties.is_empty() && body.company.is_calm(CALM_M_S)
+            }
         });
         self.calm_s = if calm { self.calm_s + dt_s } else { 0.0 };
         self.calm_s >= REST_S
