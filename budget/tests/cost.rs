@@ -220,7 +220,7 @@ fn lag_is_shared_out_whole() {
     let split = pipeline.split(20.0);
     assert_eq!((split.choose, split.draw, split.extrapolate), (4.0, 76.0, 100.0));
     let beside = Pipeline { overlapped: true, ..pipeline }.split(20.0);
-    assert_eq!((beside.choose, beside.draw), (1.5, 50.0));
+    assert_eq!((beside.choose, beside.draw), (4.0, 80.0));
     for cull in [200.0, f64::NAN, f64::INFINITY] {
         let split = pipeline.split(cull);
         assert_eq!((split.choose, split.draw), (0.0, 0.0));

@@ -9,6 +9,7 @@ use super::view::{Camera, Size};
 use image::RgbaImage;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, OnceLock};
+use std::time::Duration;
 
 /// Whether and why a device was lost.
 #[derive(Debug, Clone, Default)]
@@ -246,10 +247,26 @@ impl Offscreen {
     /// # Errors
     /// As [`Renderer::render`].
     pub fn render(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
+        let times = self.submit(picture, camera)?;
+        Ok(DrawTimes { gpu: self.wait()?, ..times })
+    }
+
+    /// Begins to draw: [`Offscreen::wait`] waits for its end, and this thread has its time to itself until then.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn submit(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
         let Some((_, view)) = &self.texture else { return Ok(DrawTimes::default()) };
-        let times = self.renderer.render(picture, camera, Target { view, size: self.size })?;
+        Ok(self.renderer.render(picture, camera, Target { view, size: self.size })?)
+    }
+
+    /// Waits until all that was submitted is drawn; the adapter's own time, where it has told of any.
+    ///
+    /// # Errors
+    /// [`GpuError::Draw`] where the device was lost.
+    pub fn wait(&mut self) -> Result<Option<Duration>, GpuError> {
         wait(&self.gpu.device, self.renderer.lost())?;
-        Ok(DrawTimes { gpu: self.renderer.gpu_time(), ..times })
+        Ok(self.renderer.gpu_time())
     }
 
     /// The pixels of the last picture, sRGB.

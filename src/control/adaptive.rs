@@ -34,6 +34,14 @@ struct Dish {
     weight: Option<f64>,
 }
 
+/// A choice that is drawn.
+#[derive(Debug, Clone, Copy, Default)]
+struct Drawn {
+    frame: u64,
+    plan: Plan,
+    fixed_s: f64,
+}
+
 /// The law, and what is on its menu.
 #[derive(Debug, Clone)]
 pub(super) struct AdaptiveChoice {
@@ -43,9 +51,11 @@ pub(super) struct AdaptiveChoice {
     closing: Closing,
     offers: Vec<Offer>,
     fixed_s: f64,
-    /// Number of the frame, as the law counts them.
+    /// Number of the frame chosen for last, as the law counts them.
     frame: u64,
     plan: Plan,
+    /// What the frame that is drawn was chosen with.
+    drawn: Drawn,
     status: Status,
     kept: Settings,
 }
@@ -61,6 +71,7 @@ impl Default for AdaptiveChoice {
             fixed_s: 0.0,
             frame: 0,
             plan: Plan::default(),
+            drawn: Drawn::default(),
             status: Status::Waiting,
             kept,
         }
@@ -82,16 +93,23 @@ impl AdaptiveChoice {
         self.promise()
     }
 
-    /// Learns what the frame took: the drawing of what was chosen, and all of it, and what was kept for others; seconds.
+    /// What was chosen last is drawn now.
+    pub fn take_up(&mut self) {
+        self.drawn = Drawn { frame: self.frame, plan: self.plan, fixed_s: self.fixed_s };
+    }
+
+    /// Learns what the frame that is drawn took: the drawing of what was chosen, and all of it, and what was kept for others; seconds.
     pub fn observe(&mut self, drawn_s: f64, (work_s, others_s): (f64, f64), target_s: f64) {
-        self.law.observe(self.frame, DRAWING, TICKS * drawn_s);
-        self.law.finished(self.frame, TICKS * work_s);
-        let missing = (work_s + others_s) / target_s - self.plan.predicted / (TICKS * target_s);
+        let Drawn { frame, plan, fixed_s } = self.drawn;
+        self.law.observe(frame, DRAWING, TICKS * drawn_s);
+        self.law.finished(frame, TICKS * work_s);
+        let missing = (work_s + others_s) / target_s - plan.predicted / (TICKS * target_s);
+        let spent_s = plan.predicted / TICKS - fixed_s;
         self.status = match () {
-            () if !self.plan.feasible => Status::Clamped(Bound::Coarsest),
+            () if !plan.feasible => Status::Clamped(Bound::Coarsest),
             () if missing.abs() > ON_TARGET => Status::Moving,
-            () if self.plan.lambda == 0.0 => Status::Clamped(Bound::Finest),
-            () if self.plan.budget / (TICKS * target_s) - self.spent() / target_s > ON_TARGET => Status::BetweenLevels,
+            () if plan.lambda == 0.0 => Status::Clamped(Bound::Finest),
+            () if plan.budget / (TICKS * target_s) - spent_s / target_s > ON_TARGET => Status::BetweenLevels,
             () => Status::Settled,
         };
     }
@@ -106,7 +124,7 @@ impl AdaptiveChoice {
     }
 
     /// κ as planned with: how much slower the machine is than its prices.
-    fn kappa(&self) -> f64 {
+    pub fn kappa(&self) -> f64 {
         self.law.planned_kappa(DRAWING)
     }
 
@@ -118,11 +136,6 @@ impl AdaptiveChoice {
     /// The part of the target that is left free now.
     pub fn margin(&self) -> f64 {
         self.law.margin()
-    }
-
-    /// Time of what was chosen, seconds.
-    fn spent(&self) -> f64 {
-        self.plan.predicted / TICKS - self.fixed_s
     }
 
     fn set_margin(&mut self, ask: &Ask<'_>) {

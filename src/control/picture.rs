@@ -3,6 +3,7 @@
 //! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule.
 //! A frame is `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
 
+mod ahead;
 mod wishes;
 
 use super::adaptive::AdaptiveChoice;
@@ -21,6 +22,7 @@ use super::select::Select;
 use super::status::Status;
 use super::view::{Kind, ObjectView};
 use super::worth;
+use ahead::Ahead;
 use metachron_agents::{AgentId, Resolution};
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::cost::pipeline::Pipeline;
@@ -75,6 +77,10 @@ pub struct PictureControl {
     speeds: Vec<(AgentId, Option<f64>)>,
     views: Vec<Seen>,
     plan: Plan,
+    /// What was chosen for the next frame while this one is drawn.
+    ahead: Option<Ahead>,
+    /// What the levels of this frame were to take for one second that they take as they are seen now, both by the prices.
+    chosen_part: f64,
 }
 
 impl PictureControl {
@@ -107,6 +113,8 @@ impl PictureControl {
             speeds: Vec::new(),
             views: Vec::new(),
             plan: Plan::default(),
+            ahead: None,
+            chosen_part: 1.0,
         }
     }
 
@@ -128,9 +136,9 @@ impl PictureControl {
         match self.policy {
             Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
             Policy::Threshold => self.select.observe(work_s, target_s),
-            Policy::Adaptive => {
-                let chosen_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
-                self.adaptive.observe(chosen_s, (work_s, self.others_s), target_s);
+            Policy::Adaptive if self.is_as_chosen() => {
+                let drawn_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
+                self.adaptive.observe(self.chosen_part * drawn_s, (work_s, self.others_s), target_s);
             }
             _ => {}
         }
@@ -148,6 +156,8 @@ impl PictureControl {
         levels.clear();
         self.plan.promise = self.choose(&mut levels);
         self.plan.levels = levels;
+        (self.ahead, self.chosen_part) = (None, 1.0);
+        self.adaptive.take_up();
         self.count();
         &self.plan
     }
@@ -178,7 +188,7 @@ impl PictureControl {
         let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
         self.others_s = self.reserve_s + kept_s;
         let fixed_s = self.prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
-        if (fixed_s - self.fixed_s).abs() * self.target_hz > FIXED_TREMBLE {
+        if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
             self.fixed_s = fixed_s;
         }
         let ask = Ask {

@@ -5,7 +5,8 @@
 //! Theory: `docs/theory/budget.md`, eq. 41 … 44.
 
 use super::area::Areas;
-use super::view::Shading;
+use super::plan::LevelDemand;
+use super::view::{ObjectView, Shading};
 use metachron_budget::cost::fit::{Sample, fit};
 use metachron_budget::cost::stages::{Stages, Work};
 
@@ -136,6 +137,13 @@ impl Prices {
             (Some(areas), Shading::Shadowed) => areas[Shading::Textured as usize].time(polygons, SOFTER * pixels),
             (Some(areas), _) => areas[shading as usize].time(polygons, pixels),
         }
+    }
+
+    /// Seconds of the objects in view at these levels; both in the same order.
+    #[must_use]
+    pub fn objects_s<'a>(&self, views: impl Iterator<Item = &'a ObjectView>, levels: &[LevelDemand]) -> f64 {
+        let drawn = views.zip(levels).filter(|(view, level)| view.visible && level.polygons > 0.0);
+        drawn.map(|(view, level)| self.object_s(level.shading, level.polygons, view.pixels)).fold(0.0, |sum, s| sum + s)
     }
 
     /// Seconds of a picture in which nothing is chosen.

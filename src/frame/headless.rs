@@ -121,15 +121,19 @@ pub(super) fn frame_seen_by(
     let started = session.now();
     session.compose(camera, size, style, None);
     let composed = session.now();
-    let gpu = match drawing {
-        Drawing::Every(screen) => screen.render(session.picture(), camera).map_err(SessionError::Draw)?.gpu,
+    let (draw, gpu) = match drawing {
+        Drawing::Every(screen) => {
+            screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
+            session.choose_beside(camera, size);
+            let gpu = screen.wait().map_err(SessionError::Draw)?;
+            (session.now().saturating_sub(composed), gpu)
+        }
         Drawing::Last(_) | Drawing::Nothing => {
-            session.spend_declared(size);
-            None
+            session.choose_beside(camera, size);
+            (session.spend_declared(size), None)
         }
     };
-    let done = session.now();
-    let (work, draw) = (done.saturating_sub(started), done.saturating_sub(composed));
+    let work = session.now().saturating_sub(started);
     Ok(session.finish(started, Finished { work, draw, gpu, skip }))
 }
 

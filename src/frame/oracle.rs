@@ -130,6 +130,7 @@ fn common_clock(scene: &Scene) -> Scene {
     machine.steps = MODELS.map(|model| (model.to_owned(), Some(0.0), Some(0.0))).to_vec();
     (machine.draw_setup_ms, machine.draw_object_us) = (Some(0.0), Some(0.0));
     (machine.draw_triangle_us, machine.draw_pixel_ns) = (Some(0.0), Some(0.0));
+    (machine.cull_object_ns, machine.choose_object_ns) = (Some(0.0), Some(0.0));
     machine.noise = Some(0.0);
     scene
 }

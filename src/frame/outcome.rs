@@ -29,9 +29,9 @@ pub struct FrameRecord {
     pub triangles: u64,
     /// Objects in view.
     pub objects: u64,
-    /// Gathering states and finding what is seen, milliseconds; zero in lockstep, as choosing is.
+    /// Gathering states and finding what is seen, milliseconds; in lockstep as it is declared, as choosing is.
     pub cull_ms: f64,
-    /// Choosing levels, milliseconds.
+    /// Choosing levels, milliseconds; with a bounded lag the next frame's, beside the drawing of this one.
     pub select_ms: f64,
     /// Making the picture and drawing it, milliseconds.
     pub draw_ms: f64,

@@ -3,6 +3,7 @@
 //! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
 
+mod ahead;
 mod choose;
 mod record;
 
@@ -48,6 +49,8 @@ pub struct Session {
     last_start: Option<Duration>,
     /// Where the camera was when it was last read, and when.
     lens: Option<(Duration, Camera)>,
+    /// Where the next frame's camera will be when its picture is finished, as far as that can be known.
+    next_eye: Option<Camera>,
     /// From reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
     /// When real time began to pass.
@@ -82,13 +85,19 @@ struct Chosen {
     more_triangles: f64,
     /// Gathering states and finding what is seen.
     cull: Duration,
-    /// Choosing levels.
+    /// Choosing levels before the picture is made.
     select: Duration,
+    /// Choosing the next frame's beside the drawing of this one.
+    beside: Option<Duration>,
     /// Making the picture at these levels.
     build: Duration,
     /// Triangles that nobody chose: fixed solids, the floor, the caps of tubes.
     other_triangles: f64,
     objects: u64,
+    /// What the chosen objects take on the declared machine, seconds.
+    objects_s: f64,
+    /// Mean level.
+    n: f64,
 }
 
 /// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
@@ -136,6 +145,7 @@ impl Session {
             chosen: Chosen::default(),
             last_start: None,
             lens: None,
+            next_eye: None,
             lag_s: 0.0,
             begun: Duration::ZERO,
             warm_up: 0,
@@ -300,19 +310,6 @@ impl Session {
     #[must_use]
     pub fn camera_at(&self, seconds: f64) -> Camera {
         cast::camera(&self.scene, &self.stage, seconds)
-    }
-
-    /// Where a camera that is read now will be when the picture begun now is finished; where the scene asks for no lag, where it is.
-    pub fn ahead(&mut self, camera: Camera) -> Camera {
-        let now = self.now();
-        let before = self.lens.replace((now, camera));
-        match (self.scene.target.lag, before) {
-            (Some((most_s, _)), Some((then, before))) => {
-                let passed_s = now.saturating_sub(then).as_secs_f64();
-                camera.carried_on(&before, self.lag_s.min(most_s) / passed_s)
-            }
-            _ => camera,
-        }
     }
 
     /// Waits until the wall time `until`, the agents going on meanwhile.

@@ -77,6 +77,8 @@ struct WindowShow<'a> {
     hand: Option<Hand>,
     tuning: Option<Tuning>,
     started: Duration,
+    /// What drawing took of the declared frame.
+    declared_draw: Duration,
     refreshed: Option<Duration>,
     last: FrameRecord,
     pictures: u64,
@@ -112,6 +114,7 @@ impl<'a> WindowShow<'a> {
             hand: None,
             tuning: None,
             started: Duration::ZERO,
+            declared_draw: Duration::ZERO,
             refreshed: None,
             last: FrameRecord::default(),
             pictures: 0,
@@ -371,9 +374,16 @@ impl Show for WindowShow<'_> {
         }
         self.session.compose(&view.camera, view.size, view.style, self.hand);
         if self.session.is_virtual() {
-            self.session.spend_declared(view.size);
+            self.session.choose_beside(&view.camera, view.size);
+            self.declared_draw = self.session.spend_declared(view.size);
         }
         self.session.picture()
+    }
+
+    fn while_drawn(&mut self, view: &ViewRequest) {
+        if !self.session.is_virtual() {
+            self.session.choose_beside(&view.camera, view.size);
+        }
     }
 
     fn measured(&mut self, times: &FrameTimes) {
@@ -381,8 +391,8 @@ impl Show for WindowShow<'_> {
             self.session.pass_over();
             return;
         }
-        let declared = || self.session.now().saturating_sub(self.started);
-        let (work, draw) = if self.session.is_virtual() { (declared(), declared()) } else { (times.work, times.draw) };
+        let declared = || (self.session.now().saturating_sub(self.started), self.declared_draw);
+        let (work, draw) = if self.session.is_virtual() { declared() } else { (times.work, times.draw) };
         let unlike = times.skip.is_some();
         let skip = unlike || self.tuning.as_ref().is_some_and(Tuning::draws);
         self.last = self.session.finish(self.started, Finished { work, draw, gpu: times.draw_gpu, skip });

@@ -15,6 +15,8 @@ pub struct Machine {
     pub steps: Vec<StepPrice>,
     /// What a frame costs.
     pub draw: DrawPrice,
+    /// Nanoseconds that finding out whether an object is seen takes, and choosing the level of one in view, ≥ 0.
+    pub choice_ns: (f64, f64),
     /// Relative standard deviation of every cost, `0..=1`.
     pub noise_sd: f64,
     /// Relative standard deviation of a factor on frames that wanders, nine tenths of it kept from one frame to the next, `0..=1`.
@@ -96,6 +98,7 @@ impl Machine {
                 price("synthetic", 0.0, 1.0),
             ],
             draw: DrawPrice { setup_ms: 1.4, pixel_ns: 6.0, objects: [price_of_objects(5.0, 0.22); 4] },
+            choice_ns: (0.0, 0.0),
             noise_sd: 0.0,
             wander_sd: 0.0,
             spikes: 0.0,

@@ -143,6 +143,10 @@ pub struct Machine {
     pub draw_triangle_us: Option<f64>,
     /// Nanoseconds a pixel.
     pub draw_pixel_ns: Option<f64>,
+    /// Nanoseconds that culling takes an object.
+    pub cull_object_ns: Option<f64>,
+    /// Nanoseconds that choosing takes an object in view.
+    pub choose_object_ns: Option<f64>,
     /// What objects cost by their shading: flat, Gouraud, light at every pixel, textured.
     pub shading: [ObjectCost; 4],
     /// Relative standard deviation of every cost, 0 … 1.

@@ -122,6 +122,84 @@ fn a_lag_that_is_bounded_is_kept() {
     assert!(free > 24.0 && bounded <= 12.0 && bounded > 8.0, "{free} {bounded}");
 }
 
+/// Nine balls before a camera that stands still, all of them at their finest, on a machine on which `choosing` has a price.
+fn calm(target: &str, choosing: &str) -> String {
+    format!(
+        "[target]\nframe_hz = 10.0\npolicy = \"adaptive\"\n{target}\n[camera]\neye_m = [0, -8, 2]\n[machine]\n{choosing}\n\
+         [[object]]\nname = \"ball\"\nmodel = \"mesh\"\ngenerate = \"blob\"\ntriangles = 2000\ngrid = [3, 3, 1]\n\
+         spacing_m = [1, 1, 0]\n"
+    )
+}
+
+#[test]
+fn choosing_beside_drawing_shortens_the_lag_by_exactly_what_drawing_hides() {
+    let last = |target: &str, choosing: &str| *play(&calm(target, choosing), 8).frames.last().expect("eight frames");
+    let (asked, near) = ("lag_ms = 1000.0", |a: f64, b: f64| (a - b).abs() < 1e-5); // times are whole nanoseconds
+    // ten objects' culling and choosing; drawing takes longer
+    let cheap = "cull_object_ns = 100_000.0\nchoose_object_ns = 200_000.0";
+    let (row, beside) = (last("", cheap), last(asked, cheap));
+    assert_eq!(row.triangles, beside.triangles);
+    let (cull, select) = (row.cull_ms, row.select_ms);
+    assert!(near(cull, 0.9) && near(select, 1.8) && row.draw_ms > 2.0 * (cull + select), "{row:?}");
+    assert!(near(row.lag_ms, cull + select + row.draw_ms), "one after the other: {row:?}");
+    assert!(near(beside.lag_ms, row.lag_ms - select), "{} of {}", beside.lag_ms, row.lag_ms);
+    // beside drawing it is found out for the next frame's camera what is seen, too
+    assert!(near(beside.select_ms, cull + select) && near(beside.draw_ms, row.draw_ms), "{beside:?}");
+    // drawing hides no more than it takes
+    let dear = "cull_object_ns = 100_000.0\nchoose_object_ns = 900_000.0";
+    let (row, beside) = (last("", dear), last(asked, dear));
+    let hidden = row.draw_ms;
+    assert!(row.select_ms + row.cull_ms > hidden, "{row:?}");
+    assert!(near(beside.lag_ms, row.cull_ms + beside.select_ms), "{beside:?}");
+}
+
+#[test]
+fn what_comes_into_view_after_the_choice_is_drawn_at_its_coarsest_and_chosen_for_beside_that_drawing() {
+    let wall = |name: &str, y: i32| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"mesh\"\ngenerate = \"blob\"\ntriangles = 4000\nposition_m = [0, {y}, 0]\n"
+        )
+    };
+    let (front, back) = (wall("front", 0), wall("back", -12));
+    let text = format!("[target]\nframe_hz = 20.0\npolicy = \"adaptive\"\nlag_ms = 40.0\n{front}{back}");
+    let mut session = session(&text);
+    let eye = glam::DVec3::new(0.0, -6.0, 0.0);
+    let looking = |y: f64| Camera::looking(eye, glam::DVec3::new(0.0, y, 0.0), 0.8);
+    let mut frame = |y: f64| {
+        let (camera, started) = (looking(y), session.now());
+        let triangles = session.compose(&camera, SIZE, Style::default(), None).triangles();
+        session.choose_beside(&camera, SIZE);
+        let draw = session.spend_declared(SIZE);
+        let work = session.now() - started;
+        session.finish(started, Finished { work, draw, gpu: None, skip: false });
+        (triangles, [0, 1].map(|at: usize| session.levels()[at].triangles))
+    };
+    // one of them is ever in view; while a mesh goes over to another level both are drawn as the finer one
+    let before = (0..10).map(|_| frame(0.0)).last().expect("ten frames");
+    assert!(before.1[0] > 1000 && before.0 > 1000, "{before:?}");
+    let turned = frame(-12.0);
+    assert!(
+        (1..400).contains(&turned.1[1]) && (1..400).contains(&turned.0),
+        "the front is gone, the back is there: {turned:?}"
+    );
+    let after = frame(-12.0);
+    assert!(after.1[1] > 1000 && after.0 > 1000, "{after:?}");
+    let again = frame(0.0);
+    assert!((1..400).contains(&again.1[0]) && (1..400).contains(&again.0), "{again:?}");
+}
+
+#[test]
+fn a_frame_whose_time_is_gone_before_anything_is_drawn_is_drawn_in_lowest_forms() {
+    let first = |cull_ns: &str| {
+        let text = calm("", &format!("cull_object_ns = {cull_ns}")).replace("frame_hz = 10.0", "frame_hz = 100.0");
+        play(&text, 1).frames[0]
+    };
+    // nine objects in a frame of 10 ms: 0.9 and 9 ms of it
+    let (in_time, late) = (first("100_000.0"), first("1_000_000.0"));
+    assert!(in_time.triangles > 5 * late.triangles && late.triangles >= 9, "{in_time:?} {late:?}");
+    assert!(late.frame_ms < in_time.frame_ms + 8.2, "{} {}", late.frame_ms, in_time.frame_ms);
+}
+
 /// How far the eye of the picture is from where the eye is when the picture is finished, metres, in the mean.
 fn eye_error_m(target: &str) -> f64 {
     let mut session = session(&turning(target));

@@ -10,11 +10,12 @@ pub struct Pipeline {
     pub lag: f64,
     /// The part of what culling leaves that choosing may take, 0 … 1.
     pub share: f64,
-    /// Whether the next frame is chosen while this one is drawn: then drawing has the whole rest of a period, and a frame lags two.
+    /// Whether the next frame is chosen while this one is drawn: then drawing has all that culling leaves, and choosing takes none of it.
     pub overlapped: bool,
 }
 
-/// The time of each part, ≥ 0; the sum is the lag where culling does not take it all.
+/// The time of each part, ≥ 0. Culling and what is longer of the other two where they go side by side, else culling and both, are the
+/// lag where culling does not take it all.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Split {
     /// For choosing.
@@ -32,11 +33,9 @@ impl Pipeline {
         let lag = if self.lag.is_finite() && self.lag > 0.0 { self.lag } else { 0.0 };
         let share = crate::within(self.share, (0.0, 1.0));
         let cull = if cull.is_finite() { cull.max(0.0) } else { lag };
-        // in two overlapping halves each is a period
-        let period = if self.overlapped { 0.5 * lag } else { lag };
-        let rest = (period - cull).max(0.0);
+        let rest = (lag - cull).max(0.0);
         let choose = share * rest;
-        let draw = if self.overlapped { period } else { rest - choose };
+        let draw = if self.overlapped { rest } else { rest - choose };
         Split { choose, draw, extrapolate: lag }
     }
 }

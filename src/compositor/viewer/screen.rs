@@ -121,6 +121,7 @@ impl GpuScreen {
         let resized = self.resize(size);
         let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
         let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
+        show.while_drawn(view);
         // a device that fails here is lost, and that is noticed before the next frame
         let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
         let gpu = self.renderer.gpu_time().or(times.gpu);

@@ -20,6 +20,9 @@ pub trait Show {
     /// Gathers the newest states, chooses a level for each object and gives the picture to draw.
     fn compose(&mut self, view: &ViewRequest) -> &Picture;
 
+    /// Called while the adapter draws what was composed for this request: there is time for the next picture's sake until it is drawn.
+    fn while_drawn(&mut self, _view: &ViewRequest) {}
+
     /// Takes the finished frame's measured work.
     fn measured(&mut self, times: &FrameTimes);
 

@@ -1,5 +1,6 @@
 //! The picture's controller against declared plants: a frame takes setup + fill + c · triangles.
 
+mod ahead;
 mod policies;
 
 use super::super::view::Shading;

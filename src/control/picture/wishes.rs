@@ -15,6 +15,7 @@ impl PictureControl {
     /// Changes the policy. The loop goes on from the picture as it is.
     pub fn set_policy(&mut self, policy: Policy) {
         if policy != self.policy {
+            self.ahead = None;
             let other = policy.prices(&self.prices) != self.policy.prices(&self.prices);
             self.policy = policy;
             if other {
@@ -86,9 +87,10 @@ impl PictureControl {
     }
 
     /// Bounds the time from reading the camera to the finished picture (finite, > 0; else there is no bound): of what culling leaves of it,
-    /// `share` (0 … 1) is kept for choosing, and the rest is drawn in (GB99). Policies that do not predict take no notice.
+    /// `share` (0 … 1) is kept for choosing, which goes beside the drawing of the frame before, and the rest is drawn in (GB99). Policies
+    /// that do not predict take no notice.
     pub fn set_lag(&mut self, lag_s: f64, share: f64) {
-        self.pipeline = (lag_s.is_finite() && lag_s > 0.0).then_some(Pipeline { lag: lag_s, share, overlapped: false });
+        self.pipeline = (lag_s.is_finite() && lag_s > 0.0).then_some(Pipeline { lag: lag_s, share, overlapped: true });
     }
 
     /// Says what culling took of the frame that is chosen for next; it counts where the lag is bounded.

@@ -3,54 +3,98 @@
 //! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, what a frame took.
 
 use super::super::cast;
-use super::Session;
+use super::{Chosen, Session};
 use crate::compositor::{Camera, Hand, Picture, Size, Style};
-use crate::control::{Backdrop, LevelDemand, ObjectView};
+use crate::control::Backdrop;
+use metachron_budget::adaptive::is_late;
 use metachron_budget::adaptive::joint::Drawing;
+use std::time::Duration;
 
 impl Session {
     /// Takes the newest states, finds what `camera` sees of them, chooses levels and makes the picture.
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
         let started = self.now();
         self.gather();
-        self.stage.survey(camera, size);
+        self.survey(camera, size);
         self.sight.look(started, self.stage.seen(), camera, size);
         let culled = self.now();
-        self.chosen.cull = culled.saturating_sub(started);
-        self.choose(size);
+        self.chosen.cull = culled.saturating_sub(started) + self.declared_cull();
+        self.choose(started, size);
         let chosen = self.now();
         let picture = self.stage.compose(camera, &self.levels, style, hand);
         self.chosen.triangles = picture.triangles();
         self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
-        self.chosen.select = chosen.saturating_sub(culled);
+        self.chosen.select += chosen.saturating_sub(culled);
         self.chosen.build = self.run.now().saturating_sub(chosen);
         self.stage.picture()
     }
 
-    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself.
-    pub fn spend_declared(&mut self, size: Size) {
-        let backdrop = Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles };
-        let prices = &self.declared;
-        let of = |(view, level): (&ObjectView, &LevelDemand)| {
-            let drawn = view.visible && level.polygons > 0.0;
-            if drawn { prices.object_s(level.shading, level.polygons, view.pixels) } else { 0.0 }
-        };
-        let objects_s: f64 = self.views.iter().zip(&self.control.last_plan().levels).map(of).sum();
-        let cost = self.machine.frame_time(prices.backdrop_s(backdrop) + objects_s, self.frames(), self.now());
-        self.run.spend(cost);
+    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Gives what of it passed from the
+    /// start of the drawing to its end.
+    pub fn spend_declared(&mut self, size: Size) -> Duration {
+        let Chosen { cull, select, beside, objects_s, other_triangles, .. } = self.chosen;
+        let backdrop = Backdrop { pixels: size.pixels(), triangles: other_triangles };
+        let seconds = self.declared.backdrop_s(backdrop) + objects_s;
+        let draw = self.machine.frame_time(seconds, self.frames(), self.now());
+        let started = self.now();
+        self.run.spend(cull + select + draw.max(beside.unwrap_or_default()));
+        self.now().saturating_sub(started + cull + select)
     }
 
-    fn choose(&mut self, size: Size) {
+    /// Finds what `camera` sees.
+    pub(super) fn survey(&mut self, camera: &Camera, size: Size) {
+        self.stage.survey(camera, size);
         cast::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
-        // what is in the picture besides hardly changes from one frame to the next
-        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
-        self.buy();
-        self.control.set_cull(self.chosen.cull);
-        let plan = self.control.plan(&self.views);
+    }
+
+    /// What this frame is drawn with: what was chosen while the frame before was drawn, else what is chosen now.
+    fn choose(&mut self, started: Duration, size: Size) {
+        self.chosen.select = Duration::ZERO;
+        if !self.control.take_up(&self.views) {
+            self.bid(size);
+            self.control.plan(&self.views);
+            self.chosen.select = self.declared_choice();
+        }
+        if self.control.policy().predicts() && self.is_late(started) {
+            self.control.hurry();
+        }
+        let plan = self.control.last_plan();
         self.levels.clear();
         self.levels.extend(self.views.iter().zip(&plan.levels).map(cast::level));
         self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
         self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
+        self.chosen.objects_s = self.declared.objects_s(self.views.iter(), &plan.levels);
+        self.chosen.n = self.mean_level();
+    }
+
+    /// Whether most of the time of the frame that began at `started` is gone; while time stands still nothing is late.
+    fn is_late(&self, started: Duration) -> bool {
+        let gone = self.now().saturating_sub(started) + self.declared_cull() + self.chosen.select;
+        let passes = self.run.timeline().runs_at(self.now());
+        passes && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
+    }
+
+    /// Tells the controller what the choice that it is to make next has to do with.
+    pub(super) fn bid(&mut self, size: Size) {
+        // what is in the picture besides hardly changes from one frame to the next
+        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
+        self.buy();
+        self.control.set_cull(self.chosen.cull);
+    }
+
+    /// What finding out what is seen takes on the declared machine; nothing in real time, where it is measured.
+    pub(super) fn declared_cull(&self) -> Duration {
+        self.declared_work(self.machine.choice_ns.0, self.views.len())
+    }
+
+    /// What choosing takes on it.
+    pub(super) fn declared_choice(&self) -> Duration {
+        self.declared_work(self.machine.choice_ns.1, self.views.iter().filter(|view| view.visible).count())
+    }
+
+    fn declared_work(&self, each_ns: f64, count: usize) -> Duration {
+        let seconds = if self.is_virtual() { 1e-9 * each_ns * count as f64 } else { 0.0 };
+        Duration::try_from_secs_f64(seconds).unwrap_or_default()
     }
 
     /// Shares the processor out between agents and the picture, where it draws as well.

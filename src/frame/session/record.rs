@@ -11,7 +11,7 @@ use std::time::Duration;
 
 impl Session {
     pub(super) fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
-        let Chosen { sim, triangles, more_triangles, objects, cull, select, build, .. } = self.chosen;
+        let Chosen { sim, triangles, more_triangles, objects, cull, select, beside, build, n, .. } = self.chosen;
         let ms = |time: Duration| time.as_secs_f64() * 1e3;
         let plan = self.control.last_plan();
         let promise = plan.promise;
@@ -27,7 +27,7 @@ impl Session {
             triangles,
             objects,
             cull_ms: ms(cull),
-            select_ms: ms(select),
+            select_ms: ms(select + beside.unwrap_or_default()),
             draw_ms: ms(build + finished.draw),
             lag_ms: ms(cull + select + build + finished.draw),
             predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
@@ -36,12 +36,12 @@ impl Session {
             reversals: plan.reversals,
             holes: promise.holes,
             eps: self.control.eps_hat(),
-            n: self.mean_level(),
+            n,
         }
     }
 
     /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
-    fn mean_level(&self) -> f64 {
+    pub(super) fn mean_level(&self) -> f64 {
         let mean = |tubes_only: bool| {
             let all = self.stage.seen().iter().zip(&self.levels);
             let drawn = all.filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));

@@ -158,6 +158,8 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
     let draw_object_us = number("draw_object_us", file.draw_object_us, allowed(0.0..=1e6, "µs"));
     let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
     let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
+    let cull_object_ns = number("cull_object_ns", file.cull_object_ns, allowed(0.0..=1e6, "ns"));
+    let choose_object_ns = number("choose_object_ns", file.choose_object_ns, allowed(0.0..=1e6, "ns"));
     let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
     let wander = number("wander", file.wander, allowed(0.0..=1.0, ""));
     let spikes = number("spikes", file.spikes, allowed(0.0..=1.0, ""));
@@ -174,6 +176,8 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
         draw_object_us,
         draw_triangle_us,
         draw_pixel_ns,
+        cull_object_ns,
+        choose_object_ns,
         shading,
         noise,
         wander,

@@ -259,6 +259,10 @@ pub struct MachineFile {
     pub draw_triangle_us: Option<f64>,
     /// Nanoseconds a pixel of the picture, 0 … 1e6.
     pub draw_pixel_ns: Option<f64>,
+    /// Nanoseconds that finding out whether it is seen takes an object, 0 … 1e6. Default 0.
+    pub cull_object_ns: Option<f64>,
+    /// Nanoseconds that choosing its level takes an object in view, 0 … 1e6. Default 0.
+    pub choose_object_ns: Option<f64>,
     /// What objects of one shading cost that differs from `draw_object_us` and `draw_triangle_us`.
     pub shading: Option<ShadingCostsFile>,
     /// Relative standard deviation of every cost, 0 … 1.

@@ -1,0 +1,37 @@
+//! What is done ahead of time where a scene bounds the lag: cameras are carried on by it, and levels are chosen while the frame before is
+//! drawn (GB99).
+//!
+//! In: cameras as they are read. Out: cameras as they will be, and the next frame's levels. Never here: a policy, drawing.
+//! Theory: `docs/theory/control.md`, section 6.
+
+use super::Session;
+use crate::compositor::{Camera, Size};
+
+impl Session {
+    /// Where a camera that is read now will be when the picture begun now is finished; where the scene asks for no lag, where it is.
+    pub fn ahead(&mut self, camera: Camera) -> Camera {
+        let now = self.now();
+        let before = self.lens.replace((now, camera));
+        let (Some((most_s, _)), Some((then, before))) = (self.scene.target.lag, before) else { return camera };
+        let (passed_s, lag_s) = (now.saturating_sub(then).as_secs_f64(), self.lag_s.min(most_s));
+        // the next frame follows this one as this one followed the last
+        self.next_eye = Some(camera.carried_on(&before, (lag_s + passed_s) / passed_s));
+        camera.carried_on(&before, lag_s / passed_s)
+    }
+
+    /// Chooses the next frame's levels while this frame, which `camera` sees, is drawn: where the scene bounds the lag and the policy knows
+    /// what levels cost. To be called between the start of the drawing and the wait for its end.
+    pub fn choose_beside(&mut self, camera: &Camera, size: Size) {
+        self.chosen.beside = None;
+        if self.scene.target.lag.is_none() || !self.control.policy().predicts() {
+            return;
+        }
+        let started = self.now();
+        let eye = self.next_eye.take().unwrap_or(*camera);
+        self.survey(&eye, size);
+        self.bid(size);
+        self.control.plan_ahead(&self.views);
+        let declared = self.declared_cull() + self.declared_choice();
+        self.chosen.beside = Some(self.now().saturating_sub(started) + declared);
+    }
+}
