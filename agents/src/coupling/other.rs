@@ -31,6 +31,8 @@ pub struct Other {
     held: bool,
     /// How far impulses have lifted it off what it stood on, metres, ≥ 0; `None` while none has.
     height_m: Option<f64>,
+    /// Whether impulses only press it on what it stands on, while a solve takes that for granted.
+    pressed: Option<bool>,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
     /// What is expected of them after that: in how many seconds it begins, N and N·m.
@@ -81,7 +83,7 @@ impl Other {
         let snapshot = &neighbour.snapshot;
         self.neighbour = Some(neighbour.clone());
         self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
-        (self.age_s, self.height_m, self.lean) = (0.0, None, None);
+        (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
         self.coming.clear();
         self.lasting.clear();
         self.positions.clear();
@@ -364,7 +366,8 @@ impl Other {
     /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a).
     fn stands(&self, linear: DVec3, angular: DVec3) -> Option<DVec3> {
         let stand = self.neighbour.as_ref()?.snapshot.stand?;
-        stand.bears(self.pose.centre, Impulse { linear, angular }).then_some(stand.normal)
+        let pressed = self.pressed.unwrap_or_else(|| stand.bears(self.pose.centre, Impulse { linear, angular }));
+        pressed.then_some(stand.normal)
     }
 
     /// Lets impulses, one a slot, act on it: for the next `h` seconds, or at once where that is zero.

@@ -134,6 +134,12 @@ impl Mate {
         &mut all[self.slots.0..self.end()]
     }
 
+    /// Whether impulses, in slots of all, tip or lift it off what it stands on.
+    pub fn gives_way(&mut self, all: &[DVec3]) -> bool {
+        let (first, end) = (self.slots.0, self.end());
+        self.other.gives_way(&all[first..end])
+    }
+
     /// The fastest of its points through a substep for which all slots have these velocities, m/s.
     pub fn speed(&self, all: &[DVec3]) -> f64 {
         let list = &all[self.slots.0..self.end()];

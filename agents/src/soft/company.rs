@@ -123,6 +123,25 @@ impl Company {
         }
     }
 
+    /// Begins a solve: whether somebody stands on something fixed, which is taken to carry what presses it.
+    pub fn press(&mut self) -> bool {
+        self.mates[..self.count].iter_mut().fold(false, |any, mate| mate.other.press() || any)
+    }
+
+    /// Whether the impulses that a solve found tip or lift somebody who stands.
+    pub fn gives_way<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, slots: usize) -> bool {
+        let Self { mates, count, impulses, .. } = self;
+        impulses.clear();
+        impulses.resize(slots, DVec3::ZERO);
+        contacts.for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
+        mates[..*count].iter_mut().fold(false, |any, mate| mate.gives_way(impulses) || any)
+    }
+
+    /// Ends a solve.
+    pub fn release(&mut self) {
+        self.mates[..self.count].iter_mut().for_each(|mate| mate.other.release());
+    }
+
     /// Turns the impulses on the others, one a slot, into the velocities they cause; the body's own slots are left alone.
     pub fn respond(&self, impulses: &mut [DVec3]) {
         self.mates[..self.count].iter().for_each(|mate| mate.other.respond(mate.slots_mut(impulses)));

@@ -31,6 +31,8 @@ pub(super) struct Contacts {
     /// The size of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
     room: TouchRoom,
+    /// The velocities before a solve.
+    free: Vec<DVec3>,
     slack_m: f64,
 }
 
@@ -62,6 +64,7 @@ impl Contacts {
             touches: vec![],
             mobilities: vec![],
             room: TouchRoom::default(),
+            free: vec![],
             slack_m: SLACK_SHARE * edge_m,
         })
     }
@@ -88,16 +91,40 @@ impl Contacts {
         }
         self.list.sort_unstable_by_key(|contact| contact.key);
         company.scale(&mut self.mobilities);
-        let mut answer = |impulses: &mut [DVec3]| {
-            system.respond(&mut impulses[..own]);
-            company.respond(impulses);
-        };
-        let Self { list: contacts, mobilities, .. } = self;
-        let problem = Problem { contacts, kin: &[], h_s: h, mobilities, settings };
-        self.solver.solve(&problem, velocities, &mut answer);
+        self.solve((h, settings), velocities, system, company);
         company.watch(self.list.iter().zip(self.solver.impulses()), velocities);
         velocities.truncate(own);
         self.mobilities.truncate(own);
+    }
+
+    /// Solves the contacts of the list: what stands is taken to be pressed, and where that was wrong to be free (coupling.md, eq. 7a).
+    fn solve(
+        &mut self,
+        (h_s, settings): (f64, Settings),
+        velocities: &mut [DVec3],
+        system: &System,
+        company: &mut Company,
+    ) {
+        let Self { list: contacts, mobilities, solver, free, .. } = self;
+        let problem = Problem { contacts, kin: &[], h_s, mobilities, settings };
+        let own = system.vertices();
+        let stands = company.press();
+        if stands {
+            free.clear();
+            free.extend_from_slice(velocities);
+        }
+        loop {
+            solver.solve(&problem, velocities, &mut |impulses: &mut [DVec3]| {
+                system.respond(&mut impulses[..own]);
+                company.respond(impulses);
+            });
+            // each time round one more who stands gives way
+            if !stands || !company.gives_way(contacts.iter().zip(solver.impulses()), velocities.len()) {
+                break;
+            }
+            velocities.copy_from_slice(free);
+        }
+        company.release();
     }
 
     /// Finds what may close within the substep, and says how well it is to be solved.

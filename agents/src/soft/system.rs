@@ -27,6 +27,11 @@ impl System {
         Self { matrix, first, held, forces, square: 0.0 }
     }
 
+    /// How many vertices there are.
+    pub const fn vertices(&self) -> usize {
+        self.held.len()
+    }
+
     /// Begins a substep of `h` seconds: no force, no stiffness.
     pub fn begin(&mut self, h: f64) {
         // the factor overwrote the matrix in place, of the same shape

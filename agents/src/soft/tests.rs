@@ -1,6 +1,7 @@
 //! What a soft body must do, against closed forms.
 
 mod error;
+mod falls;
 mod meetings;
 mod promises;
 mod statics;

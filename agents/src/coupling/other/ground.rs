@@ -5,6 +5,7 @@
 
 use super::Other;
 use crate::Stand;
+use crate::coupling::Impulse;
 use glam::DVec3;
 
 /// How a body that was lifted off the ground moves along its normal.
@@ -63,6 +64,30 @@ impl Other {
     pub fn lift_m_s(&self, normal: DVec3, h: f64) -> f64 {
         let stand = self.footing().filter(|_| self.fall(h).is_none());
         stand.map_or(0.0, |stand| 0.5 * h * stand.weight_m_s2 * (-normal.dot(stand.normal)).max(0.0))
+    }
+
+    /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a); whether it stands at all. While a solve looks
+    /// for impulses its answer to them must be linear: one that changed with the line on which they act would have no end.
+    pub fn press(&mut self) -> bool {
+        self.pressed = self.footing().map(|_| true);
+        self.pressed.is_some()
+    }
+
+    /// Takes the sum of the impulses that a solve found, in its slots: whether they tip it or lift it, and so meet the free body
+    /// in another solve.
+    pub fn gives_way(&mut self, impulses: &[DVec3]) -> bool {
+        let (Some(true), Some(stand), [linear, angular]) = (self.pressed, self.footing(), impulses) else {
+            return false;
+        };
+        let sum = Impulse { linear: *linear, angular: *angular };
+        let gives_way = sum != Impulse::ZERO && !stand.bears(self.pose.centre, sum);
+        self.pressed = Some(!gives_way);
+        gives_way
+    }
+
+    /// Ends a solve: each impulse tells by itself again how it meets the ground.
+    pub const fn release(&mut self) {
+        self.pressed = None;
     }
 
     /// How it stands, where impulses may move it.

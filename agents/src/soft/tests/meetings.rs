@@ -18,7 +18,7 @@ fn ball_spec(mass_kg: f64, position: DVec3, velocity: DVec3, gravity: DVec3) -> 
 }
 
 /// A floor at z = 0.
-fn floor() -> Obstacle {
+pub(super) fn floor() -> Obstacle {
     Obstacle {
         name: String::new(),
         solid: Solid::Plane,

@@ -1,0 +1,68 @@
+//! Soft bodies fall on rigid ones that stand on the floor.
+
+use super::meetings::floor;
+use super::*;
+use crate::coupling::harness::{Faults, Stage};
+use crate::rigid::{RigidBody, RigidSpec};
+use crate::shape::Solid;
+
+/// A box of 10 cm and `mass_kg` that stands on the floor, and a block of 25 × 25 × 10 cm in so many cells that falls on it from
+/// `drop_m`.
+struct Fall {
+    rates: (f64, f64),
+    drop_m: f64,
+    mass_kg: f64,
+    segments: [u32; 3],
+}
+
+impl Fall {
+    /// Plays 1.5 s: where the middles of block and box then are, and the lowest point of the block at any time.
+    fn play(&self) -> (DVec3, DVec3, f64) {
+        let block = SoftSpec {
+            matter: SoftMatter { young_pa: 2.5e5, damping_per_s: 1.0, ..MATTER },
+            position: DVec3::new(-0.125, -0.125, 0.1 + self.drop_m),
+            gravity: G,
+            friction: 0.3,
+            obstacles: [floor()].into(),
+            ..spec(SoftShape::Box { size_m: DVec3::new(0.25, 0.25, 0.1), segments: self.segments })
+        };
+        let solid = Solid::Box { half_extents_m: DVec3::splat(0.05) };
+        let low = RigidSpec {
+            gravity: G,
+            friction: 0.3,
+            obstacles: [floor()].into(),
+            ..RigidSpec::free(solid, DVec3::Z * 0.05, self.mass_kg)
+        };
+        let mut stage = Stage::new(Faults::default());
+        let low = stage.add(RigidBody::new(low).unwrap(), self.rates.0);
+        let block = stage.add(SoftBody::new(block).unwrap(), self.rates.1);
+        let mut lowest = f64::INFINITY;
+        stage.run(1.5, |stage| {
+            lowest = stage.newest(block).bounds.map_or(lowest, |bounds| lowest.min(bounds.low.z));
+        });
+        let Body::Soft(soft) = &stage.newest(block).body else { panic!("a soft body") };
+        let middle = soft.positions.iter().sum::<DVec3>() / soft.positions.len() as f64;
+        (middle, stage.settled(low, 1.5).state.position, lowest)
+    }
+}
+
+#[test]
+fn a_block_that_falls_on_a_box_stays_on_it_at_any_rates() {
+    let fall = |rates, drop_m, mass_kg, segments| Fall { rates, drop_m, mass_kg, segments };
+    for fall in [
+        fall((240.0, 240.0), 0.2, 6.0, [4, 4, 2]),
+        fall((60.0, 60.0), 0.2, 6.0, [4, 4, 2]),
+        fall((100.0, 10.0), 0.55, 34.0, [4, 4, 2]),
+        fall((240.0, 240.0), 0.2, 6.0, [8, 8, 3]),
+        fall((1000.0, 1000.0), 0.2, 6.0, [4, 4, 2]),
+    ] {
+        let (block, low, lowest) = fall.play();
+        let Fall { rates, drop_m, segments, .. } = fall;
+        println!("{rates:?} {drop_m} {segments:?}: {block:.4} box {low:.4} lowest {lowest:.4}");
+        // it bends down by 1 to 4 mm where nothing carries it, and the corners hang farthest when it lands
+        assert!((0.146..0.15).contains(&block.z), "{rates:?} {drop_m} {segments:?}: at {block}");
+        assert!(block.truncate().length() < 0.025, "{rates:?} {drop_m} {segments:?}: thrown aside to {block}");
+        assert!((low.z - 0.05).abs() < 1e-3, "{rates:?} {drop_m} {segments:?}: the box is at {low}");
+        assert!(lowest > 0.06, "{rates:?} {drop_m} {segments:?}: it came down to {lowest}");
+    }
+}
