@@ -2,7 +2,7 @@
 //!
 //! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state
 //! that is on time covers the present and pictures need no delay. An agent that is late steps again at once until it has
-//! caught up. Past the lag cap its time jumps to the present without a step: the gap is dropped and counted,
+//! caught up; one that others touch makes longer steps while it is behind, for its contact to keep its time. Past the lag cap its time jumps to the present without a step: the gap is dropped and counted,
 //! so that an agent that cannot keep up runs at the rate it can reach, and never falls further behind.
 //! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
 
@@ -20,13 +20,21 @@ pub const LAG_CAP: Duration = Duration::from_millis(100);
 /// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
 
+/// Longer than any step.
+const ANY: SimSpan = SimSpan::from_nanos(u64::MAX);
+
+/// The longest step that an agent makes of a shorter one that it wants, because it is behind.
+const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
+
 /// An agent's own time and the length of its next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
     time: SimTime,
     dt: SimSpan,
-    /// What the agent makes of it, where that is less.
-    shorter: Option<SimSpan>,
+    /// What the agent makes of it, where that is less; else longer than any step.
+    shorter: SimSpan,
+    /// What it makes of it while it is behind.
+    stretched: SimSpan,
     dropped: SimSpan,
     rested: SimSpan,
 }
@@ -44,7 +52,7 @@ impl Pace {
     /// A pace from `time` in steps of `dt` (above zero).
     #[must_use]
     pub const fn new(time: SimTime, dt: SimSpan) -> Self {
-        Self { time, dt, shorter: None, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
+        Self { time, dt, shorter: ANY, stretched: SimSpan::ZERO, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
     }
 
     /// The agent's own time.
@@ -56,7 +64,7 @@ impl Pace {
     /// The length of its steps: what is wanted, or the shorter one that it made last.
     #[must_use]
     pub fn dt(&self) -> SimSpan {
-        self.shorter.map_or(self.dt, |shorter| shorter.min(self.dt))
+        self.shorter.min(self.dt)
     }
 
     /// The length of step that is wanted.
@@ -72,7 +80,7 @@ impl Pace {
 
     /// Where `wanted` was to be stepped by, the agent steps by `made` (above zero), which is not longer.
     pub fn shorten(&mut self, wanted: SimSpan, made: SimSpan) {
-        self.shorter = (made < wanted).then_some(made);
+        self.shorter = if made < wanted { made } else { ANY };
     }
 
     /// Simulated time given up so far because it could not be made up.
@@ -106,6 +114,25 @@ impl Pace {
             self.time = now;
         }
         Start { late, dropped }
+    }
+
+    /// The step in place of a `wanted` one of an agent that others touch, at wall time `wall`: a quarter longer with each turn that
+    /// finds it more than two steps behind, slowly shorter again when it has caught up.
+    ///
+    /// What it would give up later, others would have gone through without it; and steps of one length change what it does less
+    /// than single long ones.
+    pub fn stretch(&mut self, wanted: SimSpan, timeline: &Timeline, wall: Duration) -> SimSpan {
+        let lag = timeline.sim_at(wall).since(self.time);
+        let now = self.stretched.max(wanted);
+        let times = |span: SimSpan, by: u64, of: u64| SimSpan::from_nanos(span.as_nanos().saturating_mul(by) / of);
+        self.stretched = if lag > times(now, LAG_CAP_STEPS, 1) {
+            times(now, 5, 4).min(STRETCHED_MAX)
+        } else if lag <= now {
+            times(now, 63, 64)
+        } else {
+            now
+        };
+        self.stretched.max(wanted)
     }
 
     /// The step is done: the agent's time is a step further.
@@ -146,6 +173,24 @@ mod tests {
 
     const fn pace(dt_ms: u64) -> Pace {
         Pace::new(SimTime::ZERO, span_ms(dt_ms))
+    }
+
+    #[test]
+    fn steps_that_take_longer_than_they_last_grow_until_they_keep_up_and_shrink_again() {
+        let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
+        let mut steps = Vec::new();
+        // a step takes 6 ms for a second, then 1 ms
+        while wall < ms(3000) {
+            wall = wall.max(pace.due(&line).unwrap());
+            assert_eq!(pace.begin(&line, wall).dropped, SimSpan::ZERO, "at {wall:?}");
+            let step = pace.stretch(span_ms(4), &line, wall);
+            steps.push((wall, step));
+            pace.advance_by(step);
+            wall += if wall < ms(1000) { ms(6) } else { ms(1) };
+        }
+        let during = |from: u64, to: u64| steps.iter().filter(move |(at, _)| (ms(from)..ms(to)).contains(at));
+        assert!(during(100, 1000).all(|(_, step)| *step >= span_ms(5) && *step <= span_ms(10)));
+        assert!(during(2000, 3000).all(|(_, step)| *step == span_ms(4)));
     }
 
     #[test]

@@ -257,6 +257,8 @@ impl Actor {
         let start = self.pace.begin(timeline, wall);
         let alone = self.gather(timeline, wall, &start);
         let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
+        let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
+        let wanted = if is_met { self.pace.stretch(wanted, timeline, wall) } else { wanted };
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
         let (Made { report, dt }, led) =
             if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };

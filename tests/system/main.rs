@@ -1,4 +1,5 @@
 //! The whole program as its users meet it; one binary, so that it links once.
+mod behind;
 mod chart;
 mod chart_policies;
 mod cli;
