@@ -228,7 +228,8 @@ mod tests {
         let scene = falling();
         let mut session = Session::open(scene.clone()).unwrap();
         session.keep_trace();
-        for frame in 0..25 {
+        session.begin();
+        for frame in 0..30 {
             session.wait_until(session.period() * frame);
             session.look();
         }
@@ -240,7 +241,8 @@ mod tests {
             true
         });
         // the balls fly their parabola exactly at any step; between ticks of 0.5 ms it is drawn straight: g dt²/2 = 1.2 µm
-        assert!(oracle.unwrap().states > 40 && told > 5 && !distances.is_empty());
+        let states = oracle.unwrap().states;
+        assert!(states > 40 && told > 5 && !distances.is_empty(), "{states} states, told {told} times");
         for distance in distances {
             assert!(distance.max_m < 2e-6 && distance.momentum_max_n_s < 1e-6, "{distance:?}");
         }

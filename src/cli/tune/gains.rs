@@ -209,7 +209,7 @@ mod tests {
             "α=1e-4,κ=0.5",
             "α=0",
             "α=-1e-4",
-            "kappa=1",
+            "kappa=2",
             "kappa=nan",
             "margin=inf",
             "law=magic",

@@ -178,11 +178,12 @@ fn time_that_an_agent_drops_is_no_real_time() {
     with_show(|show| {
         (0..60).for_each(|_| frame(show, None));
         let on_time = show.status().real_time_factor;
-        assert!((on_time - 1.0).abs() < 0.01, "{on_time}");
+        // the first of sixty pictures is drawn before time begins
+        assert!((on_time - 1.0).abs() < 0.02, "{on_time}");
     });
     let mut plan = plan("pendulum");
-    // a step of 2.5 to 10 ms takes 20
-    plan.overrides.push(("machine.step.tube.base_us".to_owned(), "20000".to_owned()));
+    // a step that becomes 50 ms long at most takes 100
+    plan.overrides.push(("machine.step.tube.base_us".to_owned(), "100000".to_owned()));
     let session = Session::open(scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     let show = &mut WindowShow::new(session, plan, &mut go_on);
