@@ -12,6 +12,8 @@ use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings};
 pub const PART_MAX_S: f64 = 1.0 / 60.0;
 /// A step longer than [`PART_MAX_S`] by less than this is not divided.
 const SPLIT_SLACK: f64 = 1.01;
+/// No step is made shorter than this because of somebody fast, seconds.
+const HURRY_S: f64 = 1e-3;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
 const SURPRISE_M_S2: f64 = 30.0;
 
@@ -35,8 +37,29 @@ pub fn longest_step(
         return dt;
     }
     let bounds = bounds();
-    let near = |n: &Neighbour| wild(n) && may_touch(n, around, &bounds, dt_s);
+    let near = |n: &Neighbour| wild(n) && (is_linked(n, around) || may_touch(n, around, &bounds, dt_s));
     if around.neighbours.iter().any(near) { SimSpan::from_nanos(dt.as_nanos() / u64::from(parts)) } else { dt }
+}
+
+/// A part of a step of `dt` in which nobody whose pair the body owns and whom it may touch comes farther than `way_m`; a millisecond
+/// at least.
+pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Bounds, way_m: f64) -> SimSpan {
+    let dt_s = dt.as_secs_f64();
+    let fast = |n: &&Neighbour| n.owned && n.snapshot.bounds.is_some_and(|b| b.speed_m_s * dt_s > way_m);
+    if !around.neighbours.iter().any(|n| fast(&n)) {
+        return dt;
+    }
+    let bounds = bounds();
+    let near = around.neighbours.iter().filter(fast).filter(|n| may_touch(n, around, &bounds, dt_s));
+    let speed_m_s = near.filter_map(|n| n.snapshot.bounds).map(|b| b.speed_m_s).fold(0.0, f64::max);
+    let parts = (dt_s * speed_m_s / way_m).ceil().min((dt_s / HURRY_S).floor()).max(1.0);
+    SimSpan::from_nanos(dt.as_nanos() / parts as u64)
+}
+
+/// Whether a link by the ledger joins a neighbour to this body.
+#[must_use]
+pub fn is_linked(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    around.links.iter().any(|link| link.other == neighbour.id && link.law == Law::Ledger)
 }
 
 /// Whether a neighbour bends: how it moves within a step is known to itself alone.

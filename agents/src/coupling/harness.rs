@@ -69,11 +69,16 @@ impl Stage {
 
     /// Adds an agent that steps `rate_hz` times a second.
     pub(crate) fn add(&mut self, agent: impl Agent + 'static, rate_hz: f64) -> AgentId {
+        self.add_boxed(Box::new(agent), rate_hz)
+    }
+
+    /// The same of an agent of any model.
+    pub(crate) fn add_boxed(&mut self, agent: Box<dyn Agent>, rate_hz: f64) -> AgentId {
         let mut snapshot = Snapshot::default();
         agent.write_snapshot(&mut snapshot);
         let published = vec![Arc::new(snapshot)];
         let (hands, links) = (vec![], vec![]);
-        self.actors.push(Actor { agent: Box::new(agent), rate_hz, time: SimTime::ZERO, published, hands, links });
+        self.actors.push(Actor { agent, rate_hz, time: SimTime::ZERO, published, hands, links });
         AgentId(self.actors.len() as u32 - 1)
     }
 

@@ -103,8 +103,8 @@ pub struct Ledger {
 
 /// How long a page is written on, seconds.
 const PAGE_S: f64 = 1.0;
-/// Impulses that act within so long of each other are taken together, nanoseconds: 1/240 s, in which a body falls 0.1 mm.
-const GRAIN_NS: u64 = 1_000_000_000 / 240;
+/// Impulses that act within so long of each other are taken together, nanoseconds: a millisecond, in which a body falls 5 µm.
+const GRAIN_NS: u64 = 1_000_000;
 
 impl Impulse {
     /// No impulse.

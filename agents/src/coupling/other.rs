@@ -6,6 +6,7 @@
 
 mod deliver;
 mod ground;
+mod held;
 
 use super::sprung::{Lean, Sprung};
 use super::{Exchange, Form, Impulse, Place, Placed, Site, Slots, Twist, View};
@@ -251,8 +252,10 @@ impl Other {
 
     /// Makes the published velocities of a tube, which are means over its last substep, those at its end (eq. 6a).
     fn reckon(&mut self) {
-        let Some(Inertia::Curve(curve)) = self.neighbour.as_ref().map(|n| &n.snapshot.inertia) else { return };
-        let half_s = 0.5 * curve.span_s;
+        let half_s = self.reckoned_s();
+        if half_s == 0.0 {
+            return;
+        }
         for node in 0..self.positions.len() {
             let gained = self.acceleration_of(node) * half_s;
             self.velocities[2 * node] += gained;

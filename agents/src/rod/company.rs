@@ -257,7 +257,7 @@ impl Company {
                 }
                 End::Linked(link) => {
                     let mate = mates.iter_mut().find(|mate| mate.other.id() == Some(by));
-                    mate.into_iter().for_each(|mate| mate.pull(link.there, -impulse, impulses));
+                    mate.into_iter().for_each(|mate| mate.pull(link.there, -impulse));
                 }
             }
         }

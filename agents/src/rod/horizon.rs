@@ -9,8 +9,8 @@ use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
 use super::tube::Tube;
 use crate::coupling::Law;
-use crate::coupling::beside::PART_MAX_S;
-use crate::{Body, Neighbour, Surroundings};
+use crate::coupling::beside::{PART_MAX_S, bends, is_linked};
+use crate::{Neighbour, Surroundings};
 use glam::DVec3;
 
 /// An owner is slower if its steps are longer by more than this share.
@@ -41,7 +41,7 @@ impl Tube {
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
         // beside this one it makes no longer steps
-        let steps_s = around.neighbours.iter().filter(|n| owns_it(n)).map(|n| n.step_s.min(PART_MAX_S));
+        let steps_s = around.neighbours.iter().filter(|n| owns_it(n, around)).map(|n| n.step_s.min(PART_MAX_S));
         // to a faster one among them the tube must not look too heavy
         let span_s = steps_s.fold(f64::INFINITY, f64::min);
         if !(span_s.is_finite() && span_s > SLOWER * dt) {
@@ -72,8 +72,8 @@ impl Stepper {
     }
 }
 
-/// Whether a neighbour computes the contacts with this tube, and expects it by its factor.
-pub fn owns_it(neighbour: &Neighbour) -> bool {
-    let solves = matches!(neighbour.snapshot.body, Body::Curve(_) | Body::Soft(_)) && neighbour.law == Law::Ledger;
-    solves && !neighbour.owned && neighbour.form.is_some()
+/// Whether a neighbour computes the contacts or links with this tube, and expects it by its factor.
+pub fn owns_it(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    let meets = neighbour.law == Law::Ledger && neighbour.form.is_some();
+    bends(neighbour) && !neighbour.owned && (meets || is_linked(neighbour, around))
 }

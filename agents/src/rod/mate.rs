@@ -43,6 +43,9 @@ pub struct Mate {
     span_s: f64,
     woken: bool,
     linked: bool,
+    /// What links give it in the substep, in its slots: that lasts, and is no blow.
+    lasting: Vec<DVec3>,
+    room: Vec<DVec3>,
 }
 
 impl Mate {
@@ -70,8 +73,9 @@ impl Mate {
         stale: bool,
     ) -> bool {
         let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
-        let other = std::mem::take(&mut self.other);
-        *self = Self { other, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
+        let (other, mut lasting) = (std::mem::take(&mut self.other), std::mem::take(&mut self.lasting));
+        lasting.clear();
+        *self = Self { other, lasting, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
         if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, None) }
     }
 
@@ -243,19 +247,39 @@ impl Mate {
     /// The far end of a link to this agent, for a substep of `h` seconds.
     pub fn far(&mut self, there: Anchor, h: f64) -> Option<Far> {
         self.linked = true;
-        let (point, velocity) = self.other.point(there)?;
+        let (point, velocity) = self.other.carried_m_s(there, h)?;
         let mut slots = Slots::default();
         self.other.hold(&mut slots, there);
         let inverse_mass = self.other.inverse_mass(&slots);
-        Some(Far { point, velocity: velocity + self.other.gain(h)[0], inverse_mass })
+        Some(Far { point, velocity, inverse_mass })
     }
 
     /// Adds what a link gives to one of its points.
-    pub fn pull(&mut self, there: Anchor, impulse: DVec3, impulses: &mut [DVec3]) {
+    pub fn pull(&mut self, there: Anchor, impulse: DVec3) {
         let mut slots = Slots::default();
         self.other.hold(&mut slots, there);
-        slots.scatter(impulse, self.slots_mut(impulses));
+        self.lasting.resize(self.other.velocities().len(), DVec3::ZERO);
+        slots.scatter(impulse, &mut self.lasting);
         self.acted = true;
+    }
+
+    /// Turns what links have given so far into the velocities that it causes.
+    pub fn give_way(&mut self) {
+        if !self.lasting.is_empty() {
+            self.other.respond(&mut self.lasting);
+        }
+    }
+
+    /// How one of its points moves by the velocities of [`Self::give_way`].
+    pub fn yield_at(&self, there: Anchor) -> DVec3 {
+        let mut slots = Slots::default();
+        self.other.hold(&mut slots, there);
+        slots.velocity(&self.lasting)
+    }
+
+    /// Forgets what links have given so far.
+    pub fn ease(&mut self) {
+        self.lasting.clear();
     }
 
     /// Forgets the contacts of the substep before.
@@ -292,12 +316,26 @@ impl Mate {
         if self.acted {
             let (first, end) = (self.slots.0, self.end());
             let list = &mut impulses[first..end];
+            self.other.book(exchange, (start, h), list);
+            self.last(exchange, (start, h));
+            list.iter_mut().zip(&self.lasting).for_each(|(all, part)| *all += *part);
+            self.lasting.clear();
             let linear = if self.other.is_many() { list.len() } else { 1 };
             self.given += list[..linear].iter().step_by(self.other.stride()).sum::<DVec3>();
-            self.other.book(exchange, (start, h), list);
             self.other.push(list, h);
         }
         self.other.go_on(h);
+    }
+
+    /// Books what links give: it acts evenly through the substep.
+    fn last(&mut self, exchange: &mut Exchange, (start, h): (f64, f64)) {
+        let parts = self.other.parts(h);
+        let part_s = h / f64::from(parts);
+        self.room.clear();
+        self.room.extend(self.lasting.iter().map(|impulse| *impulse / f64::from(parts)));
+        for part in (0..parts).filter(|_| !self.lasting.is_empty()) {
+            self.other.book(exchange, (start + part_s * f64::from(part), part_s), &self.room);
+        }
     }
 
     /// Writes on the state of the pair.

@@ -248,7 +248,7 @@ impl Tube {
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
         // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
-        let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(owns_it);
+        let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
         for (a, u) in self.accelerations.iter_mut().zip(self.now.u.iter().step_by(2)) {
             let gained = (*u - *a) / dt;
             *a = if lasts { gained } else { smooth(gained, gravity) };

@@ -172,7 +172,9 @@ impl Agent for SoftBody {
     }
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
-        beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around))
+        let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
+        // what comes farther in a step than an edge is long would turn cells inside out before it is felt
+        beside::unhurried(dt, around, || self.bounds(), self.contacts.edge_m())
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -5,12 +5,18 @@
 //! Theory: docs/theory/coupling.md; a soft body owns every pair but those with faster soft bodies.
 
 use super::holds::Tie;
+use super::system::System;
 use crate::coupling::beside::may_touch;
 use crate::coupling::touch::{TouchRoom, touches};
 use crate::coupling::{Contact, Exchange, Impulse, PairKind, Placed, Site, Touch};
 use crate::rod::{Mate, Tanks};
-use crate::{Body, Bounds, SimSpan, Snapshot, Surroundings};
+use crate::{Body, Bounds, DT_MAX_S, SimSpan, Snapshot, Surroundings};
 use glam::DVec3;
+
+/// Links to one agent are shared in no more rounds than this, and well enough at this error, m/s: a tenth of what counts as rest.
+const SHARES_MAX: u32 = 60;
+/// See [`SHARES_MAX`].
+const SHARED_M_S: f64 = 1e-5;
 
 /// The agents near one soft body.
 #[derive(Default)]
@@ -72,7 +78,9 @@ impl Company {
         let Self { mates, count, exchange, tanks, .. } = self;
         for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
             let linked = around.links.iter().any(|link| link.other == neighbour.id);
-            let touched = may_touch(neighbour, around, bounds, dt);
+            // who has been given something since is no longer on the way that it published
+            let turned = exchange.pair(neighbour.id).is_some_and(|pair| pair.in_flight_n_s > 0.0);
+            let touched = may_touch(neighbour, around, bounds, if turned { dt + DT_MAX_S } else { dt });
             if !(linked || touched) {
                 continue;
             }
@@ -125,16 +133,16 @@ impl Company {
 
     /// Begins a solve: whether somebody stands on something fixed, which is taken to carry what presses it.
     pub fn press(&mut self) -> bool {
-        self.mates[..self.count].iter_mut().fold(false, |any, mate| mate.other.press() || any)
+        self.mates[..self.count].iter_mut().map(|mate| mate.other.press()).filter(|stands| *stands).count() > 0
     }
 
-    /// Whether the impulses that a solve found tip or lift somebody who stands.
+    /// Whether the impulses that a solve found tip or lift somebody who stands: the first of them.
     pub fn gives_way<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, slots: usize) -> bool {
         let Self { mates, count, impulses, .. } = self;
         impulses.clear();
         impulses.resize(slots, DVec3::ZERO);
         contacts.for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
-        mates[..*count].iter_mut().fold(false, |any, mate| mate.gives_way(impulses) || any)
+        mates[..*count].iter_mut().any(|mate| mate.gives_way(impulses))
     }
 
     /// Ends a solve.
@@ -161,6 +169,53 @@ impl Company {
             let Some(far) = mate.and_then(|mate| mate.far(link.there, h)) else { continue };
             ties[i].aim(&far, positions[ties[i].vertex], (h, shared));
         }
+    }
+
+    /// Lets links to the same agent know of each other: what each gives moves the far ends of the rest, and so the free velocities
+    /// `free` that `system` answers with (soft.md, eq. 4a, 4b).
+    pub fn share(&mut self, ties: &mut [Tie], free: &mut [DVec3], system: &System) {
+        let other = |tie: &Tie| tie.link.map(|link| link.other);
+        let lonely = |tie: &Tie| ties.iter().filter(|t| other(t) == other(tie)).count() < 2;
+        if ties.iter().all(|tie| tie.link.is_none() || lonely(tie)) {
+            return;
+        }
+        let (mut share, mut before) = (1.0, Vec::new());
+        for _ in 0..SHARES_MAX {
+            let amiss = self.amiss(ties, free);
+            if amiss.iter().all(|amiss| amiss.length() < SHARED_M_S) {
+                break;
+            }
+            share *= quotient(&before, &amiss);
+            self.impulses.clear();
+            self.impulses.resize(free.len(), DVec3::ZERO);
+            for (tie, amiss) in ties.iter_mut().zip(&amiss) {
+                self.impulses[tie.vertex] += tie.spare(*amiss * share);
+            }
+            system.respond(&mut self.impulses);
+            free.iter_mut().zip(&self.impulses).for_each(|(v, dv)| *v += *dv);
+            before = amiss;
+        }
+    }
+
+    /// What is amiss with the expected velocity of each far end, m/s.
+    fn amiss(&mut self, ties: &[Tie], free: &[DVec3]) -> Vec<DVec3> {
+        let mates = &mut self.mates[..self.count];
+        mates.iter_mut().for_each(Mate::ease);
+        for tie in ties {
+            let mate = mates.iter_mut().find(|mate| mate.other.id() == tie.link.map(|link| link.other));
+            if let (Some(mate), Some(link)) = (mate, tie.link) {
+                mate.pull(link.there, -tie.gives(free[tie.vertex]));
+            }
+        }
+        mates.iter_mut().for_each(Mate::give_way);
+        let of = |tie: &Tie| {
+            let mate = mates.iter().find(|mate| mate.other.id() == tie.link.map(|link| link.other));
+            let moved = tie.link.zip(mate).map(|(link, mate)| mate.yield_at(link.there));
+            moved.map_or(DVec3::ZERO, |moved| tie.amiss(moved, free[tie.vertex]))
+        };
+        let list = ties.iter().map(of).collect();
+        mates.iter_mut().for_each(Mate::ease);
+        list
     }
 
     /// Gives what the contacts and ties of a substep gave, `start` seconds into the step, and lets the others go on by `h`.
@@ -192,7 +247,7 @@ impl Company {
                 }
                 Some(link) => {
                     let mate = mates.iter_mut().find(|mate| mate.other.id() == Some(by));
-                    mate.into_iter().for_each(|mate| mate.pull(link.there, -tie.given, impulses));
+                    mate.into_iter().for_each(|mate| mate.pull(link.there, -tie.given));
                 }
             }
         }
@@ -223,4 +278,12 @@ impl Company {
         let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
         into.touches.extend(woken);
     }
+}
+
+/// By how much longer the next step of an iteration is to be than the last, from what was amiss before it and after (BB88).
+fn quotient(before: &[DVec3], after: &[DVec3]) -> f64 {
+    let pairs = || before.iter().zip(after);
+    let size: f64 = pairs().map(|(b, _)| b.length_squared()).sum();
+    let change: f64 = pairs().map(|(b, a)| b.dot(*b - *a)).sum();
+    if change > 0.0 { size / change } else { 1.0 }
 }

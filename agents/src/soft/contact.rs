@@ -153,6 +153,11 @@ impl Contacts {
         if fixed > 0 && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 
+    /// The mean length of an edge of the skin, metres.
+    pub fn edge_m(&self) -> f64 {
+        self.slack_m / SLACK_SHARE
+    }
+
     /// The contacts of the last substep and their impulses, N·s.
     pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
         let solved = if self.list.is_empty() { &[] } else { self.solver.impulses() };

@@ -29,6 +29,12 @@ pub(super) struct Tie {
     /// The impulse of the substep if the vertex stood still, N·s, and what its velocity takes away, kg.
     still: DVec3,
     eased: DMat3,
+    /// What a velocity of the far end adds to that impulse, kg, and how the far end yields to all links to the same agent as if
+    /// they were at one point, 1/kg.
+    reach: DMat3,
+    yields: DMat3,
+    /// By how much the far end is expected to yield less than that, m/s.
+    spared: DVec3,
     /// The impulse of the last substep, and of the step, N·s.
     pub given: DVec3,
     pub impulse: DVec3,
@@ -64,6 +70,9 @@ impl Tie {
             ease: DMat3::IDENTITY,
             still: DVec3::ZERO,
             eased: DMat3::ZERO,
+            reach: DMat3::ZERO,
+            yields: DMat3::ZERO,
+            spared: DVec3::ZERO,
             given: DVec3::ZERO,
             impulse: DVec3::ZERO,
         })
@@ -89,13 +98,34 @@ impl Tie {
         }
         (self.target, self.target_velocity) = (aim, far.velocity);
         let resistance = self.stiffness * (h * h) + self.damping * h;
-        self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass * shared as f64).inverse();
+        self.yields = far.inverse_mass * shared as f64;
+        self.ease = (DMat3::IDENTITY + resistance * self.yields).inverse();
+    }
+
+    /// By how much more the far end is spared than was expected, m/s, where the links to its agent make it `move_m_s` and this end
+    /// has this velocity (eq. 4a).
+    pub fn amiss(&self, move_m_s: DVec3, velocity: DVec3) -> DVec3 {
+        move_m_s + self.yields * self.gives(velocity) - self.spared
+    }
+
+    /// Expects the far end to be spared by `more`, m/s; the impulse that adds.
+    pub fn spare(&mut self, more: DVec3) -> DVec3 {
+        self.spared += more;
+        let impulse = self.reach * more;
+        self.still += impulse;
+        impulse
+    }
+
+    /// The impulse that it gives if this end has this velocity after the substep.
+    pub fn gives(&self, velocity: DVec3) -> DVec3 {
+        self.still - self.eased * velocity
     }
 
     /// Adds what it does in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
     pub fn add(&mut self, position: DVec3, h: f64, system: &mut System) {
         let eased = self.ease * (self.stiffness * (h * h) + self.damping * h);
         self.eased = (eased + eased.transpose()) * 0.5;
+        (self.reach, self.spared) = (eased, DVec3::ZERO);
         let apart = self.target + self.target_velocity * h - position;
         let force = self.ease * (self.stiffness * apart + self.damping * self.target_velocity);
         self.still = force * h;
@@ -105,7 +135,7 @@ impl Tie {
 
     /// Books what it gave in a substep of `h` seconds that ended with `velocity`, and lets a led end go on.
     pub fn book(&mut self, velocity: DVec3, h: f64) {
-        self.given = self.still - self.eased * velocity;
+        self.given = self.gives(velocity);
         self.impulse += self.given;
         self.target += self.target_velocity * h;
     }

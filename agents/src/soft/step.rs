@@ -61,6 +61,7 @@ impl SoftBody {
         let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
         free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
         system.respond(free);
+        company.share(ties, free, system);
         Ok(())
     }
 

@@ -1,7 +1,9 @@
 //! What a soft body must do, against closed forms.
 
+mod bullets;
 mod error;
 mod falls;
+mod links;
 mod meetings;
 mod promises;
 mod statics;

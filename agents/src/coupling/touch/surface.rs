@@ -219,7 +219,9 @@ impl Meeting<'_> {
         let ball = on_span(strand, span, share);
         let way = point - ball.centre;
         let out = if spot.shares[2] > 0.0 && self.surface.form.closed { self.out_of(spot) } else { None };
-        let across = || self.out_of(spot).unwrap_or(DVec3::Z);
+        // a core that lies in the skin of a closed body is outside it
+        let inward = || spot.out(self.normals).and_then(DVec3::try_normalize).map(|out| -out);
+        let across = || self.out_of(spot).or_else(inward).unwrap_or(DVec3::Z);
         let length = way.length();
         let (mut normal, mut distance) = if length > CROSSING_M { (way / length, length) } else { (across(), 0.0) };
         if out.is_some_and(|out| out.dot(normal) > 0.0) {

@@ -1,4 +1,4 @@
-//! Soft bodies fall on rigid ones that stand on the floor.
+//! Soft bodies fall on rigid ones that stand on the floor, and are pushed out of each other.
 
 use super::meetings::floor;
 use super::*;
@@ -64,5 +64,29 @@ fn a_block_that_falls_on_a_box_stays_on_it_at_any_rates() {
         assert!(block.truncate().length() < 0.025, "{rates:?} {drop_m} {segments:?}: thrown aside to {block}");
         assert!((low.z - 0.05).abs() < 1e-3, "{rates:?} {drop_m} {segments:?}: the box is at {low}");
         assert!(lowest > 0.06, "{rates:?} {drop_m} {segments:?}: it came down to {lowest}");
+    }
+}
+
+#[test]
+fn a_ball_that_starts_in_the_skin_of_a_block_comes_out_where_it_is_nearer() {
+    for (depth_m, rates) in
+        [(0.03, (240.0, 60.0)), (0.03, (60.0, 240.0)), (0.02, (240.0, 60.0)), (0.029, (240.0, 240.0))]
+    {
+        let cushion = SoftSpec {
+            matter: SoftMatter { young_pa: 5e4, damping_per_s: 1.0, ..MATTER },
+            position: DVec3::new(-0.125, -0.125, -0.1),
+            held: vec![Side::Bottom],
+            gravity: G,
+            ..spec(SoftShape::Box { size_m: DVec3::new(0.25, 0.25, 0.1), segments: [4, 4, 2] })
+        };
+        let solid = Solid::Ball { radius_m: 0.03 };
+        let ball = RigidSpec { gravity: G, ..RigidSpec::free(solid, DVec3::Z * (0.03 - depth_m), 0.3) };
+        let mut stage = Stage::new(Faults::default());
+        stage.add(SoftBody::new(cushion).unwrap(), rates.0);
+        let ball = stage.add(RigidBody::new(ball).unwrap(), rates.1);
+        stage.run(0.5, |_| {});
+        let at = stage.settled(ball, 0.5).state.position;
+        println!("{depth_m} {rates:?}: {at:.4}");
+        assert!((0.015..0.04).contains(&at.z), "{depth_m} m deep at {rates:?}: it is at {at}");
     }
 }

@@ -1,0 +1,105 @@
+//! What hangs on a soft body by links, against statics: each link is longer by its share of the weight over its stiffness.
+
+use super::*;
+use crate::coupling::harness::{Faults, Stage};
+use crate::coupling::{Law, Link};
+use crate::rigid::{RigidBody, RigidSpec};
+use crate::rod::{Material, Section, Tube, TubeSpec};
+use crate::shape::Solid;
+use crate::{Agent, Anchor};
+
+const STIFFNESS_N_M: f64 = 150.0;
+const REST_M: f64 = 0.012;
+
+/// A sheet of 30 × 10 cm that hangs from its upper edge, its lower one at z = 0.
+fn curtain() -> SoftBody {
+    let shape = SoftShape::Sheet { size_m: [0.3, 0.1], thickness_m: 0.001, segments: [12, 4] };
+    let matter = SoftMatter { young_pa: 8e4, density_kg_m3: 1050.0, damping_per_s: 4.0, ..MATTER };
+    let rotation = DQuat::from_rotation_x(std::f64::consts::FRAC_PI_2);
+    let position = DVec3::new(-0.15, 0.0, 0.0);
+    SoftBody::new(SoftSpec { matter, position, rotation, held: vec![Side::Far], gravity: G, ..spec(shape) }).unwrap()
+}
+
+/// A tube of 30 cm, 5 cm below the sheet.
+fn tube() -> Tube {
+    let material = Material { young_pa: 6e4, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    let path = [-0.15, 0.15].map(|x| DVec3::new(x, 0.0, -0.05)).to_vec();
+    let free = TubeSpec::free(path, Section::hollow(0.012, 0.002, material), 20);
+    Tube::new(TubeSpec { damping_per_s: 3.0, gravity: G, ..free }).unwrap()
+}
+
+/// A bar of 20 cm and 0.1 kg, as deep.
+fn bar() -> RigidBody {
+    let solid = Solid::Box { half_extents_m: DVec3::new(0.1, 0.01, 0.01) };
+    RigidBody::new(RigidSpec { gravity: G, ..RigidSpec::free(solid, DVec3::Z * -0.05, 0.1) }).unwrap()
+}
+
+/// How far apart the ends of each link are after two seconds of which the last half is averaged, and the lengths that statics
+/// asks for. The places of the links, along x, are on both.
+fn hang(rates: (f64, f64), made: Box<dyn Agent>, places: &[f64]) -> (Vec<f64>, f64) {
+    let is_tube = made.model() == "tube";
+    let mut stage = Stage::new(Faults::default());
+    let sheet = curtain();
+    let Body::Soft(start) = sheet.start() else { panic!("a soft body") };
+    let vertex = |x: f64| {
+        let way = |i: &usize| start.positions[*i].distance(DVec3::X * x);
+        (0..start.positions.len()).min_by(|a, b| way(a).total_cmp(&way(b))).unwrap() as u32
+    };
+    let sheet = stage.add(sheet, rates.0);
+    let other = stage.add_boxed(made, rates.1);
+    stage.law(sheet, other, Law::Off);
+    for &x in places {
+        let there = if is_tube { Anchor::Arc(x + 0.15) } else { Anchor::Local(DVec3::X * x) };
+        let (here, rest_m) = (Anchor::Vertex(vertex(x)), REST_M);
+        let link =
+            Link { other, here, there, stiffness_n_m: STIFFNESS_N_M, damping_n_s_m: 0.2, rest_m, law: Law::Ledger };
+        stage.link(sheet, link);
+    }
+    let (mut sums, mut count) = (vec![0.0; places.len()], 0.0);
+    stage.run(3.0, |stage| {
+        let (Body::Soft(soft), newest) = (&stage.newest(sheet).body, stage.newest(other)) else { return };
+        if newest.time.as_secs_f64() < 2.0 {
+            return;
+        }
+        for (sum, &x) in sums.iter_mut().zip(places) {
+            let at = match &newest.body {
+                Body::Curve(curve) => {
+                    let (segment, share) = curve.locate(x + 0.15).unwrap();
+                    curve.positions[segment].lerp(curve.positions[segment + 1], share)
+                }
+                Body::Rigid(_) => {
+                    let bar = stage.settled(other, stage.newest(sheet).time.as_secs_f64()).state;
+                    bar.position + bar.rotation * (DVec3::X * x)
+                }
+                _ => panic!("a tube or a rigid body"),
+            };
+            *sum += soft.positions[vertex(x) as usize].distance(at);
+        }
+        count += 1.0;
+    });
+    let wanted = REST_M + stage.mass_kg(other) * 9.81 / STIFFNESS_N_M / places.len() as f64;
+    (sums.into_iter().map(|sum| sum / count).collect(), wanted)
+}
+
+#[test]
+fn what_hangs_on_a_sheet_hangs_as_statics_has_it_whatever_the_sheet_s_rate() {
+    for rates in [(240.0, 240.0), (60.0, 60.0), (60.0, 1000.0), (20.0, 1000.0)] {
+        for (name, made, places) in [
+            ("tube", Box::new(tube()) as Box<dyn Agent>, &[0.0][..]),
+            ("tube", Box::new(tube()), &[-0.075, 0.075]),
+            ("tube", Box::new(tube()), &[-0.1, 0.0, 0.1]),
+            ("bar", Box::new(bar()), &[-0.1, 0.1]),
+        ] {
+            let (lengths, wanted) = hang(rates, made, places);
+            let mean = lengths.iter().sum::<f64>() / lengths.len() as f64;
+            println!("{rates:?} {name} on {}: {mean:.5} of {wanted:.5}: {lengths:.4?}", places.len());
+            // a bar hangs to rounding of its swing; of a tube, what it bends in a step of the sheet
+            let near_m = if name == "bar" { 2e-5 } else { 4e-4 };
+            assert!(
+                (mean - wanted).abs() < near_m,
+                "{rates:?}: {name} on {} links of {mean} m, not {wanted}",
+                places.len()
+            );
+        }
+    }
+}
