@@ -113,5 +113,6 @@ fn the_overload_scene_is_back_at_its_frame_rate_after_two_seconds_and_says_what_
     let report = lockstep("overload", &["--seconds", "2"]);
     let strand = agent(&report, "strand 01");
     let gave_up = number(strand, "/eps_m") > 0.0008 || number(strand, "/dt_ms") > 2.0;
-    assert!(gave_up && number(strand, "/dropped_ms") > 0.0, "{strand}");
+    // while it was behind it made longer steps: nothing is lost
+    assert!(gave_up && number(strand, "/rate_hz") < 499.0 && number(strand, "/dropped_ms") == 0.0, "{strand}");
 }
