@@ -148,8 +148,11 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
     let boxes = outcome.agents.len();
     let dropped_s = outcome.agents.iter().map(|a| a.stats.dropped.as_secs_f64()).sum::<f64>() / boxes.max(1) as f64;
     let who = format!("agents, {}", executor.name());
-    // time that an agent has not yet given up is not made either
-    let made_s = |s: &AgentStats| s.steps as f64 * s.dt.as_secs_f64();
+    // the time that its steps have made, however long they were: what it lags behind is not made
+    let made_s = |s: &AgentStats| {
+        let lived_s = if s.steps == 0 { 0.0 } else { s.steps as f64 / s.mean_hz };
+        (lived_s - s.dropped.as_secs_f64() - s.late.p50_s).max(0.0)
+    };
     let made_s = outcome.agents.iter().map(|a| made_s(&a.stats)).sum::<f64>() / boxes.max(1) as f64;
     let steps_per_cpu_s = made_s * STEP_HZ / cpu_s;
     Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })
