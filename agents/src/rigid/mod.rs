@@ -7,9 +7,8 @@
 //! Between touches a body follows its parabola in closed form and turns by a splitting that keeps the angular momentum
 //! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds how long that may
 //! last. At a touch the blow is solved as if it took no time, so bounce heights do not depend on the step either: with all
-//! that is touched at once, in double precision (`meeting.rs`; against fixed meshes alone in single precision, `world.rs`). A
-//! body that stays in touch with fixed solids is carried by the contact solver (`world.rs`, 4 small passes in at most 1/240 s),
-//! one that stays in touch with others by the solve of `meeting.rs`. Springs are implicit (`springs.rs`).
+//! that is touched at once, in double precision (`meeting.rs`). A body that stays in touch with fixed solids is carried by
+//! the contact solver (`world.rs`, single precision, 4 small passes in at most 1/240 s), one that stays in touch with others by the solve of `meeting.rs`. Springs are implicit (`springs.rs`).
 //!
 //! Two rules hold for every pair: friction is the geometric mean of both coefficients, restitution the larger of both.
 

@@ -27,6 +27,8 @@ pub(super) struct Company {
     count: usize,
     touches: Vec<Touch>,
     impulses: Vec<DVec3>,
+    /// What was amiss with each link before and after a round of [`Self::share`], m/s.
+    amiss: [Vec<DVec3>; 2],
     tanks: Tanks,
     /// What others gave since the last step: impulses, and how far they have carried, one a vertex.
     received: Vec<DVec3>,
@@ -179,9 +181,11 @@ impl Company {
         if ties.iter().all(|tie| tie.link.is_none() || lonely(tie)) {
             return;
         }
-        let (mut share, mut before) = (1.0, Vec::new());
+        let mut share = 1.0;
+        let [mut before, mut amiss] = std::mem::take(&mut self.amiss);
+        before.clear();
         for _ in 0..SHARES_MAX {
-            let amiss = self.amiss(ties, free);
+            self.find_amiss(ties, free, &mut amiss);
             if amiss.iter().all(|amiss| amiss.length() < SHARED_M_S) {
                 break;
             }
@@ -193,12 +197,13 @@ impl Company {
             }
             system.respond(&mut self.impulses);
             free.iter_mut().zip(&self.impulses).for_each(|(v, dv)| *v += *dv);
-            before = amiss;
+            std::mem::swap(&mut before, &mut amiss);
         }
+        self.amiss = [before, amiss];
     }
 
-    /// What is amiss with the expected velocity of each far end, m/s.
-    fn amiss(&mut self, ties: &[Tie], free: &[DVec3]) -> Vec<DVec3> {
+    /// Finds what is amiss with the expected velocity of each far end, m/s.
+    fn find_amiss(&mut self, ties: &[Tie], free: &[DVec3], into: &mut Vec<DVec3>) {
         let mates = &mut self.mates[..self.count];
         mates.iter_mut().for_each(Mate::ease);
         for tie in ties {
@@ -213,9 +218,9 @@ impl Company {
             let moved = tie.link.zip(mate).map(|(link, mate)| mate.yield_at(link.there));
             moved.map_or(DVec3::ZERO, |moved| tie.amiss(moved, free[tie.vertex]))
         };
-        let list = ties.iter().map(of).collect();
+        into.clear();
+        into.extend(ties.iter().map(of));
         mates.iter_mut().for_each(Mate::ease);
-        list
     }
 
     /// Gives what the contacts and ties of a substep gave, `start` seconds into the step, and lets the others go on by `h`.
