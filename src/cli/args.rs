@@ -1,5 +1,6 @@
 //! The arguments, and the help that teaches them.
 
+use super::assignment::assignment;
 use super::report::Goal;
 use crate::scene::format::PolicyKind;
 use crate::scene::papers::Paper;
@@ -444,28 +445,6 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     Ok([side(width)?, side(height)?])
 }
 
-fn assignment(text: &str) -> Result<(String, String), String> {
-    match equals_sign(text).map(|at| (&text[..at], &text[at + 1..])) {
-        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
-        _ => Err("expected KEY=VALUE, such as target.frame_hz=60".to_owned()),
-    }
-}
-
-/// The sign between a key and its value: parts of the key that stand in quotes may hold others.
-fn equals_sign(text: &str) -> Option<usize> {
-    let (mut open, mut before) = (None, '.');
-    for (at, c) in text.char_indices() {
-        match (open, c) {
-            (None, '=') => return Some(at),
-            (None, '"' | '\'') if before == '.' => open = Some(c),
-            (Some(quote), c) if c == quote && before != '\\' => open = None,
-            _ => {}
-        }
-        before = c;
-    }
-    None
-}
-
 fn goal(text: &str) -> Result<Goal, String> {
     text.parse().map_err(|e: super::report::GoalError| e.to_string())
 }
@@ -481,27 +460,11 @@ mod tests {
     }
 
     #[test]
-    fn keys_in_quotes_may_hold_the_sign_that_ends_a_key() {
-        let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
-        assert_eq!(assignment("target.frame_hz = 60"), pair("target.frame_hz", "60"));
-        assert_eq!(assignment("object.\"a=b.c\".look='x=y'"), pair("object.\"a=b.c\".look", "'x=y'"));
-        assert_eq!(assignment("object.six\"inch.n=2"), pair("object.six\"inch.n", "2"));
-        assert!(assignment("=2").is_err() && assignment("'a=2").is_err());
-    }
-
-    #[test]
     fn sizes_are_two_numbers_of_pixels() {
         assert_eq!(size("640x360"), Ok([640, 360]));
         for bad in ["640", "0x360", "640x", "640x9000", "-1x2", "axb", "1x2x3"] {
             assert!(size(bad).is_err(), "{bad}");
         }
-    }
-
-    #[test]
-    fn an_assignment_keeps_what_follows_the_first_equals_sign() {
-        assert_eq!(assignment("a.b=c=d"), Ok(("a.b".to_owned(), "c=d".to_owned())));
-        assert!(assignment("a.b").is_err());
-        assert!(assignment("=1").is_err());
     }
 
     #[test]

@@ -4,6 +4,7 @@
 //! Never here: physics, drawing, the format of scenes.
 
 mod args;
+mod assignment;
 mod bench;
 mod chart;
 mod check;
