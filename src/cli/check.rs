@@ -3,7 +3,8 @@
 use super::Exit;
 use super::args::CheckArgs;
 use super::output::{data, message, pictured, tell_overlaps};
-use crate::scene::{Overlap, Scene, SceneError, SceneProblem, Source, load};
+use super::report::{MovedReport, OverlapReport};
+use crate::scene::{Scene, SceneError, SceneProblem, Source, load};
 use serde::Serialize;
 
 #[derive(Serialize)]
@@ -23,14 +24,8 @@ struct Content {
     scenery: usize,
     joints: usize,
     couplings: usize,
-    overlaps: Vec<OverlapRow>,
-}
-
-#[derive(Serialize)]
-struct OverlapRow {
-    a: String,
-    b: String,
-    depth_m: f64,
+    overlaps: Vec<OverlapReport>,
+    moved: Vec<MovedReport>,
 }
 
 #[derive(Serialize)]
@@ -85,7 +80,6 @@ fn counted((count, what): (usize, &str)) -> String {
 }
 
 fn content(scene: &Scene) -> Content {
-    let row = |Overlap { a, b, depth_m }| OverlapRow { a, b, depth_m };
     Content {
         agents: scene.agents.len(),
         fixed: scene.obstacles.len(),
@@ -93,7 +87,8 @@ fn content(scene: &Scene) -> Content {
         scenery: scene.scenery.len(),
         joints: scene.joints.len(),
         couplings: scene.couplings.len(),
-        overlaps: scene.overlaps().into_iter().map(row).collect(),
+        overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
+        moved: scene.moved.iter().map(MovedReport::of).collect(),
     }
 }
 

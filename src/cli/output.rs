@@ -3,7 +3,7 @@
 use super::Exit;
 use crate::runtime::Priority;
 use crate::scene::format::{ExecutorKind, PriorityKind};
-use crate::scene::{Overlap, Scene, SceneError};
+use crate::scene::{Moved, Overlap, Scene, SceneError};
 use std::io::{ErrorKind, Write};
 
 /// Writes data to standard output. A reader that has gone away (`| head`) is no error.
@@ -23,15 +23,23 @@ pub(super) fn message(text: &str) {
 /// More overlaps than this are counted, not told.
 const OVERLAPS_TOLD: usize = 10;
 
-/// Tells of agents that start inside each other or fixed solids, which is no error: they are pushed apart without a jump.
+/// Tells of agents that start inside each other or fixed solids, which is no error: what bends begins elsewhere, the others come
+/// apart without a jump.
 pub(super) fn tell_overlaps(scene: &Scene) {
-    let overlaps = scene.overlaps();
+    let overlaps = &scene.overlaps;
     for overlap in overlaps.iter().take(OVERLAPS_TOLD) {
         let Overlap { a, b, depth_m } = overlap;
         message(&format!("note: `{a}` and `{b}` overlap by {:.3} mm at the start", depth_m * 1e3));
     }
     if overlaps.len() > OVERLAPS_TOLD {
         message(&format!("note: {} more pairs overlap at the start", overlaps.len() - OVERLAPS_TOLD));
+    }
+    for Moved { object, by_m } in scene.moved.iter().take(OVERLAPS_TOLD) {
+        let [x, y, z] = (*by_m * 1e3).to_array();
+        message(&format!("note: `{object}` starts ({x:.3}, {y:.3}, {z:.3}) mm from there, clear of others"));
+    }
+    if scene.moved.len() > OVERLAPS_TOLD {
+        message(&format!("note: {} more objects start elsewhere", scene.moved.len() - OVERLAPS_TOLD));
     }
 }
 

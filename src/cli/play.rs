@@ -3,8 +3,8 @@
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
 use super::report::{
-    AgentReport, BudgetReport, CouplingError, CouplingReport, OracleReport, OverlapReport, ProbeReport, Quantiles,
-    Report, summarise, summarise_choices, summarise_undrawn,
+    AgentReport, BudgetReport, CouplingError, CouplingReport, MovedReport, OracleReport, OverlapReport, ProbeReport,
+    Quantiles, Report, summarise, summarise_choices, summarise_undrawn,
 };
 use super::run::{Played, Request, RunLength, Step};
 use crate::compositor::viewer::WindowError;
@@ -14,8 +14,8 @@ use crate::frame::{
     WindowFailure, WindowPlan, consult_oracle, play_headless, play_in_window,
 };
 use crate::runtime::{AgentState, Spread};
+use crate::scene::Scene;
 use crate::scene::format::ExecutorKind;
-use crate::scene::{Overlap, Scene};
 use metachron_agents::AgentId;
 use metachron_budget::Bound;
 use std::path::{Path, PathBuf};
@@ -155,11 +155,8 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         summary,
         agents: outcome.agents.iter().map(|one| agent(scene, one)).collect(),
         couplings: outcome.couplings.iter().map(|one| coupling(scene, one)).collect(),
-        overlaps: scene
-            .overlaps()
-            .into_iter()
-            .map(|Overlap { a, b, depth_m }| OverlapReport { a, b, depth_m })
-            .collect(),
+        overlaps: scene.overlaps.iter().map(OverlapReport::of).collect(),
+        moved: scene.moved.iter().map(MovedReport::of).collect(),
         oracle: None,
         budget: BudgetReport { spent_share, clamped: outcome.clamp, choices },
         probes: outcome.probes.iter().map(probe).collect(),

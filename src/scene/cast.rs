@@ -3,7 +3,9 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
+use super::apart::Moved;
 use super::format::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
+use super::overlap::Overlap;
 use super::ties::{Coupling, Faults};
 use glam::DVec3;
 use metachron_agents::instrument::ToolSpec;
@@ -55,6 +57,10 @@ pub struct Scene {
     pub couplings: Vec<Coupling>,
     /// The points whose state is reported.
     pub probes: Vec<Probe>,
+    /// What is inside each other where the scene puts it.
+    pub overlaps: Vec<Overlap>,
+    /// What starts elsewhere because of that.
+    pub moved: Vec<Moved>,
 }
 
 /// The frame rate wanted and how it is held.

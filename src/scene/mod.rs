@@ -3,11 +3,13 @@
 //! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
 //! [`SceneError`] that shows every problem where it stands. Never here: running agents, drawing, the command line.
 
+mod apart;
 mod build;
 pub mod builtin;
 mod cast;
 mod check;
 mod document;
+mod figure;
 pub mod format;
 mod overlap;
 pub mod papers;
@@ -16,6 +18,7 @@ mod schema;
 mod source;
 pub mod ties;
 
+pub use apart::Moved;
 pub use cast::{Camera, Gains, Group, Look, Machine, Member, PaceWish, Probe, Scene, Scenery, Spec, Target, View};
 pub use overlap::Overlap;
 pub use problem::{SceneError, SceneProblem};
@@ -65,7 +68,11 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let objects = build::read_objects(&mut c, document.root().get("object"), &around);
     let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
     match (scene, c.finish()) {
-        (Some(scene), problems) if problems.is_empty() => Ok(scene),
+        (Some(mut scene), problems) if problems.is_empty() => {
+            scene.overlaps = scene.name_overlaps();
+            scene.set_apart();
+            Ok(scene)
+        }
         (_, problems) => Err(problems),
     }
 }
@@ -128,5 +135,7 @@ fn assemble(
         joints,
         couplings,
         probes,
+        overlaps: Vec::new(),
+        moved: Vec::new(),
     }
 }

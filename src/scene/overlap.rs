@@ -4,23 +4,19 @@
 //! of rigid bodies so near that turning could make them touch.
 //! Never here: what is done about it.
 
-use super::cast::{Member, Scene, Spec};
+use super::cast::{Scene, Spec};
+use super::figure::{Figure, figure};
 use super::ties::{Coupling, CouplingKind};
-use glam::{DQuat, DVec3};
+use glam::DVec3;
+use metachron_agents::AgentId;
 use metachron_agents::coupling::touch::{TouchRoom, touches};
-use metachron_agents::coupling::{Form, FormKind, Law, Placed, SolidForm, Touch, View};
-use metachron_agents::rod::Tube;
-use metachron_agents::shape::{Obstacle, Solid, ToolShape};
-use metachron_agents::soft::SoftBody;
-use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
+use metachron_agents::coupling::{FormKind, Law, Touch};
 use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
-const OVERLAP_MIN_M: f64 = 2e-5;
+pub(super) const OVERLAP_MIN_M: f64 = 2e-5;
 /// Bodies no farther apart than this lie against each other, metres.
 const TOUCH_MAX_M: f64 = 1e-4;
-/// How far a plane's slab reaches past a figure, in sizes of it.
-const SLAB_SHARE: f64 = 4.0;
 
 /// An agent that starts inside another or inside a fixed solid.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,57 +29,57 @@ pub struct Overlap {
     pub depth_m: f64,
 }
 
-/// An agent's shape where it starts.
-struct Figure {
-    id: AgentId,
-    form: Form,
-    place: Pose,
-    low: DVec3,
-    high: DVec3,
-}
-
-enum Pose {
-    Solid(DVec3, DQuat),
-    Chain(CurveState),
-    Soft(SoftState),
-    Tool(DVec3, DQuat, f64),
+/// What an agent starts inside of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Inside {
+    /// Another agent.
+    Agent(AgentId),
+    /// A fixed solid, by its place in [`Scene::obstacles`].
+    Fixed(usize),
 }
 
 impl Scene {
-    /// All that starts inside each other: pairs of agents in the order of their numbers, then rigid ones inside fixed solids.
+    /// All that is inside each other where the scene puts it, named: pairs of agents in the order of their numbers, then agents
+    /// inside fixed solids.
+    pub(super) fn name_overlaps(&self) -> Vec<Overlap> {
+        let name = |b: Inside| match b {
+            Inside::Agent(id) => self.name_of(id).to_owned(),
+            Inside::Fixed(at) => self.obstacles[at].name.clone(),
+        };
+        let named = |(a, b, depth_m)| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
+        self.inside_each_other().into_iter().map(named).collect()
+    }
+
+    /// All that is inside each other, and how deep, metres.
     ///
-    /// What bends may be meant to be held there. Meshes are left out: what is inside one of them may be in its hollow.
-    #[must_use]
-    pub fn overlaps(&self) -> Vec<Overlap> {
+    /// What bends and is held may be meant to be held inside a fixed solid.
+    pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {
         let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
             if gap_m <= -OVERLAP_MIN_M {
-                pairs.push((one.id.min(two.id), one.id.max(two.id), -gap_m));
+                pairs.push((one.id.min(two.id), Inside::Agent(one.id.max(two.id)), -gap_m));
             }
         });
         pairs.sort_by_key(|&(a, b, _)| (a, b));
-        let name = |id: AgentId| self.name_of(id).to_owned();
-        let pairs = pairs.into_iter().map(|(a, b, depth_m)| Overlap { a: name(a), b: name(b), depth_m });
-        pairs.chain(self.fixed_overlaps()).collect()
+        self.inside_fixed(&mut pairs);
+        pairs
     }
 
-    /// The rigid agents that start inside fixed solids.
-    fn fixed_overlaps(&self) -> Vec<Overlap> {
+    /// Appends the agents that start inside fixed solids.
+    fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
         let (mut room, mut found) = (TouchRoom::default(), Vec::new());
-        let mut overlaps = Vec::new();
-        let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
-        for figure in rigid.filter_map(figure) {
-            for obstacle in self.obstacles.iter().filter(|obstacle| !matches!(obstacle.solid, Solid::Mesh { .. })) {
+        let free =
+            self.agents.iter().filter(|member| self.is_loose(member.id) || matches!(member.spec, Spec::Rigid(_)));
+        for figure in free.filter_map(figure) {
+            for (at, obstacle) in self.obstacles.iter().enumerate() {
                 let Some(fixed) = figure.over(obstacle) else { continue };
                 touches(&figure.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
                 let depth_m = found.iter().map(|touch: &Touch| -touch.gap_m).fold(0.0, f64::max);
                 if depth_m >= OVERLAP_MIN_M {
-                    let (a, b) = (self.name_of(figure.id).to_owned(), obstacle.name.clone());
-                    overlaps.push(Overlap { a, b, depth_m });
+                    pairs.push((figure.id, Inside::Fixed(at), depth_m));
                 }
             }
         }
-        overlaps
     }
 
     /// Every pair of rigid agents that starts at rest against each other and touches by the ledger.
@@ -155,7 +151,7 @@ impl Scene {
     }
 
     /// Pairs whose contact differs from the scene's: with contacts those that do not touch, without those that do.
-    fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
+    pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
         let contact =
             |c: &&super::ties::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
         let coupled = self.couplings.iter().filter(contact).map(|c| (c.a, c.b));
@@ -163,88 +159,10 @@ impl Scene {
         coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()
     }
 
-    fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
+    /// Whether two agents act on each other where they touch.
+    pub(super) fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
         let led = |figure: &Figure| matches!(figure.form.kind, FormKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
         named != self.contacts && !(led(one) && led(two))
     }
 }
-
-impl Figure {
-    fn meets(&self, other: &Self, reach_m: f64) -> bool {
-        self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
-    }
-
-    /// A fixed solid where it stands, if this may be inside it. A plane is a slab below this figure, as high as the plane.
-    fn over(&self, obstacle: &Obstacle) -> Option<Self> {
-        let rotation = obstacle.rotation.normalize();
-        let (middle, half) = ((self.low + self.high) * 0.5, (self.high - self.low) * 0.5);
-        let (solid, place) = if matches!(obstacle.solid, Solid::Plane) {
-            let up = rotation * DVec3::Z;
-            let height = up.dot(middle - obstacle.position);
-            if height > up.abs().dot(half) {
-                return None;
-            }
-            let deep = SLAB_SHARE * (half.length() + height.abs());
-            (Solid::Box { half_extents_m: DVec3::splat(deep) }, middle - up * (height + deep))
-        } else {
-            (obstacle.solid.clone(), obstacle.position)
-        };
-        let form = SolidForm::new(solid, DVec3::ZERO).ok()?;
-        let radius = DVec3::splat(form.radius_m);
-        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0 };
-        let fixed =
-            Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
-        self.meets(&fixed, 0.0).then_some(fixed)
-    }
-
-    fn placed(&self) -> Placed<'_> {
-        let view = match &self.place {
-            Pose::Solid(position, rotation) => View::Solid { position: *position, rotation: *rotation },
-            Pose::Chain(curve) => View::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
-            Pose::Soft(soft) => View::Surface(&soft.positions),
-            Pose::Tool(tip, rotation, jaw) => View::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
-        };
-        Placed { form: &self.form, view }
-    }
-}
-
-/// The shape of an agent at its start; `None` for one that nothing touches.
-fn figure(member: &Member) -> Option<Figure> {
-    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
-    let (kind, place, low, high) = match &member.spec {
-        Spec::Rigid(spec) => {
-            let solid = SolidForm::new(spec.solid.clone(), DVec3::ZERO).ok()?;
-            let (radius, at) = (DVec3::splat(solid.radius_m), spec.position);
-            (FormKind::Solid(solid), Pose::Solid(at, spec.rotation.normalize()), at - radius, at + radius)
-        }
-        Spec::Tube(spec) => {
-            let mut start = Snapshot::default();
-            Tube::new(spec.clone()).ok()?.write_snapshot(&mut start);
-            let Body::Curve(curve) = start.body else { return None };
-            let radius = DVec3::splat(curve.radii_m.iter().copied().fold(0.0, f64::max));
-            let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
-            let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
-            // where it is held is no matter of places
-            (FormKind::Chain { held_ends: 0 }, Pose::Chain(curve), low, high)
-        }
-        Spec::Soft(spec) => {
-            let body = SoftBody::new(spec.clone()).ok()?;
-            let Body::Soft(soft) = body.start() else { return None };
-            let low = soft.positions.iter().copied().reduce(DVec3::min)?;
-            let high = soft.positions.iter().copied().reduce(DVec3::max)?;
-            let kind = body.form()?.kind.clone();
-            (kind, Pose::Soft(soft), low, high)
-        }
-        Spec::Instrument(spec) => {
-            let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
-            let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
-            (FormKind::Tool(shape), Pose::Tool(key.tip_m, key.rotation, key.jaw), key.tip_m - reach, key.tip_m + reach)
-        }
-        Spec::Synthetic(_) => return None,
-    };
-    Some(Figure { id: member.id, form: form(kind), place, low, high })
-}
-
-/// Nothing of a tool is farther from its tip than its shaft is long and this many shaft radii.
-const TOOL_TIP_RADII: f64 = 12.0;

@@ -14,6 +14,7 @@ mod scene;
 mod scene_ties;
 mod scenery;
 mod scenes;
+mod scenes_apart;
 mod scenes_coupled;
 mod scenes_soft;
 mod shares;

@@ -11,6 +11,7 @@ pub use choices::{ChoiceSummary, summarise_choices};
 pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
 pub use goal::{Goal, GoalError, Verdict};
 
+use crate::scene::{Moved, Overlap};
 use serde::Serialize;
 
 /// The report of a run.
@@ -49,6 +50,8 @@ pub struct Report {
     pub couplings: Vec<CouplingReport>,
     /// Agents that started inside each other or fixed solids.
     pub overlaps: Vec<OverlapReport>,
+    /// What starts elsewhere than the scene puts it, because of that.
+    pub moved: Vec<MovedReport>,
     /// What different clocks changed, where that was asked for.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oracle: Option<OracleReport>,
@@ -164,6 +167,27 @@ pub struct OverlapReport {
     pub depth_m: f64,
 }
 
+/// An object that starts clear of others, and not where the scene puts it.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct MovedReport {
+    /// Its name.
+    pub object: String,
+    /// From where the scene puts it to where it starts, metres.
+    pub by_m: [f64; 3],
+}
+
+impl OverlapReport {
+    pub(super) fn of(overlap: &Overlap) -> Self {
+        Self { a: overlap.a.clone(), b: overlap.b.clone(), depth_m: overlap.depth_m }
+    }
+}
+
+impl MovedReport {
+    pub(super) fn of(moved: &Moved) -> Self {
+        Self { object: moved.object.clone(), by_m: moved.by_m.to_array() }
+    }
+}
+
 /// The same scene on one tiny common clock, and what its own clocks changed.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct OracleReport {
@@ -247,6 +271,7 @@ impl Report {
             agents: vec![AgentReport::default()],
             couplings: vec![CouplingReport::default()],
             overlaps: vec![OverlapReport::default()],
+            moved: vec![MovedReport::default()],
             oracle: Some(oracle),
             budget: BudgetReport { choices: summarise_choices(&[frame]), ..BudgetReport::default() },
             probes: vec![ProbeReport::default()],
@@ -258,66 +283,70 @@ impl Report {
 mod tests {
     use super::*;
 
+    /// Names that other programs read.
+    const NAMES: &[&str] = &[
+        "/scene",
+        "/policy",
+        "/executor",
+        "/adapter",
+        "/frames",
+        "/sim_s",
+        "/wall_s",
+        "/start_up_s",
+        "/cpu_s",
+        "/state_hash",
+        "/target_ms",
+        "/frame_ms/mean",
+        "/frame_ms/stddev",
+        "/frame_ms/min",
+        "/frame_ms/p50",
+        "/frame_ms/p95",
+        "/frame_ms/p99",
+        "/frame_ms/max",
+        "/interval_ms/p99",
+        "/binding_stddev",
+        "/avg_err",
+        "/missed_share",
+        "/settle_frames",
+        "/agents/0/name",
+        "/agents/0/model",
+        "/agents/0/steps",
+        "/agents/0/rate_hz",
+        "/agents/0/wanted_hz",
+        "/agents/0/dt_ms",
+        "/agents/0/eps_m",
+        "/agents/0/n",
+        "/agents/0/cpu_s",
+        "/agents/0/age_ms/p50",
+        "/agents/0/age_ms/p99",
+        "/agents/0/dropped_ms",
+        "/agents/0/parked",
+        "/agents/0/energy_j",
+        "/agents/0/residual_m",
+        "/couplings/0/a",
+        "/couplings/0/b",
+        "/couplings/0/kind",
+        "/couplings/0/contacts",
+        "/couplings/0/force_n",
+        "/couplings/0/momentum_error",
+        "/couplings/0/tank_j",
+        "/couplings/0/penetration_m",
+        "/overlaps/0/depth_m",
+        "/moved/0/by_m",
+        "/oracle/dt_ms",
+        "/oracle/couplings/0/position_rms_m",
+        "/agents/0/led_by",
+        "/budget/spent_share",
+        "/probes/0/object",
+        "/probes/0/at",
+        "/probes/0/position_m",
+        "/probes/0/velocity_m_s",
+    ];
+
     #[test]
     fn the_report_has_the_names_of_the_design() {
         let json = serde_json::to_value(Report::template()).unwrap();
-        for path in [
-            "/scene",
-            "/policy",
-            "/executor",
-            "/adapter",
-            "/frames",
-            "/sim_s",
-            "/wall_s",
-            "/start_up_s",
-            "/cpu_s",
-            "/state_hash",
-            "/target_ms",
-            "/frame_ms/mean",
-            "/frame_ms/stddev",
-            "/frame_ms/min",
-            "/frame_ms/p50",
-            "/frame_ms/p95",
-            "/frame_ms/p99",
-            "/frame_ms/max",
-            "/interval_ms/p99",
-            "/binding_stddev",
-            "/avg_err",
-            "/missed_share",
-            "/settle_frames",
-            "/agents/0/name",
-            "/agents/0/model",
-            "/agents/0/steps",
-            "/agents/0/rate_hz",
-            "/agents/0/wanted_hz",
-            "/agents/0/dt_ms",
-            "/agents/0/eps_m",
-            "/agents/0/n",
-            "/agents/0/cpu_s",
-            "/agents/0/age_ms/p50",
-            "/agents/0/age_ms/p99",
-            "/agents/0/dropped_ms",
-            "/agents/0/parked",
-            "/agents/0/energy_j",
-            "/agents/0/residual_m",
-            "/couplings/0/a",
-            "/couplings/0/b",
-            "/couplings/0/kind",
-            "/couplings/0/contacts",
-            "/couplings/0/force_n",
-            "/couplings/0/momentum_error",
-            "/couplings/0/tank_j",
-            "/couplings/0/penetration_m",
-            "/overlaps/0/depth_m",
-            "/oracle/dt_ms",
-            "/oracle/couplings/0/position_rms_m",
-            "/agents/0/led_by",
-            "/budget/spent_share",
-            "/probes/0/object",
-            "/probes/0/at",
-            "/probes/0/position_m",
-            "/probes/0/velocity_m_s",
-        ] {
+        for path in NAMES {
             assert!(json.pointer(path).is_some(), "{path} is missing");
         }
     }

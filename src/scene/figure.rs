@@ -1,0 +1,126 @@
+//! The shape of an agent or of a fixed solid where a scene starts it.
+//!
+//! In: a member of the scene, an obstacle. Out: its form, where it stands, and a box around it.
+//! Never here: what touches what.
+
+use super::cast::{Member, Spec};
+use glam::{DQuat, DVec3};
+use metachron_agents::coupling::{Form, FormKind, Placed, SolidForm, View};
+use metachron_agents::rod::Tube;
+use metachron_agents::shape::{Obstacle, Solid, ToolShape};
+use metachron_agents::soft::SoftBody;
+use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
+
+/// How far a plane's slab reaches past a figure, in sizes of it.
+const SLAB_SHARE: f64 = 4.0;
+/// Nothing of a tool is farther from its tip than its shaft is long and this many shaft radii.
+const TOOL_TIP_RADII: f64 = 12.0;
+
+/// An agent's shape where it starts.
+pub(super) struct Figure {
+    pub id: AgentId,
+    pub form: Form,
+    place: Pose,
+    pub low: DVec3,
+    pub high: DVec3,
+}
+
+#[derive(Clone)]
+enum Pose {
+    Solid(DVec3, DQuat),
+    Chain(CurveState),
+    Soft(SoftState),
+    Tool(DVec3, DQuat, f64),
+}
+
+impl Figure {
+    pub fn meets(&self, other: &Self, reach_m: f64) -> bool {
+        self.low.cmple(other.high + reach_m).all() && other.low.cmple(self.high + reach_m).all()
+    }
+
+    /// The same, moved by `by_m`.
+    pub fn shifted(&self, by_m: DVec3) -> Self {
+        let mut place = self.place.clone();
+        match &mut place {
+            Pose::Solid(at, _) | Pose::Tool(at, ..) => *at += by_m,
+            Pose::Chain(CurveState { positions, .. }) | Pose::Soft(SoftState { positions, .. }) => {
+                positions.iter_mut().for_each(|point| *point += by_m);
+            }
+        }
+        Self { id: self.id, form: self.form.clone(), place, low: self.low + by_m, high: self.high + by_m }
+    }
+
+    /// A fixed solid where it stands, if this may be inside it. A plane is a slab below this figure, as high as the plane.
+    /// Meshes are left out: what is inside one of them may be in its hollow.
+    pub fn over(&self, obstacle: &Obstacle) -> Option<Self> {
+        if matches!(obstacle.solid, Solid::Mesh { .. }) {
+            return None;
+        }
+        let rotation = obstacle.rotation.normalize();
+        let (middle, half) = ((self.low + self.high) * 0.5, (self.high - self.low) * 0.5);
+        let (solid, place) = if matches!(obstacle.solid, Solid::Plane) {
+            let up = rotation * DVec3::Z;
+            let height = up.dot(middle - obstacle.position);
+            if height > up.abs().dot(half) {
+                return None;
+            }
+            let deep = SLAB_SHARE * (half.length() + height.abs());
+            (Solid::Box { half_extents_m: DVec3::splat(deep) }, middle - up * (height + deep))
+        } else {
+            (obstacle.solid.clone(), obstacle.position)
+        };
+        let form = SolidForm::new(solid, DVec3::ZERO).ok()?;
+        let radius = DVec3::splat(form.radius_m);
+        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0 };
+        let fixed =
+            Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
+        self.meets(&fixed, 0.0).then_some(fixed)
+    }
+
+    pub fn placed(&self) -> Placed<'_> {
+        let view = match &self.place {
+            Pose::Solid(position, rotation) => View::Solid { position: *position, rotation: *rotation },
+            Pose::Chain(curve) => View::Chain { positions: &curve.positions, radii_m: &curve.radii_m },
+            Pose::Soft(soft) => View::Surface(&soft.positions),
+            Pose::Tool(tip, rotation, jaw) => View::Tool { tip: *tip, rotation: *rotation, jaw: *jaw },
+        };
+        Placed { form: &self.form, view }
+    }
+}
+
+/// The shape of an agent at its start; `None` for one that nothing touches.
+pub(super) fn figure(member: &Member) -> Option<Figure> {
+    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
+    let (kind, place, low, high) = match &member.spec {
+        Spec::Rigid(spec) => {
+            let solid = SolidForm::new(spec.solid.clone(), DVec3::ZERO).ok()?;
+            let (radius, at) = (DVec3::splat(solid.radius_m), spec.position);
+            (FormKind::Solid(solid), Pose::Solid(at, spec.rotation.normalize()), at - radius, at + radius)
+        }
+        Spec::Tube(spec) => {
+            let mut start = Snapshot::default();
+            Tube::new(spec.clone()).ok()?.write_snapshot(&mut start);
+            let Body::Curve(curve) = start.body else { return None };
+            let radius = DVec3::splat(curve.radii_m.iter().copied().fold(0.0, f64::max));
+            let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
+            let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
+            // where it is held is no matter of places
+            (FormKind::Chain { held_ends: 0 }, Pose::Chain(curve), low, high)
+        }
+        Spec::Soft(spec) => {
+            let body = SoftBody::new(spec.clone()).ok()?;
+            let Body::Soft(soft) = body.start() else { return None };
+            let low = soft.positions.iter().copied().reduce(DVec3::min)?;
+            let high = soft.positions.iter().copied().reduce(DVec3::max)?;
+            let kind = body.form()?.kind.clone();
+            (kind, Pose::Soft(soft), low, high)
+        }
+        Spec::Instrument(spec) => {
+            let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
+            let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
+            (FormKind::Tool(shape), Pose::Tool(key.tip_m, key.rotation, key.jaw), key.tip_m - reach, key.tip_m + reach)
+        }
+        Spec::Synthetic(_) => return None,
+    };
+    Some(Figure { id: member.id, form: form(kind), place, low, high })
+}
