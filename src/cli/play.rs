@@ -219,6 +219,7 @@ fn coupling(scene: &Scene, coupling: &Coupling) -> CouplingReport {
         momentum_error: coupling.momentum_error,
         impulse_n_s: coupling.impulse_n_s,
         in_flight_n_s: coupling.in_flight_n_s,
+        inverse_mass_per_kg: coupling.inverse_mass_per_kg,
         tank_j: coupling.tank_j,
         penetration_m: coupling.penetration_m,
         penetration_max_m: coupling.penetration_max_m,

@@ -40,6 +40,9 @@ pub struct Coupling {
     pub momentum_error: Option<f64>,
     /// Whether both accounts were ever seen at the same reading.
     pub(super) met: bool,
+    /// How easily `a` and `b` gave way along the normal at the contact that bore most, 1/kg, when they last pressed on each other; `None`
+    /// where no contact was solved between the two: in an island, whose world is one solve, and for links, penalties and lines.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What was left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
     /// The mass that the law added, kilograms.
@@ -80,6 +83,7 @@ impl Coupling {
             in_flight_n_s: 0.0,
             momentum_error: None,
             met: false,
+            inverse_mass_per_kg: None,
             tank_j: None,
             parasitic_kg: 0.0,
         }
@@ -99,6 +103,7 @@ impl Coupling {
         self.penetration_max_m = self.penetration_max_m.max(state.penetration_m);
         self.impulse_n_s = state.impulse_n_s;
         self.in_flight_n_s = state.in_flight_n_s;
+        self.inverse_mass_per_kg = state.inverse_mass_per_kg;
         self.tank_j = state.tank_j;
         self.parasitic_kg = state.parasitic_kg;
     }
@@ -232,6 +237,9 @@ impl Couplings {
         }
         let coupling = self.at(a, b, state.kind.name());
         coupling.see(state);
+        if held_by_tool {
+            coupling.inverse_mass_per_kg = state.inverse_mass_per_kg.map(|[mine, its]| [its, mine]);
+        }
         if let Some((apart_n_s, same_reading)) = difference_n_s((mine, owner), (theirs, other)) {
             coupling.compare(apart_n_s, same_reading);
         }
@@ -280,8 +288,8 @@ fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapsh
 mod tests {
     use super::*;
     use crate::scene::{Source, load};
-    use metachron_agents::SimTime;
     use metachron_agents::coupling::{Impulse, Ledger, Site};
+    use metachron_agents::{SimTime, ToolState};
 
     fn two_balls() -> Scene {
         let text = "format = 1\nobject = [\n{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 },\n\
@@ -348,6 +356,24 @@ mod tests {
     }
 
     #[test]
+    fn what_a_contact_weighs_is_told_in_the_order_of_the_two_names() {
+        let scene = two_balls();
+        let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
+        let tool = ToolState { tip, rotation, velocity: DVec3::ZERO, jaw: 0.0, grasp: None, force_n: 0.0 };
+        for (kind, body, want) in [
+            (PairKind::Ledger, Body::Nothing, (0, 1, [3.0, 2.0])),
+            (PairKind::Grasp, Body::Tool(tool), (1, 0, [2.0, 3.0])),
+        ] {
+            let pair = PairState { inverse_mass_per_kg: Some([3.0, 2.0]), ..PairState::new(AgentId(1), kind) };
+            let owner = Snapshot { pairs: vec![pair], ..Snapshot::default() };
+            let mut couplings = Couplings::of(&scene);
+            note(&mut couplings, &[Arc::new(owner), Arc::new(Snapshot { body, ..Snapshot::default() })]);
+            let told = &couplings.all()[0];
+            assert_eq!((told.a.0, told.b.0, told.inverse_mass_per_kg.unwrap()), want, "{kind:?}");
+        }
+    }
+
+    #[test]
     fn bodies_that_share_a_clock_are_an_island_until_they_part() {
         let bound = |with| Arc::new(Snapshot { bonds: vec![AgentId(with)], ..Snapshot::default() });
         let scene = two_balls();
@@ -357,6 +383,7 @@ mod tests {
             couplings.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>(),
             [(0, 1, "island", 1)]
         );
+        assert_eq!(couplings.all()[0].inverse_mass_per_kg, None, "its contacts meet in the shared world");
         note(&mut couplings, &[Arc::default(), Arc::default()]);
         assert_eq!(couplings.all()[0].contacts, 0);
     }

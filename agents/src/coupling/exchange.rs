@@ -57,6 +57,9 @@ pub struct PairState {
     pub impulse_n_s: f64,
     /// The impulse that the other side has not yet acknowledged, N·s.
     pub in_flight_n_s: f64,
+    /// How easily the owner and the other side give way along the normal at the contact that bears most, 1/kg, ≥ 0, when they last
+    /// pressed on each other (a few steps ago at most); the sum is W of that contact. `None` where no contact was solved between the two.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What is left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
@@ -77,6 +80,7 @@ impl PairState {
             penetration_m: 0.0,
             impulse_n_s: 0.0,
             in_flight_n_s: 0.0,
+            inverse_mass_per_kg: None,
             tank_j: None,
             parasitic_kg: 0.0,
             wave: None,

@@ -30,6 +30,7 @@ pub use other::{Other, WAKE_M_S};
 pub use rebound::Rebound;
 pub(crate) use rebound::{since_s, spared};
 pub use six::{Six, Twist};
+pub(crate) use solver::inverse_mass;
 pub use solver::{Problem, Response, Settings, Solver, SolverReport};
 pub use sprung::Sprung;
 

@@ -163,6 +163,12 @@ impl Other {
         self.held
     }
 
+    /// Whether it only rests: impulses would move it if it woke.
+    #[must_use]
+    pub fn is_asleep(&self) -> bool {
+        self.held && self.neighbour.as_ref().is_some_and(|n| !matches!(n.snapshot.inertia, Inertia::Immovable))
+    }
+
     /// Whether springs hold it, as its owner knows.
     #[must_use]
     pub const fn is_sprung(&self) -> bool {

@@ -246,6 +246,25 @@ impl Solver {
     }
 }
 
+/// The inverse mass of both sides of a contact along its normal, 1/kg: n·J A⁻¹ Jᵀ n over the slots before `own`, and over those from
+/// there on, of `slots` in all. One answer; nothing is allocated once `room` has its size.
+pub fn inverse_mass(
+    contact: &Contact,
+    (own, slots): (usize, usize),
+    body: &mut impl Response,
+    room: &mut Vec<DVec3>,
+) -> [f64; 2] {
+    let Contact { slots: at, normal, .. } = contact;
+    room.clear();
+    room.resize(slots, DVec3::ZERO);
+    at.scatter(*normal, room);
+    body.respond(room);
+    let both = at.velocity(room).dot(*normal);
+    room[..own].fill(DVec3::ZERO);
+    let other = at.velocity(room).dot(*normal);
+    [both - other, other]
+}
+
 impl Iterate {
     /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards.
     fn cause(&mut self, contacts: &[Contact], body: &mut impl Response, answer: &mut [DVec3]) {

@@ -12,7 +12,7 @@ use super::company::Company;
 use super::mass::Spread;
 use super::motion::Motion;
 use super::obstacles::Obstacles;
-use crate::coupling::{Contact, Problem, Settings, Solver, Touch};
+use crate::coupling::{Contact, Problem, Settings, Solver, Touch, inverse_mass};
 use glam::{DMat3, DVec3};
 
 /// The body itself, as a solve needs it.
@@ -61,6 +61,7 @@ pub(super) struct Meeting {
     /// Where each guest's slots begin.
     pub(super) bases: Vec<u32>,
     given: Vec<DVec3>,
+    room: Vec<DVec3>,
     pub(super) touches: Vec<Touch>,
     press: Solver,
     blow: Solver,
@@ -285,6 +286,7 @@ impl Meeting {
         let after_s = company.after_s;
         for i in 0..company.guests().len() {
             self.account(me, company, i, h);
+            self.weigh(company, i, h);
             let (guests, exchange, ..) = company.split();
             let guest = &mut guests[i];
             if guest.touchable {
@@ -296,6 +298,26 @@ impl Meeting {
                 }
             }
         }
+    }
+
+    /// Finds how the body and guest `i` give way along the normal of the contact that bears most between them.
+    fn weigh(&mut self, company: &mut Company, i: usize, h: f64) {
+        let solver = if h > 0.0 { &self.press } else { &self.blow };
+        let pressed = self.found.iter().zip(solver.impulses()).filter(|(found, _)| found.guest == Some(i));
+        let along = pressed.map(|(found, impulse)| (found.contact, impulse.dot(found.contact.normal)));
+        let strongest = along.filter(|(_, along)| *along > 0.0).max_by(|a, b| a.1.total_cmp(&b.1));
+        let (guests, exchange, ..) = company.split();
+        let other = &guests[i].other;
+        let (Some((contact, _)), Some(id)) = (strongest, other.id().filter(|_| !other.is_asleep())) else { return };
+        let Self { inverse, bases, room, .. } = self;
+        let its = bases[i] as usize..bases[i] as usize + other.velocities().len();
+        let mut answer = |impulses: &mut [DVec3]| {
+            impulses[0] *= inverse.0;
+            impulses[1] = inverse.1 * impulses[1];
+            other.respond(&mut impulses[its.clone()]);
+        };
+        let weighed = inverse_mass(&contact, (2, its.end), &mut answer, room);
+        exchange.pair_mut(id).inverse_mass_per_kg = Some(weighed);
     }
 
     /// Writes down what the solve means for the pair with guest `i`.

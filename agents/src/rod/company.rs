@@ -266,6 +266,12 @@ impl Company {
         }
     }
 
+    /// Weighs the strongest contact with each: one answer each at most. `respond` is the tube's own, in `own` slots.
+    pub fn weigh(&mut self, own: usize, respond: impl Fn(&mut [DVec3])) {
+        let Self { mates, count, tanks, .. } = self;
+        mates[..*count].iter_mut().for_each(|mate| mate.weigh(tanks, own, &respond));
+    }
+
     /// Ends a step of `dt` seconds.
     pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
         for mate in &mut self.mates[..self.count] {

@@ -3,6 +3,7 @@
 //! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::band::Factor;
+use super::contact::respond;
 use glam::DVec3;
 
 /// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
@@ -51,12 +52,6 @@ impl CurveInertia {
     /// Where there are not as many as [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3]) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        let last = impulses.len().saturating_sub(1);
-        for (end, slot) in [(0, 0), (1, last)] {
-            if self.held[end] {
-                impulses[slot] = DVec3::ZERO;
-            }
-        }
-        self.factor.solve(impulses);
+        respond((&self.factor, self.held), impulses);
     }
 }

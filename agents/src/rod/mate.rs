@@ -4,7 +4,8 @@
 //! Never here: the solve itself, the tube's own state. Theory: docs/theory/coupling.md.
 
 use super::holds::Far;
-use super::tank::Tanks;
+use super::tank::{Tank, Tanks};
+use crate::coupling::inverse_mass;
 use crate::coupling::{Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
 use crate::{Anchor, Inertia, Neighbour, Surroundings};
 use glam::DVec3;
@@ -30,6 +31,10 @@ pub struct Mate {
     /// Places that touched in the step, at most; the deepest overlap, metres.
     contacts: u32,
     depth_m: f64,
+    /// The contact that bears most in the step, and its impulse, N·s.
+    strongest: Option<(Contact, f64)>,
+    /// What it weighs: the inverse mass of both sides, 1/kg.
+    weighed: Option<[f64; 2]>,
     /// Whether impulses passed in the step, and whether this tube woke it.
     acted: bool,
     /// Linear impulse given in the step, N·s.
@@ -73,9 +78,10 @@ impl Mate {
         stale: bool,
     ) -> bool {
         let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
-        let (other, mut lasting) = (std::mem::take(&mut self.other), std::mem::take(&mut self.lasting));
+        let (other, room) = (std::mem::take(&mut self.other), std::mem::take(&mut self.room));
+        let mut lasting = std::mem::take(&mut self.lasting);
         lasting.clear();
-        *self = Self { other, lasting, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
+        *self = Self { other, room, lasting, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
         if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, None) }
     }
 
@@ -300,7 +306,28 @@ impl Mate {
             self.now += 1;
             self.contacts = self.contacts.max(self.now);
             self.depth_m = self.depth_m.max(-contact.gap_m / self.fade);
+            let along = impulse.dot(contact.normal);
+            if self.strongest.is_none_or(|(_, most)| along > most) {
+                self.strongest = Some((*contact, along));
+            }
         }
+    }
+
+    /// Finds what the contact that bears most in the step weighs, where that is due: how the two sides give way to an impulse there along
+    /// its normal. `respond` is how the body that owns the contact answers impulses in its `own` slots.
+    pub fn weigh(&mut self, tanks: &mut Tanks, own: usize, respond: impl Fn(&mut [DVec3])) {
+        // who rests is only held for as long as nobody comes: that is not what it weighs
+        let Some((contact, _)) = self.strongest.filter(|_| !self.other.is_asleep()) else { return };
+        if !self.other.id().is_some_and(|id| tanks.get(id).is_none_or(Tank::weighs)) {
+            return;
+        }
+        let mut room = std::mem::take(&mut self.room);
+        let mut answer = |impulses: &mut [DVec3]| {
+            respond(&mut impulses[..own]);
+            self.other.respond(self.slots_mut(impulses));
+        };
+        self.weighed = Some(inverse_mass(&contact, (own, self.end()), &mut answer, &mut room));
+        self.room = room;
     }
 
     /// Takes its part of the impulses of a substep, books it, and goes on.
@@ -347,6 +374,7 @@ impl Mate {
             pair.tank_j = Some(tank.left_j);
             pair.kind = if self.linked { PairKind::Attachment } else { PairKind::Ledger };
             (pair.contacts, pair.penetration_m) = (self.contacts, self.depth_m);
+            pair.inverse_mass_per_kg = self.weighed.or(pair.inverse_mass_per_kg);
         }
     }
 

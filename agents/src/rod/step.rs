@@ -7,7 +7,7 @@ use super::band::{Factor, InverseBlocks, Row};
 use super::calm;
 use super::company::Company;
 use super::config::{Config, Matter};
-use super::contact::{Solved, TubeContacts};
+use super::contact::{Solved, TubeContacts, respond};
 use super::division::Division;
 use super::holds::{NodeSpring, Tie};
 use super::horizon::Horizon;
@@ -187,6 +187,12 @@ impl Stepper {
     /// The same, and how long that substep was, seconds; zero before the first.
     pub fn last(&self) -> (&Factor, f64) {
         (&self.factor, self.span_s)
+    }
+
+    /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.
+    pub fn weigh(&mut self, held: [bool; 2]) {
+        let Self { factor, company, .. } = self;
+        company.weigh(factor.slots(), |impulses| respond((factor, held), impulses));
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had

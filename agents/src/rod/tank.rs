@@ -1,6 +1,6 @@
 //! What a tube remembers of each agent that it touches: the energy that their coupling may still add.
 //!
-//! In: what each substep did. Out: how far push-out has to fade. Never here: impulses.
+//! In: what each substep did. Out: how far push-out has to fade, when a contact is to be weighed. Never here: impulses.
 //!
 //! The tank counts the work of each impulse against the relative velocity after it, which only push-out makes positive, and,
 //! where the other side turned out to move differently from what was expected while impulses were on their way, their work on
@@ -23,6 +23,8 @@ pub struct Tank {
     /// How the other was expected to move when the step ended, m/s, and the impulse then on its way to it, N·s.
     expected: Option<(DVec3, DVec3)>,
     idle_s: f64,
+    /// Steps in which the two have pressed on each other since they met.
+    pressed: u32,
 }
 
 /// The speed whose energy a tank holds at the start, m/s: what the push-out of a few steps may spend before it fades.
@@ -31,6 +33,9 @@ const RESERVE_M_S: f64 = 0.1;
 const REFILL_S: f64 = 1.0;
 /// A pair that has not touched for this long is forgotten, seconds.
 const FORGET_S: f64 = 2.0;
+/// What a contact weighs is found in the first step of a touch and in every so many from there on: an answer of what bends is up to a
+/// twentieth of its step (measured), and what a place weighs changes slowly.
+const WEIGH_EVERY: u32 = 4;
 /// The share of push-out that an empty tank leaves, for the same reason.
 const LEAST: f64 = 0.25;
 
@@ -39,7 +44,7 @@ impl Tanks {
     pub fn of(&mut self, with: AgentId, mass_kg: f64) -> &mut Tank {
         let at = self.0.iter().position(|tank| tank.with == with).unwrap_or_else(|| {
             let reserve_j = 0.5 * mass_kg * RESERVE_M_S * RESERVE_M_S;
-            self.0.push(Tank { with, left_j: reserve_j, reserve_j, expected: None, idle_s: 0.0 });
+            self.0.push(Tank { with, left_j: reserve_j, reserve_j, expected: None, idle_s: 0.0, pressed: 1 });
             self.0.len() - 1
         });
         self.0[at].idle_s = 0.0;
@@ -56,6 +61,9 @@ impl Tanks {
         for tank in &mut self.0 {
             let missing = (tank.reserve_j - tank.left_j).max(0.0);
             tank.left_j += missing.min(tank.reserve_j * dt / REFILL_S);
+            if tank.idle_s > 0.0 {
+                tank.pressed = 0;
+            }
             tank.idle_s += dt;
         }
         self.0.retain(|tank| tank.idle_s < FORGET_S);
@@ -63,6 +71,12 @@ impl Tanks {
 }
 
 impl Tank {
+    /// Whether what the strongest contact weighs is to be found in this step, in which the two press on each other.
+    pub fn weighs(&mut self) -> bool {
+        self.pressed += 1;
+        (self.pressed - 1).is_multiple_of(WEIGH_EVERY)
+    }
+
     /// How much of push-out it still allows: all of it until half the reserve is spent.
     pub fn fade(&self) -> f64 {
         (2.0 * self.left_j / self.reserve_j).clamp(LEAST, 1.0)
@@ -103,6 +117,22 @@ mod tests {
         assert_eq!(tank.fade(), LEAST);
         tanks.close(REFILL_S);
         assert_eq!(tanks.of(AgentId(1), 2.0).fade(), 1.0);
+    }
+
+    #[test]
+    fn a_touch_is_weighed_in_its_first_step_and_in_every_fourth() {
+        let mut tanks = Tanks::default();
+        let mut step = |presses| {
+            let weighs = presses && tanks.get(AgentId(1)).is_none_or(Tank::weighs);
+            if presses {
+                tanks.of(AgentId(1), 2.0);
+            }
+            tanks.close(0.01);
+            weighs
+        };
+        let touch = [true; 6];
+        assert_eq!(touch.map(&mut step), [true, false, false, false, true, false]);
+        assert_eq!([false, true, true].map(&mut step), [false, true, false], "after a step apart");
     }
 
     #[test]

@@ -149,6 +149,7 @@ impl SoftBody {
     /// Ends a step of `dt` seconds: books, grips, what others may expect.
     fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let mass_kg = self.mass_kg();
+        self.company.weigh(&self.system);
         self.company.close(around, (dt, mass_kg));
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));

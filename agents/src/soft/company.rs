@@ -261,6 +261,13 @@ impl Company {
         }
     }
 
+    /// Weighs the strongest contact with each: one answer each at most.
+    pub fn weigh(&mut self, system: &System) {
+        let Self { mates, count, tanks, .. } = self;
+        let mates = mates[..*count].iter_mut();
+        mates.for_each(|mate| mate.weigh(tanks, system.vertices(), |impulses| system.respond(impulses)));
+    }
+
     /// Ends a step of `dt` seconds of a body of `mass_kg`.
     pub fn close(&mut self, around: &Surroundings<'_>, (dt, mass_kg): (f64, f64)) {
         for mate in &mut self.mates[..self.count] {

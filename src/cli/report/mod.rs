@@ -142,6 +142,10 @@ pub struct CouplingReport {
     pub impulse_n_s: f64,
     /// What one had given and the other had not taken yet when it was last seen, newton seconds.
     pub in_flight_n_s: f64,
+    /// How easily `a` and `b` gave way along the normal at the contact that bore most, 1/kg, when they last pressed on each other: the
+    /// sum is the contact's W, its inverse the mass that either feels there. `None` where the two share one solve (islands), and
+    /// where no contact was solved between them.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What was left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
     /// Overlap at the end of the run, metres.
@@ -329,6 +333,7 @@ mod tests {
         "/couplings/0/contacts",
         "/couplings/0/force_n",
         "/couplings/0/momentum_error",
+        "/couplings/0/inverse_mass_per_kg",
         "/couplings/0/tank_j",
         "/couplings/0/penetration_m",
         "/overlaps/0/depth_m",

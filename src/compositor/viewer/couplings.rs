@@ -19,7 +19,10 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
         for row in order.iter().take(ROWS_MAX) {
             ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
             ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
-            ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
+            let force = ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
+            if let Some(felt) = row.inverse_mass_per_kg {
+                force.on_hover_text(weighed(row, felt));
+            }
             let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
             let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
             let color = if low { palette.warn } else { palette.weak };
@@ -38,4 +41,43 @@ fn spoken(row: &CouplingRow) -> String {
         row.contacts,
         text::metres(row.penetration_m)
     )
+}
+
+/// How heavy the two feel where they press hardest.
+fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
+    let felt = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
+    format!(
+        "The contact that bears most feels as heavy as {}: there {} gives way like {}, {} like {}",
+        felt(a + b),
+        row.a,
+        felt(a),
+        row.b,
+        felt(b)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_a_contact_weighs_is_told_of_both_sides_and_of_both_together() {
+        let row = CouplingRow {
+            a: "hose".to_owned(),
+            b: "floor".to_owned(),
+            kind: "ledger",
+            contacts: 1,
+            force_n: 1.0,
+            penetration_m: 0.0,
+            inverse_mass_per_kg: None,
+            tank_j: None,
+        };
+        let told = |pair| weighed(&row, pair);
+        assert_eq!(
+            told([60.0, 20.0]),
+            "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
+        );
+        // what is led does not give way at all
+        assert!(told([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
+    }
 }

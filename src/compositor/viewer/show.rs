@@ -271,6 +271,8 @@ pub struct CouplingRow {
     pub force_n: f64,
     /// The deepest overlap, metres, ≥ 0.
     pub penetration_m: f64,
+    /// How easily each gave way along the normal where it bore most, 1/kg, where a contact was solved.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What is left in its energy tank, joules, where it has one.
     pub tank_j: Option<f64>,
 }

@@ -44,6 +44,19 @@ pub fn joules(value: f64) -> String {
     }
 }
 
+/// A mass such as `3.20 g` or `1.50 kg`; one without end is that of what is held.
+#[must_use]
+pub fn kilograms(value: f64) -> String {
+    if !value.is_finite() {
+        return "what is held".to_owned();
+    }
+    match value.abs() {
+        size if size < 1e-3 => format!("{} mg", figures(value * 1e6)),
+        size if size < 1.0 => format!("{} g", figures(value * 1e3)),
+        _ => format!("{} kg", figures(value)),
+    }
+}
+
 /// Three figures: `0`, `0.123`, `1.23`, `12.3`, `123`, `1234`.
 #[must_use]
 pub fn figures(value: f64) -> String {
@@ -95,6 +108,10 @@ mod tests {
         assert_eq!(seconds(2.5), "2.50 s");
         assert_eq!(metres(0.0032), "3.20 mm");
         assert_eq!(metres(1.5), "1.50 m");
+        assert_eq!(
+            (kilograms(0.0125), kilograms(2.0), kilograms(2e-5)),
+            ("12.5 g".to_owned(), "2.00 kg".to_owned(), "20.0 mg".to_owned())
+        );
         assert_eq!(figures(9.996), "10.0");
         assert_eq!(count(1_234_567), "1 234 567");
         assert_eq!((plain(20.0), plain(0.5), plain(0.0)), ("20".to_owned(), "0.5".to_owned(), "0".to_owned()));

@@ -93,6 +93,55 @@ fn an_oblique_blow_with_friction_is_the_closed_form() {
     }
 }
 
+/// How easily the two of the only pair give way at their contact, 1/kg, as the owner `of` it says.
+fn felt(stage: &Stage, of: AgentId) -> [f64; 2] {
+    stage.newest(of).pairs[0].inverse_mass_per_kg.unwrap()
+}
+
+#[test]
+fn a_ball_feels_the_mass_of_another_and_on_a_box_that_stands_none_at_all() {
+    for rates in [[240.0, 60.0], [60.0, 240.0]] {
+        let shot = Shot { masses: [0.1, 0.3], rates, restitution: 1.0, friction: 0.3, offset: 0.04 };
+        let (stage, _) = shoot(&shot, 0.6, Faults::default());
+        let owner = usize::from(rates[1] > rates[0]);
+        let [mine, its] = felt(&stage, AgentId(owner as u32));
+        // spheres: whatever the offset, the normal goes through both middles
+        assert!((mine * shot.masses[owner] - 1.0).abs() < 1e-12, "{rates:?}: {mine}/kg of mine");
+        assert!((its * shot.masses[1 - owner] - 1.0).abs() < 1e-12, "{rates:?}: {its}/kg of the other's");
+    }
+    let mut stage = Stage::new(Faults::default());
+    let box_ = RigidSpec { obstacles: [floor(0.5)].into(), ..cube(0.05, UP * 0.05) };
+    let ball = stage.add(RigidBody::new(ball(0.2, 1.0)).unwrap(), 500.0);
+    stage.add(RigidBody::new(box_).unwrap(), 100.0);
+    stage.run(0.3, |_| {});
+    // what only presses it on its ground meets the ground (coupling.md, eq. 7a)
+    let [mine, ground] = felt(&stage, ball);
+    assert!(
+        (mine - 2.0).abs() < 1e-12 && ground.abs() < 1e-12,
+        "{mine}/kg of half a kilogram, {ground}/kg of the ground"
+    );
+}
+
+#[test]
+fn a_blow_beside_the_middle_of_a_bar_meets_less_than_its_mass() {
+    let (half, r, mass_kg) = (DVec3::new(0.2, 0.01, 0.01), 0.15, 0.6);
+    let mut stage = Stage::new(Faults::default());
+    let free = |solid, at, mass_kg| RigidSpec { gravity: DVec3::ZERO, mass_kg, ..spec(solid, at) };
+    let ball = free(Solid::Ball { radius_m: RADIUS }, DVec3::new(r, 0.0, 0.1), 0.1);
+    let ball = RigidSpec { velocity: -UP, restitution: 1.0, ..ball };
+    let ball = stage.add(RigidBody::new(ball).unwrap(), 500.0);
+    let bar = free(Solid::Box { half_extents_m: half }, DVec3::ZERO, mass_kg);
+    stage.add(RigidBody::new(bar).unwrap(), 100.0);
+    stage.run(0.1, |_| {});
+    let moment = mass_kg * (half.x * half.x + half.z * half.z) / 3.0;
+    let want = [10.0, mass_kg.recip() + r * r / moment];
+    let told = felt(&stage, ball);
+    println!("{told:?} of {want:?}");
+    for (told, want) in told.into_iter().zip(want) {
+        assert!((told / want - 1.0).abs() < 1e-9, "{told}/kg and not {want}/kg");
+    }
+}
+
 fn momentum_of(ends: &[Settled]) -> (DVec3, DVec3) {
     ends.iter().map(Settled::momentum).fold((DVec3::ZERO, DVec3::ZERO), |sum, m| (sum.0 + m.0, sum.1 + m.1))
 }

@@ -73,16 +73,9 @@ impl TubeContacts {
         }
         self.scale(solved);
         company.scale(&mut self.mobilities);
-        let held = solved.matter.held;
-        let last = own - 1;
         let met = !company.is_empty();
         let mut answer = |impulses: &mut [DVec3]| {
-            for (end, slot) in [(0, 0), (1, last)] {
-                if held[end] {
-                    impulses[slot] = DVec3::ZERO;
-                }
-            }
-            solved.factor.solve(&mut impulses[..own]);
+            respond((solved.factor, solved.matter.held), &mut impulses[..own]);
             company.respond(impulses);
         };
         self.solve((solved.h, SETTINGS), velocities, met, &mut answer);
@@ -139,4 +132,13 @@ impl TubeContacts {
             }
         }
     }
+}
+
+/// How a tube answers impulses, one a slot, by the factor of its substep: ends that are held stay.
+pub(crate) fn respond((factor, held): (&Factor, [bool; 2]), impulses: &mut [DVec3]) {
+    let last = impulses.len().saturating_sub(1);
+    for (_, slot) in [(held[0], 0), (held[1], last)].into_iter().filter(|(held, _)| *held) {
+        impulses[slot] = DVec3::ZERO;
+    }
+    factor.solve(impulses);
 }

@@ -12,7 +12,7 @@ use crate::coupling::touch;
 use crate::coupling::{Contact, Problem, Response, Settings, Slots, Solver, SolverReport};
 use crate::shape::field::Ball;
 use crate::shape::{Obstacle, ShapeError};
-pub(crate) use act::Solved;
+pub(crate) use act::{Solved, respond};
 use glam::DVec3;
 use pairs::{Meeting, PLACES, Pairs};
 use walls::{WallTouch, Walls};

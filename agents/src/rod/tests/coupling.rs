@@ -7,6 +7,7 @@ mod bridge;
 mod capstan;
 mod closed;
 mod crossing;
+mod felt;
 mod gripper;
 mod meetings;
 mod rates;

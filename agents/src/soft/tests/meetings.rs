@@ -79,6 +79,41 @@ fn a_ball_rests_on_a_sheet_and_on_a_solid_at_any_rates() {
     }
 }
 
+/// How easily a body and a ball of 0.2 kg give way where the ball comes down at `x_m`, `y_m` on it with its skin in z = 0, 1/kg.
+fn felt(made: SoftSpec, (x_m, y_m): (f64, f64)) -> [f64; 2] {
+    let mut stage = Stage::new(Faults::default());
+    let skin_m = if let SoftShape::Sheet { thickness_m, .. } = made.shape { 0.5 * thickness_m } else { 0.0 };
+    let soft = stage.add(SoftBody::new(made).unwrap(), 240.0);
+    let above = DVec3::new(x_m, y_m, BALL_M + skin_m + 1e-4);
+    stage.add(ball(0.2, above, DVec3::NEG_Z * 0.1, DVec3::ZERO), 240.0);
+    stage.run(1.0 / 240.0, |_| {});
+    stage.newest(soft).pairs[0].inverse_mass_per_kg.unwrap()
+}
+
+#[test]
+fn a_ball_feels_the_matter_nearby_of_a_soft_body_and_all_of_a_stiff_one() {
+    let [size_m, thickness_m] = [0.3, 0.002];
+    let shape = SoftShape::Sheet { size_m: [size_m; 2], thickness_m, segments: [8, 8] };
+    let sheet = SoftSpec { matter: SoftMatter { young_pa: 1.0, ..MATTER }, ..spec(shape) };
+    // the diagonals of the four cells around the vertex in the middle meet there: a third of each of their eight halves
+    let cell = size_m / 8.0;
+    let vertex_kg = 8.0 / 3.0 * MATTER.density_kg_m3 * thickness_m * 0.5 * cell * cell;
+    let [soft, ball] = felt(sheet, (4.0 * cell, 4.0 * cell));
+    println!("vertex {} of {vertex_kg} kg, ball {ball}", soft.recip());
+    // a modulus of 1 Pa holds it to its neighbours with h² E t, a hundred-thousandth of its mass
+    assert!((soft * vertex_kg - 1.0).abs() < 1e-4, "{soft}/kg of a vertex of {vertex_kg} kg");
+    assert!((ball * 0.2 - 1.0).abs() < 1e-12, "{ball}/kg of the ball");
+    let [all, high] = [0.2, 0.1];
+    let shape = SoftShape::Box { size_m: DVec3::new(all, all, high), segments: [4, 4, 2] };
+    let matter = SoftMatter { young_pa: 1e11, ..MATTER };
+    let block = SoftSpec { matter, position: DVec3::new(-0.5 * all, -0.5 * all, -high), ..spec(shape) };
+    let block_kg = MATTER.density_kg_m3 * all * all * high;
+    let [stiff, _] = felt(block, (0.0, 0.0));
+    println!("block {} of {block_kg} kg", stiff.recip());
+    // h² E a is 10⁴ times its mass
+    assert!((stiff * block_kg - 1.0).abs() < 1e-3, "{stiff}/kg of a block of {block_kg} kg");
+}
+
 #[test]
 fn a_falling_ball_is_caught_at_any_rates_and_gains_nothing() {
     for (name, made) in [("sheet", trampoline(3e5)), ("solid", cushion(3e4))] {
