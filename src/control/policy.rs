@@ -118,7 +118,7 @@ pub enum Law {
     },
     /// The law on the logarithm of the measured time (control.md, eq. 7).
     Corrected {
-        /// κ, 0.01 … 1.99: the share of an error that one frame removes.
+        /// κ, 0.001 … 1.99: the share of an error that one frame removes.
         kappa: f64,
         /// λ, 0 … 1.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
         lead: f64,
@@ -130,6 +130,11 @@ pub enum Law {
 impl Law {
     /// The printed law with the gains of (GDC04).
     pub const PRINTED: Self = Self::Printed { alpha: 1e-4, beta: 5.0 };
+
+    /// The range of κ.
+    pub const KAPPA: (f64, f64) = (1e-3, 1.99);
+    /// The range of λ.
+    pub const LEAD: (f64, f64) = (0.0, 1.99);
 
     /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses
     /// (is past 1.05 T in) fewer than 1 frame in 100.

@@ -466,6 +466,11 @@ mod tests {
     use super::*;
 
     #[test]
+    fn a_scene_may_ask_for_as_many_threads_as_the_runtime_gives() {
+        assert_eq!(crate::scene::THREADED_MAX, crate::runtime::THREADS_MAX);
+    }
+
+    #[test]
     fn scenes_and_control_have_the_same_names_for_policies() {
         let written: Vec<_> = PolicyKind::ALL.into_iter().map(PolicyKind::name).collect();
         let known: Vec<_> = Policy::ALL.into_iter().map(Policy::name).collect();

@@ -28,7 +28,7 @@ pub use source::{SCENE_BYTES_MAX, Source};
 use build::{Around, Objects};
 use check::{Checker, Place};
 use document::Document;
-use format::{SceneFile, WorldFile};
+use format::{ExecutorKind, SceneFile, WorldFile};
 use glam::DVec3;
 use metachron_agents::rigid::Joint;
 use problem::Problem;
@@ -39,6 +39,8 @@ use toml::de::{DeValue, ValueDeserializer};
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
+/// Agents that may each have a thread at most, as the runtime has it.
+pub const THREADED_MAX: usize = 1000;
 /// Gravity where a scene does not say, m/s².
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Strongest gravity, m/s².
@@ -107,6 +109,12 @@ fn assemble(
     if file.format != FORMAT {
         let what = format!("is {}, which this program does not know", file.format);
         c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
+    }
+    let agents = objects.agents.len();
+    if file.executor == Some(ExecutorKind::Threads) && agents > THREADED_MAX {
+        let what = format!("is `threads`, with {agents} agents");
+        let expected = format!("expected `pool` or `auto`: at most {THREADED_MAX} agents have a thread each");
+        c.wrong(&Place::new("", ""), "executor", what, expected);
     }
     let probes = build::probes(c, &file.probe, &objects.names);
     // ties between objects that are wrong themselves would be told of for nothing

@@ -42,6 +42,12 @@ impl Disturbance {
         Self::Speed(0.5),
     ];
 
+    /// Whether it differs from one seed to another.
+    #[must_use]
+    pub fn is_by_chance(self) -> bool {
+        self == Self::Spikes
+    }
+
     /// The factor on the work of a frame when the share `passed` of the trial is over; `random` is uniform in 0 … 1.
     #[must_use]
     pub fn load(self, passed: f64, random: f64) -> f64 {

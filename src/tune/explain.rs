@@ -5,9 +5,9 @@
 
 use super::contender::Contender;
 use super::margins::Loop;
-use super::measures::{Cycle, Measures};
+use super::measures::{BAND, Cycle, Measures};
 use super::plant::{Plant, Reach};
-use super::play::{Start, Trial, play};
+use super::play::{Beat, Start, Trial, play};
 use super::rests::{FixedPoint, fixed_points};
 use super::trials::speeds_in_reach;
 use crate::control::Law;
@@ -39,6 +39,8 @@ pub struct Explanation {
 const STARTS: [f64; 7] = [0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0];
 /// Seconds that a calm trial is watched.
 const WATCH_S: f64 = 12.0;
+/// A loop whose ε̂ stays within this part of itself stands.
+const STANDS: f64 = 1e-4;
 /// Slower than this is slow, seconds.
 const SLOW_S: f64 = 1.0;
 /// A loop nearer than this factor to swinging has little room.
@@ -50,16 +52,21 @@ pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -
     let contender = contender.into();
     let calm = |rate: f64| {
         let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S, ..Trial::calm(contender, target_hz) };
-        Measures::of(&play(plant, &trial))
+        play(plant, &trial)
     };
-    let runs = STARTS.map(calm);
+    let played = STARTS.map(calm);
+    let runs = played.each_ref().map(|beats| Measures::of(beats));
     let set_s = contender.set_share() / target_hz;
     let mut explanation = Explanation {
         reach: plant.reach(1.0),
         set_s,
         share: plant.share(set_s, 1.0),
         near: contender.local_loop(plant, target_hz, 1.0),
-        rests: fixed_points(plant, contender, target_hz),
+        rests: match contender {
+            Contender::Feedback(_) => with_ends(fixed_points(plant, contender, target_hz), &played),
+            // what it was given to learn from differs from start to start
+            Contender::Adaptive { .. } => fixed_points(plant, contender, target_hz),
+        },
         cycle: runs.iter().find_map(|measured| measured.cycle),
         chatter: runs.iter().map(|measured| measured.chatter).fold(0.0, f64::max),
         from: [runs[1], runs[5]],
@@ -67,6 +74,27 @@ pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -
     };
     explanation.sentences = explanation.tell(contender, target_hz);
     explanation
+}
+
+/// Adds the places off the set point at which loops were left: where ε̂ and n are at ends of their ranges there is no line to follow.
+fn with_ends(mut rests: Vec<FixedPoint>, played: &[Vec<Beat>]) -> Vec<FixedPoint> {
+    for end in played.iter().filter_map(|beats| left_at(beats)) {
+        if rests.iter().all(|rest| (rest.ratio - end.ratio).abs() > BAND) {
+            rests.push(end);
+        }
+    }
+    rests.sort_by(|a, b| a.eps_hat.total_cmp(&b.eps_hat));
+    rests
+}
+
+/// Where a loop stood for its last second, if it did.
+fn left_at(beats: &[Beat]) -> Option<FixedPoint> {
+    let last = beats.last()?;
+    let mut second = beats.iter().rev().take_while(|beat| beat.time_s > last.time_s - 1.0);
+    let stands =
+        second.all(|beat| (beat.eps_hat / last.eps_hat - 1.0).abs() < STANDS && beat.polygons == last.polygons);
+    let clamped = last.status.clamped().is_some();
+    stands.then_some(FixedPoint { eps_hat: last.eps_hat, ratio: last.ratio, clamped })
 }
 
 /// Why no gain can bring `plant` to `target_hz`; `None` where one can, on this machine or, where the finest picture leaves time, on a slower
@@ -116,8 +144,8 @@ impl Explanation {
         }
         if let [first, .., last] = &self.rests[..] {
             return format!(
-                "It can rest in {} places, from ε̂ = {:.3} ({:.2} of the time) to {:.3} ({:.2}), depending on where it begins: n = ⌊ρ⌋ \
-                 makes frames slower where ε̂ grows. Use the corrected law, which has one.",
+                "It can rest in {} places, from ε̂ = {:.3} ({:.2} of the time) to {:.3} ({:.2}), depending on where it begins: β ties \
+                 n = ⌊ρ⌋ to ε̂, and not all of these places take the time. Use the corrected law, which has one.",
                 self.rests.len(),
                 first.eps_hat,
                 first.ratio,
@@ -139,9 +167,13 @@ impl Explanation {
                 "It takes {s:.1} s to settle: each frame removes only {removes:.1} % of an error, and at {target_hz} Hz frames are few. Raise \
                  {name} from {value:.2e} to {safe:.2e}, which still leaves a factor of two before it swings."
             ),
-            None => format!(
+            None if safe > value => format!(
                 "It does not come within 5 % of its time in {WATCH_S} s: each frame removes {removes:.2} % of an error, or the levels of what is \
                  in view are too coarse for the target. Raise {name} from {value:.2e} to {safe:.2e}, or widen the ranges of ε and n."
+            ),
+            None => format!(
+                "It does not come within 5 % of its time in {WATCH_S} s, though each frame removes {removes:.0} % of an error: the levels of \
+                 what is in view are too coarse for the target. Widen the ranges of ε and n."
             ),
         }
     }
@@ -210,6 +242,28 @@ mod tests {
         let told = explain(&plant(), Law::PRINTED, 30.0);
         assert!(told.near.unwrap().gain < 0.2, "{:?}", told.near);
         assert!(!told.sentences.contains("Nothing needs"), "{}", told.sentences);
+    }
+
+    #[test]
+    fn advice_on_the_printed_gains_leads_to_gains_that_work_or_to_another_law() {
+        // the tube's plant: whatever is advised is followed, for as long as it names a gain of the printed law
+        for target_hz in [30.0, 60.0] {
+            let mut law = Law::PRINTED;
+            for _ in 0..4 {
+                let told = explain(&plant(), law, target_hz);
+                if told.sentences.contains("Nothing needs") || told.sentences.contains("Use the corrected law") {
+                    break;
+                }
+                let Law::Printed { alpha, beta } = law else { panic!("printed") };
+                let to = told.sentences.rsplit(" to ").next().unwrap().split([',', '.']).collect::<Vec<_>>();
+                let advised: f64 =
+                    format!("{}.{}", to[0], to[1]).parse().unwrap_or_else(|_| panic!("{}", told.sentences));
+                assert!((advised / alpha - 1.0).abs() > 0.01, "no news: {}", told.sentences);
+                law = Law::Printed { alpha: advised, beta };
+            }
+            let told = explain(&plant(), law, target_hz).sentences;
+            assert!(told.contains("Nothing needs") || told.contains("Use the corrected law"), "{target_hz}: {told}");
+        }
     }
 
     #[test]

@@ -32,4 +32,4 @@ pub use play::{Beat, Start, Trial, play};
 pub use relay::relay_gains;
 pub use rests::{FixedPoint, fixed_points};
 pub use search::{Family, Found, Search, search};
-pub use trials::{Extent, Verdict, judge, speeds_in_reach};
+pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};

@@ -6,8 +6,6 @@ use super::plant::Plant;
 use crate::control::{FrameWork, Law, PictureControl, Policy};
 use std::time::Duration;
 
-/// Gains that the law takes.
-const GAINS: (f64, f64) = (0.01, 1.99);
 /// The relay moves ln ε by so much to either side.
 const HEIGHT: f64 = 0.2;
 /// Frames of the experiment, and those that are left out at its start.
@@ -29,8 +27,8 @@ pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     let period = tail.len() as f64 / rises as f64;
     let ultimate = 4.0 * HEIGHT / (std::f64::consts::PI * amplitude);
     let proportional = 0.45 * ultimate;
-    let kappa = (proportional * 1.2 / period).clamp(GAINS.0, GAINS.1);
-    Some(Law::Corrected { kappa, lead: proportional.min(GAINS.1), margin })
+    let kappa = (proportional * 1.2 / period).clamp(Law::KAPPA.0, Law::KAPPA.1);
+    Some(Law::Corrected { kappa, lead: proportional.min(Law::LEAD.1), margin })
 }
 
 /// ln(t/T_set) of frames whose ln ε a relay moves against it, without noise.

@@ -59,11 +59,11 @@ impl Family {
     /// Who is meant by the logarithms of its gains.
     fn contender(self, at: &[f64]) -> Contender {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
-        let (kappa, margin) = ((0.01, 1.99), (0.005, 0.5));
+        let margin = (0.005, 0.5);
         match self {
-            Self::Corrected => Law::Corrected { kappa: gain(0, kappa), lead: 0.0, margin: gain(1, margin) }.into(),
+            Self::Corrected => Law::Corrected { kappa: gain(0, Law::KAPPA), lead: 0.0, margin: gain(1, margin) }.into(),
             Self::Pi => {
-                Law::Corrected { kappa: gain(0, kappa), lead: gain(2, (1e-3, 1.99)), margin: gain(1, margin) }.into()
+                Law::Corrected { kappa: gain(0, Law::KAPPA), lead: gain(2, Law::LEAD), margin: gain(1, margin) }.into()
             }
             Self::Printed => Law::Printed { alpha: gain(0, (1e-9, 1.0)), beta: gain(1, (1e-6, 1e3)) }.into(),
             Self::Adaptive => Contender::Adaptive { margin: gain(0, margin) },

@@ -46,10 +46,9 @@ pub struct Verdict {
     pub reversals: f64,
     /// Mean share of the polygons that the whole time of a frame would have paid for.
     pub quality: f64,
-    /// The factor on the gains at which it begins to swing for ever, at the worst of the speeds that were asked.
-    pub gain_margin: f64,
-    /// How many frames later a change may show, at the worst of them.
-    pub delay_margin: usize,
+    /// How far it is from swinging for ever, at the worst of the speeds that were asked; `None` where its set point is out of reach at all
+    /// of them.
+    pub margins: Option<Margins>,
     /// Speeds of the machine, in parts of the plant's own, at which it settles within a second and does not swing.
     pub robust_to: Vec<f64>,
     /// Speeds that were asked: those at which the picture can be made to take the time of a frame.
@@ -60,10 +59,21 @@ pub struct Verdict {
     pub objective: f64,
 }
 
+/// How far a law is from swinging for ever.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Margins {
+    /// The factor on the gains at which it begins to.
+    pub gain: f64,
+    /// How many frames later a change may show.
+    pub delay: usize,
+}
+
 /// Speeds of the machine that a law must bear.
 const SPEEDS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
 /// Starts from which it must settle.
 const STARTS: [f64; 2] = [0.4, 2.5];
+/// A scatter of frame times below this part, a five-hundredth of what counts as settled, is no reason to play a trial again.
+const NOISE_LEAST: f64 = 1e-4;
 /// It must settle within a second.
 const SETTLE_MAX_S: f64 = 1.0;
 /// Least margins: a factor on the gain, and frames of delay.
@@ -92,8 +102,9 @@ pub fn judge(plant: &Plant, contender: impl Into<Contender>, target_hz: f64, ext
         |speed: f64, rate: f64| Trial { speed, start: Start::Rate(rate), seconds, ..Trial::calm(contender, target_hz) };
     let starts: Vec<_> = asked.iter().flat_map(|&speed| STARTS.map(|rate| calm(speed, rate))).collect();
     let upset = disturbed(&calm(own, 1.0), plant.line.scatter, extent);
-    let played = play_all(plant, &[starts.clone(), upset].concat(), extent);
-    let (settling, upset) = played.split_at(starts.len());
+    let played = measure(plant, &[starts.clone(), upset.clone()].concat(), extent.threads);
+    let (settling, upset_by) = played.split_at(starts.len());
+    let mean = |value: fn(&Measures) -> f64| mean(&upset, upset_by, value);
     let at_speed = |speed: f64| starts.iter().zip(settling).filter(move |(t, _)| t.speed == speed).map(|(_, m)| *m);
     let good = |m: Measures| m.settle_s.is_some_and(|s| s <= SETTLE_MAX_S) && m.cycle.is_none();
     let near: Vec<Loop> = asked.iter().filter_map(|&speed| contender.local_loop(plant, target_hz, speed)).collect();
@@ -101,17 +112,16 @@ pub fn judge(plant: &Plant, contender: impl Into<Contender>, target_hz: f64, ext
         contender,
         settle_s: at_speed(own).map(|m| m.settle_s).reduce(|a, b| Some(a?.max(b?))).flatten(),
         overshoot: at_speed(own).map(|m| m.overshoot).fold(0.0, f64::max),
-        miss_share: mean(upset, |m| m.miss_share),
-        reversals: mean(upset, |m| m.reversals),
-        quality: mean(upset, |m| m.quality),
-        gain_margin: near.iter().map(|l| l.gain_margin()).reduce(f64::min).unwrap_or(0.0),
-        delay_margin: near.iter().map(|l| l.delay_margin()).min().unwrap_or(0),
+        miss_share: mean(|m| m.miss_share),
+        reversals: mean(|m| m.reversals),
+        quality: mean(|m| m.quality),
+        margins: near.iter().map(Margins::of).reduce(Margins::worse),
         robust_to: asked.iter().copied().filter(|&speed| at_speed(speed).all(good)).collect(),
         asked,
         at_speed: own,
         objective: 0.0,
     };
-    verdict.objective = verdict.weigh(mean(upset, |m| m.error), mean(upset, |m| m.overrun), seconds);
+    verdict.objective = verdict.weigh(mean(|m| m.error), mean(|m| m.overrun), seconds);
     verdict
 }
 
@@ -119,8 +129,9 @@ impl Verdict {
     /// Mean error, late frames, reversals, lost quality, settling and missing margins in one number (control.md, eq. 29).
     fn weigh(&self, error: f64, overrun: f64, longest_s: f64) -> f64 {
         let [late, reversal, quality, settling, margin] = WEIGHTS;
-        let missing = (1.0 - self.gain_margin / GAIN_MARGIN).max(0.0)
-            + (1.0 - self.delay_margin as f64 / DELAY_MARGIN as f64).max(0.0)
+        let margins = self.margins.unwrap_or(Margins { gain: 0.0, delay: 0 });
+        let missing = (1.0 - margins.gain / GAIN_MARGIN).max(0.0)
+            + (1.0 - margins.delay as f64 / DELAY_MARGIN as f64).max(0.0)
             + (self.asked.len() - self.robust_to.len()) as f64 / SPEEDS.len() as f64;
         error
             + late * overrun
@@ -133,25 +144,44 @@ impl Verdict {
     /// Whether it keeps the margins that are asked of gains: a factor of two, and two frames.
     #[must_use]
     pub fn is_safe(&self) -> bool {
-        self.gain_margin >= GAIN_MARGIN && self.delay_margin >= DELAY_MARGIN
+        self.margins.is_some_and(|margins| margins.gain >= GAIN_MARGIN && margins.delay >= DELAY_MARGIN)
     }
 }
 
-/// Trials with every disturbance and every seed.
+impl Margins {
+    fn of(near: &Loop) -> Self {
+        Self { gain: near.gain_margin(), delay: near.delay_margin() }
+    }
+
+    fn worse(self, other: Self) -> Self {
+        Self { gain: self.gain.min(other.gain), delay: self.delay.min(other.delay) }
+    }
+}
+
+/// Trials with every disturbance and every seed; one of those that no seed changes.
 fn disturbed(calm: &Trial, noise: f64, extent: Extent) -> Vec<Trial> {
-    let seeds = 1..=extent.seeds.max(1);
-    let of =
-        |disturbance| seeds.clone().map(move |seed| Trial { disturbance, seed, noise, start: Start::Target, ..*calm });
+    let of = |disturbance: Disturbance| {
+        let by_chance = disturbance.is_by_chance() || noise > NOISE_LEAST;
+        let seeds = if by_chance { extent.seeds.max(1) } else { 1 };
+        (1..=seeds).map(move |seed| Trial { disturbance, seed, noise, start: Start::Target, ..*calm })
+    };
     Disturbance::ALL.into_iter().flat_map(of).collect()
 }
 
-fn mean(all: &[Measures], value: impl Fn(&Measures) -> f64) -> f64 {
-    all.iter().map(value).sum::<f64>() / all.len().max(1) as f64
+/// The mean over disturbances of the mean over their trials.
+fn mean(trials: &[Trial], measured: &[Measures], value: fn(&Measures) -> f64) -> f64 {
+    let of = |disturbance: &Disturbance| {
+        let its = trials.iter().zip(measured).filter(|(trial, _)| trial.disturbance == *disturbance);
+        let (sum, count) = its.fold((0.0, 0.0), |(sum, count), (_, m)| (sum + value(m), count + 1.0));
+        sum / count
+    };
+    Disturbance::ALL.iter().map(of).sum::<f64>() / Disturbance::ALL.len() as f64
 }
 
-/// Plays every trial.
-fn play_all(plant: &Plant, trials: &[Trial], extent: Extent) -> Vec<Measures> {
-    let threads = extent.threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
+/// Plays every trial on so many threads; `None`: as many as there are cores.
+#[must_use]
+pub fn measure(plant: &Plant, trials: &[Trial], threads: Option<NonZero<usize>>) -> Vec<Measures> {
+    let threads = threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
     let threads = threads.min(trials.len().max(1));
     let next = AtomicUsize::new(0);
     let work = || {
@@ -204,6 +234,19 @@ mod tests {
         // the larger the share of the time that goes with polygons, the larger the loop's gain: the fastest machine is the worst
         let fastest = verdict.asked.iter().copied().filter(|s| plant.reach(*s).holds(0.03)).fold(0.0, f64::max);
         let share = plant.share(0.03, fastest);
-        assert!((verdict.gain_margin - 2.0 / (0.5 * share)).abs() < 0.01, "{verdict:?}");
+        assert!((verdict.margins.unwrap().gain - 2.0 / (0.5 * share)).abs() < 0.01, "{verdict:?}");
+    }
+
+    #[test]
+    fn trials_that_no_seed_changes_are_played_once_and_weigh_as_much() {
+        let calm = Trial::calm(Law::CORRECTED, 30.0);
+        let extent = Extent { seeds: 10, millis: 500, threads: None };
+        let still = disturbed(&calm, 0.0, extent);
+        assert_eq!((still.len(), disturbed(&calm, 0.01, extent).len()), (17, 80));
+        let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
+        let ten = |trial: &Trial| (1..=10).map(|seed| Trial { seed, ..*trial }).collect::<Vec<_>>();
+        let all: Vec<_> = still.iter().filter(|trial| trial.seed == 1).flat_map(ten).collect();
+        let miss = |trials: &[Trial]| mean(trials, &measure(&plant, trials, None), |m| m.error);
+        assert!((miss(&still) - miss(&all)).abs() < 1e-12, "{} and {}", miss(&still), miss(&all));
     }
 }

@@ -260,6 +260,9 @@ fn more_agents_than_a_scene_can_carry_are_refused() {
     let many = |n| format!("format = 1\n{balls}grid = [100, {n}, 1]\n");
     assert!(read(&many(100)).is_ok());
     assert!(problem(&many(101)).3.contains("at most 10000"));
+    let threads = |n| format!("format = 1\nexecutor = \"threads\"\n{balls}grid = [100, {n}, 1]\n");
+    assert!(read(&threads(10)).is_ok());
+    assert!(problem(&threads(11)).3.contains("at most 1000 agents have a thread each"));
 }
 
 #[test]

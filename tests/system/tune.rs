@@ -300,9 +300,17 @@ fn given_gains_are_explained_in_sentences_and_every_law_has_its_analysis() {
             said["rests"]
         );
     }
+    // from above it comes home, from below it stops at an end of both ranges: no α mends that
     let printed = analysed("α=1e-4,β=5");
     let sentences = printed["sentences"].as_str().unwrap();
-    assert!(sentences.contains("each frame removes") && sentences.contains("Raise α"), "{sentences}");
+    assert!(
+        sentences.starts_with("It can rest in 2 places") && sentences.contains("Use the corrected law"),
+        "{sentences}"
+    );
+    assert!((number(&printed, "/rests/0/ratio") - 0.77).abs() < 0.01, "{}", printed["rests"]);
+    let slow = analysed("kappa=0.02");
+    let sentences = slow["sentences"].as_str().unwrap();
+    assert!(sentences.contains("each frame removes only") && sentences.contains("Raise κ"), "{sentences}");
     let swings = analysed("α=1e-2,β=5");
     assert!(swings["sentences"].as_str().unwrap().starts_with("It swings"), "{}", swings["sentences"]);
     assert!(number(&swings, "/loop_gain") > number(&swings, "/loop_gain_boundary"));

@@ -5,10 +5,12 @@
 use super::super::chart::figure::{self, Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::{Identified, Tuned};
 use crate::control::Law;
-use crate::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, play};
+use crate::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, measure, play};
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
+/// Starts that are shown, in parts of the wanted rate.
+const STARTS: [f64; 2] = [0.4, 2.5];
 /// Seconds of a step response that are shown.
 const SHOWN_S: f64 = 2.0;
 /// Cells of the map along α and along β.
@@ -59,15 +61,25 @@ fn calm(on: &Identified, contender: impl Into<Contender>, rate: f64, seconds: f6
     Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
 }
 
+/// How a law's points are drawn.
+type Drawn = fn(Vec<(f64, f64)>) -> Mark;
+
+/// A colour for every law of the table: those that were found as lines, those that they are compared with dashed.
+fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
+    let found = tuned.found.len();
+    let mark = move |k: usize| if k < found { Mark::Line } else { Mark::Dashed };
+    Colour::LINES.into_iter().cycle().enumerate().map(move |(k, colour)| (colour, mark(k) as Drawn))
+}
+
 /// From 0.4 and from 2.5 times the wanted rate.
 fn responses(on: &Identified, tuned: &Tuned) -> Panel {
     let plant = judged_on(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
-    for (row, colour) in tuned.rows.iter().zip(Colour::LINES) {
-        for (k, rate) in [0.4, 2.5].into_iter().enumerate() {
+    for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
+        for (k, rate) in STARTS.into_iter().enumerate() {
             let beats = play(&plant, &calm(on, row.verdict.contender, rate, SHOWN_S));
             let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
-            layers.push(layer(if k == 0 { row.name } else { "" }, colour, Mark::Line(line)));
+            layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
         }
     }
     Panel {
@@ -93,16 +105,21 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
     });
     let found: Vec<_> = found.collect();
     let (alphas, betas) = (around(ALPHA, found.iter().map(|at| at.0)), around(BETA, found.iter().map(|at| at.1)));
-    let mut cells: [Vec<[f64; 4]>; 3] = Default::default();
-    for column in 0..columns {
-        for row in 0..rows {
+    let corners = (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)));
+    let cells: Vec<[f64; 4]> = corners
+        .map(|(column, row)| {
             let (a, b) = (step(alphas, columns, column), step(betas, rows, row));
-            let (a_end, b_end) = (step(alphas, columns, column + 1), step(betas, rows, row + 1));
-            let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
-            cells[kind(&plant, calm(on, law, 1.0, MAP_S))].push([a, a_end, b, b_end]);
-        }
-    }
-    let [good, slow, swings] = cells;
+            [a, step(alphas, columns, column + 1), b, step(betas, rows, row + 1)]
+        })
+        .collect();
+    let starts = cells.iter().flat_map(|[a, a_end, b, b_end]| {
+        let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
+        STARTS.map(|rate| calm(on, law, rate, MAP_S))
+    });
+    let measured = measure(&plant, &starts.collect::<Vec<_>>(), None);
+    let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
+    let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
+    let [good, slow, swings] = [0, 1, 2].map(of);
     Panel {
         title: "the printed law over its gains".to_owned(),
         x: Axis::log("α", alphas.0, alphas.1),
@@ -123,8 +140,7 @@ fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
 }
 
 /// 0: settles within a second from both starts; 1: later, or not; 2: swings.
-fn kind(plant: &Plant, calm: Trial) -> usize {
-    let measured = [0.4, 2.5].map(|rate| Measures::of(&play(plant, &Trial { start: Start::Rate(rate), ..calm })));
+fn kind(measured: &[Measures]) -> usize {
     if measured.iter().any(|m| m.cycle.is_some()) {
         2
     } else {
@@ -134,23 +150,23 @@ fn kind(plant: &Plant, calm: Trial) -> usize {
 
 /// Late frames over the speed of the machine, the load 40 % up for a third of the time.
 fn misses(on: &Identified, tuned: &Tuned) -> Panel {
-    let share = |contender: Contender, speed: f64| {
-        let trial = Trial {
-            speed,
-            disturbance: Disturbance::Load(1.4),
-            noise: on.plant.line.scatter,
-            seed: 1,
-            start: Start::Rate(speed),
-            ..calm(on, contender, 1.0, 4.0)
-        };
-        100.0 * Measures::of(&play(&on.plant, &trial)).miss_share
+    let trial = |contender: Contender, speed: f64| Trial {
+        speed,
+        disturbance: Disturbance::Load(1.4),
+        noise: on.plant.line.scatter,
+        seed: 1,
+        start: Start::Rate(speed),
+        ..calm(on, contender, 1.0, 4.0)
     };
-    let lines = tuned.rows.iter().zip(Colour::LINES).map(|(row, colour)| {
-        layer(row.name, colour, Mark::Line(SPEEDS.iter().map(|&s| (s, share(row.verdict.contender, s))).collect()))
+    let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.contender, speed)));
+    let measured = measure(&on.plant, &trials.collect::<Vec<_>>(), None);
+    let lines = tuned.rows.iter().zip(styles(tuned)).zip(measured.chunks(SPEEDS.len()));
+    let lines = lines.map(|((row, (colour, mark)), measured)| {
+        let points = SPEEDS.iter().zip(measured).map(|(speed, m)| (*speed, 100.0 * m.miss_share)).collect();
+        layer(row.name, colour, mark(points))
     });
     let layers: Vec<_> = lines.collect();
-    let values = layers.iter().flat_map(|l| if let Mark::Line(points) = &l.mark { points.clone() } else { Vec::new() });
-    let high = values.map(|p| p.1).fold(1.0, f64::max);
+    let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);
     Panel {
         title: "tuned at 1, run on a machine of another speed, load + 40 %".to_owned(),
         x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),

@@ -79,8 +79,8 @@ fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> 
         }
         "adaptive" => Contender::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
         _ => Law::Corrected {
-            kappa: gain("κ", "kappa", 0.5, (0.01, 1.99))?,
-            lead: gain("λ", "lead", lead, (0.0, 1.99))?,
+            kappa: gain("κ", "kappa", 0.5, Law::KAPPA)?,
+            lead: gain("λ", "lead", lead, Law::LEAD)?,
             margin: gain(MARGIN, MARGIN, 0.1, (0.0, 0.9))?,
         }
         .into(),
@@ -117,7 +117,7 @@ fn refused(text: &str, why: &str) -> anyhow::Error {
 /// The gains in one line.
 pub(super) fn told(contender: Contender) -> String {
     match contender {
-        Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {beta:.3}"),
+        Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
         Contender::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
             format!("κ = {kappa:.3}, margin = {margin:.3}")
         }
@@ -126,6 +126,11 @@ pub(super) fn told(contender: Contender) -> String {
         }
         Contender::Adaptive { margin } => format!("margin = {margin:.3}"),
     }
+}
+
+/// A number that may be small, so that it can be typed again.
+fn digits(value: f64) -> String {
+    if value < 0.01 { format!("{value:.3e}") } else { format!("{value:.3}") }
 }
 
 /// The fragment of a scene that asks for `law`, with `comment` above it.

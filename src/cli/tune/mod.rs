@@ -152,9 +152,13 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
         .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
     let tuned = look_for_gains(args, on, stopped)?;
     gains::write(fragment, &gains::fragment(tuned.best, &told::comment(on, &tuned)))?;
-    let files = figures::write(folder, &stem(&on.scene.name), on, &tuned)?;
-    let files: Vec<_> = std::iter::once(fragment.to_owned()).chain(files).collect();
-    let checked = if tuned.interrupted { Vec::new() } else { checked::check(args, on, &tuned, stopped)? };
+    let mut files = vec![fragment.to_owned()];
+    let mut checked = Vec::new();
+    // who interrupts does not want to wait for pictures
+    if !tuned.interrupted {
+        files.extend(figures::write(folder, &stem(&on.scene.name), on, &tuned)?);
+        checked = checked::check(args, on, &tuned, stopped)?;
+    }
     data(&if args.common.json {
         told::json(on, &tuned, &checked, &files)?
     } else {

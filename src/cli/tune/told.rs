@@ -6,7 +6,7 @@ use super::super::chart::table::{Cell, Table};
 use super::checked::Checked;
 use super::{Identified, Tuned, gains};
 use crate::control::Law;
-use crate::tune::{Contender, Explanation, Verdict};
+use crate::tune::{Contender, Explanation, Margins, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -34,8 +34,8 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
             settle,
             Cell::Number(v.overshoot, 3),
             Cell::Number(v.miss_share, 4),
-            Cell::Number(v.gain_margin, 1),
-            Cell::Number(v.delay_margin as f64, 0),
+            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.gain, 1)),
+            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.delay as f64, 0)),
             Cell::Number(v.reversals, 4),
             Cell::Number(v.quality, 3),
             robust(v).into(),
@@ -95,15 +95,19 @@ fn robust(v: &Verdict) -> String {
     }
 }
 
+/// How far a law is from swinging.
+fn margins(Margins { gain, delay }: Margins) -> String {
+    format!("gain margin {gain:.2}, delay margin {delay} frames")
+}
+
 /// What stands above the fragment.
 pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
     let worth = tuned.verdict().map_or_else(String::new, |v| {
         let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
         format!(
-            "\n{settle}, {:.2} % of frames late, gain margin {:.1}, delay margin {} frames",
+            "\n{settle}, {:.2} % of frames late{}",
             100.0 * v.miss_share,
-            v.gain_margin,
-            v.delay_margin
+            v.margins.map_or_else(String::new, |m| format!(", {}", margins(m)))
         )
     });
     format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
@@ -146,7 +150,7 @@ fn plant_json(on: &Identified) -> Value {
 fn row_json(name: &str, v: &Verdict) -> Value {
     json!({
         "law": name, "gains": gains_json(v.contender), "settle_s": v.settle_s, "overshoot": v.overshoot,
-        "miss_share": v.miss_share, "gain_margin": v.gain_margin, "delay_margin_frames": v.delay_margin,
+        "miss_share": v.miss_share, "gain_margin": v.margins.map(|m| m.gain), "delay_margin_frames": v.margins.map(|m| m.delay),
         "reversals": v.reversals, "quality": v.quality, "robust_to": v.robust_to, "asked": v.asked, "at_speed": v.at_speed,
         "objective": v.objective,
     })
@@ -176,11 +180,10 @@ pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String 
     let near = e.near.map_or_else(String::new, |near| {
         format!(
             "  near the set point a frame removes {:.1} % of an error, and the loop swings past {:.1} %; with the machine's speed off as far \
-             as the target can be reached: gain margin {:.2}, delay margin {} frames\n",
+             as the target can be reached: {}\n",
             100.0 * near.gain,
             100.0 * near.gain * near.gain_margin(),
-            v.gain_margin,
-            v.delay_margin
+            v.margins.map_or_else(|| "out of reach".to_owned(), margins)
         )
     });
     let rest = |eps: f64, ratio: f64, end: bool| {
