@@ -224,6 +224,11 @@ pub struct Pull {
 /// Past this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag its catch along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
+/// By how many seconds a tool seen at `seen` is brought forward to `time`.
+pub(crate) fn led_s(time: SimTime, seen: SimTime) -> f64 {
+    time.secs_after(seen).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
+}
+
 impl<'a> Surroundings<'a> {
     /// An empty world at `time`, for tests and for agents that see nobody.
     #[must_use]
@@ -237,7 +242,7 @@ impl<'a> Surroundings<'a> {
         let held = self.neighbours.iter().filter_map(move |other| {
             let Body::Tool(tool) = &other.snapshot.body else { return None };
             let grasp = tool.grasp.filter(|g| g.target == me)?;
-            let age_s = time.secs_after(other.snapshot.time).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S);
+            let age_s = led_s(time, other.snapshot.time);
             Some(Pull {
                 by: Some(other.id),
                 anchor: grasp.anchor,

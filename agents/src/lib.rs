@@ -26,7 +26,7 @@ pub use drift::DRIFT_S;
 pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
-    Anchor, Body, Bounds, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, SoftState, Stand,
+    Anchor, Body, Bounds, Clasp, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, SoftState, Stand,
     ToolState,
 };
 pub use time::{SimSpan, SimTime};

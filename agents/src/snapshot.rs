@@ -198,10 +198,14 @@ pub struct ToolState {
     pub rotation: DQuat,
     /// Velocity of the tip, m/s.
     pub velocity: DVec3,
+    /// Angular velocity in world axes, rad/s.
+    pub spin: DVec3,
     /// Opening of the jaws: 0 shut … 1 wide open.
     pub jaw: f64,
     /// What the jaws hold.
     pub grasp: Option<Grasp>,
+    /// The rigid body that the open jaws are about to take, or have just let go: it may come between them.
+    pub lets_in: Option<AgentId>,
     /// Magnitude of the force that what is held exerts on the tool, newtons.
     pub force_n: f64,
 }
@@ -213,10 +217,21 @@ pub struct Grasp {
     pub target: AgentId,
     /// Which material point of it.
     pub anchor: Anchor,
+    /// How it is kept from turning between the jaws; `None` where it may.
+    pub clasp: Option<Clasp>,
     /// Stiffness of the hold, N/m, > 0.
     pub stiffness_n_m: f64,
     /// Damping of the hold, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
+}
+
+/// How jaws keep a rigid body from turning: they are as long as `arm_m`, and bear on all of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clasp {
+    /// Rotation from the body's axes to the tool's in which the hold turns nothing.
+    pub rotation: DQuat,
+    /// The hold resists turning about every axis as springs and dampers of its own strength do at this distance, metres, ≥ 0.
+    pub arm_m: f64,
 }
 
 /// A material point of a body: it moves with the matter, whatever the resolution.
@@ -320,7 +335,9 @@ impl Body {
             Self::Rigid(b) => {
                 b.position.is_finite() && b.rotation.is_finite() && b.velocity.is_finite() && b.spin.is_finite()
             }
-            Self::Tool(t) => t.tip.is_finite() && t.rotation.is_finite() && t.velocity.is_finite() && t.jaw.is_finite(),
+            Self::Tool(t) => {
+                [t.tip, t.velocity, t.spin].iter().all(|v| v.is_finite()) && t.rotation.is_finite() && t.jaw.is_finite()
+            }
             Self::Soft(s) => s.positions.iter().chain(&s.velocities).all(|p| p.is_finite()),
         }
     }

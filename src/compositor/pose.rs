@@ -88,8 +88,10 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
                 tip: a.tip.lerp(b.tip, w),
                 rotation: turn(a.rotation, b.rotation, w),
                 velocity: a.velocity.lerp(b.velocity, w),
+                spin: a.spin.lerp(b.spin, w),
                 jaw: a.jaw + (b.jaw - a.jaw) * w,
                 grasp: b.grasp,
+                lets_in: b.lets_in,
                 force_n: a.force_n + (b.force_n - a.force_n) * w,
             });
         }

@@ -359,7 +359,17 @@ mod tests {
     fn what_a_contact_weighs_is_told_in_the_order_of_the_two_names() {
         let scene = two_balls();
         let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
-        let tool = ToolState { tip, rotation, velocity: DVec3::ZERO, jaw: 0.0, grasp: None, force_n: 0.0 };
+        let still = DVec3::ZERO;
+        let tool = ToolState {
+            tip,
+            rotation,
+            velocity: still,
+            spin: still,
+            jaw: 0.0,
+            grasp: None,
+            lets_in: None,
+            force_n: 0.0,
+        };
         for (kind, body, want) in [
             (PairKind::Ledger, Body::Nothing, (0, 1, [3.0, 2.0])),
             (PairKind::Grasp, Body::Tool(tool), (1, 0, [2.0, 3.0])),

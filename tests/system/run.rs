@@ -1,6 +1,7 @@
 //! What the whole program promises, played from the command line: physics, control, rest, outputs and ends.
 
 mod budget;
+mod grasp;
 mod isolation;
 mod limits;
 mod outputs;

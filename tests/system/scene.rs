@@ -211,7 +211,14 @@ fn references_name_what_exists() {
     let said = problem(&format!("{TUBE}{tool}")).3;
     assert!(said.contains("`liver`") && said.contains("`intestine`"), "{said}");
     let said = problem(&format!("{TUBE}{}", tool.replace("liver", "tool"))).3;
-    assert!(said.contains("which is not soft"), "{said}");
+    assert!(said.contains("names `tool`, an instrument, which jaws cannot hold"), "{said}");
+    let fixed = format!(
+        "{TUBE}{}\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n",
+        tool.replace("liver", "floor")
+    );
+    let (line, _, text, said) = problem(&fixed);
+    assert_eq!((line, text.as_str()), (20, "\"floor\""));
+    assert!(said.contains("names `floor`, a fixed object, which jaws cannot hold"), "{said}");
 }
 
 #[test]

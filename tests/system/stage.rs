@@ -34,11 +34,17 @@ pub fn still_life() -> (Stage, Camera) {
     let held = folded_tube(150);
     let grip_arc_m = 0.47 * held.arc_m[150];
     let (point, _) = held.point_at(grip_arc_m).expect("the tube has nodes");
-    let grasp =
-        Grasp { target: AgentId(TUBE), anchor: Anchor::Arc(grip_arc_m), stiffness_n_m: 200.0, damping_n_s_m: 1.0 };
+    let grasp = Grasp {
+        target: AgentId(TUBE),
+        anchor: Anchor::Arc(grip_arc_m),
+        clasp: None,
+        stiffness_n_m: 200.0,
+        damping_n_s_m: 1.0,
+    };
     let tool = |tip: DVec3, from: DVec3, jaw, grasp| {
         let rotation = DQuat::from_rotation_arc(DVec3::Z, (tip - from).normalize());
-        Body::Tool(ToolState { tip, rotation, velocity: DVec3::ZERO, jaw, grasp, force_n: 0.6 })
+        let still = DVec3::ZERO;
+        Body::Tool(ToolState { tip, rotation, velocity: still, spin: still, jaw, grasp, lets_in: None, force_n: 0.6 })
     };
     let bodies = [
         Body::Curve(held),

@@ -41,7 +41,7 @@ impl Six {
         }
     }
 
-    /// Adds stiffness against turning across the arm `r`.
+    /// Adds stiffness against turning across the arm `r`; about every axis where that has no length.
     pub fn add_turning(&mut self, r: DVec3, stiffness: f64) {
         let axis = r.normalize_or_zero();
         for i in 0..3 {

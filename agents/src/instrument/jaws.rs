@@ -1,10 +1,14 @@
-//! What the jaws catch: the nearest point of a tube or soft body within reach, held by a spring that comes on smoothly.
+//! What the jaws catch: the nearest point of a tube, soft or rigid body within reach, held by a spring that comes on smoothly.
 //!
-//! In: an opening, a tip, the snapshots around. Out: a [`Grasp`]. Never here: where the tip goes.
+//! In: an opening, where the jaws are, the snapshots around. Out: a [`Grasp`]. Never here: where the tip goes.
+//!
+//! What bends is held at a point: it turns about it as its own stiffness lets it. A rigid body is kept from turning as well: jaws
+//! are plates and no point, and bear on it along all that they reach.
 
 use super::ToolSpec;
-use crate::{AgentId, Anchor, Body, CurveState, Grasp, SoftState, Surroundings};
-use glam::DVec3;
+use crate::coupling::{FormKind, SolidForm};
+use crate::{AgentId, Anchor, Body, Clasp, CurveState, Grasp, Neighbour, RigidState, SoftState, Surroundings};
+use glam::{DQuat, DVec3};
 
 /// Jaws that pass below this opening grasp.
 pub(crate) const GRASP_BELOW: f64 = 0.2;
@@ -27,7 +31,20 @@ pub(super) struct Jaws {
 struct Held {
     target: AgentId,
     anchor: Anchor,
+    /// From a rigid body's axes to the tool's, when it was caught.
+    rotation: Option<DQuat>,
     for_s: f64,
+}
+
+/// What lies near the jaws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Near {
+    target: AgentId,
+    anchor: Anchor,
+    /// From the tip to its skin, metres; a tube's is below zero inside.
+    pub gap_m: f64,
+    /// How a rigid body is turned.
+    rotation: Option<DQuat>,
 }
 
 impl Jaws {
@@ -41,12 +58,12 @@ impl Jaws {
         self.held.is_some()
     }
 
-    /// Opens and closes over a step of `dt` seconds: from opening `was` to `now`, the tip at `tip`.
+    /// Opens and closes over a step of `dt` seconds: from opening `was` to `now`, the tip at `tip`, the tool turned by `rotation`.
     pub(super) fn move_to(
         &mut self,
         spec: &ToolSpec,
         (was, now): (f64, f64),
-        tip: DVec3,
+        (tip, rotation): (DVec3, DQuat),
         seen: (&Surroundings<'_>, f64),
     ) {
         let (around, dt) = seen;
@@ -56,7 +73,10 @@ impl Jaws {
         if let Some(held) = &mut self.held {
             held.for_s += dt;
         } else if now < GRASP_BELOW && self.armed {
-            self.held = nearest(spec, tip, around).map(|(target, anchor, _)| Held { target, anchor, for_s: 0.0 });
+            self.held = nearest(spec, tip, around).map(|Near { target, anchor, rotation: body, .. }| {
+                let rotation = body.map(|body| (rotation.conjugate() * body).normalize());
+                Held { target, anchor, rotation, for_s: 0.0 }
+            });
             // jaws that have come to a stop catch nothing any more
             self.armed = self.held.is_none() && now < was;
         }
@@ -70,23 +90,55 @@ impl Jaws {
         Some(Grasp {
             target: held.target,
             anchor: held.anchor,
+            clasp: held.rotation.map(|rotation| Clasp { rotation, arm_m: spec.reach_m }),
             stiffness_n_m: share * spec.stiffness_n_m,
             damping_n_s_m: share * spec.damping_n_s_m,
         })
     }
 }
 
-/// The nearest point within reach of what may be grasped: whose, which, and the gap to its skin.
-pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<(AgentId, Anchor, f64)> {
-    let soft = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id)).filter_map(|other| {
-        let (anchor, gap_m) = match &other.snapshot.body {
-            Body::Curve(curve) => nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?,
-            Body::Soft(soft) => nearest_vertex(soft, tip)?,
-            _ => return None,
-        };
-        Some((other.id, anchor, gap_m))
-    });
-    soft.filter(|(_, _, gap_m)| *gap_m <= spec.reach_m).min_by(|a, b| a.2.total_cmp(&b.2))
+/// The nearest point within reach of what may be grasped.
+pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<Near> {
+    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id));
+    let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= spec.reach_m);
+    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+}
+
+/// The rigid body that open jaws may take, or have just let go: the nearest within `reach_m` of the tip.
+pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundings<'_>, f64)) -> Option<AgentId> {
+    let rigid = |other: &&Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
+    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id)).filter(rigid);
+    let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= reach_m);
+    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|near| near.target)
+}
+
+/// The nearest point of what can be held.
+fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
+    let ((anchor, gap_m), rotation) = match &other.snapshot.body {
+        Body::Curve(curve) => (nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?, None),
+        Body::Soft(soft) => (nearest_vertex(soft, tip)?, None),
+        Body::Rigid(state) => {
+            let FormKind::Solid(form) = &other.form.as_ref()?.kind else { return None };
+            (nearest_in(form, state, tip)?, Some(state.rotation))
+        }
+        Body::Tool(_) | Body::Nothing => return None,
+    };
+    Some(Near { target: other.id, anchor, gap_m, rotation })
+}
+
+/// The point of a solid that is nearest, and how far it is: none inside.
+fn nearest_in(form: &SolidForm, state: &RigidState, tip: DVec3) -> Option<(Anchor, f64)> {
+    let local = state.rotation.conjugate() * (tip - state.position);
+    let place = (local + form.com_local).as_vec3();
+    if !place.is_finite() {
+        return None;
+    }
+    let found = form.shape.project_local_point(place, true);
+    if found.is_inside {
+        return Some((Anchor::Local(local), 0.0));
+    }
+    let point = found.point.as_dvec3() - form.com_local;
+    Some((Anchor::Local(point), point.distance(local)))
 }
 
 /// The nearest vertex of a soft body, and how far it is.

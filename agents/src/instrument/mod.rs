@@ -1,6 +1,6 @@
-//! A driven tool: follows keyframes or a hand, opens, closes, grasps a tube and drags it.
+//! A driven tool: follows keyframes or a hand, opens, closes, grasps a tube, a soft or a rigid body and drags it.
 //!
-//! In: a [`ToolSpec`], steps, the user's hand, the snapshots of the tubes it can grasp. Out: a tip, jaws, a hold.
+//! In: a [`ToolSpec`], steps, the user's hand, the snapshots of what it can grasp. Out: a tip, jaws, a hold.
 //! Never here: the force of the hold. What is held solves it in its own step and books it in a ledger (`felt.rs` reads it).
 //!
 //! A tool weighs nothing and nothing stops it: it is led. `script.rs` says where the keyframes lead, `jaws.rs` what the

@@ -11,13 +11,14 @@ pub struct ToolSpec {
     /// Whether the motion starts again after the last keyframe. A script that does not end where it began first goes back
     /// there, in as long as its last leg took.
     pub repeat: bool,
-    /// How far from the tip the jaws reach, metres, > 0: from the tip to the skin of the tube.
+    /// How far from the tip the jaws reach, metres, > 0: from the tip to the skin of what they catch. A rigid body is kept
+    /// from turning as by springs at this distance.
     pub reach_m: f64,
     /// Stiffness of the hold, N/m, > 0.
     pub stiffness_n_m: f64,
     /// Damping of the hold, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
-    /// The tubes it can grasp.
+    /// What it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
 }
 

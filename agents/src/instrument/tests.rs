@@ -1,6 +1,7 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
 mod holds;
+mod rigid;
 
 use super::{Instrument, Keyframe, ToolError, ToolSpec};
 use crate::coupling::{Form, FormKind, Impulse, Ledger, Site};

@@ -1,20 +1,20 @@
 //! The agent: one step of a tool, told as a contents page.
 //!
-//! In: a span, the hand, the tubes around. Out: a [`ToolState`]. Never here: forces; who is held or touched solves them.
+//! In: a span, the hand, what can be held. Out: a [`ToolState`]. Never here: forces; who is held or touched solves them.
 //!
 //! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
 //! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
 
 use super::felt::Felt;
-use super::jaws::{Jaws, nearest};
+use super::jaws::{GRASP_BELOW, Jaws, let_in, nearest};
 use super::script::{Pose, Script};
 use super::spec::REACH_MAX_M;
 use super::{ToolError, ToolSpec};
 use crate::coupling::{Form, FormKind, Knock, Placed, View};
 use crate::shape::ToolShape;
 use crate::{
-    Agent, Anchor, Body, Bounds, Inertia, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport, Surroundings,
-    ToolState, check_span,
+    Agent, AgentId, Anchor, Body, Bounds, Inertia, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport,
+    Surroundings, ToolState, check_span,
 };
 use glam::{DQuat, DVec3};
 use std::fmt;
@@ -51,7 +51,7 @@ const HAND_RATE_PER_S: f64 = 60.0;
 const RETURN_RATE_PER_S: f64 = 4.0;
 /// How fast jaws open and close where no script says, 1/s.
 const JAW_RATE_PER_S: f64 = 4.0;
-/// In the hand, jaws close on a tube whose skin is nearer than this share of their reach.
+/// In the hand, jaws close on what has its skin is nearer than this share of their reach.
 const CATCH_SHARE: f64 = 0.5;
 /// A tip nearer than this to its script has arrived, metres (and m/s).
 const ARRIVED: f64 = 1e-7;
@@ -67,7 +67,8 @@ impl Instrument {
         spec.check()?;
         let script = Script::new(&spec.keyframes, spec.repeat);
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
-        let tool = ToolState { tip, rotation, velocity, jaw, grasp: None, force_n: 0.0 };
+        let spin = DVec3::ZERO;
+        let tool = ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0 };
         let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
         Ok(Self { spec, script, tool, jaws, felt, knock, form, speed_m_s: 0.0, at_rest: false, steps: 0 })
@@ -79,13 +80,13 @@ impl Instrument {
         (hand.target - self.tool.rotation * local, hand.target_velocity)
     }
 
-    /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on a tube that is near.
+    /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on what is near.
     fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
         let (target, target_velocity) = self.hand_target(hand);
         let now = (self.tool.tip - target, self.tool.velocity - target_velocity);
         let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
         let tip = target + target_velocity * dt + off;
-        let near = nearest(&self.spec, tip, around).is_some_and(|(_, _, gap)| gap < CATCH_SHARE * self.spec.reach_m);
+        let near = nearest(&self.spec, tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
         let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
@@ -111,6 +112,13 @@ impl Instrument {
             jaw: jaw.clamp(0.0, 1.0),
             ..self.tool
         }
+    }
+
+    /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
+    fn let_in(&self, around: &Surroundings<'_>, dt_s: f64) -> Option<AgentId> {
+        let open = self.tool.jaw > GRASP_BELOW;
+        let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
+        if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
     }
 
     /// Finds who sleeps in its way.
@@ -160,6 +168,13 @@ fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
     (way(front).max(way(back)) + (after.jaw - before.jaw).abs() * side_m) / dt
 }
 
+/// The angular velocity that leads from one rotation to another in `dt` seconds, world axes, rad/s.
+fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
+    let turned = to * from.conjugate();
+    let shorter = if turned.w < 0.0 { -turned } else { turned };
+    if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
+}
+
 /// A deviation and its rate after `t` seconds of critical damping: exact, whatever the step.
 fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
     let left = libm::exp(-damping_s * t);
@@ -191,9 +206,10 @@ impl Agent for Instrument {
         }
         let was = self.tool.jaw;
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        self.tool = led;
-        self.jaws.move_to(&self.spec, (was, led.jaw), led.tip, (around, dt_s));
+        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), ..led };
+        self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.tool.lets_in = self.let_in(around, dt_s);
         self.wake_others(around, dt_s);
         self.felt.read(around);
         self.tool.force_n = self.felt.force_n();

@@ -122,7 +122,7 @@ impl Company {
             };
             if known {
                 guest.learn(neighbour, &self.form, mover);
-                guest.touchable &= !holds(neighbour, around.me); // jaws pass through what they hold
+                guest.touchable &= !lets_in(neighbour, around.me); // jaws pass through what they hold
                 self.count += 1;
                 if let Some(pair) = self.pairs.get(neighbour.id) {
                     let on_their_way = on_their_way(&self.exchange, around, neighbour);
@@ -276,6 +276,12 @@ fn is_met(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
         || around.links.iter().any(|link| link.other == neighbour.id && matches!(link.law, Law::Tlm { .. }));
     let owned = neighbour.owned || alone;
     ((owned && (touched || linked())) || holds(neighbour, around.me)) && neighbour.snapshot.is_finite()
+}
+
+/// Whether `neighbour` is a tool that holds `me`, or has its jaws open for it.
+fn lets_in(neighbour: &Neighbour, me: AgentId) -> bool {
+    let open = matches!(&neighbour.snapshot.body, Body::Tool(tool) if tool.lets_in == Some(me));
+    open || holds(neighbour, me)
 }
 
 /// Whether `neighbour` is a tool that holds `me`.

@@ -31,6 +31,7 @@ mod sided;
 mod spec;
 mod springs;
 mod ties;
+mod turn;
 mod world;
 
 pub use body::RigidBody;

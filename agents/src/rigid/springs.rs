@@ -1,7 +1,7 @@
 //! Springs that pull a rigid body: linearly implicit, stable at any stiffness, whatever the other end weighs.
 //!
 //! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring; all springs together
-//! as others have to know them. Never here: contacts; positions stay.
+//! as others have to know them. Never here: contacts; positions stay; how jaws turn a body ([`super::turn`]).
 //!
 //! With the generalised velocity u = (v, ω), the point Jacobian G = (1, −r×) and the spring's force at the *end* of the step,
 //! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The turning of r under
@@ -10,6 +10,7 @@
 
 use super::mass::Spread;
 use super::motion::Motion;
+use super::turn::Turn;
 use crate::coupling::{Six, Sprung, Twist};
 use crate::{Anchor, Grip, Pull};
 use glam::{DMat3, DVec3};
@@ -25,12 +26,14 @@ pub(super) struct Tie {
     pub yields: DMat3,
     /// The impulse it gave this body in the last part, N·s.
     pub impulse: DVec3,
+    /// How it keeps the body from turning, where jaws hold it.
+    pub turn: Option<Turn>,
 }
 
 impl Tie {
     /// A spring whose other end is led.
     pub(super) const fn led(pull: Pull) -> Self {
-        Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO }
+        Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
     }
 
     /// By how much it is stretched where its ends are `away` from each other, metres, and the directions in which it pulls.
@@ -92,9 +95,13 @@ pub(super) fn pull(
         change = system.matrix.solve(system.right);
     }
     grips.clear();
+    let spin = motion.spin(body);
     for tie in ties.iter_mut() {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
         tie.impulse = spring.after(change, r) - spring.bent(tie, r, under.bent);
+        if let Some(turn) = &mut tie.turn {
+            turn.give((motion.rotation, spin), (change[1], h), under.bent);
+        }
         grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
     }
     motion.velocity += change[0];
@@ -128,6 +135,9 @@ pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3)
         all.stiffness.add_point(r, pass * tie.pull.stiffness_n_m);
         all.stiffness.add_turning(r, r.dot(force).max(0.0));
         all.damping.add_point(r, pass * tie.pull.damping_n_s_m);
+        if let Some(turn) = &tie.turn {
+            turn.lean(motion.rotation, spin, &mut all);
+        }
     }
     all
 }
@@ -196,6 +206,10 @@ impl System {
         self.matrix.add_point(r, spring.resistance);
         self.right[0] += spring.impulse;
         self.right[1] += r.cross(spring.impulse);
+        if let Some(turn) = &tie.turn {
+            self.matrix.add_turning(DVec3::ZERO, turn.resistance(h));
+            self.right[1] += turn.impulse_at(motion.rotation, motion.spin(body), h);
+        }
         if let Some(change) = first {
             let stiffness = h * h * r.dot(spring.after(change, r) / h).max(0.0);
             let (axis, spin) = (r.normalize_or_zero(), motion.spin(body));

@@ -5,8 +5,10 @@
 
 use super::company::Company;
 use super::springs::Tie;
-use crate::coupling::{Law, Link, PairKind, Slots};
-use crate::{Anchor, Pull, Surroundings};
+use super::turn::Turn;
+use crate::agent::led_s;
+use crate::coupling::{Law, Link, Other, PairKind, Slots};
+use crate::{Anchor, Body, Pull, Surroundings};
 use glam::{DMat3, DVec3};
 
 /// All springs on a body.
@@ -46,9 +48,14 @@ impl Ties {
         self.all.clear();
         self.ends.clear();
         for pull in around.pulls() {
-            let by = pull.by.and_then(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
-            self.all.push(Tie::led(pull));
-            self.ends.push(by.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
+            let by = pull.by.map(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
+            if by == Some(None) {
+                continue; // a tool that is not finite holds nothing
+            }
+            let guest = by.flatten();
+            let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
+            self.all.push(Tie { turn, ..Tie::led(pull) });
+            self.ends.push(guest.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
         }
         for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
             let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
@@ -67,7 +74,8 @@ impl Ties {
     pub(super) fn aim(&mut self, company: &Company) {
         let Self { all, ends, room } = self;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
-            let Some(End { guest: i, anchor, .. }) = *end else { continue };
+            // a tool's end goes on its way by itself, as a hand's does
+            let Some(End { guest: i, anchor, .. }) = end.filter(|end| end.kind != PairKind::Grasp) else { continue };
             let other = &company.guests()[i].other;
             let Some((target, velocity)) = other.point(anchor) else { continue };
             (tie.pull.target, tie.pull.target_velocity) = (target, velocity);
@@ -86,15 +94,13 @@ impl Ties {
         }
     }
 
-    /// Gives the other ends what the springs gave to this one in the `h` seconds since; hands go on their way.
+    /// Gives the other ends what the springs gave to this one in the `h` seconds since; hands and tools go on their way.
     pub(super) fn give(&mut self, company: &mut Company, h: f64) {
         let Self { all, ends, room } = self;
         let after_s = company.after_s;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
-            let Some(End { guest: i, anchor, kind }) = *end else {
-                tie.pull.target += tie.pull.target_velocity * h;
-                continue;
-            };
+            tie.pull.target += tie.pull.target_velocity * h;
+            let Some(End { guest: i, anchor, kind }) = *end else { continue };
             let (guests, exchange, ..) = company.split();
             let other = &mut guests[i].other;
             let mut slots = Slots::default();
@@ -102,6 +108,10 @@ impl Ties {
             room.clear();
             room.resize(other.velocities().len(), DVec3::ZERO);
             slots.scatter(-tie.impulse, room);
+            if let Some(turn) = &mut tie.turn {
+                room[1] -= turn.impulse;
+                turn.go_on(h);
+            }
             other.book(exchange, (after_s, h), room);
             other.push(room, h);
             if let Some(id) = other.id() {
@@ -111,6 +121,14 @@ impl Ties {
             }
         }
     }
+}
+
+/// How a tool, brought to the body's own time, keeps the body that it pulls from turning.
+fn turn_of(tool: &Other, (pull, around): (&Pull, &Surroundings<'_>)) -> Option<Turn> {
+    let seen = &tool.neighbour()?.snapshot;
+    let Body::Tool(state) = &seen.body else { return None };
+    let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
+    Some(Turn::of(state, &clasp, (pull, led_s(around.time, seen.time))))
 }
 
 /// A link as a spring; its target is aimed later.

@@ -32,15 +32,26 @@ fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &InstrumentFile, name
     let mut found = Vec::with_capacity(wanted.len().min(names.len()));
     for (i, name) in wanted.iter().enumerate() {
         let key = format!("grasps.{i}");
-        let soft = |named| matches!(named, Named::Tube(_) | Named::Soft(_));
-        if names.is_known(name) && names.soft(name).is_none() {
-            let expected = "expected the name of a tube, sheet, solid or rope";
-            c.wrong(place, &key, format_args!("names `{name}`, which is not soft"), expected);
-        } else if c.reference(place, &key, name, names.only(soft)) {
-            found.extend(names.soft(name).filter(|id| !found.contains(id)));
+        let named = names.get(name);
+        if let Some(what) = named.and_then(ungraspable) {
+            let expected = "expected the name of a tube, sheet, solid, rope or rigid object that moves";
+            c.wrong(place, &key, format_args!("names `{name}`, {what}, which jaws cannot hold"), expected);
+        } else if c.reference(place, &key, name, names.only(|named| named.graspable().is_some())) {
+            found.extend(named.and_then(Named::graspable).filter(|id| !found.contains(id)));
         }
     }
     found
+}
+
+/// What something is that jaws cannot hold.
+const fn ungraspable(named: Named) -> Option<&'static str> {
+    match named {
+        Named::Fixed => Some("a fixed object"),
+        Named::Scenery => Some("a mesh or tree without matter"),
+        Named::Tool(_) => Some("an instrument"),
+        Named::Synthetic(_) => Some("an agent without matter"),
+        Named::Rigid(_) | Named::Tube(_) | Named::Soft(_) => None,
+    }
 }
 
 fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> Vec<Keyframe> {

@@ -89,6 +89,14 @@ pub(in crate::scene) enum Named {
 }
 
 impl Named {
+    /// What jaws can hold if a scene says so: what has a body of its own.
+    pub(super) const fn graspable(self) -> Option<AgentId> {
+        match self {
+            Self::Rigid(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
+            Self::Fixed | Self::Scenery | Self::Tool(_) | Self::Synthetic(_) => None,
+        }
+    }
+
     /// The number of what moves.
     pub(in crate::scene) const fn agent(self) -> Option<AgentId> {
         match self {
@@ -114,11 +122,6 @@ impl Names {
 
     pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
         self.0.iter().filter_map(|(name, n)| if let Named::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
-    }
-
-    /// What jaws can hold if a scene says so: tubes and soft bodies.
-    pub(super) fn soft(&self, name: &str) -> Option<AgentId> {
-        self.get(name).filter(|named| matches!(named, Named::Tube(_) | Named::Soft(_))).and_then(Named::agent)
     }
 
     pub(super) fn is_known(&self, name: &str) -> bool {
@@ -434,7 +437,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 
-/// Tools and the tubes that they can hold see each other.
+/// Tools and what they can hold see each other.
 fn link(members: &mut [Member]) {
     let mut pairs = Vec::new();
     for member in members.iter() {

@@ -4,7 +4,7 @@ use super::Point;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A driven tool: it follows its keyframes, or the user's hand, and grasps tubes.
+/// A driven tool: it follows its keyframes, or the user's hand, and grasps tubes, soft and rigid bodies.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InstrumentFile {
@@ -13,13 +13,14 @@ pub struct InstrumentFile {
     pub keyframe: Vec<KeyframeFile>,
     /// Whether the motion starts again after the last keyframe. Default false.
     pub repeat: Option<bool>,
-    /// How far from the tip the jaws reach, metres, 1e-6 … 100. Default 0.02.
+    /// How far from the tip the jaws reach, metres, 1e-6 … 100. Default 0.02. Against turning, a rigid object is held as by the
+    /// hold's stiffness and damping at this distance.
     pub reach_m: Option<f64>,
     /// Stiffness of the hold, N/m, 1e-3 … 1e7. Default 200.
     pub stiffness_n_m: Option<f64>,
     /// Damping of the hold, N·s/m, 0 … 1e5. Default 1.
     pub damping_n_s_m: Option<f64>,
-    /// Names of the tubes it can grasp. Default every tube of the scene.
+    /// Names of what it can grasp: tubes, sheets, solids, ropes, rigid objects that move. Default every tube of the scene.
     pub grasps: Option<Vec<String>>,
 }
 

@@ -20,11 +20,13 @@ enum Held {
     Tube,
     Rope,
     Solid,
-    /// A rigid body, on a link: jaws hold what is soft.
+    /// A rigid body in the jaws.
+    Cube,
+    /// A rigid body on a link.
     Brick,
 }
 
-const ALL: [Held; 4] = [Held::Tube, Held::Rope, Held::Solid, Held::Brick];
+const ALL: [Held; 5] = [Held::Tube, Held::Rope, Held::Solid, Held::Cube, Held::Brick];
 
 /// Puts it on a stage of its own, held by a tool that goes along `way` in half a second: the stage, and the two.
 fn stage(
@@ -63,7 +65,7 @@ fn stage(
             let shape = SoftShape::Box { size_m: DVec3::splat(0.1), segments: [2; 3] };
             stage.add(SoftBody::new(soft(shape, DVec3::new(-0.05, -0.05, -0.1))).unwrap(), rates.0)
         }
-        Held::Brick => {
+        Held::Cube | Held::Brick => {
             let brick = RigidSpec {
                 solid: Solid::Box { half_extents_m: DVec3::splat(0.05) },
                 position: DVec3::Z * -0.05,
@@ -83,7 +85,8 @@ fn stage(
     };
     let keyframes = vec![key(0.0, TIP, 0.0), key(0.5, TIP + way, 0.0)];
     // who takes long steps has fallen by one when it is first seen
-    let spec = ToolSpec { reach_m: 0.2, damping_n_s_m: 4.0, graspable: vec![id], ..spec(keyframes) };
+    let graspable = if held == Held::Brick { vec![] } else { vec![id] };
+    let spec = ToolSpec { reach_m: 0.2, damping_n_s_m: 4.0, graspable, ..spec(keyframes) };
     let (stiffness_n_m, damping_n_s_m) = (spec.stiffness_n_m, spec.damping_n_s_m);
     let tool = stage.add(Instrument::new(spec).unwrap(), rates.1);
     stage.law(id, tool, Law::Off); // nothing but the hold

@@ -194,8 +194,10 @@ fn a_tool_pushes_a_body_at_its_own_speed_and_feels_what_it_gives() {
             tip: DVec3::ZERO,
             rotation: DQuat::from_rotation_y(std::f64::consts::FRAC_PI_2),
             velocity,
+            spin: DVec3::ZERO,
             jaw: 0.0,
             grasp: None,
+            lets_in: None,
             force_n: 0.0,
         };
         let tool = stage.add(Pusher { state, exchange: Exchange::default(), taken: DVec3::ZERO }, tool_hz);

@@ -82,8 +82,10 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
         tip,
         rotation: DQuat::IDENTITY,
         velocity: DVec3::ZERO,
+        spin: DVec3::ZERO,
         jaw: 0.0,
-        grasp: Some(Grasp { target: AgentId(0), anchor, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
+        grasp: Some(Grasp { target: AgentId(0), anchor, clasp: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
+        lets_in: None,
         force_n: 0.0,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
