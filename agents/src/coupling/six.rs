@@ -86,6 +86,25 @@ impl Six {
         inverse
     }
 
+    /// The columns of L with L Lᵀ = this matrix, which must be symmetric and positive or zero in every direction; those that are
+    /// nothing are left out.
+    pub fn roots(&self) -> impl Iterator<Item = Twist> {
+        let (mut left, mut roots) = (self.0, [[0.0; 6]; 6]);
+        let largest = (0..6).map(|i| self.0[i][i]).fold(0.0, f64::max);
+        for (j, root) in roots.iter_mut().enumerate() {
+            // below that it is rounding
+            if left[j][j] <= 1e-12 * largest {
+                continue;
+            }
+            let scale = left[j][j].sqrt().recip();
+            (j..6).for_each(|i| root[i] = left[i][j] * scale);
+            for i in j..6 {
+                (j..6).for_each(|k| left[i][k] -= root[i] * root[k]);
+            }
+        }
+        roots.into_iter().filter(|root| root.iter().any(|x| *x != 0.0)).map(of_flat)
+    }
+
     /// L below and D on the diagonal.
     fn factored(&self) -> Self {
         let mut a = self.0;

@@ -16,7 +16,7 @@ use super::ties::Ties;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::beside::{self, bends};
-use crate::coupling::{Form, FormKind, SolidForm};
+use crate::coupling::{Form, FormKind, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
@@ -157,7 +157,7 @@ impl RigidBody {
     fn part(&mut self, h: f64) -> Result<(), &'static str> {
         let pulled = self.pull(h)?;
         // the spring's solution has the gravity of this part in its velocity already
-        self.advance(h, if pulled { DVec3::ZERO } else { self.gravity })
+        self.advance(h, if pulled.is_some() { DVec3::ZERO } else { self.gravity })
     }
 
     /// Begins a step of `dt` seconds: takes what others gave, and what pulls; `fellows`, by rising ids, share its world.
@@ -168,18 +168,33 @@ impl RigidBody {
         self.grips.clear();
     }
 
-    /// The springs' part of `h` seconds, gravity with it; whether there was one.
-    pub(super) fn pull(&mut self, h: f64) -> Result<bool, &'static str> {
+    /// The springs' part of `h` seconds, gravity with it; how they resist what else happens in it, where there is one.
+    pub(super) fn pull(&mut self, h: f64) -> Result<Option<Six>, &'static str> {
         self.ties.aim(&self.company);
         let under = self.hold.under(h, self.gravity);
         let pulled = springs::pull(&mut self.motion, &self.spread, &mut self.ties.all, &under, &mut self.grips);
-        if let Some(added) = pulled {
-            self.hold.note(added, h);
-            self.ties.give(&mut self.company, h);
+        if let Some(pulled) = &pulled {
+            self.hold.note(pulled, h);
+            let after_s = self.company.after_s;
+            self.ties.give(&mut self.company, (after_s, h));
+            self.ties.go_on(h);
             self.coupled += self.ties.linked() / self.spread.mass_kg;
             self.world.moved();
         }
-        if self.motion.is_sane(&self.spread) { Ok(pulled.is_some()) } else { Err("a spring threw it out of reach") }
+        let resistance = pulled.map(|pulled| pulled.resistance);
+        if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
+    }
+
+    /// Books what the springs of the last part, which took `h` seconds, gave besides because a shared world changed the velocities
+    /// by so much within it.
+    pub(super) fn give_way(&mut self, change: Twist, h: f64) {
+        springs::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
+        for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
+            grip.force_n += tie.impulse / h;
+        }
+        let after_s = self.company.after_s - h;
+        self.ties.give(&mut self.company, (after_s, h));
+        self.coupled += self.ties.linked() / self.spread.mass_kg;
     }
 
     /// Ends a step in which a shared world has moved it.

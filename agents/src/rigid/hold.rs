@@ -5,7 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 4c and 7b–7d.
 
 use super::RigidBody;
-use super::springs::{Under, lean};
+use super::springs::{Pulled, Under, lean};
 use crate::Surroundings;
 use crate::coupling::{Impulse, Law, Six, Sprung, Twist};
 use glam::{DMat3, DQuat, DVec3};
@@ -46,8 +46,8 @@ impl Hold {
     }
 
     /// Notes what springs, gravity and what lasts added to the velocities in `h` seconds, and what the last of these did.
-    pub(super) fn note(&mut self, [all, lasting]: [Twist; 2], h: f64) {
-        self.past = [0, 1].map(|i| (all[i] - lasting[i]) / h);
+    pub(super) fn note(&mut self, Pulled { change, lasting, .. }: &Pulled, h: f64) {
+        self.past = [0, 1].map(|i| (change[i] - lasting[i]) / h);
     }
 }
 

@@ -69,8 +69,18 @@ pub(super) struct Under {
     pub bent: (Twist, f64),
 }
 
+/// What springs did in a part.
+pub(super) struct Pulled {
+    /// What was added to velocity and spin.
+    pub change: Twist,
+    /// How much of that what lasts did.
+    pub lasting: Twist,
+    /// The impulse with which all springs resist a further change of the velocities in this part, about the centre of mass.
+    pub resistance: Six,
+}
+
 /// Changes the velocities by gravity, the springs and what else lasts over a part; writes each spring's impulse, and its force
-/// for those who hold the body. Returns what it added to velocity and spin, and how much of that what lasts did.
+/// for those who hold the body.
 ///
 /// Nothing is written and `None` returned where no spring holds a point of this body.
 pub(super) fn pull(
@@ -79,7 +89,7 @@ pub(super) fn pull(
     ties: &mut [Tie],
     under: &Under,
     grips: &mut Vec<Grip>,
-) -> Option<[Twist; 2]> {
+) -> Option<Pulled> {
     if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
         return None;
     }
@@ -106,7 +116,21 @@ pub(super) fn pull(
     }
     motion.velocity += change[0];
     motion.angular += motion.inertia_times(body, change[1]);
-    Some([change, system.matrix.solve(under.lasting)])
+    let lasting = system.matrix.solve(under.lasting);
+    let mut resistance = system.matrix;
+    resistance.add(&System::free(motion, body, under).matrix, -1.0);
+    Some(Pulled { change, lasting, resistance })
+}
+
+/// Writes what a further `change` of the velocities in a part of `h` seconds adds to each spring's impulse.
+pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change, h): (Twist, f64)) {
+    for tie in ties {
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
+        tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
+        if let Some(turn) = &mut tie.turn {
+            turn.impulse = -change[1] * turn.resistance(h);
+        }
+    }
 }
 
 /// What springs whose far ends are led do to the body in this state, and how that changes as it moves (docs/theory/coupling.md,

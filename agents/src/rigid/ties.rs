@@ -94,12 +94,18 @@ impl Ties {
         }
     }
 
-    /// Gives the other ends what the springs gave to this one in the `h` seconds since; hands and tools go on their way.
-    pub(super) fn give(&mut self, company: &mut Company, h: f64) {
-        let Self { all, ends, room } = self;
-        let after_s = company.after_s;
-        for (tie, end) in all.iter_mut().zip(ends.iter()) {
+    /// Lets `h` seconds pass for hands and tools: they go on their way.
+    pub(super) fn go_on(&mut self, h: f64) {
+        for tie in &mut self.all {
             tie.pull.target += tie.pull.target_velocity * h;
+            tie.turn.iter_mut().for_each(|turn| turn.go_on(h));
+        }
+    }
+
+    /// Gives the other ends what the springs gave to this one in `h` seconds from `after_s` seconds into the step on.
+    pub(super) fn give(&mut self, company: &mut Company, (after_s, h): (f64, f64)) {
+        let Self { all, ends, room } = self;
+        for (tie, end) in all.iter().zip(ends.iter()) {
             let Some(End { guest: i, anchor, kind }) = *end else { continue };
             let (guests, exchange, ..) = company.split();
             let other = &mut guests[i].other;
@@ -108,9 +114,8 @@ impl Ties {
             room.clear();
             room.resize(other.velocities().len(), DVec3::ZERO);
             slots.scatter(-tie.impulse, room);
-            if let Some(turn) = &mut tie.turn {
+            if let Some(turn) = &tie.turn {
                 room[1] -= turn.impulse;
-                turn.go_on(h);
             }
             other.book(exchange, (after_s, h), room);
             other.push(room, h);

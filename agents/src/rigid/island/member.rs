@@ -6,6 +6,7 @@ use super::super::mass::Spread;
 use super::super::motion::Motion;
 use super::super::{RigidBody, RigidError};
 use crate::AgentId;
+use crate::coupling::{Six, Twist};
 use crate::shape::{Obstacle, Solid};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::math::{Pose, Rotation};
@@ -31,6 +32,10 @@ pub(super) struct Member {
     pub motion: Motion,
     /// Gravity of the part being solved, m/s²; zero where a spring's solution has it already.
     pub gravity: DVec3,
+    /// How springs on it resist what the island does to it in the part being solved, about its centre of mass.
+    pub springs: Option<Six>,
+    /// By how much the island changed its velocities in the last part, for those springs.
+    pub bent: Twist,
     /// Nothing but gravity and the island moves it in this step: its body is asked for nothing between the parts.
     pub alone: bool,
     /// Whether it touched anything in the last part.
@@ -53,6 +58,8 @@ impl Member {
             restitution: body.company.form.restitution,
             motion: body.motion,
             gravity: body.gravity,
+            springs: None,
+            bent: [DVec3::ZERO; 2],
             alone: false,
             touching: body.touching,
             depth_m: 0.0,

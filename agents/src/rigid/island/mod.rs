@@ -221,7 +221,7 @@ impl Island {
             self.before.push((body.motion, body.touching));
             body.begin(around, &self.fellows, dt_s);
             body.stand_fast();
-            (member.motion, member.gravity) = (body.motion, body.gravity);
+            (member.motion, member.gravity, member.springs) = (body.motion, body.gravity, None);
             member.alone = body.ties.is_empty() && body.company.guests().is_empty();
         }
     }
@@ -246,7 +246,7 @@ impl Island {
         for member in self.members.iter_mut().filter(|m| !m.alone) {
             let body = crew.body(member.seat).0;
             body.motion = member.motion;
-            let pulled = body.pull(h)?;
+            member.springs = body.pull(h)?;
             if body.company.guests().is_empty() {
                 body.company.go_on(h);
             } else {
@@ -254,10 +254,13 @@ impl Island {
             }
             member.motion = body.motion;
             // the springs' solution has the gravity of this part in its velocity already
-            member.gravity = if pulled { DVec3::ZERO } else { body.gravity };
+            member.gravity = if member.springs.is_some() { DVec3::ZERO } else { body.gravity };
         }
         if let Solver::Few(direct) = &mut self.solver {
             if direct.advance((&mut self.members, &self.ground), &self.held, h)? {
+                for member in self.members.iter().filter(|m| m.springs.is_some()) {
+                    crew.body(member.seat).0.give_way(member.bent, h);
+                }
                 return Ok(());
             }
             self.go_many();

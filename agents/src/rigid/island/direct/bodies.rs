@@ -5,6 +5,7 @@
 use super::super::member::Member;
 use super::near::Contact;
 use super::row::{Law, Mass, NOBODY, Row, Twist};
+use crate::coupling::Six;
 use glam::{DMat3, DVec3};
 
 /// A spring softer than this, as ω²h² of what it pulls, is a force at both ends of the part: it then keeps its energy.
@@ -38,6 +39,19 @@ pub(super) fn push(members: &mut [Member], row: &Row, impulse: f64) {
         let member = &mut members[body as usize];
         member.motion.velocity += row.lin * (impulse / member.spread.mass_kg);
         member.motion.angular += turn * impulse;
+    }
+}
+
+/// Appends what springs from outside do against every change of the velocities `free` that they left: R = L Lᵀ, a row for each
+/// column of L.
+pub(super) fn spring_rows(members: &[Member], free: &[Twist], into: &mut Vec<Row>) {
+    for (index, (member, free)) in members.iter().zip(free).enumerate() {
+        for [lin, turn] in member.springs.iter().flat_map(Six::roots) {
+            let bias = -lin.dot(free[0]) - turn.dot(free[1]);
+            let law = Law::Spring(1.0);
+            let a = index as u32;
+            into.push(Row { a, b: NOBODY, lin, turn_a: turn, turn_b: DVec3::ZERO, law, bias, lambda: 0.0 });
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Few bodies: every contact and joint of a part solved at once, in double precision.
 //!
 //! In: members, the ground, joints, a part of a step. Out: their motions after it, and who touches whom.
-//! Never here: springs of hands and tools, who is a member.
+//! Never here: how hands and tools pull (the bodies' own springs do, and tell how they resist), who is a member.
 //!
 //! A part is RATTLE (AND83) with contacts: half of gravity's kick; impulses that keep joints and gaps at the part's *end*,
 //! turning of the bodies included; the flight there; the other half; impulses that keep velocities there, and bounce. So a
@@ -20,7 +20,7 @@ mod row;
 use super::Held;
 use super::member::{Ground, Member};
 use crate::rigid::motion::Motion;
-use bodies::{contact_rows, gap_now, is_soft, middle, push, weigh};
+use bodies::{contact_rows, gap_now, is_soft, middle, push, spring_rows, weigh};
 use glam::DVec3;
 use joints::JointRow;
 use near::{Near, Warm};
@@ -132,9 +132,12 @@ impl Direct {
         !reach::is_overrun(self.near.contacts.len(), self.newton.work())
     }
 
-    /// Half a part of gravity and soft springs, at its start (0) or its end (1).
+    /// Half a part of gravity and soft springs, at its start (0) or its end (1). Where a spring from outside bears the members,
+    /// which acts on the way of the part, all of gravity acts at the start: what it bears then hangs still.
     fn kick(&mut self, members: &mut [Member], end: usize, h: f64) {
-        members.iter_mut().for_each(|m| m.motion.velocity += m.gravity * (0.5 * h));
+        let is_borne = members.iter().any(|m| m.springs.is_some());
+        let share = if is_borne { 1.0 - end as f64 } else { 0.5 };
+        members.iter_mut().for_each(|m| m.motion.velocity += m.gravity * (share * h));
         let rows = if end == 0 { &self.joints } else { &self.ahead };
         if rows.iter().all(|row| row.spring.is_none()) {
             return;
@@ -163,6 +166,9 @@ impl Direct {
             }
         }
         self.remember(0, h);
+        for (member, (now, free)) in members.iter_mut().zip(self.velocities.iter().zip(&self.free)) {
+            member.bent = [now[0] - free[0], now[1] - free[1]];
+        }
         if self.displace(members, h) {
             std::mem::swap(&mut self.velocities, &mut self.real);
             self.solve();
@@ -217,6 +223,7 @@ impl Direct {
             let at = self.rows.len() - 3;
             self.rows[at].bias = contact.gap_m.max(0.0) / h;
         }
+        spring_rows(members, &self.free, &mut self.rows);
     }
 
     /// Measures what turning adds to the joints' errors; whether that asks for another solve.

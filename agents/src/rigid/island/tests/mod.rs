@@ -2,20 +2,22 @@
 
 use super::super::{Joint, JointKind, RigidBody, RigidSpec};
 use crate::shape::{Obstacle, Solid};
-use crate::{Agent, AgentId, Body, Companion, RigidState, SimSpan, SimTime, Snapshot, StepReport, Surroundings};
+use crate::{Agent, AgentId, Body, Companion, Pull, RigidState, SimSpan, SimTime, Snapshot, StepReport, Surroundings};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 mod chains;
+mod held;
 mod joints;
 mod membership;
 mod stacks;
 
 const G: f64 = 9.81;
 
-/// Bodies 0 … n − 1; the first leads.
+/// Bodies 0 … n − 1; the first leads, and hands hold it.
 struct Party {
     bodies: Vec<RigidBody>,
+    hands: Vec<Pull>,
     time: SimTime,
     apart: Vec<u32>,
 }
@@ -56,7 +58,7 @@ fn floor(friction: f64, rotation: DQuat) -> Arc<[Obstacle]> {
 impl Party {
     fn new(specs: impl IntoIterator<Item = RigidSpec>) -> Self {
         let bodies = specs.into_iter().map(|spec| RigidBody::new(spec).unwrap()).collect();
-        Self { bodies, time: SimTime::ZERO, apart: vec![] }
+        Self { bodies, hands: vec![], time: SimTime::ZERO, apart: vec![] }
     }
 
     /// The same, held by joints.
@@ -76,7 +78,7 @@ impl Party {
                 Companion { id, agent: body, around: Surroundings::alone(id, self.time) }
             })
             .collect();
-        let around = Surroundings::alone(AgentId(0), self.time);
+        let around = Surroundings { hands: &self.hands, ..Surroundings::alone(AgentId(0), self.time) };
         leader.lead(dt, &around, &mut others, &mut self.apart).unwrap()
     }
 

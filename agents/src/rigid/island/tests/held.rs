@@ -1,0 +1,74 @@
+//! Islands that a spring from outside bears: what hangs on one member weighs on the spring as closed forms have it.
+
+use super::*;
+use crate::Anchor;
+
+/// So many rods of 0.1 m on ball joints one after the other along `along`, the first end at the origin; the last weighs `ratio`
+/// times the 0.1 kg of each other one. A hand holds that end.
+fn chain(links: u32, ratio: f64, along: DVec3, (stiffness_n_m, damping_n_s_m): (f64, f64)) -> Party {
+    let solid = Solid::Capsule { radius_m: 0.01, half_height_m: 0.03 };
+    let rods = (0..links).map(|i| RigidSpec {
+        rotation: DQuat::from_rotation_arc(DVec3::NEG_Z, along),
+        mass_kg: if i + 1 == links { 0.1 * ratio } else { 0.1 },
+        ..spec(solid.clone(), along * (0.05 + 0.1 * f64::from(i)))
+    });
+    let joints = (1..links).map(|i| Joint {
+        anchor_a_m: DVec3::Z * 0.05,
+        anchor_b_m: DVec3::Z * -0.05,
+        ..Joint::new(AgentId(i), Some(AgentId(i - 1)), JointKind::Spherical)
+    });
+    let hand = Pull {
+        by: None,
+        anchor: Anchor::Local(DVec3::Z * 0.05),
+        target: DVec3::ZERO,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m,
+        damping_n_s_m,
+    };
+    Party { hands: vec![hand], ..Party::jointed(rods, joints) }
+}
+
+/// Where the held end is.
+fn end(party: &Party) -> DVec3 {
+    let state = party.state(0);
+    state.position + state.rotation * DVec3::Z * 0.05
+}
+
+#[test]
+fn a_chain_hangs_from_a_spring_by_all_of_its_weight_and_is_still() {
+    for (links, ratio) in [(1, 1.0), (3, 1.0), (8, 1.0), (3, 100.0)] {
+        for (stiffness, dt) in [(1e3, 1.0 / 60.0), (1e3, 1.0 / 600.0), (1e5, 1.0 / 240.0)] {
+            let weight_n = 0.1 * (f64::from(links) - 1.0 + ratio) * G;
+            let damping = 2.0 * (stiffness * weight_n / G).sqrt();
+            let mut party = chain(links, ratio, DVec3::NEG_Z, (stiffness, damping));
+            party.run(dt, 6.0);
+            let (sag_m, wanted_m) = (-end(&party).z, weight_n / stiffness);
+            let force_n = party.snapshot(0).grips[0].force_n.z;
+            let speed_m_s = (0..links as usize).map(|i| party.state(i).velocity.length()).fold(0.0, f64::max);
+            println!(
+                "{links}, {ratio}, {stiffness}, {dt}: {sag_m} m of {wanted_m}, {force_n} N of {weight_n}, {speed_m_s:e} m/s"
+            );
+            let what = format!("{links} links, ratio {ratio}, {stiffness} N/m, dt {dt}");
+            assert!((sag_m - wanted_m).abs() < 1e-3 * wanted_m, "{what}: {sag_m} m, not {wanted_m} m");
+            assert!((force_n - weight_n).abs() < 1e-3 * weight_n, "{what}: {force_n} N, not {weight_n} N");
+            assert!(speed_m_s < 1e-4, "{what}: {speed_m_s} m/s");
+        }
+    }
+}
+
+#[test]
+fn a_chain_that_swings_from_an_undamped_spring_gains_no_energy() {
+    for stiffness in [1e2, 1e4, 1e6] {
+        let mut party = chain(5, 10.0, DVec3::X, (stiffness, 0.0));
+        let before_j = party.energy_j();
+        // what the fall of the heavy end through the length of the chain gives
+        let (scale_j, mut gained_j) = (1.4 * 0.5 * G, f64::NEG_INFINITY);
+        for _ in 0..1200 {
+            party.step(1.0 / 240.0);
+            let sprung_j = 0.5 * stiffness * end(&party).length_squared();
+            gained_j = gained_j.max(party.energy_j() + sprung_j - before_j);
+        }
+        println!("{stiffness} N/m: {:e} of the fall gained", gained_j / scale_j);
+        assert!(gained_j < 0.01 * scale_j, "{stiffness} N/m: {gained_j} J of {scale_j} J");
+    }
+}
