@@ -3,11 +3,11 @@
 //! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: where the solid is, what it weighs.
 
 use super::Solid;
+use super::edges::is_closed;
 use glam::{DVec3, Vec3};
 use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::shape::{SharedShape, TriMeshFlags};
 use rapier3d::parry::transformation::try_convex_hull;
-use std::collections::HashMap;
 use std::f32::consts::FRAC_PI_2;
 
 /// Why a solid is no shape.
@@ -173,24 +173,6 @@ pub(crate) fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result
     Ok(Triangles { points: points.to_vec(), triangles: kept })
 }
 
-/// Whether every edge has a triangle on both sides, running opposite ways. Corners at the same place are one.
-pub(crate) fn is_closed(mesh: &Triangles) -> bool {
-    let mut first_at = HashMap::new();
-    let same: Vec<u32> = (0u32..)
-        .zip(&mesh.points)
-        // adding zero makes -0.0 the same place as 0.0
-        .map(|(i, p)| *first_at.entry((*p + DVec3::ZERO).to_array().map(f64::to_bits)).or_insert(i))
-        .collect();
-    let mut balance: HashMap<(u32, u32), i32> = HashMap::new();
-    for t in &mesh.triangles {
-        for (a, b) in [(t[0], t[1]), (t[1], t[2]), (t[2], t[0])] {
-            let (a, b) = (same[a as usize], same[b as usize]);
-            *balance.entry((a.min(b), a.max(b))).or_default() += if a < b { 1 } else { -1 };
-        }
-    }
-    balance.values().all(|&b| b == 0)
-}
-
 /// Lowest and highest coordinates.
 pub(crate) fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
     points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
@@ -251,14 +233,5 @@ mod tests {
         }
         let points_m = vec![DVec3::ZERO, DVec3::splat(1e39)].into();
         assert_eq!(Solid::Hull { points_m }.to_shared_shape().unwrap_err(), ShapeError::BadPoint { index: 1 });
-    }
-
-    #[test]
-    fn a_box_of_triangles_is_closed_and_a_box_without_lid_is_not() {
-        let hull = hull_triangles(&corners()).unwrap();
-        assert!(is_closed(&hull));
-        let mut open = hull;
-        open.triangles.pop();
-        assert!(!is_closed(&open));
     }
 }

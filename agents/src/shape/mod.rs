@@ -2,6 +2,7 @@
 
 mod convert;
 mod curve;
+mod edges;
 pub(crate) mod field;
 mod foliage;
 mod furniture;
@@ -21,8 +22,10 @@ mod tom;
 mod tool;
 
 pub use convert::ShapeError;
-pub(crate) use convert::{Triangles, bounds, hull_triangles, is_closed, mesh_triangles};
+pub(crate) use convert::{Triangles, bounds, hull_triangles, mesh_triangles};
 pub use curve::{INTERVALS_MAX, Skeleton, SkinFrame, hermite, hermite_slope, intervals};
+pub(crate) use edges::is_closed;
+pub use edges::{Branch, branch};
 pub use foliage::{Foliage, Prefix, Rung, Stroke, TreeSpec, tree};
 pub use generate::{Generator, generate};
 pub use geodesic::geodesic_edges;

@@ -4,7 +4,7 @@
 //! Each position waits in a heap with its cheapest sound collapse; whoever's surroundings change is looked at anew.
 
 use super::quadric::Quadric;
-use super::topology::{Surface, Verdict, direction};
+use super::topology::{HUB, Surface, Verdict, direction};
 use super::weld::Welded;
 use super::{SAME_PLACE, Tom};
 use glam::{DVec3, Vec3};
@@ -85,7 +85,11 @@ impl Builder {
                 continue;
             }
             // what is two steps away may have changed since
-            if self.surface.verdict(u, v, turn).is_some() {
+            let mut of_u = std::mem::take(&mut self.neighbours);
+            self.surface.neighbours(u, &mut of_u);
+            let sound = self.surface.verdict((u, &of_u), v, turn).is_some();
+            self.neighbours = of_u;
+            if sound {
                 self.collapse(u, v, turn);
             } else {
                 self.look(u, turn);
@@ -96,7 +100,7 @@ impl Builder {
     /// Finds the cheapest sound collapse of `p` and lets it wait.
     fn look(&mut self, p: u32, turn: f64) {
         self.looks[p as usize] += 1;
-        if self.surface.around[p as usize].is_empty() {
+        if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) {
             return;
         }
         let mut neighbours = std::mem::take(&mut self.neighbours);
@@ -108,10 +112,11 @@ impl Builder {
             let slide = LENGTH_SHARE * area * from.distance_squared(at);
             self.prices.push((self.quadrics[p as usize].at(at) + slide, to));
         }
-        self.neighbours = neighbours;
         self.prices.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict(p, to, turn)?));
-        let Some((price, to, verdict)) = self.prices.iter().find_map(judged) else { return };
+        let judged = |&(price, to): &(f64, u32)| Some((price, to, self.surface.verdict((p, &neighbours), to, turn)?));
+        let found = self.prices.iter().find_map(judged);
+        self.neighbours = neighbours;
+        let Some((price, to, verdict)) = found else { return };
         let price = if verdict == Verdict::Vanishes { price + self.loss(p, to) } else { price };
         self.heap.push(Reverse((price.to_bits(), p, to, self.looks[p as usize])));
     }
@@ -140,8 +145,11 @@ impl Builder {
         self.quadrics[v as usize] += of_u;
         self.looks[u as usize] += 1;
         let mut around: Vec<u32> = touched.iter().map(|(p, _)| *p).collect();
-        self.surface.neighbours(v, &mut touched);
-        around.extend(touched.iter().map(|(p, _)| *p).filter(|p| !around.contains(p)).collect::<Vec<_>>());
+        // what is around a hub and not around `u` finds the hub as it was
+        if !self.surface.is_hub(v) {
+            self.surface.neighbours(v, &mut touched);
+            around.extend(touched.iter().map(|(p, _)| *p).filter(|p| !around.contains(p)).collect::<Vec<_>>());
+        }
         self.neighbours = touched;
         for p in around {
             match self.surface.around[p as usize].is_empty() {
@@ -164,7 +172,7 @@ impl Builder {
         }
     }
 
-    /// Every wedge of `u` gets the wedge of `v` on its own side of the crease, else the one with the nearest normal.
+    /// Every wedge of `u` gets the wedge of `v` on its own side of the crease, else the one with the nearest normal (of a hub's first).
     fn substitute_wedges(&mut self, u: u32, v: u32) {
         let place = |t: u32, i: usize| self.surface.triangles[t as usize][i];
         let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(self.wedges[u as usize].len());
@@ -175,8 +183,9 @@ impl Builder {
                 (0..3).find(|&i| own && place(t, i) == v).map(|i| corners[i])
             });
             let alike = |to: &&u32| self.normals[w as usize].dot(self.normals[**to as usize]);
-            let nearest = self.wedges[v as usize].iter().max_by(|a, b| alike(a).total_cmp(&alike(b)));
-            pairs.push((w, beside.or(nearest.copied()).unwrap_or(w)));
+            let some = || self.wedges[v as usize].iter().take(HUB);
+            let nearest = || some().max_by(|a, b| alike(a).total_cmp(&alike(b))).copied();
+            pairs.push((w, beside.or_else(nearest).unwrap_or(w)));
         }
         for &(w, to) in &pairs {
             self.substitutes[w as usize] = to;
@@ -223,8 +232,7 @@ fn quadrics(surface: &Surface) -> Vec<Quadric> {
         t.iter().for_each(|&p| quadrics[p as usize] += Quadric::plane(normal, corners[0], area / 3.0));
         for i in 0..3 {
             let (p, q) = (t[i], t[(i + 1) % 3]);
-            let open =
-                surface.around[p as usize].iter().filter(|&&o| surface.triangles[o as usize].contains(&q)).count() == 1;
+            let open = surface.sharing(p, q) == 1;
             let edge = corners[(i + 1) % 3] - corners[i];
             if let (true, Some(upright)) = (open, edge.cross(normal).try_normalize()) {
                 let plane = Quadric::plane(upright, corners[i], RIM_WEIGHT * edge.length_squared());

@@ -6,7 +6,11 @@
 //! last few triangles of a part that hangs on nothing, may vanish.
 
 use glam::DVec3;
+use std::collections::HashMap;
 
+/// A position of more triangles than this is a hub: it stays until it has fewer, and what is around it is not looked through. The
+/// time that a fan of n triangles takes stays in proportion to n.
+pub(super) const HUB: usize = 64;
 /// Most positions of a part that may vanish: a tetrahedron's.
 const TINY: usize = 4;
 /// A triangle flatter than this, height to longest side, has no direction.
@@ -19,10 +23,18 @@ pub(super) struct Surface {
     pub points: Vec<DVec3>,
     /// Positions of each triangle; those of one that is gone do not change any more.
     pub triangles: Vec<[u32; 3]>,
-    /// Triangles around each position.
+    /// Triangles around each position; around a hub also some that are gone.
     pub around: Vec<Vec<u32>>,
     /// How many triangles are left.
     pub left: usize,
+    /// Which of them.
+    stands: Vec<bool>,
+    /// How many of the triangles around each position are gone.
+    stale: Vec<u32>,
+    /// How many triangles share each edge, the lesser position first.
+    edges: HashMap<[u32; 2], u32>,
+    /// Edges at each position that one triangle has, and those that more than two share.
+    uneven: Vec<[u32; 2]>,
 }
 
 /// What the triangles around a position make of it.
@@ -30,8 +42,8 @@ pub(super) struct Surface {
 enum Standing {
     /// Surrounded.
     Inner,
-    /// On a rim: its two neighbours along it.
-    Rim([u32; 2]),
+    /// On a rim.
+    Rim,
     /// Where surfaces branch or rims cross.
     Branch,
 }
@@ -47,15 +59,52 @@ pub(super) enum Verdict {
 
 impl Surface {
     pub fn new(points: Vec<DVec3>, triangles: Vec<[u32; 3]>) -> Self {
-        let mut around = vec![Vec::new(); points.len()];
-        for (number, t) in triangles.iter().enumerate() {
-            t.iter().for_each(|&p| around[p as usize].push(number as u32));
+        let (count, left) = (points.len(), triangles.len());
+        let mut surface = Self {
+            points,
+            around: vec![Vec::new(); count],
+            left,
+            stands: vec![true; left],
+            stale: vec![0; count],
+            edges: HashMap::with_capacity(left / 2 * 3),
+            uneven: vec![[0; 2]; count],
+            triangles: Vec::new(),
+        };
+        for (number, &[a, b, c]) in triangles.iter().enumerate() {
+            [a, b, c].iter().for_each(|&p| surface.around[p as usize].push(number as u32));
+            [[a, b], [b, c], [c, a]].iter().for_each(|&edge| surface.share(edge, 1));
         }
-        let left = triangles.len();
-        Self { points, triangles, around, left }
+        Self { triangles, ..surface }
     }
 
-    /// Every neighbour of `p` with the number of triangles on their edge, into `found`.
+    /// How many triangles share the edge between two positions; 0 where there is none.
+    pub fn sharing(&self, a: u32, b: u32) -> u32 {
+        self.edges.get(&[a.min(b), a.max(b)]).copied().unwrap_or(0)
+    }
+
+    /// Whether too many triangles are around a position to look at each.
+    pub fn is_hub(&self, p: u32) -> bool {
+        self.around[p as usize].len() > HUB
+    }
+
+    /// One triangle more or less has an edge.
+    fn share(&mut self, [a, b]: [u32; 2], by: i32) {
+        let edge = [a.min(b), a.max(b)];
+        let count = self.edges.entry(edge).or_default();
+        let before = *count;
+        let now = before.saturating_add_signed(by);
+        *count = now;
+        if now == 0 {
+            self.edges.remove(&edge);
+        }
+        for p in edge {
+            let [rims, branches] = &mut self.uneven[p as usize];
+            *rims = *rims + u32::from(now == 1) - u32::from(before == 1);
+            *branches = *branches + u32::from(now > 2) - u32::from(before > 2);
+        }
+    }
+
+    /// Every neighbour of `p`, which is no hub, with the number of triangles on their edge, into `found`.
     pub fn neighbours(&self, p: u32, found: &mut Vec<(u32, u8)>) {
         found.clear();
         let corners = self.around[p as usize].iter().flat_map(|&t| self.triangles[t as usize]);
@@ -67,23 +116,23 @@ impl Surface {
         }
     }
 
-    /// Whether `u` may be put in the place of its neighbour `v`; faces may turn until the cosine is `turn`.
-    pub fn verdict(&self, u: u32, v: u32, turn: f64) -> Option<Verdict> {
-        let (mut of_u, mut of_v) = (Vec::with_capacity(16), Vec::with_capacity(16));
-        self.neighbours(u, &mut of_u);
-        self.neighbours(v, &mut of_v);
-        let shared = of_u.iter().find(|(p, _)| *p == v)?.1;
+    /// Whether `u`, which is no hub and has these neighbours, may be put in the place of `v`; faces may turn until the cosine is `turn`.
+    pub fn verdict(&self, (u, of_u): (u32, &[(u32, u8)]), v: u32, turn: f64) -> Option<Verdict> {
+        let shared = self.sharing(u, v);
         let tiny = self.is_tiny(u, v);
-        if tiny && self.left <= usize::from(shared) {
+        if shared == 0 || tiny && self.left <= shared as usize {
             return None;
         }
-        let keeps = tiny || self.keeps_kind((&of_u, standing(&of_u)), (&of_v, standing(&of_v)), (u, v, shared));
+        let keeps = tiny || self.keeps_kind((u, of_u), v, shared);
         let sound = keeps && self.keeps_faces(u, v, if tiny { -2.0 } else { turn });
         sound.then_some(if tiny { Verdict::Vanishes } else { Verdict::Keeps })
     }
 
     /// Whether the part that `u` and `v` belong to has no more than [`TINY`] positions.
     fn is_tiny(&self, u: u32, v: u32) -> bool {
+        if self.is_hub(u) || self.is_hub(v) {
+            return false;
+        }
         let mut part = Vec::with_capacity(TINY + 1);
         let corners = |p: u32| self.around[p as usize].iter().flat_map(|&t| self.triangles[t as usize]);
         for p in corners(u).chain(corners(v)) {
@@ -94,25 +143,28 @@ impl Surface {
                 return false;
             }
         }
-        part.iter().all(|&p| corners(p).all(|q| part.contains(&q)))
+        part.iter().all(|&p| !self.is_hub(p) && corners(p).all(|q| part.contains(&q)))
     }
 
-    fn keeps_kind(
-        &self,
-        (of_u, at_u): (&[(u32, u8)], Standing),
-        (of_v, at_v): (&[(u32, u8)], Standing),
-        (_, v, shared): (u32, u32, u8),
-    ) -> bool {
-        let common = of_u.iter().filter(|(p, _)| of_v.iter().any(|(q, _)| p == q)).count();
-        match (at_u, at_v) {
+    fn keeps_kind(&self, (u, of_u): (u32, &[(u32, u8)]), v: u32, shared: u32) -> bool {
+        let common = || of_u.iter().filter(|(p, _)| self.sharing(*p, v) > 0).count();
+        match (self.standing(u), self.standing(v)) {
             (Standing::Branch, other) => other == Standing::Branch,
-            (Standing::Inner, _) => shared == 2 && common == 2,
-            (Standing::Rim(_), Standing::Inner) => false,
-            (Standing::Rim(ends), at_v) => {
-                let beyond = if ends[0] == v { ends[1] } else { ends[0] };
-                let closes = matches!(at_v, Standing::Rim(of_v) if of_v.contains(&beyond));
-                ends.contains(&v) && shared == 1 && common == 1 && !closes
+            (Standing::Inner, _) => shared == 2 && common() == 2,
+            (Standing::Rim, Standing::Inner) => false,
+            (Standing::Rim, at_v) => {
+                let beyond = of_u.iter().find(|(p, count)| *count == 1 && *p != v);
+                let closes = at_v == Standing::Rim && beyond.is_some_and(|(p, _)| self.sharing(*p, v) == 1);
+                shared == 1 && common() == 1 && !closes
             }
+        }
+    }
+
+    fn standing(&self, p: u32) -> Standing {
+        match self.uneven[p as usize] {
+            [0, 0] => Standing::Inner,
+            [2, 0] => Standing::Rim,
+            _ => Standing::Branch,
         }
     }
 
@@ -134,39 +186,38 @@ impl Surface {
         })
     }
 
-    /// Puts `u` in the place of `v`: moves its triangles, and tells `gone` those that vanish.
+    /// Puts `u`, which is no hub, in the place of `v`: moves its triangles, and tells `gone` those that vanish.
     pub fn collapse(&mut self, u: u32, v: u32, mut gone: impl FnMut(u32)) {
         for number in std::mem::take(&mut self.around[u as usize]) {
             let t = self.triangles[number as usize];
+            let others = t.into_iter().filter(|&p| p != u);
+            others.clone().for_each(|p| self.share([u, p], -1));
             if t.contains(&v) {
-                t.iter().filter(|&&p| p != u).for_each(|&p| self.around[p as usize].retain(|&other| other != number));
+                others.clone().filter(|&p| p != v).for_each(|p| self.share([p, v], -1));
+                self.stands[number as usize] = false;
+                others.for_each(|p| self.forget(p, number));
                 self.left -= 1;
                 gone(number);
             } else {
+                others.for_each(|p| self.share([p, v], 1));
                 self.triangles[number as usize] = t.map(|p| if p == u { v } else { p });
                 self.around[v as usize].push(number);
             }
         }
     }
-}
 
-fn standing(neighbours: &[(u32, u8)]) -> Standing {
-    let mut rim = [u32::MAX; 2];
-    let mut open = 0;
-    for &(p, count) in neighbours {
-        match count {
-            2 => {}
-            1 if open < 2 => {
-                rim[open] = p;
-                open += 1;
-            }
-            _ => return Standing::Branch,
+    /// A triangle that is gone is not around `p` any more. A long list is put in order only when half of it is gone.
+    fn forget(&mut self, p: u32, number: u32) {
+        let (around, stale) = (&mut self.around[p as usize], &mut self.stale[p as usize]);
+        if around.len() <= HUB {
+            around.retain(|&other| other != number);
+            return;
         }
-    }
-    match open {
-        0 => Standing::Inner,
-        2 => Standing::Rim(rim),
-        _ => Standing::Branch,
+        *stale += 1;
+        if 2 * *stale as usize >= around.len() {
+            around.retain(|&other| self.stands[other as usize]);
+            *stale = 0;
+        }
     }
 }
 
