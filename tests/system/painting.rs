@@ -8,7 +8,7 @@ use metachron::compositor::{
 };
 use metachron::scene::format::ShadingKind;
 use metachron::scene::{self, Scene, Source};
-use metachron_agents::shape::{Generator, Model, Pattern, Placement, Texture, Tom, generate};
+use metachron_agents::shape::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
 use metachron_agents::{AgentId, Resolution};
 use std::io::Cursor;
 use std::path::Path;
@@ -105,24 +105,46 @@ fn load(folder: &Path, object: &str) -> Result<Scene, String> {
     })
 }
 
-#[test]
-fn the_image_inside_a_glb_lies_as_its_corners_say() {
-    let folder = tempfile::tempdir().expect("a folder");
-    // red on the left, blue on the right, darker above
-    let image = RgbaImage::from_fn(64, 64, |x, y| {
+/// Red on the left, blue on the right, darker above.
+fn quarters() -> RgbaImage {
+    RgbaImage::from_fn(64, 64, |x, y| {
         let strength = if y < 32 { 120 } else { 240 };
         if x < 32 { Rgba([strength, 0, 0, 255]) } else { Rgba([0, 0, strength, 255]) }
-    });
-    std::fs::write(folder.path().join("quad.glb"), glb(&png(&image))).expect("a folder of our own");
-    let scene = load(folder.path(), "file = \"quad.glb\"").unwrap();
+    })
+}
+
+/// Draws a scene's only mesh, a square of side 2 that faces −y, and looks for [`quarters`] on it.
+fn shows_quarters(scene: &Scene) {
     let it = &scene.scenery[0];
     assert_eq!((it.look.shading, it.look.colour), (ShadingKind::Textured, [255; 3]));
     let (Some(gpu), Some(texture)) = (gpu(), &it.texture) else { return };
-    // glTF's +z, which the square faces, is −y here: towards the eye
     let picture = draw(&gpu, (&it.model, texture), Shading::Textured);
     let [low_left, low_right, high_left] = [(60, 180), (180, 180), (60, 60)].map(|(x, y)| picture.get_pixel(x, y).0);
     assert!(low_left[0] > 2 * low_left[2] && low_right[2] > 2 * low_right[0], "{low_left:?} {low_right:?}");
     assert!(high_left[0] > 2 * high_left[2] && high_left[0] < low_left[0], "{high_left:?} {low_left:?}");
+}
+
+#[test]
+fn the_image_inside_a_glb_lies_as_its_corners_say() {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("quad.glb"), glb(&png(&quarters()))).expect("a folder of our own");
+    // glTF's +z, which the square faces, is −y here: towards the eye
+    shows_quarters(&load(folder.path(), "file = \"quad.glb\"").unwrap());
+}
+
+#[test]
+fn an_image_beside_an_obj_file_lies_as_its_corners_say() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let square = "v -1 0 -1\nv 1 0 -1\nv 1 0 1\nv -1 0 1\nvt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nf 1/1 2/2 3/3 4/4\n";
+    std::fs::write(folder.path().join("quad.obj"), square).expect("a folder of our own");
+    std::fs::write(folder.path().join("quad.png"), png(&quarters())).expect("a folder of our own");
+    let object = "file = \"quad.obj\"\ntexture = \"quad.png\"";
+    shows_quarters(&load(folder.path(), object).unwrap());
+    let wrap = |object: &str| load(folder.path(), object).unwrap().scenery[0].texture.as_ref().map(|t| t.wrap());
+    assert_eq!(wrap(object), Some(Wrap::Corners));
+    // a size asks for it to be laid onto the sides
+    assert_eq!(wrap(&format!("{object}\ntexture_m = 0.5")), Some(Wrap::Sides(0.5)));
+    assert_eq!(wrap("generate = \"sphere\"\ntexture = \"quad.png\""), Some(Wrap::Sides(1.0)));
 }
 
 #[test]

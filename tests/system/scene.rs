@@ -310,6 +310,33 @@ fn files_beside_a_scene_are_read_and_named_when_they_are_bad() {
 }
 
 #[test]
+fn a_mesh_that_no_scene_can_hold_is_refused_by_name_whether_it_is_touched_or_seen() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let tetrahedron = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
+    let seen = "format = 1\n[[object]]\nname = \"seen\"\nmodel = \"mesh\"\nfile = \"m.obj\"\n";
+    for (file, why) in [
+        (format!("{tetrahedron}v 1 1 1\nf 1 2 5\n"), "line 10: it is not manifold: 3 triangles share the edge"),
+        (tetrahedron.trim_end_matches(" 4\n").to_owned(), "line 8: a face has 2 corners"),
+        (tetrahedron.replace("v 1 0 0", "v 1e38 0 0"), "it reaches 1.000e38 m"),
+        ("\u{0}\u{1}\u{2}".to_owned(), "neither a .glb file"),
+    ] {
+        std::fs::write(at("m.obj"), file).unwrap();
+        for scene in [seen, &rigid("shape = \"mesh\"\nfixed = true\nfile = \"m.obj\"")] {
+            std::fs::write(at("s.toml"), scene).unwrap();
+            let error = load(&Source::open(at("s.toml").to_str().unwrap()).unwrap(), &[]).unwrap_err();
+            let message = &error.problems[0].message;
+            assert!(error.problems.len() == 1 && message.contains("m.obj") && message.contains(why), "{message}");
+        }
+    }
+    // what is sound in its own unit and huge in the scene's
+    std::fs::write(at("m.obj"), tetrahedron).unwrap();
+    std::fs::write(at("s.toml"), format!("{seen}{}", seen[10..].replace("seen\"", "far\"\nscale = 2e5"))).unwrap();
+    let error = load(&Source::open(at("s.toml").to_str().unwrap()).unwrap(), &[]).unwrap_err();
+    assert!(error.problems[0].message.contains("`scale` of `far` makes it too large"), "{:?}", error.problems);
+}
+
+#[test]
 fn a_scene_that_does_not_exist_lists_the_built_in_ones() {
     let error = Source::open("tubee").unwrap_err();
     let help = error.problems[0].help.clone().unwrap();

@@ -4,11 +4,12 @@
 //! painted on them; or what is wrong with the file. Never here: light, skins, files beside the file, what an image's bytes mean. Every number in it is doubted: it may be hostile
 //! (the crate `gltf` panics on a number of an accessor that is not there, so the few tables needed are read here).
 
+mod tables;
+
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DMat4, DQuat, DVec3, DVec4, Vec2};
-use serde::Deserialize;
-use serde::de::IgnoredAny;
-use std::collections::BTreeMap;
+use metachron_agents::shape::branch;
+use tables::{Node, Tables};
 
 /// What such a file begins with.
 pub(super) const MAGIC: &[u8] = b"glTF";
@@ -16,115 +17,8 @@ pub(super) const MAGIC: &[u8] = b"glTF";
 const NODES_MAX: usize = 100_000;
 /// Deepest nesting of nodes.
 const DEPTH_MAX: usize = 64;
-/// What is said of data that is not in the file.
-const OUTSIDE: &str = "its data lies outside the file: it is cut short, or kept in another";
 /// glTF has y up: it becomes z.
 const UPRIGHT: DMat4 = DMat4::from_cols(DVec4::X, DVec4::Z, DVec4::NEG_Y, DVec4::W);
-
-/// The tables of the file's text, as far as triangles need them.
-#[derive(Deserialize, Default)]
-#[serde(rename_all = "camelCase", default)]
-struct Tables {
-    scene: usize,
-    scenes: Vec<Root>,
-    nodes: Vec<Node>,
-    meshes: Vec<Mesh>,
-    accessors: Vec<Accessor>,
-    buffer_views: Vec<View>,
-    buffers: Vec<Buffer>,
-    materials: Vec<Material>,
-    textures: Vec<TextureEntry>,
-    images: Vec<Image>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default)]
-struct Root {
-    nodes: Vec<usize>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(default)]
-struct Node {
-    mesh: Option<usize>,
-    children: Vec<usize>,
-    matrix: Option<[f64; 16]>,
-    translation: [f64; 3],
-    rotation: Option<[f64; 4]>,
-    scale: Option<[f64; 3]>,
-}
-
-#[derive(Deserialize)]
-struct Mesh {
-    primitives: Vec<Primitive>,
-}
-
-#[derive(Deserialize)]
-struct Primitive {
-    attributes: BTreeMap<String, usize>,
-    indices: Option<usize>,
-    mode: Option<u32>,
-    material: Option<usize>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(rename_all = "camelCase", default)]
-struct Material {
-    pbr_metallic_roughness: Roughness,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(rename_all = "camelCase", default)]
-struct Roughness {
-    base_color_texture: Option<TextureUse>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct TextureUse {
-    index: usize,
-    #[serde(default)]
-    tex_coord: usize,
-}
-
-#[derive(Deserialize)]
-struct TextureEntry {
-    source: Option<usize>,
-}
-
-#[derive(Deserialize, Default)]
-#[serde(rename_all = "camelCase", default)]
-struct Image {
-    buffer_view: Option<usize>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct Accessor {
-    buffer_view: Option<usize>,
-    #[serde(default)]
-    byte_offset: usize,
-    component_type: u32,
-    count: usize,
-    #[serde(rename = "type")]
-    kind: String,
-    sparse: Option<IgnoredAny>,
-}
-
-#[derive(Deserialize)]
-#[serde(rename_all = "camelCase")]
-struct View {
-    buffer: usize,
-    #[serde(default)]
-    byte_offset: usize,
-    byte_length: usize,
-    byte_stride: Option<usize>,
-}
-
-#[derive(Deserialize)]
-struct Buffer {
-    uri: Option<IgnoredAny>,
-}
 
 /// A file in its two parts, and what was found in it.
 struct Reader<'d> {
@@ -133,25 +27,39 @@ struct Reader<'d> {
     points: Vec<DVec3>,
     uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
+    /// For each triangle how many meshes of nodes were read before its own.
+    objects: Vec<u32>,
+    meshes: u32,
+    /// For each primitive of a mesh of a node its first point, its mesh and its number in it.
+    primitives: Vec<(u32, [usize; 2])>,
     nodes: usize,
 }
 
 /// Points, their places on the image of [`image`], and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
-    let (text, data) = parts(bytes)?;
-    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
+    let (tables, data) = tables::read(bytes)?;
     let roots = tables.scenes.get(tables.scene).ok_or("it has no scene")?.nodes.clone();
-    let mut reader = Reader { tables, data, points: Vec::new(), uvs: Vec::new(), triangles: Vec::new(), nodes: 0 };
+    let mut reader = Reader {
+        tables,
+        data,
+        points: Vec::new(),
+        uvs: Vec::new(),
+        triangles: Vec::new(),
+        objects: Vec::new(),
+        meshes: 0,
+        primitives: Vec::new(),
+        nodes: 0,
+    };
     for node in roots {
         reader.node(node, UPRIGHT, 0)?;
     }
+    reader.check()?;
     Ok((reader.points, reader.uvs, reader.triangles))
 }
 
 /// The bytes of the one image that all base colours of a file come from; `None` where they come from none or several.
 pub(super) fn image(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
-    let (text, data) = parts(bytes)?;
-    let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
+    let (tables, data) = tables::read(bytes)?;
     let primitives = tables.meshes.iter().flat_map(|mesh| &mesh.primitives);
     let painted = primitives.filter_map(|primitive| tables.painted(primitive));
     let mut images: Vec<usize> = painted.map(|on| tables.source(on.index)).collect::<Result<_, _>>()?;
@@ -161,55 +69,6 @@ pub(super) fn image(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
     let image = tables.images.get(only).ok_or_else(|| format!("it names image {only}, which is not there"))?;
     let view = image.buffer_view.ok_or_else(|| format!("its image {only} is kept in another file"))?;
     tables.bytes(view, data).map(Some)
-}
-
-/// The text and the data of a file; the data is empty where there is none.
-fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
-    let word = |at: usize| bytes.get(at..at + 4).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes);
-    let short = || "it is cut short".to_owned();
-    let (version, length) = (word(4).ok_or_else(short)?, word(8).ok_or_else(short)? as usize);
-    if version != 2 {
-        return Err(format!("it is of version {version}; expected 2"));
-    }
-    let whole = bytes.get(..length).ok_or_else(short)?;
-    let (mut text, mut data, mut at): (Option<&[u8]>, &[u8], usize) = (None, &[], 12);
-    while at + 8 <= whole.len() {
-        let size = word(at).ok_or_else(short)? as usize;
-        let body = whole.get(at + 8..).and_then(|rest| rest.get(..size)).ok_or_else(short)?;
-        match &whole[at + 4..at + 8] {
-            b"JSON" if text.is_none() => text = Some(body),
-            b"BIN\0" if data.is_empty() => data = body,
-            _ => {}
-        }
-        at += 8 + size;
-    }
-    Ok((text.ok_or("it has no text")?, data))
-}
-
-impl Tables {
-    /// What the base colour of a primitive comes from, if from an image.
-    fn painted(&self, primitive: &Primitive) -> Option<&TextureUse> {
-        self.materials.get(primitive.material?)?.pbr_metallic_roughness.base_color_texture.as_ref()
-    }
-
-    /// The image of a texture.
-    fn source(&self, texture: usize) -> Result<usize, String> {
-        let entry =
-            self.textures.get(texture).ok_or_else(|| format!("it names texture {texture}, which is not there"))?;
-        entry.source.ok_or_else(|| format!("its texture {texture} has no image that is understood"))
-    }
-
-    /// The bytes of a view, checked to lie inside the file.
-    fn bytes<'d>(&self, view: usize, data: &'d [u8]) -> Result<&'d [u8], String> {
-        let outside = || OUTSIDE.to_owned();
-        let view = self.buffer_views.get(view).ok_or_else(outside)?;
-        // only the first buffer can be in the file
-        if view.buffer != 0 || self.buffers.first().is_none_or(|buffer| buffer.uri.is_some()) {
-            return Err(outside());
-        }
-        let end = view.byte_offset.checked_add(view.byte_length).ok_or_else(outside)?;
-        data.get(view.byte_offset..end).ok_or_else(outside)
-    }
 }
 
 impl Reader<'_> {
@@ -231,35 +90,55 @@ impl Reader<'_> {
     fn mesh(&mut self, number: usize, place: DMat4) -> Result<(), String> {
         let mesh =
             self.tables.meshes.get(number).ok_or_else(|| format!("it names mesh {number}, which is not there"))?;
-        for primitive in &mesh.primitives {
+        self.meshes += 1;
+        for (part, primitive) in mesh.primitives.iter().enumerate() {
             // triangles, strips and fans; points and lines are left out
             let Some(mode @ 4..=6) = Some(primitive.mode.unwrap_or(4)) else { continue };
             let positions = primitive.attributes.get("POSITION").ok_or("a primitive has no positions")?;
             let first = u32::try_from(self.points.len()).map_err(|_| "too many points")?;
-            let points = points(&self.tables, *positions, self.data)?;
+            let points = tables::points(&self.tables, *positions, self.data)?;
             let count = points.len() as u32;
             let corners = match primitive.indices {
-                Some(accessor) => indices(&self.tables, accessor, self.data)?,
+                Some(accessor) => tables::indices(&self.tables, accessor, self.data)?,
                 None => (0..count).collect(),
             };
             if let Some(bad) = corners.iter().find(|&&i| i >= count) {
                 return Err(format!("a face uses point {bad} of {count}"));
             }
+            if mode == 4 && !corners.len().is_multiple_of(3) || corners.len() < 3 {
+                let (count, expected) =
+                    (corners.len(), if mode == 4 { "a multiple of three" } else { "three or more" });
+                return Err(format!("primitive {part} of mesh {number} has {count} corners; expected {expected}"));
+            }
+            self.primitives.push((first, [number, part]));
             self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
             let coordinates = self.tables.painted(primitive).map_or(0, |on| on.tex_coord);
             if let Some(&accessor) = primitive.attributes.get(&format!("TEXCOORD_{coordinates}")) {
-                let uvs = uvs(&self.tables, accessor, self.data)?;
+                let uvs = tables::uvs(&self.tables, accessor, self.data)?;
                 self.uvs.extend(uvs.into_iter().take(points.len()));
             }
             self.uvs.resize(self.points.len(), Vec2::ZERO);
             let turned = place.determinant() < 0.0;
             let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
             self.triangles.extend(triangles(&corners, mode).into_iter().map(|t| side(t).map(|i| i + first)));
+            self.objects.resize(self.triangles.len(), self.meshes);
             if self.triangles.len() > TRIANGLES_MAX {
                 return Err(format!("it has more than {TRIANGLES_MAX} triangles"));
             }
         }
         Ok(())
+    }
+
+    /// Whether the mesh of every node is a surface, all primitives of it together.
+    fn check(&self) -> Result<(), String> {
+        let Some(found) = branch(&self.points, &self.triangles, |t| self.objects[t]) else { return Ok(()) };
+        let named = |corner: u32| {
+            let at = self.primitives.partition_point(|(first, _)| *first <= corner) - 1;
+            let (first, [mesh, part]) = self.primitives[at];
+            format!("vertex {} of primitive {part} of mesh {mesh}", corner - first)
+        };
+        let ([a, b], sharing) = (found.corners.map(named), found.sharing);
+        Err(format!("it is not manifold: {sharing} triangles share the edge from {a} to {b}, and only two can"))
     }
 }
 
@@ -285,63 +164,6 @@ fn triangles(corners: &[u32], mode: u32) -> Vec<[u32; 3]> {
         6 => corners[1.min(corners.len())..].windows(2).map(|w| [corners[0], w[0], w[1]]).collect(),
         _ => corners.as_chunks::<3>().0.to_vec(),
     }
-}
-
-fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<DVec3>, String> {
-    let accessor = accessor(tables, number)?;
-    if (accessor.component_type, accessor.kind.as_str()) != (5126, "VEC3") {
-        return Err("its positions are not three 32-bit floats".to_owned());
-    }
-    let number = |b: &[u8], at: usize| f64::from(f32::from_le_bytes([b[at], b[at + 1], b[at + 2], b[at + 3]]));
-    let items = items(tables, accessor, (data, 12))?;
-    Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
-}
-
-/// Places on a texture: floats, or parts of the greatest whole number.
-fn uvs(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<Vec2>, String> {
-    let accessor = accessor(tables, number)?;
-    let (size, number): (usize, fn(&[u8]) -> f32) = match (accessor.component_type, accessor.kind.as_str()) {
-        (5126, "VEC2") => (4, |b| f32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        (5121, "VEC2") => (1, |b| f32::from(b[0]) / 255.0),
-        (5123, "VEC2") => (2, |b| f32::from(u16::from_le_bytes([b[0], b[1]])) / 65_535.0),
-        _ => return Err("its places on a texture are not two numbers".to_owned()),
-    };
-    let items = items(tables, accessor, (data, 2 * size))?;
-    Ok(items.map(|bytes| Vec2::new(number(bytes), number(&bytes[size..]))).collect())
-}
-
-fn indices(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<u32>, String> {
-    let accessor = accessor(tables, number)?;
-    let (size, number): (usize, fn(&[u8]) -> u32) = match (accessor.component_type, accessor.kind.as_str()) {
-        (5121, "SCALAR") => (1, |b| u32::from(b[0])),
-        (5123, "SCALAR") => (2, |b| u32::from(u16::from_le_bytes([b[0], b[1]]))),
-        (5125, "SCALAR") => (4, |b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])),
-        _ => return Err("its indices are not single whole numbers".to_owned()),
-    };
-    Ok(items(tables, accessor, (data, size))?.map(number).collect())
-}
-
-fn accessor(tables: &Tables, number: usize) -> Result<&Accessor, String> {
-    tables.accessors.get(number).ok_or_else(|| format!("it names accessor {number}, which is not there"))
-}
-
-/// The bytes of every item of an accessor, checked to lie inside the file.
-fn items<'d>(
-    tables: &Tables,
-    accessor: &Accessor,
-    (data, size): (&'d [u8], usize),
-) -> Result<impl Iterator<Item = &'d [u8]> + use<'d>, String> {
-    let view = accessor.buffer_view.filter(|_| accessor.sparse.is_none());
-    let view = view.ok_or("its data is sparse, which is not understood")?;
-    let bytes = tables.bytes(view, data)?;
-    let (start, count) = (accessor.byte_offset, accessor.count);
-    let stride = tables.buffer_views[view].byte_stride.unwrap_or(size).max(size);
-    let last = count.checked_sub(1).ok_or("it has an empty list")?;
-    let reach = last.checked_mul(stride).and_then(|n| n.checked_add(start)?.checked_add(size));
-    if reach.is_none_or(|reach| reach > bytes.len()) {
-        return Err(OUTSIDE.to_owned());
-    }
-    Ok((0..count).map(move |i| &bytes[start + i * stride..start + i * stride + size]))
 }
 
 #[cfg(test)]
@@ -388,20 +210,20 @@ mod tests {
     }
 
     #[test]
-    fn a_tetrahedron_is_read_placed_scaled_and_set_upright() {
-        let mesh = read(&tetrahedron(), 10.0).unwrap();
-        assert_eq!((mesh.points_m.len(), mesh.triangles.len()), (4, 4));
+    fn a_tetrahedron_is_read_placed_and_set_upright() {
+        let mesh = read(&tetrahedron(), 1.0).unwrap();
+        assert_eq!((mesh.points.len(), mesh.triangles.len()), (4, 4));
         // x 5 from the node; what was up along y is up along z
-        assert!(mesh.points_m.contains(&glam::DVec3::new(50.0, 0.0, 20.0)), "{:?}", mesh.points_m);
+        assert!(mesh.points.contains(&glam::DVec3::new(5.0, 0.0, 2.0)), "{:?}", mesh.points);
         let volume: f64 = mesh
             .triangles
             .iter()
             .map(|t| {
-                let [a, b, c] = t.map(|i| mesh.points_m[i as usize] - mesh.points_m[0]);
+                let [a, b, c] = t.map(|i| mesh.points[i as usize] - mesh.points[0]);
                 a.dot(b.cross(c)) / 6.0
             })
             .sum();
-        assert!((volume - 1000.0 / 3.0).abs() < 1e-9, "{volume}"); // faces outward
+        assert!((volume - 1.0 / 3.0).abs() < 1e-12, "{volume}"); // faces outward
     }
 
     #[test]
@@ -417,6 +239,45 @@ mod tests {
         }
         let ring = json(72, 4, 12).replace("\"translation\":[5,0,0]", "\"children\":[0]");
         assert!(read(&file(&ring), 1.0).is_err());
+    }
+
+    /// What is said of the tetrahedron with one piece of its text put in place of another.
+    fn told(from: &str, to: &str) -> String {
+        let text = json(48 + 24, 4, 12);
+        assert!(text.contains(from), "{from}");
+        read(&file(&text.replace(from, to)), 1.0).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn an_extension_that_is_required_is_refused_by_its_name_if_it_changes_triangles() {
+        let with = |names: &str| told("\"scene\":0", &format!("\"scene\":0,\"extensionsRequired\":[{names}]"));
+        assert!(
+            with("\"KHR_materials_unlit\",\"KHR_draco_mesh_compression\"").contains("`KHR_draco_mesh_compression`")
+        );
+        assert_eq!(with("\"KHR_materials_unlit\""), "");
+    }
+
+    #[test]
+    fn corners_that_make_no_triangles_are_refused() {
+        assert!(told("\"count\":12", "\"count\":11").contains("primitive 0 of mesh 0 has 11 corners"));
+        let short = json(48 + 24, 4, 2).replace("\"indices\":1}", "\"indices\":1,\"mode\":6}");
+        assert!(read(&file(&short), 1.0).unwrap_err().contains("expected three or more"));
+    }
+
+    #[test]
+    fn a_mesh_that_branches_is_refused_and_meshes_that_touch_are_not() {
+        let primitive = r#"{"attributes":{"POSITION":0},"indices":1}"#;
+        let told_twice = told(primitive, &format!("{primitive},{primitive}"));
+        let edge = "4 triangles share the edge from vertex 0 of primitive 1 of mesh 0 to vertex";
+        assert!(told_twice.contains("not manifold") && told_twice.contains(edge), "{told_twice}");
+        assert_eq!(told("\"nodes\":[0]", "\"nodes\":[0,0]"), "");
+    }
+
+    #[test]
+    fn a_node_that_blows_its_mesh_up_past_the_bounds_of_a_scene_is_refused() {
+        let why = told("\"translation\":[5,0,0]", "\"scale\":[1e30,1e30,1e30]");
+        assert!(why.contains("it reaches 2.000e30 m"), "{why}");
+        assert!(told("\"translation\":[5,0,0]", "\"scale\":[0,0,0]").contains("has an area"));
     }
 
     proptest! {

@@ -1,12 +1,14 @@
-//! Files of triangles as points and triangles: OBJ, and glTF's binary form by [`super::glb`].
+//! Files of triangles as points and triangles: OBJ by [`super::obj`], and glTF's binary form by [`super::glb`].
 //!
-//! In: any bytes. Out: a mesh with sound corner numbers, or what is wrong with the file. Never here: the file system.
+//! In: any bytes. Out: a surface with sound corner numbers, within bounds and manifold, or what is wrong with the file. What is drawn
+//! and what is touched come through this one door. Never here: the file system.
+//!
+//! Manifold is judged where points stand, not by their numbers: a seam of points that are doubled for their places on a texture or their
+//! normals is no rim, and hides no branch. It is judged object by object (of an OBJ file `o` and `g`, of glTF the mesh of a node): boxes
+//! side by side are no branch. Open rims are sound; a face that is there twice counts twice; one without an area does not count.
 
-use super::glb;
+use super::{POSITION_MAX_M, glb, obj};
 use glam::{DVec3, Vec2};
-use std::io::Cursor;
-use std::sync::Arc;
-use tobj::{LoadError, LoadOptions};
 
 /// Most triangles of a mesh: past it a body would not step in real time.
 pub(super) const TRIANGLES_MAX: usize = 1_000_000;
@@ -14,41 +16,59 @@ pub(super) const TRIANGLES_MAX: usize = 1_000_000;
 /// A triangle mesh.
 #[derive(Debug)]
 pub(super) struct Mesh {
-    pub(super) points_m: Arc<[DVec3]>,
-    /// The place of each point on the file's texture; empty where it has none.
+    /// In the file's own unit.
+    pub(super) points: Vec<DVec3>,
+    /// The place of each point on a texture, from the top left; empty where it has none.
     pub(super) uvs: Vec<Vec2>,
-    pub(super) triangles: Arc<[[u32; 3]]>,
-}
-
-/// Reads a file of either kind, told apart by its first bytes; coordinates are multiplied by `scale`.
-pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
-    let (mut points, uvs, triangles) = if bytes.starts_with(glb::MAGIC) { glb::read(bytes)? } else { read_obj(bytes)? };
-    points.iter_mut().for_each(|point| *point *= scale);
-    check(&points, &triangles)?;
-    Ok(Mesh { points_m: points.into(), uvs, triangles: triangles.into() })
+    pub(super) triangles: Vec<[u32; 3]>,
 }
 
 /// Points, their places on a texture (none, if empty) and triangles.
 pub(super) type Parts = (Vec<DVec3>, Vec<Vec2>, Vec<[u32; 3]>);
 
-/// Points and triangles of an OBJ file.
-fn read_obj(bytes: &[u8]) -> Result<Parts, String> {
-    let options = LoadOptions { triangulate: true, ignore_points: true, ignore_lines: true, ..LoadOptions::default() };
-    let no_materials = |_: &std::path::Path| Err(LoadError::OpenFileFailed);
-    let (models, _) = tobj::load_obj_buf(&mut Cursor::new(bytes), &options, no_materials).map_err(|e| e.to_string())?;
-    let mut points = Vec::new();
-    let mut triangles = Vec::new();
-    for model in models {
-        let base = u32::try_from(points.len()).map_err(|_| "too many points".to_owned())?;
-        points.extend(model.mesh.positions.as_chunks::<3>().0.iter().map(|p| DVec3::from(p.map(f64::from))));
-        triangles.extend(model.mesh.indices.as_chunks::<3>().0.iter().map(|t| t.map(|i| i.saturating_add(base))));
+/// Reads a file of either kind, told apart by its first bytes; `scale` is what its coordinates will be multiplied by.
+pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
+    let (points, uvs, triangles) = match bytes {
+        [] => return Err("it is empty".to_owned()),
+        _ if bytes.starts_with(glb::MAGIC) => glb::read(bytes)?,
+        _ => obj::read(text(bytes)?)?,
+    };
+    check(&points, &triangles)?;
+    let far = |point: &DVec3| point.abs().max_element();
+    if let Some(point) = points.iter().max_by(|a, b| far(a).total_cmp(&far(b))) {
+        let at = point.to_array().map(|x| format!("{x:.3e}")).join(", ");
+        within(far(point), scale).map_err(|why| format!("{why}: a point of it is at ({at})"))?;
     }
-    Ok((points, Vec::new(), triangles))
+    Ok(Mesh { points, uvs, triangles })
+}
+
+/// Whether a mesh that reaches so far in its own unit stays within what a scene can hold.
+pub(super) fn within(reach: f64, scale: f64) -> Result<(), String> {
+    let metres = reach * scale;
+    if metres <= POSITION_MAX_M {
+        return Ok(());
+    }
+    Err(format!("it reaches {metres:.3e} m from where its axes start, more than {POSITION_MAX_M:.0} m"))
+}
+
+/// Tells bytes that cannot be a text.
+fn text(bytes: &[u8]) -> Result<&[u8], String> {
+    if bytes.trim_ascii_start().starts_with(b"{") {
+        return Err("it is no OBJ file; if it is glTF's text form, expected the binary one, .glb".to_owned());
+    }
+    match bytes.iter().position(|byte| *byte == 0) {
+        None => Ok(bytes),
+        Some(at) => Err(format!(
+            "it is neither a .glb file, which begins with `glTF`, nor an OBJ file, which is text: byte {at} is 0"
+        )),
+    }
 }
 
 fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if triangles.is_empty() {
-        return Err("it has no faces".to_owned());
+        return Err(
+            "it has no faces: no triangles of a .glb file, no line of an OBJ file that begins with `f`".to_owned()
+        );
     }
     if triangles.len() > TRIANGLES_MAX {
         return Err(format!("it has {} triangles, more than {TRIANGLES_MAX}", triangles.len()));
@@ -60,22 +80,29 @@ fn check(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<(), String> {
     if let Some(bad) = triangles.iter().position(|t| t.iter().any(|i| *i as usize >= count)) {
         return Err(format!("face {} uses a point that does not exist", bad + 1));
     }
+    let area = |t: &[u32; 3]| {
+        let [a, b, c] = t.map(|i| points[i as usize]);
+        (b - a).cross(c - a) != DVec3::ZERO
+    };
+    if !triangles.iter().any(area) {
+        return Err(format!("none of its {} triangles has an area", triangles.len()));
+    }
     Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use metachron_agents::shape::{Generator, PrimitiveVertex, generate};
     use proptest::prelude::*;
 
     const TETRAHEDRON: &str = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n";
 
     #[test]
-    fn a_tetrahedron_is_read_and_scaled() {
-        let mesh = read(TETRAHEDRON.as_bytes(), 2.0).unwrap();
-        assert_eq!(mesh.points_m.len(), 4);
-        assert_eq!(mesh.triangles.len(), 4);
-        assert!(mesh.points_m.contains(&(DVec3::X * 2.0)));
+    fn a_tetrahedron_is_read() {
+        let mesh = read(TETRAHEDRON.as_bytes(), 1.0).unwrap();
+        assert_eq!((mesh.points.len(), mesh.triangles.len(), mesh.uvs.len()), (4, 4, 0));
+        assert!(mesh.points.contains(&DVec3::X));
     }
 
     #[test]
@@ -90,6 +117,59 @@ mod tests {
         ] {
             assert!(read(bad.as_bytes(), 1.0).is_err(), "{bad:?}");
         }
+    }
+
+    #[test]
+    fn every_mesh_that_comes_with_the_program_is_let_in() {
+        for text in [include_str!("../../../scenes/bracket.obj"), include_str!("../../../scenes/crystal.obj")] {
+            assert_eq!(told(text), "");
+        }
+        for kind in Generator::ALL {
+            let mesh = generate(kind, 1, 500);
+            let point = |v: &PrimitiveVertex| format!("v {} {} {}\n", v.core.x, v.core.y, v.core.z);
+            let face = |t: &[u32; 3]| format!("f {} {} {}\n", t[0] + 1, t[1] + 1, t[2] + 1);
+            let text: String = mesh.vertices.iter().map(point).chain(mesh.triangles.iter().map(face)).collect();
+            assert_eq!(told(text), "", "{kind:?}");
+        }
+    }
+
+    /// Why a file is refused.
+    fn told(bytes: impl AsRef<[u8]>) -> String {
+        read(bytes.as_ref(), 1.0).err().unwrap_or_default()
+    }
+
+    #[test]
+    fn what_is_no_mesh_at_all_is_told_what_it_is_not() {
+        assert_eq!(told(""), "it is empty");
+        let rubbish: Vec<u8> = (0..=255).collect();
+        for bytes in [&rubbish[..], b"XXXX\x02\0\0\0", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"] {
+            let told = told(bytes);
+            assert!(told.contains("neither a .glb file") && told.contains("nor an OBJ file"), "{told}");
+        }
+        assert!(told("{\"asset\":{\"version\":\"2.0\"}}").contains("expected the binary one"));
+        assert!(told("hello world\n").contains("no faces"));
+        // bytes that are no UTF-8 in what is not read do no harm
+        assert!(read(&[b"# Gr\xf6\xdfe\n", TETRAHEDRON.as_bytes()].concat(), 1.0).is_ok());
+    }
+
+    #[test]
+    fn a_mesh_stays_within_the_bounds_of_a_scene_after_its_scale() {
+        let far = TETRAHEDRON.replace("v 1 0 0", "v 2e5 0 0");
+        let why = told(&far);
+        assert!(
+            why.contains("2.000e5 m") && why.contains("100000 m") && why.contains("(2.000e5, 0.000e0, 0.000e0)"),
+            "{why}"
+        );
+        assert!(read(far.as_bytes(), 0.4).is_ok());
+        assert!(read(TETRAHEDRON.as_bytes(), 1.1e5).is_err());
+        for huge in ["1e38", "-1e300", "1e154"] {
+            assert!(told(TETRAHEDRON.replace("v 1 0 0", &format!("v {huge} 0 0"))).contains("it reaches"), "{huge}");
+        }
+    }
+
+    #[test]
+    fn a_file_without_area_is_refused() {
+        assert!(told("v 0 0 0\nv 1 0 0\nv 2 0 0\nf 1 2 3\n").contains("none of its 1 triangles has an area"));
     }
 
     proptest! {

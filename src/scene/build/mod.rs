@@ -13,6 +13,7 @@ mod joint;
 mod joint_keys;
 mod joint_rules;
 mod mesh;
+mod obj;
 mod object;
 mod rigid;
 mod scenery;

@@ -157,22 +157,25 @@ fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Sour
         }
         Shape::Plane => Solid::Plane,
         Shape::Hull => {
-            let Mesh { points_m, .. } = from_file(c, place, file, source)?;
+            let (points_m, _) = from_file(c, place, file, source)?;
             sound(c, place, Solid::Hull { points_m })?
         }
         Shape::Mesh => {
-            let Mesh { points_m, triangles, .. } = from_file(c, place, file, source)?;
+            let (points_m, triangles) = from_file(c, place, file, source)?;
             sound(c, place, Solid::Mesh { points_m, triangles })?
         }
     })
 }
 
-fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Mesh> {
+/// Points of a mesh, metres, and its triangles.
+type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
+
+fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
     let name = file.file.as_deref()?;
     let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
     let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
     match read {
-        Ok(mesh) => Some(mesh),
+        Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
         Err(why) => {
             c.wrong(
                 place,

@@ -30,8 +30,8 @@ const LEAVES_IMPORTANCE: f64 = 0.5;
 const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
-/// Meshes that were made, by what they were made from: equal ones are one.
-type Made = BTreeMap<(String, u32, [Option<u32>; 2]), Arc<Tom>>;
+/// Meshes that were made and how far they reach in their own unit, by what they were made from: equal ones are one.
+type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<Tom>, f64)>;
 
 /// Reads every mesh and tree.
 pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
@@ -104,11 +104,11 @@ fn mesh_of(
         }
     };
     let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
-    if let Some(tom) = made.get(&key) {
-        return Some((Arc::clone(tom), at));
+    if let Some((tom, reach)) = made.get(&key) {
+        return in_bounds(c, place, "scale", (scale, *reach)).then(|| (Arc::clone(tom), at));
     }
     let made_now = match (&file.file, file.generate) {
-        (Some(name), _) => from_file(name, source),
+        (Some(name), _) => from_file(name, source, scale),
         (None, kind) => Tom::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
             .map_err(|why| why.to_string()),
     };
@@ -120,8 +120,9 @@ fn mesh_of(
                 None => tom,
             };
             let tom = Arc::new(tom.no_coarser(least.unwrap_or(0)));
-            made.insert(key, Arc::clone(&tom));
-            Some((tom, at))
+            let reach = reach(&tom);
+            made.insert(key, (Arc::clone(&tom), reach));
+            in_bounds(c, place, "scale", (scale, reach)).then_some((tom, at))
         }
         Err(why) => {
             let what = format!("cannot be used: {}: {why}", key.0);
@@ -131,9 +132,23 @@ fn mesh_of(
     }
 }
 
-fn from_file(name: &str, source: &Source) -> Result<Tom, String> {
-    let mesh = mesh::read(&source.sibling(name)?, 1.0)?;
-    Tom::new(&painted_mesh(&mesh.points_m, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
+fn from_file(name: &str, source: &Source, scale: f64) -> Result<Tom, String> {
+    let mesh = mesh::read(&source.sibling(name)?, scale)?;
+    Tom::new(&painted_mesh(&mesh.points, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
+}
+
+/// The greatest coordinate of a mesh, in its own unit.
+fn reach(tom: &Tom) -> f64 {
+    tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
+}
+
+/// Whether a mesh that reaches so far in its own unit can stand in a scene at this scale; tells where it cannot.
+fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, (scale, reach): (f64, f64)) -> bool {
+    let within = mesh::within(reach, scale);
+    if let Err(why) = &within {
+        c.wrong(place, key, format_args!("makes it too large: {why}"), "expected a mesh within the bounds of a scene");
+    }
+    within.is_ok()
 }
 
 const fn generator(kind: GeneratorKind) -> Generator {
@@ -178,7 +193,12 @@ fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&S
     let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&tom)), at, look, texture: None };
     match dome {
         None => vec![(String::new(), part(at))],
-        Some(radius_m) => dome_places(at, radius_m).enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect(),
+        Some(radius_m) => {
+            let places: Vec<Placement> = dome_places(at, radius_m).collect();
+            let scale = places.iter().map(|at| at.scale).fold(0.0, f64::max);
+            in_bounds(c, &entry.place, "dome_m", (scale, reach(&tom)));
+            places.into_iter().enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect()
+        }
     }
 }
 

@@ -9,8 +9,9 @@ use crate::scene::cast::Look;
 use crate::scene::check::{Checker, allowed};
 use crate::scene::format::{MeshFile, ShadingKind};
 use crate::scene::source::Source;
+use glam::Vec2;
 use image::{ImageFormat, ImageReader, Limits};
-use metachron_agents::shape::{Pattern, Texture, Wrap};
+use metachron_agents::shape::{Model, Pattern, Texture, Wrap};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
@@ -30,8 +31,9 @@ pub(super) fn painted(
     (file, mut parts): (&MeshFile, Parts),
     from: (&Source, &mut Textures),
 ) -> Parts {
-    let (before, found) = (c.count(), texture_of(c, entry, file, from));
-    if found.is_none() && c.count() == before && entry.common.shading == Some(ShadingKind::Textured) {
+    let (before, found) = (c.count(), texture_of(c, entry, (file, &parts), from));
+    let bare = found.is_none() && c.count() == before && !parts.is_empty();
+    if bare && entry.common.shading == Some(ShadingKind::Textured) {
         c.wrong(&entry.place, "shading", "has nothing to draw", "expected `texture` beside it");
     }
     if let Some(texture) = found {
@@ -48,7 +50,7 @@ pub(super) fn painted(
 fn texture_of(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
-    file: &MeshFile,
+    (file, parts): (&MeshFile, &Parts),
     (source, textures): (&Source, &mut Textures),
 ) -> Option<Arc<Texture>> {
     let place = &entry.place;
@@ -58,14 +60,19 @@ fn texture_of(
     let metres = c.number_or(place, "texture_m", (file.texture_m, 1.0), &allowed(1e-3..=1e3, "m"));
     let (key, name) = match (&file.texture, &file.file) {
         (Some(name), _) => ("texture", name),
-        (None, Some(name)) => ("file", name),
-        (None, None) => return None,
+        // what is wrong with a file that gave no mesh was told
+        (None, Some(name)) if !parts.is_empty() => ("file", name),
+        (None, _) => return None,
     };
-    let made_from = (name.clone(), if key == "file" { 0 } else { metres.to_bits() });
+    let wrap = match key == "file" || file.texture_m.is_none() && has_places(parts) {
+        true => Wrap::Corners,
+        false => Wrap::Sides(metres as f32),
+    };
+    let made_from = (name.clone(), if wrap == Wrap::Corners { 0 } else { metres.to_bits() });
     if let Some(known) = textures.get(&made_from) {
         return known.clone();
     }
-    let made = if key == "file" { own(name, source) } else { named(name, metres as f32, source).map(Some) };
+    let made = if key == "file" { own(name, source) } else { named(name, (metres, wrap), source).map(Some) };
     let texture = made.unwrap_or_else(|why| {
         let patterns = Pattern::ALL.map(|pattern| format!("`{}`", pattern.name())).join(", ");
         let what = format!("cannot be painted: {name}: {why}");
@@ -76,11 +83,17 @@ fn texture_of(
 }
 
 /// A pattern, or an image beside the scene.
-fn named(name: &str, metres: f32, source: &Source) -> Result<Texture, String> {
+fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Texture, String> {
     if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
-        return Ok(pattern.texture(metres));
+        return Ok(pattern.texture(metres as f32));
     }
-    decode(&source.sibling(name)?, Wrap::Sides(metres))
+    decode(&source.sibling(name)?, wrap)
+}
+
+/// Whether the file of a mesh says where its corners are on a texture.
+fn has_places(parts: &Parts) -> bool {
+    let says = |model: &Model| matches!(model, Model::Mesh(tom) if tom.vertices().iter().any(|v| v.uv != Vec2::ZERO));
+    parts.iter().any(|(_, part)| says(&part.model))
 }
 
 /// The image inside a mesh's file. What is wrong with the file besides is told where its triangles are read.

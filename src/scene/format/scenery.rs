@@ -10,6 +10,7 @@ use serde::Deserialize;
 #[serde(deny_unknown_fields)]
 pub struct MeshFile {
     /// A file of triangles, glTF's binary form (.glb, +y up) or OBJ (+z up), its path relative to the scene's; not with `generate`.
+    /// A surface that may be open, but no edge of it is shared by more than two triangles, and no coordinate is past ± 1e5 m.
     pub file: Option<String>,
     /// A mesh from a formula, about a metre large; not with `file`.
     pub generate: Option<GeneratorKind>,
@@ -28,11 +29,12 @@ pub struct MeshFile {
     pub position_m: Option<Point>,
     /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// What is painted on it: `checker`, `planks`, `books`, or a PNG or JPEG file, its path relative to the scene's; laid straight onto
-    /// each side and multiplied by `colour`. Default: of a .glb file the image of its base colours, if they all come from one; else
-    /// nothing.
+    /// What is painted on it: `checker`, `planks`, `books`, or a PNG or JPEG file, its path relative to the scene's; multiplied by
+    /// `colour`. An image lies as the file's texture coordinates say (`TEXCOORD_n` of a .glb, `vt` of an OBJ file); a pattern, an image
+    /// on a mesh without them, and one with `texture_m` are laid straight onto each side. Default: of a .glb file the image of its base
+    /// colours, if they all come from one; else nothing.
     pub texture: Option<String>,
-    /// Metres of one repeat of `texture`, 0.001 … 1000. Default 1.
+    /// Metres of one repeat of `texture` where it is laid onto each side, 0.001 … 1000. Default 1.
     pub texture_m: Option<f64>,
     /// Makes a dome of it: 120 of them along the edges of a ball of triangles of this radius, metres, 0.001 … 1e4, each from −1 to 1
     /// on its z axis; their names are `NAME-0` … `NAME-119`. Not with `scale`, nor of a proxy.
