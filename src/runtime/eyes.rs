@@ -9,7 +9,7 @@ use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, owns};
-use metachron_agents::{AgentId, Neighbour, SimSpan, SimTime, Snapshot};
+use metachron_agents::{AgentId, Bounds, Inertia, Neighbour, SimSpan, SimTime, Snapshot};
 use std::sync::Arc;
 
 /// What is known of all agents of a run from the start.
@@ -38,6 +38,8 @@ pub(super) struct Eyes {
     links: usize,
     /// Only in a crowd.
     sight: Option<Box<Sight>>,
+    /// Where it stands itself, if anything could push it.
+    bounds: Option<Bounds>,
     /// Whom it wants to see besides its links.
     wanted: Vec<AgentId>,
 }
@@ -109,8 +111,21 @@ impl Eyes {
 
     /// The state this agent has written last: it tells the crowd where that is.
     pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
+        self.bounds = state.bounds.filter(|_| !matches!(state.inertia, Inertia::Immovable));
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
             sight.stand(crowd, state.bounds.as_ref(), state.time);
+        }
+    }
+
+    /// Where it stood when it wrote its last state; `None` where nothing of it can be touched, or nothing pushes it.
+    pub fn bounds(&self) -> Option<&Bounds> {
+        self.bounds.as_ref()
+    }
+
+    /// Looks at those it saw last, and at nobody else.
+    pub fn look_again(&mut self) {
+        for (neighbour, look) in self.neighbours.iter_mut().zip(&self.looks) {
+            neighbour.snapshot = look.slot.latest();
         }
     }
 
@@ -143,7 +158,7 @@ impl Eyes {
     /// Gathers whom it must see: who is near, who has called, who is neither but has an account to settle, and who gives to
     /// somebody that it gives to.
     fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
-        let Self { neighbours, links, sight, wanted, looks } = self;
+        let Self { neighbours, links, sight, wanted, looks, .. } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();

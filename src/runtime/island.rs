@@ -52,7 +52,7 @@ impl Actor {
     /// Steps alone up to `time`; how many steps that took.
     fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
         if self.pace.time() < time {
-            self.pace.begin(timeline, wall);
+            self.pace.begin(timeline, wall, true);
         }
         let mut steps = 0;
         while self.pace.time() < time {

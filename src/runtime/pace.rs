@@ -17,6 +17,13 @@ use std::time::Duration;
 /// Shorter, a hiccup of the machine costs simulated time; longer, an overload shows as old states (MuJoCo resyncs at the same lag).
 pub const LAG_CAP: Duration = Duration::from_millis(100);
 
+/// The same of an agent that is near others: what it gives up, they go through without it.
+pub const LAG_CAP_NEAR: Duration = Duration::from_millis(500);
+
+/// How long an agent waits at once for others that are behind it, and how long in all until they have caught up, wall time.
+const MOMENT: Duration = Duration::from_millis(1);
+const PATIENCE: Duration = LAG_CAP_NEAR;
+
 /// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
 
@@ -37,6 +44,10 @@ pub struct Pace {
     stretched: SimSpan,
     dropped: SimSpan,
     rested: SimSpan,
+    /// No step before this wall time: it waits for others.
+    held_until: Duration,
+    /// Since when it waits, and has not seen them catch up.
+    waits_since: Option<Duration>,
 }
 
 /// How a turn begins.
@@ -52,7 +63,16 @@ impl Pace {
     /// A pace from `time` in steps of `dt` (above zero).
     #[must_use]
     pub const fn new(time: SimTime, dt: SimSpan) -> Self {
-        Self { time, dt, shorter: ANY, stretched: SimSpan::ZERO, dropped: SimSpan::ZERO, rested: SimSpan::ZERO }
+        Self {
+            time,
+            dt,
+            shorter: ANY,
+            stretched: SimSpan::ZERO,
+            dropped: SimSpan::ZERO,
+            rested: SimSpan::ZERO,
+            held_until: Duration::ZERO,
+            waits_since: None,
+        }
     }
 
     /// The agent's own time.
@@ -98,17 +118,33 @@ impl Pace {
     /// The wall time at which the next step is released; `None` while the timeline stands still before it.
     #[must_use]
     pub fn due(&self, timeline: &Timeline) -> Option<Duration> {
-        timeline.wall_of(self.time)
+        timeline.wall_of(self.time).map(|due| due.max(self.held_until))
     }
 
-    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap.
-    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Start {
+    /// Waits a moment from wall time `wall` for others that are behind; whether it does, for it has waited long enough some time.
+    pub fn wait(&mut self, wall: Duration) -> bool {
+        let waits = wall.saturating_sub(*self.waits_since.get_or_insert(wall)) < PATIENCE;
+        if waits {
+            self.held_until = wall + MOMENT;
+        }
+        waits
+    }
+
+    /// Nobody has to be waited for any more.
+    pub const fn go_on(&mut self) {
+        self.waits_since = None;
+    }
+
+    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap, that of agents that are
+    /// `near` others for one that is.
+    pub fn begin(&mut self, timeline: &Timeline, wall: Duration, near: bool) -> Start {
+        let cap = if near { LAG_CAP_NEAR } else { LAG_CAP };
         let now = timeline.sim_at(wall);
         let lag = now.since(self.time);
         let late = timeline.wall_span(lag);
         let steps = SimSpan::from_nanos(self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS));
         let mut dropped = SimSpan::ZERO;
-        if late > LAG_CAP && late > timeline.wall_span(steps) {
+        if late > cap && late > timeline.wall_span(steps) {
             dropped = lag;
             self.dropped += lag;
             self.time = now;
@@ -182,7 +218,7 @@ mod tests {
         // a step takes 6 ms for a second, then 1 ms
         while wall < ms(3000) {
             wall = wall.max(pace.due(&line).unwrap());
-            assert_eq!(pace.begin(&line, wall).dropped, SimSpan::ZERO, "at {wall:?}");
+            assert_eq!(pace.begin(&line, wall, false).dropped, SimSpan::ZERO, "at {wall:?}");
             let step = pace.stretch(span_ms(4), &line, wall);
             steps.push((wall, step));
             pace.advance_by(step);
@@ -200,7 +236,7 @@ mod tests {
         for k in 0..1000 {
             let due = pace.due(&line).unwrap();
             assert_eq!(due, ms(4 * k));
-            assert_eq!(pace.begin(&line, due), Start { late: Duration::ZERO, dropped: SimSpan::ZERO });
+            assert_eq!(pace.begin(&line, due, false), Start { late: Duration::ZERO, dropped: SimSpan::ZERO });
             pace.advance();
         }
         assert_eq!(pace.dropped(), SimSpan::ZERO);
@@ -211,7 +247,7 @@ mod tests {
         let line = Timeline::new();
         let mut pace = pace(4);
         for _ in 0..20 {
-            pace.begin(&line, ms(80));
+            pace.begin(&line, ms(80), false);
             pace.advance();
         }
         assert_eq!(pace.time(), SimTime::from_nanos(80_000_000));
@@ -222,7 +258,7 @@ mod tests {
     fn a_lag_past_the_cap_is_dropped_and_counted() {
         let line = Timeline::new();
         let mut pace = pace(4);
-        let start = pace.begin(&line, ms(500));
+        let start = pace.begin(&line, ms(500), false);
         assert_eq!(start, Start { late: ms(500), dropped: span_ms(500) });
         assert_eq!(pace.due(&line), Some(ms(500)));
         assert_eq!(pace.dropped(), span_ms(500));
@@ -235,7 +271,7 @@ mod tests {
         let mut pace = pace(4);
         let mut wall = Duration::ZERO;
         for _ in 0..1000 {
-            let start = pace.begin(&line, wall);
+            let start = pace.begin(&line, wall, false);
             assert!(start.late <= LAG_CAP + ms(40), "late {:?}", start.late);
             wall += ms(40);
             pace.advance();
@@ -258,7 +294,7 @@ mod tests {
             let (mut wall, mut steps) = (Duration::ZERO, 0);
             for cost in costs_us.iter().copied().map(Duration::from_micros) {
                 wall = wall.max(pace.due(&line).unwrap());
-                let start = pace.begin(&line, wall);
+                let start = pace.begin(&line, wall, false);
                 assert!(start.late - Duration::from_nanos(start.dropped.as_nanos()) <= cap);
                 wall += cost;
                 pace.advance();
@@ -272,8 +308,8 @@ mod tests {
     fn a_slow_agent_is_not_late_before_two_of_its_steps() {
         let line = Timeline::new();
         let mut pace = pace(200);
-        assert_eq!(pace.begin(&line, ms(390)).dropped, SimSpan::ZERO);
-        assert_eq!(pace.begin(&line, ms(401)).dropped, span_ms(401));
+        assert_eq!(pace.begin(&line, ms(390), false).dropped, SimSpan::ZERO);
+        assert_eq!(pace.begin(&line, ms(401), false).dropped, span_ms(401));
     }
 
     #[test]

@@ -18,6 +18,7 @@ use super::island::Company;
 use super::pace::{Pace, Start, Timeline};
 use super::slot::SlotWriter;
 use metachron_agents::coupling::Link;
+use metachron_agents::coupling::beside::leaves_behind;
 use metachron_agents::{
     Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
@@ -164,15 +165,17 @@ impl Actor {
         }
     }
 
-    /// Steps at wall time `wall`, with all it leads: what that took, or `None` if it failed and is parked now.
+    /// Steps at wall time `wall`, with all it leads, or waits for others that are behind: what that took, or `None` if it failed and
+    /// is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
         self.shared.board.heed(self.id());
         self.take_in();
         match contained(|| self.attempt(timeline, wall)) {
-            Ok((open, effort)) => {
+            Ok(Some((open, effort))) => {
                 self.open = Some(open);
                 Some(effort)
             }
+            Ok(None) => Some(Effort { work: 0.0, steps: 0 }),
             Err(reason) => {
                 self.park(reason);
                 self.disband(timeline, wall);
@@ -183,7 +186,8 @@ impl Actor {
 
     /// Ends the turn that began: it took `work_s` seconds and it is wall time `wall`.
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
-        let Some(open) = self.open.take() else { return Next::Parked };
+        // it waited
+        let Some(open) = self.open.take() else { return Next::Due };
         let now = timeline.sim_at(wall);
         let mut published = self.conclude(&open, now, work_s);
         published &= self.conclude_led(now, work_s);
@@ -249,12 +253,16 @@ impl Actor {
         self.shut_door();
     }
 
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Open, Effort), String> {
+    /// `None` where it waits instead.
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Option<(Open, Effort)>, String> {
         self.take_commands();
+        let start = self.pace.begin(timeline, wall, !self.eyes.neighbours().is_empty());
+        if self.waits(wall) {
+            return Ok(None);
+        }
         if self.governor.is_some() {
             self.rhythm.beat(timeline, wall);
         }
-        let start = self.pace.begin(timeline, wall);
         let alone = self.gather(timeline, wall, &start);
         let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
         let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
@@ -271,7 +279,27 @@ impl Actor {
         self.write_snapshot(self.pace.time() + dt, rests)?;
         open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
         self.pace.advance_by(dt);
-        Ok((open, Effort { work: report.work, steps: 1 + led + alone }))
+        Ok(Some((open, Effort { work: report.work, steps: 1 + led + alone })))
+    }
+
+    /// Whether it waits for those who own contact with it and are behind; one that nobody leads or follows.
+    fn waits(&mut self, wall: Duration) -> bool {
+        // what it saw last was behind by more than it is now: who was not is not
+        let behind = self.company.is_empty() && self.leaves_behind() && {
+            self.eyes.look_again();
+            self.leaves_behind()
+        };
+        if !behind {
+            self.pace.go_on();
+        }
+        behind && self.pace.wait(wall)
+    }
+
+    fn leaves_behind(&self) -> bool {
+        let Self { eyes, hands, links, pace, .. } = self;
+        let around =
+            Surroundings { me: self.shared.id, time: pace.time(), neighbours: eyes.neighbours(), hands, links };
+        eyes.bounds().is_some_and(|bounds| leaves_behind(pace.dt(), &around, bounds))
     }
 
     /// Steps by itself, by `wanted` or what the agent makes of that.

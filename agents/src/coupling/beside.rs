@@ -1,7 +1,7 @@
 //! How long a step may be beside others of whom nobody can foresee how they move within it.
 //!
-//! In: a step that is wanted, and who is near. Out: that step, or an equal part of it; who may be touched in it. Never here: the
-//! step itself. Theory: docs/theory/coupling.md, eq. 7g.
+//! In: a step that is wanted, and who is near. Out: that step, or an equal part of it; who may be touched in it; whether somebody
+//! has to be waited for. Never here: the step itself. Theory: docs/theory/coupling.md, eq. 7g.
 
 use super::Law;
 use crate::instrument::GRASP_BELOW;
@@ -14,6 +14,9 @@ pub const PART_MAX_S: f64 = 1.0 / 60.0;
 const SPLIT_SLACK: f64 = 1.01;
 /// No step is made shorter than this because of somebody fast, seconds.
 const HURRY_S: f64 = 1e-3;
+/// Who owns contact may be this far behind, seconds: as long as a system lets a thread wait now and then, and as short as a fall
+/// from rest makes 2 mm in.
+const AHEAD_S: f64 = 0.02;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
 const SURPRISE_M_S2: f64 = 30.0;
 
@@ -54,6 +57,14 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
     let speed_m_s = near.filter_map(|n| n.snapshot.bounds).map(|b| b.speed_m_s).fold(0.0, f64::max);
     let parts = (dt_s * speed_m_s / way_m).ceil().min((dt_s / HURRY_S).floor()).max(1.0);
     SimSpan::from_nanos(dt.as_nanos() / parts as u64)
+}
+
+/// Whether somebody who owns contact with the body, and whom it may touch in a step of `dt`, stands so far behind its time that it
+/// would go through them before they know: [`AHEAD_S`] and one of their steps.
+pub fn leaves_behind(dt: SimSpan, around: &Surroundings<'_>, bounds: &Bounds) -> bool {
+    let behind = |n: &Neighbour| around.time.secs_after(n.snapshot.time) > AHEAD_S + n.step_s;
+    let near = |n: &Neighbour| may_touch(n, around, bounds, dt.as_secs_f64());
+    around.neighbours.iter().any(|n| !n.owned && !n.snapshot.at_rest && behind(n) && near(n))
 }
 
 /// Whether a link by the ledger joins a neighbour to this body.

@@ -4,7 +4,7 @@
 //! them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
 
 pub mod audit;
-pub(crate) mod beside;
+pub mod beside;
 mod contact;
 mod exchange;
 mod form;

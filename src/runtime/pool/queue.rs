@@ -204,7 +204,7 @@ mod tests {
                 continue;
             };
             made(actor.id().0 as usize);
-            actor.pace.begin(&line, now);
+            actor.pace.begin(&line, now, false);
             now += COST;
             actor.pace.advance();
             queue.put(actor, now);
@@ -236,7 +236,7 @@ mod tests {
             let mut made = Vec::new();
             while let Some(mut actor) = take(queue, now) {
                 made.push(actor.id().0);
-                actor.pace.begin(&line, now);
+                actor.pace.begin(&line, now, false);
                 actor.pace.advance();
                 queue.put_back(actor, now);
             }

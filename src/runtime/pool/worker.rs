@@ -95,7 +95,9 @@ impl Worker {
             self.given_up = true;
             return None;
         }
-        actor.served += actor.pace.dt();
+        if actor.open.is_some() {
+            actor.served += actor.pace.dt();
+        }
         // the clock is read once a turn: what follows the step counts for the next one
         self.now = self.hall.clock.now();
         let wall = self.now.saturating_sub(began);
