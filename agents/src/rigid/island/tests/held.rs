@@ -1,7 +1,9 @@
 //! Islands that a spring from outside bears: what hangs on one member weighs on the spring as closed forms have it.
 
 use super::*;
-use crate::Anchor;
+use crate::coupling::PairKind;
+use crate::instrument::{Instrument, Keyframe, ToolSpec};
+use crate::{Anchor, ToolState};
 
 /// So many rods of 0.1 m on ball joints one after the other along `along`, the first end at the origin; the last weighs `ratio`
 /// times the 0.1 kg of each other one. A hand holds that end.
@@ -70,5 +72,78 @@ fn a_chain_that_swings_from_an_undamped_spring_gains_no_energy() {
         }
         println!("{stiffness} N/m: {:e} of the fall gained", gained_j / scale_j);
         assert!(gained_j < 0.01 * scale_j, "{stiffness} N/m: {gained_j} J of {scale_j} J");
+    }
+}
+
+/// A chain and a tool above its first link, shut from the start, each at its own time.
+struct Hanging {
+    party: Party,
+    tool: Instrument,
+    time: SimTime,
+}
+
+const TOOL: AgentId = AgentId(99);
+
+impl Hanging {
+    fn new(party: Party, stiffness_n_m: f64) -> Self {
+        let down = DQuat::from_rotation_x(std::f64::consts::PI);
+        let spec = ToolSpec {
+            keyframes: vec![Keyframe { at_s: 0.0, tip_m: DVec3::ZERO, rotation: down, jaw: 0.0 }],
+            repeat: false,
+            reach_m: 0.05,
+            stiffness_n_m,
+            damping_n_s_m: 20.0,
+            graspable: vec![AgentId(0)],
+        };
+        Self { party, tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO }
+    }
+
+    fn state(&self) -> ToolState {
+        let mut seen = Snapshot::default();
+        self.tool.write_snapshot(&mut seen);
+        let Body::Tool(state) = seen.body else { panic!("a tool") };
+        state
+    }
+
+    /// Steps whoever is behind, until `seconds`.
+    fn run(&mut self, (chain_s, tool_s): (f64, f64), seconds: f64) {
+        while self.time.as_secs_f64() < seconds {
+            if self.time <= self.party.time {
+                let link = Snapshot { time: self.party.time, ..self.party.snapshot(0) };
+                let form = self.party.bodies[0].form();
+                let near = [Neighbour { form, ..Neighbour::seen(AgentId(0), Arc::new(link)) }];
+                let around = Surroundings { neighbours: &near, ..Surroundings::alone(TOOL, self.time) };
+                let dt = SimSpan::from_secs_f64(tool_s).unwrap();
+                self.tool.step(dt, &around).unwrap();
+                self.time += dt;
+            } else {
+                let mut seen = Snapshot::default();
+                self.tool.write_snapshot(&mut seen);
+                seen.time = self.time;
+                let (form, owned) = (self.tool.form(), true);
+                self.party.near = vec![Neighbour { form, owned, ..Neighbour::seen(TOOL, Arc::new(seen)) }];
+                self.party.step(chain_s);
+                self.party.time += SimSpan::from_secs_f64(chain_s).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
+fn a_chain_hangs_from_the_link_in_the_jaws_and_the_tool_reports_all_of_its_weight() {
+    for (links, steps) in [(3, (240.0, 240.0)), (3, (60.0, 600.0)), (3, (600.0, 60.0)), (8, (240.0, 24.0))] {
+        let (stiffness, weight_n) = (1000.0, 0.1 * f64::from(links) * G);
+        let mut hanging = Hanging::new(chain(links, 1.0, DVec3::NEG_Z, (0.0, 0.0)), stiffness);
+        hanging.party.hands.clear();
+        hanging.run((1.0 / steps.0, 1.0 / steps.1), 6.0);
+        let (tool, link) = (hanging.state(), hanging.party.snapshot(0));
+        let Some(Anchor::Local(local)) = tool.grasp.map(|grasp| grasp.anchor) else { panic!("{steps:?}: {tool:?}") };
+        let state = hanging.party.state(0);
+        let (sag_m, wanted_m) = (-(state.position + state.rotation * local).z, weight_n / stiffness);
+        println!("{links}, {steps:?}: {sag_m} m of {wanted_m}, {} N of {weight_n}", tool.force_n);
+        assert!((tool.force_n - weight_n).abs() < 0.01 * weight_n, "{links}, {steps:?}: {} N", tool.force_n);
+        assert!((sag_m - wanted_m).abs() < 0.01 * wanted_m, "{links}, {steps:?}: {sag_m} m, not {wanted_m} m");
+        let pair = link.pairs.iter().find(|pair| pair.with == TOOL).expect("a pair");
+        assert_eq!((pair.kind, pair.contacts), (PairKind::Grasp, 1));
     }
 }

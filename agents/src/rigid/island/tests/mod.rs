@@ -2,7 +2,9 @@
 
 use super::super::{Joint, JointKind, RigidBody, RigidSpec};
 use crate::shape::{Obstacle, Solid};
-use crate::{Agent, AgentId, Body, Companion, Pull, RigidState, SimSpan, SimTime, Snapshot, StepReport, Surroundings};
+use crate::{
+    Agent, AgentId, Body, Companion, Neighbour, Pull, RigidState, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
+};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -14,10 +16,11 @@ mod stacks;
 
 const G: f64 = 9.81;
 
-/// Bodies 0 … n − 1; the first leads, and hands hold it.
+/// Bodies 0 … n − 1; the first leads, hands hold it, and it sees who is near.
 struct Party {
     bodies: Vec<RigidBody>,
     hands: Vec<Pull>,
+    near: Vec<Neighbour>,
     time: SimTime,
     apart: Vec<u32>,
 }
@@ -58,7 +61,7 @@ fn floor(friction: f64, rotation: DQuat) -> Arc<[Obstacle]> {
 impl Party {
     fn new(specs: impl IntoIterator<Item = RigidSpec>) -> Self {
         let bodies = specs.into_iter().map(|spec| RigidBody::new(spec).unwrap()).collect();
-        Self { bodies, hands: vec![], time: SimTime::ZERO, apart: vec![] }
+        Self { bodies, hands: vec![], near: vec![], time: SimTime::ZERO, apart: vec![] }
     }
 
     /// The same, held by joints.
@@ -78,7 +81,8 @@ impl Party {
                 Companion { id, agent: body, around: Surroundings::alone(id, self.time) }
             })
             .collect();
-        let around = Surroundings { hands: &self.hands, ..Surroundings::alone(AgentId(0), self.time) };
+        let around =
+            Surroundings { hands: &self.hands, neighbours: &self.near, ..Surroundings::alone(AgentId(0), self.time) };
         leader.lead(dt, &around, &mut others, &mut self.apart).unwrap()
     }
 
