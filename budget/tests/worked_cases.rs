@@ -144,3 +144,28 @@ fn printed_rate_law_gives_the_traces() {
         check(&case, answer_to(&answers, &case, "main"), &case["expect"], &["trace"], 1e-9);
     }
 }
+
+#[test]
+fn one_level_of_everything_is_infeasible_where_an_object_has_none() {
+    let solved = |mode: &str| {
+        let file = serde_json::json!({"format": 1, "cases": [{
+            "id": "bare", "kind": "mckp", "mode": mode, "budget": 100, "objects": [[[1, 2], [3, 9]], []],
+            "expect": {"feasible": false, "opt": {}, "fs_skip": {}, "marg_fill": {}, "lp": {}},
+        }]});
+        answer::answers(&file).unwrap()
+    };
+    let (all, some) = (solved("exactly_one"), solved("at_most_one"));
+    assert!(all.len() == 4 && all.iter().all(|a| a["feasible"] == false), "{all:?}");
+    // the cheapest set beside it
+    assert_eq!(all.iter().filter(|a| a["choice"] == serde_json::json!([0, -1])).count(), 3, "{all:?}");
+    assert!(some.iter().all(|a| a["feasible"] == true), "{some:?}");
+}
+
+#[test]
+fn a_file_of_another_format_is_refused() {
+    for format in [serde_json::json!(2), serde_json::json!("1"), Value::Null] {
+        let refused = answer::answers(&serde_json::json!({"format": format, "cases": []})).unwrap_err();
+        assert!(refused.contains("format is"), "{refused}");
+    }
+    assert_eq!(answer::answers(&serde_json::json!({"format": 1, "cases": []})).unwrap(), Vec::<Value>::new());
+}

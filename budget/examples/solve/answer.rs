@@ -15,8 +15,14 @@ use serde_json::{Map, Value, json};
 /// Answers kept on the way to an optimum, at most: some gigabytes before it gives up.
 const STATES_MAX: usize = 50_000_000;
 
+/// The format of case files that is read.
+const FORMAT: i64 = 1;
+
 /// One answer for every policy of every case, in the order of the file.
 pub fn answers(file: &Value) -> Result<Vec<Value>, String> {
+    if file["format"] != FORMAT {
+        return Err(format!("format is {}; {FORMAT} is read", file["format"]));
+    }
     let cases = list(file, "cases")?;
     let mut all = Vec::new();
     for case in cases {
@@ -57,11 +63,22 @@ fn policies(case: &Value) -> Vec<String> {
 
 fn knapsack(case: &Value) -> Result<Vec<Value>, String> {
     let mode = if case["mode"] == "exactly_one" { Mode::ExactlyOne } else { Mode::AtMostOne };
-    let mut problem = Problem::new(mode, integer(case, "budget")?);
-    for (id, levels) in (0..).zip(list(case, "objects")?) {
-        problem.push(id, &entries(levels)?);
+    let objects: Result<Vec<_>, String> = list(case, "objects")?.iter().map(entries).collect();
+    let (objects, budget) = (objects?, integer(case, "budget")?);
+    // the crate draws nothing of what has no level; one level of everything is then more than there is
+    let impossible = mode == Mode::ExactlyOne && objects.iter().any(Vec::is_empty);
+    let mut problem = Problem::new(mode, if impossible { 0 } else { budget });
+    for (id, levels) in (0..).zip(&objects) {
+        problem.push(id, levels);
     }
-    policies(case).iter().map(|policy| Ok(labelled(case, policy, by_policy(&problem, policy)?))).collect()
+    let answer = |policy: &String| {
+        let mut fields = by_policy(&problem, policy)?;
+        if impossible {
+            fields["feasible"] = json!(false);
+        }
+        Ok(labelled(case, policy, fields))
+    };
+    policies(case).iter().map(answer).collect()
 }
 
 fn by_policy(problem: &Problem, policy: &str) -> Result<Value, String> {
