@@ -139,8 +139,8 @@ fn accuracy_is_that_of_the_paper() {
 #[test]
 fn benefit_falls_with_every_factor_as_far_as_its_slider_lets_it() {
     let (all, none) = (
-        Sliders { accuracy: 1.0, importance: 1.0, focus: 1.0, motion: 1.0, hysteresis: 1.0 },
-        Sliders { accuracy: 0.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 },
+        Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 1.0, motion: 1.0, hysteresis: 1.0 },
+        Sliders { size: 1.0, accuracy: 0.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 },
     );
     let level = picture(4.0, Shading::Flat);
     let poor = View { importance: 0.5, off_centre: 0.4, motion_px: 50.0, last: Some(2), ..VIEW };
@@ -152,6 +152,17 @@ fn benefit_falls_with_every_factor_as_far_as_its_slider_lets_it() {
     assert_eq!(benefit(&View { pixels: 0.0, ..VIEW }, &level, &all), 0.0);
 }
 
+#[test]
+fn size_counts_from_not_at_all_to_every_pixel() {
+    let worth = |size: f64, pixels: f64| {
+        let sliders = Sliders { size, accuracy: 0.0, ..Sliders::default() };
+        benefit(&View { pixels, ..VIEW }, &picture(4.0, Shading::Flat), &sliders)
+    };
+    assert_eq!([worth(1.0, 100.0), worth(0.5, 100.0), worth(0.0, 100.0)], [100.0, 10.0, 1.0]);
+    // what is smaller than a pixel is worth no more than there is of it, whatever the slider says
+    assert_eq!([worth(1.0, 0.25), worth(0.0, 0.25), worth(0.0, 0.0)], [0.25, 0.25, 0.0]);
+}
+
 proptest! {
     #[test]
     fn benefit_is_between_nothing_and_the_pixels(
@@ -159,7 +170,7 @@ proptest! {
     ) {
         let view = View { pixels: n[0], importance: n[1], off_centre: n[2], motion_px: n[3], last, levels: level };
         let picture = Picture { level, polygons: n[4], vertices: n[5], shading: Shading::Gouraud };
-        let sliders = Sliders { accuracy: n[5], importance: n[4], focus: n[3], motion: n[2], hysteresis: n[1] };
+        let sliders = Sliders { size: n[1], accuracy: n[5], importance: n[4], focus: n[3], motion: n[2], hysteresis: n[1] };
         let got = benefit(&view, &picture, &sliders);
         let most = if n[0] > 0.0 { n[0].min(f64::MAX) } else { 0.0 };
         prop_assert!((0.0..=most).contains(&got), "{}", got);

@@ -336,7 +336,7 @@ impl PictureControl {
 
 /// Size, accuracy and importance count as they are, motion by half: what the eye follows is not judged as strictly as what rests.
 fn usual_sliders() -> Sliders {
-    Sliders { accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
+    Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! is the benefit, in pixels. Never here: costs. Theory: `docs/theory/control.md`, eq. 20 … 22.
 
 use super::view::{Kind, ObjectView, Shading};
-use metachron_budget::cost::benefit::{self, BASE_ERROR, Picture, Sliders};
+use metachron_budget::cost::benefit::{self, BASE_ERROR, Picture, Sliders, size_worth};
 
 /// Triangles of the coarsest closed surface, a tetrahedron: half of what it covers is drawn wrong.
 const COARSEST: f64 = 4.0;
@@ -23,7 +23,7 @@ pub(super) fn pixels(view: &ObjectView) -> f64 {
     if view.pixels > 0.0 { view.pixels.min(PIXELS_MAX) } else { 0.0 }
 }
 
-/// What all levels of an object are worth together: pixels · importance · focus · motion (control.md, eq. 20).
+/// What all levels of an object are worth together: size · importance · focus · motion (control.md, eq. 20).
 pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f64 {
     let importance = if view.importance > 0.0 { view.importance.min(1e6) } else { 0.0 };
     let blur = if view.speed_px_s > 0.0 { view.speed_px_s * BLUR_S / polygon_px } else { 0.0 };
@@ -34,7 +34,8 @@ pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f
         // half of it is lost where it moves by a polygon a frame
         (1.0 / (1.0 + blur), sliders.motion),
     ];
-    factors.into_iter().fold(pixels(view), |all, (factor, slider)| all * (1.0 - slider * (1.0 - factor)).max(0.0))
+    let size = size_worth(pixels(view), sliders.size);
+    factors.into_iter().fold(size, |all, (factor, slider)| all * (1.0 - slider * (1.0 - factor)).max(0.0))
 }
 
 /// The part of an object's pixels that a level draws right, 0 … 1: of its shape by the triangles, of its light by the shading

@@ -47,6 +47,8 @@ pub struct Picture {
 /// How much each factor may take from a benefit, 0 (nothing) … 1 (all of it): the sliders.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sliders {
+    /// Size: the exponent of the pixels; at 0 all objects in view are worth the same, at 1 each as much as it covers.
+    pub size: f64,
     /// Accuracy; at 0 all levels of an object are worth the same.
     pub accuracy: f64,
     /// Importance.
@@ -62,7 +64,7 @@ pub struct Sliders {
 impl Default for Sliders {
     /// Size and accuracy alone: what the timed test of (FS93, §7) must have meant.
     fn default() -> Self {
-        Self { accuracy: 1.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 }
+        Self { size: 1.0, accuracy: 1.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 }
     }
 }
 
@@ -97,11 +99,22 @@ pub fn benefit(view: &View, picture: &Picture, sliders: &Sliders) -> f64 {
         (1.0 - blur, sliders.motion),
         (1.0 - change, sliders.hysteresis),
     ];
-    factors.into_iter().map(|(factor, slider)| weighed(factor, slider)).product::<f64>() * size
+    factors.into_iter().map(|(factor, slider)| weighed(factor, slider)).product::<f64>()
+        * size_worth(size, sliders.size)
+}
+
+/// What so many pixels are worth, ≥ 0: pixels^slider, slider 0 … 1 (eq. 48a); of less than one pixel no more than there is of it.
+#[must_use]
+pub fn size_worth(pixels: f64, slider: f64) -> f64 {
+    if pixels > 1.0 { libm::pow(pixels, part(slider)) } else { pixels.max(0.0) }
 }
 
 /// A factor of which a slider lets only a part through: 1 − slider (1 − factor) (eq. 48).
 fn weighed(factor: f64, slider: f64) -> f64 {
-    let part = |x: f64| if x > 0.0 { x.min(1.0) } else { 0.0 };
     1.0 - part(slider) * (1.0 - part(factor))
+}
+
+/// A number inside 0 … 1; 0 for what is none.
+fn part(x: f64) -> f64 {
+    if x > 0.0 { x.min(1.0) } else { 0.0 }
 }

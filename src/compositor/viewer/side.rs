@@ -97,8 +97,9 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
 /// How much each factor counts in what a level is worth.
 fn worth(ui: &mut Ui, sliders: Sliders, out: &mut Vec<Action>) {
     let mut wanted = sliders;
-    let Sliders { accuracy, importance, focus, motion, hysteresis } = &mut wanted;
+    let Sliders { size, accuracy, importance, focus, motion, hysteresis } = &mut wanted;
     for (name, value) in [
+        ("Size", size),
         ("Accuracy", accuracy),
         ("Importance", importance),
         ("Focus", focus),

@@ -293,7 +293,7 @@ fn frozen_levels_stay_while_everything_moves() {
 }
 
 #[test]
-fn importance_focus_and_motion_count_as_their_sliders_say() {
+fn size_importance_focus_and_motion_count_as_their_sliders_say() {
     let views = [
         mesh(0, 1e4, 100_000),
         ObjectView { importance: 4.0, ..mesh(1, 1e4, 100_000) },
@@ -305,10 +305,18 @@ fn importance_focus_and_motion_count_as_their_sliders_say() {
         control.set_sliders(sliders);
         control.plan(&views).levels.iter().map(|level| level.polygons).collect()
     };
-    let none = Sliders { accuracy: 1.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 };
+    let none = Sliders::default();
     assert!(polygons(none).iter().all(|p| (p / polygons(none)[0] - 1.0).abs() < 0.1), "{:?}", polygons(none));
     let all = polygons(Sliders { importance: 1.0, focus: 1.0, motion: 1.0, ..none });
     assert!(all[1] > 1.5 * all[0] && all[2] < 0.7 * all[0] && all[3] < 0.7 * all[0], "{all:?}");
+    let sizes = [mesh(0, 1e5, 100_000), mesh(1, 1e4, 100_000)];
+    let share = |size: f64| {
+        let mut control = control(Policy::MarginalStop, 100.0);
+        control.set_sliders(Sliders { size, ..none });
+        let levels = &control.plan(&sizes).levels;
+        levels[1].polygons / levels[0].polygons
+    };
+    assert!(share(1.0) < share(0.5) && share(0.5) < share(0.0), "{} {} {}", share(1.0), share(0.5), share(0.0));
 }
 
 #[test]
