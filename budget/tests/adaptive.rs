@@ -105,6 +105,31 @@ proptest! {
     }
 
     #[test]
+    fn by_default_a_warm_start_equals_another_with_the_same_levels_and_loses_no_more_than_its_certificate_says(
+        objects in any_objects(50), budget in 1.0..5000.0_f64, other in 1.0..5000.0_f64, order in any::<u64>(),
+    ) {
+        let n = objects.len();
+        let mut mixed: Vec<_> = (0..n).collect();
+        mixed.sort_by_key(|&i| (order ^ i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 7);
+        let filled = |order: &[usize]| {
+            let mut adaptive = Adaptive::new(Settings::default());
+            order.iter().for_each(|&id| put(&mut adaptive, id, false, &objects[id]));
+            adaptive
+        };
+        let sorted: Vec<_> = (0..n).collect();
+        let mut lives = [filled(&sorted), filled(&mixed)];
+        let warm = lives.each_mut().map(|life| { life.choose(0, time(other)); life.choose(1, time(budget)) });
+        prop_assert_eq!(levels(&lives[0], n), levels(&lives[1], n));
+        prop_assert_eq!(warm[0].value.to_bits(), warm[1].value.to_bits());
+        let cold = filled(&sorted).choose(0, time(budget));
+        prop_assert_eq!(cold.feasible, warm[0].feasible);
+        if cold.feasible && !warm[0].held {
+            // a few roundings of doubles
+            prop_assert!(cold.value <= warm[0].upper * (1.0 + 1e-9) && warm[0].value <= cold.upper * (1.0 + 1e-9));
+        }
+    }
+
+    #[test]
     fn no_numbers_make_it_fail(
         objects in prop::collection::vec((prop::collection::vec((any_number(), any_number()), 0..5), any_number()), 0..40),
         frames in prop::collection::vec((any_number(), any_number(), any_number()), 1..20), droppable in any::<bool>(),
@@ -122,6 +147,25 @@ proptest! {
             prop_assert!(kappa.is_finite() && kappa > 0.0 && adaptive.margin() <= 0.5);
         }
     }
+}
+
+/// Hysteresis is memory: the levels of the frame before are part of what the default chooses by.
+#[test]
+fn by_default_a_warm_start_keeps_what_a_cold_one_would_not_choose() {
+    let chosen = |weights: &[[f64; 2]]| {
+        let mut adaptive = Adaptive::new(Settings { dwell: 0, margin: 0.0, sigmas: 0.0, ..Settings::default() });
+        (0..2).for_each(|id| adaptive.set(id, 0, false, &offers(&[(1.0, 0.0), (100.0, 1.0)])));
+        for (frame, weight) in (0..).zip(weights) {
+            (0..2).for_each(|id| _ = adaptive.weigh(id, weight[id as usize]));
+            adaptive.choose(frame, time(110.0));
+        }
+        levels(&adaptive, 2)
+    };
+    // time for one of two; the second gains 1.1 times as much, and the first is in the picture already
+    assert_eq!(chosen(&[[1.0, 1.1]]), [Some(0), Some(1)]);
+    assert_eq!(chosen(&[[1.0, 0.5], [1.0, 1.1]]), [Some(1), Some(0)]);
+    // past 1 + h it goes over
+    assert_eq!(chosen(&[[1.0, 0.5], [1.0, 1.3]]), [Some(0), Some(1)]);
 }
 
 fn any_number() -> impl Strategy<Value = f64> {
