@@ -2,12 +2,13 @@
 //!
 //! In: a scene, what draws. Out: a record and a picture of every frame. Never here: what the numbers mean.
 //! Time stands still for agents; only the camera moves. So all policies see the same frames, on any machine.
+//! In lockstep a frame takes what it is declared to, and who draws draws only the pictures that are asked for.
 
 use super::error::SessionError;
 use super::headless::{Drawing, frame_seen_by};
 use super::outcome::FrameRecord;
 use super::session::Session;
-use crate::compositor::{Offscreen, PictureFile, Style};
+use crate::compositor::{Camera, PictureFile, Size, Style};
 use crate::runtime::Drive;
 use crate::scene::Scene;
 
@@ -15,21 +16,27 @@ use crate::scene::Scene;
 pub struct Walk {
     session: Session,
     drawing: Drawing,
+    size: Size,
     length_s: f64,
+    /// Who saw the last frame.
+    camera: Camera,
 }
 
 impl Walk {
-    /// Opens `scene` with the prices of the adapter that draws.
+    /// Opens `scene` for pictures of `size`, with the prices of the adapter that draws every frame.
     ///
     /// # Errors
     /// As [`Session::open`].
-    pub fn open(scene: Scene, screen: Offscreen) -> Result<Self, SessionError> {
+    pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
         let length_s = scene.camera.as_ref().and_then(crate::scene::Camera::length_s).unwrap_or(0.0);
         let mut session = Session::open(scene)?;
         session.drive(Drive::Pause);
-        let gpu = screen.gpu();
-        session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu.clone()));
-        Ok(Self { session, drawing: Drawing::Every(Box::new(screen)), length_s })
+        if let Drawing::Every(screen) = &drawing {
+            let gpu = screen.gpu();
+            session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu.clone()));
+        }
+        let camera = session.camera_at(0.0);
+        Ok(Self { session, drawing, size, length_s, camera })
     }
 
     /// The scene in play: for another policy, another target.
@@ -37,24 +44,29 @@ impl Walk {
         &mut self.session
     }
 
-    /// Draws what is seen at a part of the path, 0 … 1; the controller learns from it.
+    /// Plays what is seen at a part of the path, 0 … 1; the controller learns from it.
     ///
     /// # Errors
     /// [`SessionError::Draw`] where the adapter fails.
     pub fn step(&mut self, part: f64) -> Result<FrameRecord, SessionError> {
-        let Drawing::Every(screen) = &self.drawing else { return Ok(FrameRecord::default()) };
-        let (camera, size) = (self.session.camera_at(part * self.length_s), screen.size());
-        frame_seen_by(&mut self.session, &camera, (size, Style::default()), (&mut self.drawing, false))
+        self.camera = self.session.camera_at(part * self.length_s);
+        let view = (self.size, Style::default());
+        frame_seen_by(&mut self.session, &self.camera, view, (&mut self.drawing, false))
     }
 
-    /// The picture that was drawn last.
+    /// The picture of the last frame; `None` where nothing draws.
     ///
     /// # Errors
-    /// [`SessionError::Picture`] where it cannot be read back.
-    pub fn picture(&self) -> Result<PictureFile, SessionError> {
-        match &self.drawing {
-            Drawing::Every(screen) | Drawing::Last(screen) => screen.read_back().map_err(SessionError::Picture),
-            Drawing::Nothing => Ok(PictureFile::new(0, 0)),
-        }
+    /// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where it cannot be read back.
+    pub fn picture(&mut self) -> Result<Option<PictureFile>, SessionError> {
+        let screen = match &mut self.drawing {
+            Drawing::Nothing => return Ok(None),
+            Drawing::Every(screen) => screen,
+            Drawing::Last(screen) => {
+                screen.render(self.session.picture(), &self.camera).map_err(SessionError::Draw)?;
+                screen
+            }
+        };
+        screen.read_back().map(Some).map_err(SessionError::Picture)
     }
 }

@@ -118,6 +118,7 @@ const POLICIES: &[Entry] = &[
     entry::<policies::still::Still>(),
     entry::<policies::selection::Selection>(),
     entry::<policies::bound::Bound>(),
+    entry::<policies::every::Every>(),
 ];
 
 const POLICIES_LIVE: &[Entry] = &[

@@ -47,6 +47,8 @@ pub(super) struct Frame {
     pub(super) reversals: usize,
     /// Polygons that were drawn.
     pub(super) polygons: f64,
+    /// Choosing levels, as a part of T.
+    pub(super) choosing: f64,
 }
 
 /// Every so many frames the bound at the true costs is worked out.
@@ -112,6 +114,7 @@ impl Show {
             changes: 0,
             reversals: 0,
             polygons: sum(&|s, level, part| part * form(s, level).polygons),
+            choosing: f64::NAN,
         }
     }
 

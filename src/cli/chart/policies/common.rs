@@ -4,7 +4,7 @@ use super::super::experiment::Finding;
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::chooser::Policy;
-use super::closed_loop::{Frame, Show};
+use super::closed_loop::Show;
 use super::metrics::Row;
 
 /// A setting and a policy.
@@ -36,8 +36,8 @@ impl Case {
     /// Plays the show once for every seed; the row of all their frames.
     pub(super) fn measure(&self, show: &Show, policies: &[Policy]) -> Row {
         let (policy, seeds) = (self.policy_of(policies), self.frames / show.frames.max(1));
-        let frames: Vec<Frame> = (1..=seeds as u64).flat_map(|seed| show.play(policy, seed)).collect();
-        Row::of(&self.setting, &self.policy, &frames)
+        let runs: Vec<_> = (1..=seeds as u64).map(|seed| show.play(policy, seed)).collect();
+        Row::of(&self.setting, &self.policy, &runs)
     }
 }
 

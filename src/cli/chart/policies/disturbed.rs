@@ -4,11 +4,11 @@ use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::Figure;
 use super::super::table::{Cell, Table};
 use super::chooser::Policy;
-use super::closed_loop::Show;
+use super::closed_loop::{Frame, Show};
 use super::common::{Case, at_least, curves, figure, number, table};
 use super::hall::{LAP, show};
 use super::machine::Fault;
-use super::metrics::{Row, settled};
+use super::metrics::{Row, overshoot, settled};
 
 /// The experiment.
 pub(in super::super) struct Disturbed;
@@ -44,11 +44,15 @@ impl Experiment for Disturbed {
     fn measure(case: &Case) -> Row {
         let (show, policy) = (disturbed(), case.policy_of(&POLICIES));
         let runs: Vec<_> = (1..=(case.frames / FRAMES) as u64).map(|seed| show.play(policy, seed)).collect();
-        let settles = |run: &Vec<super::closed_loop::Frame>| {
+        let settles = |run: &Vec<Frame>| {
             let times: Vec<f64> = run.iter().map(|f| f.time).collect();
             worst([LOADED.start, LOADED.end].into_iter().zip(LATER).map(|(step, later)| settled(&times, step, later)))
         };
-        Row { settled: worst(runs.iter().map(settles)), ..Row::of(&case.setting, &case.policy, &runs.concat()) }
+        Row {
+            settled: worst(runs.iter().map(settles)),
+            overshoot: worst(runs.iter().map(|run| overshoot(run, LOADED.start))),
+            ..Row::of(&case.setting, &case.policy, &runs)
+        }
     }
 
     fn case_of(row: &Row) -> Case {

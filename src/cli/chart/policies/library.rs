@@ -130,7 +130,7 @@ impl Experiment for Library {
             findings.push(at_least(
                 format!("adaptive, {name}: benefit over the bound"),
                 of(name, |r| r.value_over_bound),
-                0.98,
+                0.99,
             ));
         }
         findings

@@ -2,6 +2,7 @@
 //!
 //! In: frames. Out: a row of numbers. Never here: who chose. The definitions are those of a run's report.
 
+use super::super::experiment::worst;
 use super::closed_loop::Frame;
 use serde::{Deserialize, Serialize};
 
@@ -12,27 +13,44 @@ const MISS: f64 = 1.05;
 /// A choice within this of the best is as good as proven best.
 const CERTIFIED: f64 = 0.01;
 
+/// Frames after a step in which what they take over T counts as overshoot.
+const AFTER_STEP: usize = 60;
+
 /// A policy on a scene: times as parts of T; NaN where nothing was to be measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     /// Which scene, path or target.
     pub(super) setting: String,
     pub(super) policy: String,
+    /// Who drew the pictures; empty where nothing was drawn.
+    pub(super) adapter: String,
     pub(super) frames: usize,
+    /// T, milliseconds, where it is what full detail makes of it.
+    pub(super) target_ms: f64,
     pub(super) mean: f64,
     pub(super) min: f64,
     pub(super) max: f64,
     pub(super) stddev: f64,
+    /// What so many of a hundred frames take at most.
+    pub(super) p50: f64,
+    pub(super) p95: f64,
+    pub(super) p99: f64,
     /// The part of frames in which full detail takes more than 1.15 T, and the times of those.
     pub(super) binding: f64,
     pub(super) binding_mean: f64,
     pub(super) binding_stddev: f64,
     /// Mean |t − T|/T of binding frames.
     pub(super) avg_err: f64,
-    /// The part of frames past 1.05 T.
+    /// The part of frames past T.
+    pub(super) late: f64,
+    /// The part of frames past 1.05 T, and the most of them in a row.
     pub(super) misses: f64,
-    /// Mean |predicted − measured| over measured.
+    pub(super) miss_run: usize,
+    /// The longest of the 60 frames from the sudden step on, less T.
+    pub(super) overshoot: f64,
+    /// |predicted − measured| over measured: the mean, and what 19 of 20 frames are within.
     pub(super) model_error: f64,
+    pub(super) model_error95: f64,
     /// Levels that changed, and changed back within three frames, to an object and frame.
     pub(super) changes: f64,
     pub(super) reversals: f64,
@@ -45,11 +63,20 @@ pub(in super::super) struct Row {
     pub(super) settled: f64,
     /// Polygons to a frame.
     pub(super) polygons: f64,
+    /// Choosing levels, as a part of T.
+    pub(super) choosing: f64,
+    /// Likeness to full detail: the mean and the least of the pictures compared.
+    pub(super) ssim: f64,
+    pub(super) ssim_least: f64,
+    pub(super) psnr_db: f64,
+    /// The time of every frame as a part of T, with spaces between; empty where the figure plays again.
+    pub(super) times: String,
 }
 
 impl Row {
-    /// The row of some frames, of one run or of several.
-    pub(super) fn of(setting: &str, policy: &str, frames: &[Frame]) -> Self {
+    /// The row of the frames of some runs.
+    pub(super) fn of(setting: &str, policy: &str, runs: &[Vec<Frame>]) -> Self {
+        let frames = &runs.concat();
         let times = |keep: fn(&&Frame) -> bool| frames.iter().filter(keep).map(|f| f.time).collect::<Vec<_>>();
         let (all, binding) = (times(|_| true), times(|f| f.full > BINDING));
         let part = |count: usize, of: usize| if of > 0 { count as f64 / of as f64 } else { f64::NAN };
@@ -57,21 +84,30 @@ impl Row {
         let each = |of: fn(&Frame) -> usize| part(frames.iter().map(of).sum(), things);
         let known = |of: fn(&Frame) -> f64| frames.iter().map(of).filter(|x| x.is_finite()).collect::<Vec<_>>();
         let gaps = known(|f| f.gap);
-        let extreme = |pick: fn(f64, f64) -> f64| all.iter().copied().reduce(pick).unwrap_or(f64::NAN);
+        let errors = known(|f| (f.predicted - f.time).abs() / f.time);
         Self {
             setting: setting.to_owned(),
             policy: policy.to_owned(),
+            adapter: String::new(),
             frames: frames.len(),
+            target_ms: f64::NAN,
             mean: mean(&all),
-            min: extreme(f64::min),
-            max: extreme(f64::max),
+            min: within(&all, 0.0),
+            max: within(&all, 1.0),
             stddev: stddev(&all),
+            p50: within(&all, 0.5),
+            p95: within(&all, 0.95),
+            p99: within(&all, 0.99),
             binding: part(binding.len(), all.len()),
             binding_mean: mean(&binding),
             binding_stddev: stddev(&binding),
             avg_err: mean(&binding.iter().map(|x| (x - 1.0).abs()).collect::<Vec<_>>()),
+            late: part(all.iter().filter(|t| **t > 1.0).count(), all.len()),
             misses: part(all.iter().filter(|t| **t > MISS).count(), all.len()),
-            model_error: mean(&known(|f| (f.predicted - f.time).abs() / f.time)),
+            miss_run: runs.iter().map(|run| longest_run(run)).max().unwrap_or(0),
+            overshoot: worst(runs.iter().map(|run| overshoot(run, steepest(run)))),
+            model_error: mean(&errors),
+            model_error95: within(&errors, 0.95),
             changes: each(|f| f.changes),
             reversals: each(|f| f.reversals),
             holes: each(|f| f.holes),
@@ -79,8 +115,37 @@ impl Row {
             certified: part(gaps.iter().filter(|g| **g <= CERTIFIED).count(), gaps.len()),
             settled: f64::NAN,
             polygons: mean(&known(|f| f.polygons)),
+            choosing: mean(&known(|f| f.choosing)),
+            ssim: f64::NAN,
+            ssim_least: f64::NAN,
+            psnr_db: f64::NAN,
+            times: String::new(),
         }
     }
+}
+
+/// What the part `share` of some numbers, 0 … 1, is at most (the nearest rank); NaN of nothing.
+fn within(x: &[f64], share: f64) -> f64 {
+    let mut sorted = x.to_vec();
+    sorted.sort_by(f64::total_cmp);
+    let rank = (share * x.len() as f64).ceil() as usize;
+    sorted.get(rank.saturating_sub(1)).copied().unwrap_or(f64::NAN)
+}
+
+/// The most misses in a row.
+fn longest_run(run: &[Frame]) -> usize {
+    run.split(|f| f.time <= MISS).map(<[Frame]>::len).max().unwrap_or(0)
+}
+
+/// The frame in which what full detail takes rises most from the frame before: the sudden turn, where a path has one.
+fn steepest(run: &[Frame]) -> usize {
+    let rise = |k: &usize| run[*k].full - run[k - 1].full;
+    (1..run.len()).max_by(|a, b| rise(a).total_cmp(&rise(b))).unwrap_or(0)
+}
+
+/// The longest of the 60 frames from `step` on as a part of T, less 1; NaN of nothing.
+pub(super) fn overshoot(run: &[Frame], step: usize) -> f64 {
+    worst(run.iter().skip(step).take(AFTER_STEP).map(|f| f.time)) - 1.0
 }
 
 /// The mean; NaN of nothing.
@@ -130,16 +195,31 @@ mod tests {
             changes: 2,
             reversals: 0,
             polygons,
+            choosing: none,
         }
     }
 
     #[test]
     fn only_binding_frames_tell_how_near_a_policy_keeps_to_its_time() {
-        let row = Row::of("", "", &[frame(0.9, 2.0), frame(1.1, 3.0), frame(0.2, 0.2), frame(1.0, 1.1)]);
+        let row = Row::of("", "", &[vec![frame(0.9, 2.0), frame(1.1, 3.0), frame(0.2, 0.2), frame(1.0, 1.1)]]);
         assert!((row.binding - 0.5).abs() < 1e-15 && (row.avg_err - 0.1).abs() < 1e-12);
         assert!((row.binding_stddev - 0.1).abs() < 1e-12 && (row.mean - 0.8).abs() < 1e-12);
         assert!((row.misses - 0.25).abs() < 1e-15 && (row.model_error - 0.1).abs() < 1e-12);
         assert!((row.holes - 0.25).abs() < 1e-15 && (row.changes - 0.5).abs() < 1e-15 && row.certified.is_nan());
+    }
+
+    #[test]
+    fn late_frames_are_counted_in_a_row_within_a_run_and_from_the_steepest_rise_on() {
+        let times = [1.2, 1.0, 1.06, 1.3, 1.1, 0.9];
+        let fulls = [2.0, 2.1, 4.0, 4.0, 4.2, 1.0];
+        let run: Vec<_> = times.into_iter().zip(fulls).map(|(time, full)| frame(time, full)).collect();
+        let row = Row::of("", "", &[run.clone(), run]);
+        // the last frame of the first run and the first of the second are not neighbours
+        assert_eq!((row.miss_run, row.frames), (3, 12));
+        assert!((row.overshoot - 0.3).abs() < 1e-12, "{}", row.overshoot);
+        // twelve frames: the sixth, the twelfth
+        assert_eq!((row.min, row.p50, row.p95, row.p99, row.max), (0.9, 1.06, 1.3, 1.3, 1.3));
+        assert!((row.late - 8.0 / 12.0).abs() < 1e-15 && (row.misses - 8.0 / 12.0).abs() < 1e-15);
     }
 
     #[test]

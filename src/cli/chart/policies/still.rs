@@ -50,8 +50,8 @@ impl Experiment for Still {
     fn measure(case: &Case) -> Row {
         let (show, policy) = (still(&case.setting), case.policy_of(&POLICIES));
         let seeds = (case.frames / (FRAMES - LEARNT)) as u64;
-        let frames: Vec<_> = (1..=seeds).flat_map(|seed| show.play(policy, seed).split_off(LEARNT)).collect();
-        Row::of(&case.setting, &case.policy, &frames)
+        let runs: Vec<_> = (1..=seeds).map(|seed| show.play(policy, seed).split_off(LEARNT)).collect();
+        Row::of(&case.setting, &case.policy, &runs)
     }
 
     fn case_of(row: &Row) -> Case {

@@ -8,7 +8,7 @@ use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
 use super::super::machine::Noise;
-use super::walk::{self, Foretold};
+use super::super::played::walk::{self, Foretold};
 use crate::control::Policy;
 use crate::scene::papers::Paper;
 use serde::{Deserialize, Serialize};

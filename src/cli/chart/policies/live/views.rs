@@ -5,7 +5,7 @@
 use super::super::super::experiment::{Experiment, Finding};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::super::table::Table;
-use super::walk::{self, Still};
+use super::super::played::walk::{self, Still};
 use crate::compositor::{PictureFile, psnr_db, ssim};
 use crate::scene::papers::Paper;
 use serde::{Deserialize, Serialize};

@@ -1,0 +1,120 @@
+//! The papers' scenes as they are, played through the program's own frame loop: every policy on every scene, the same frames for all.
+//!
+//! In: a scene, a policy, who gives the times. Out: a row of [`Row`]. Never here: a model of a scene.
+
+mod row;
+pub(super) mod walk;
+
+use super::super::figure::{Axis, Colour, Layer, Mark, Panel};
+use super::super::table::Table;
+use super::metrics::Row;
+use crate::control::Policy;
+use crate::scene::papers::Paper;
+pub(super) use walk::Times;
+
+/// A scene, its frames, and how little time there is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Play {
+    pub(super) paper: Paper,
+    /// Frames along the path, and of the quick run.
+    frames: [usize; 2],
+    /// How many targets full detail takes in the mean.
+    times_over: f64,
+}
+
+/// In (FS93, table 1) full detail takes 4.3 targets in the mean and 9.9 at most.
+pub(super) const PLAYS: [Play; 5] = [
+    Play { paper: Paper::Auditorium, frames: [250, 25], times_over: 4.3 },
+    Play { paper: Paper::Grove, frames: [250, 25], times_over: 4.0 },
+    Play { paper: Paper::Domes, frames: [240, 24], times_over: 2.5 },
+    Play { paper: Paper::Walkthrough, frames: [200, 20], times_over: 4.0 },
+    Play { paper: Paper::Library, frames: [60, 10], times_over: 2.5 },
+];
+
+/// A policy on a scene, of so many frames.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    scene: String,
+    policy: String,
+    frames: usize,
+}
+
+impl Case {
+    /// The case of a row.
+    pub(super) fn of(row: &Row) -> Self {
+        Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
+    }
+
+    /// Its row; one of no frames where it could not be played.
+    pub(super) fn measure(&self, times: Times) -> Row {
+        let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
+        play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), |play| walk::measure(play, self, times))
+    }
+}
+
+impl Play {
+    /// Every policy that the program knows.
+    pub(super) fn cases(&self, quick: bool) -> impl Iterator<Item = Case> {
+        let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
+        let case = move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames };
+        Policy::ALL.into_iter().map(case)
+    }
+}
+
+/// Every number of every row.
+pub(super) fn table(rows: &[Row]) -> Table {
+    row::table(rows)
+}
+
+/// The time of every frame of some of a scene's rows.
+pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clone) -> Panel {
+    let frames = rows.clone().map(|row| row.frames).max().unwrap_or(1) as f64;
+    let greatest = rows.clone().map(|row| row.max).fold(1.5, f64::max);
+    let target = Mark::Dashed(vec![(0.0, 1.0), (frames, 1.0)]);
+    let mut layers = vec![Layer { label: "target".to_owned(), colour: Colour::Grey, mark: target }];
+    layers.extend(rows.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| {
+        let line = row::times(row).into_iter().enumerate().map(|(k, time)| (k as f64, time)).collect();
+        Layer { label: row.policy.clone(), colour, mark: Mark::Line(line) }
+    }));
+    let (x, y) = (Axis::linear("frame", 0.0, frames), Axis::linear("time of a frame / target", 0.0, 1.05 * greatest));
+    Panel { title: title.to_owned(), x, y, layers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::compositor::Gpu;
+
+    fn row(scene: &str, policy: &str) -> Row {
+        Case { scene: scene.to_owned(), policy: policy.to_owned(), frames: 6 }.measure(Times::Declared)
+    }
+
+    #[test]
+    fn a_policy_plays_a_scene_to_the_bit_and_every_number_is_there() {
+        let policies = ["robin-hood", "adaptive"];
+        let rows = policies.map(|policy| row("library", policy));
+        for (row, again) in rows.iter().zip(policies.map(|policy| self::row("library", policy))) {
+            // NaN is unlike itself, so the rows are compared as they are written
+            assert_eq!(format!("{row:?}"), format!("{again:?}"));
+            assert_eq!((row.frames, row::times(row).len(), row.setting.as_str()), (6, 6, "library"));
+        }
+        let drawn = Gpu::headless().is_ok();
+        for row in &rows {
+            let unknown: Vec<_> = row::COLUMNS.iter().filter(|(_, of, _)| of(row).is_nan()).map(|c| c.0).collect();
+            // a promise is made by who predicts, and a bound known by who has one
+            let mut expected: Vec<&str> = match row.policy.as_str() {
+                "robin-hood" => vec!["value", "proven"],
+                _ => Vec::new(),
+            };
+            expected.extend(["ssim", "ssim_least", "psnr_db"].iter().filter(|_| !drawn));
+            assert_eq!(unknown, expected, "{}", row.policy);
+        }
+    }
+
+    #[test]
+    fn full_detail_takes_the_target_so_many_times_and_is_like_itself() {
+        let full = row("library", "full");
+        assert!((full.mean - 2.5).abs() < 1e-9 && full.holes == 0.0 && full.changes == 0.0, "{full:?}");
+        assert!(full.adapter.is_empty() || (full.ssim - 1.0).abs() < 1e-12, "{}", full.ssim);
+    }
+}

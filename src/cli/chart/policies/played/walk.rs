@@ -1,0 +1,221 @@
+//! One walk through a scene of the papers under one policy, compared with full detail.
+//!
+//! In: a play, a case, whether times are measured or declared. Out: a row; where times are measured and there is no adapter that draws,
+//! one without frames. Never here: figures.
+//! Full detail is played once for all policies of a play: its times give the target, its pictures what the others are held against.
+
+use super::super::metrics::Row;
+use super::row::Played;
+use super::{Case, Play};
+use crate::compositor::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
+use crate::control::Policy;
+use crate::frame::{Drawing, FrameRecord, Walk};
+use crate::scene::papers::{Choices, Paper};
+use crate::scene::{Source, load};
+use anyhow::Context;
+use std::sync::{Arc, Mutex, PoisonError};
+
+const SIZE: Size = Size { width: 640, height: 480 };
+/// Where the times of frames come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Times {
+    /// The adapter that is present draws every frame.
+    Measured,
+    /// Lockstep on [`DECLARED`]: the same bits on every computer. An adapter, where there is one, draws only the pictures compared.
+    Declared,
+}
+
+/// A machine whose frames take what their objects take, by the way they are shaded, with the noise of `docs/theory/budget.md`, section
+/// 10. Choosing is declared as one core was measured to take it with the default policy (`chart policies`, selection).
+const DECLARED: [(&str, &str); 12] = [
+    ("executor", "lockstep"),
+    ("machine.draw_setup_ms", "0.1"),
+    ("machine.draw_pixel_ns", "0.2"),
+    ("machine.draw_object_us", "0.5"),
+    ("machine.draw_triangle_us", "0.22"),
+    ("machine.shading.flat.triangle_us", "0.1"),
+    ("machine.shading.gouraud.triangle_us", "0.14"),
+    ("machine.shading.flat.pixel_ns", "0.3"),
+    ("machine.shading.gouraud.pixel_ns", "0.5"),
+    ("machine.choose_object_ns", "50"),
+    ("machine.noise", "0.01"),
+    ("machine.wander", "0.05"),
+];
+
+/// Pictures of a path, evenly along it, that are kept and compared at most, and frames between two at least: a comparison takes as long
+/// as dozens of frames.
+const PICTURES: usize = 5;
+const APART: usize = 10;
+/// Frames at the first place before the first that counts: pipelines, caches and prices are warm then, as after any start.
+const LEAD_IN: usize = 20;
+/// Where pictures are alike to the bit there is no noise to speak of, dB.
+pub(in super::super) const ALIKE_DB: f64 = 99.0;
+
+/// A walk that has been drawn.
+struct Walked {
+    adapter: String,
+    frames: Vec<FrameRecord>,
+    pictures: Vec<PictureFile>,
+}
+
+/// Full detail of a scene in so many frames.
+type Reference = (&'static str, usize, Times, Arc<Walked>);
+
+static REFERENCES: Mutex<Vec<Reference>> = Mutex::new(Vec::new());
+
+/// The row of a case.
+pub(super) fn measure(play: &Play, case: &Case, times: Times) -> Row {
+    let measured = reference(play, case.frames, times).and_then(|full| {
+        let target_s = 1e-3 * mean_ms(&full) / play.times_over;
+        let full_itself = case.policy == "full";
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(play, case, (target_s, times))?) };
+        Ok((full, own, target_s))
+    });
+    let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
+    let pairs = own.pictures.iter().zip(&full.pictures);
+    let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
+    let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
+    let played = Played {
+        scene: play.paper.name(),
+        policy: &case.policy,
+        adapter: &own.adapter,
+        target_ms: 1e3 * target_s,
+        frames: &own.frames,
+        full_ms: &full_ms,
+        likeness: &likeness,
+    };
+    played.row()
+}
+
+fn nothing() -> Arc<Walked> {
+    Arc::new(Walked { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
+}
+
+fn mean_ms(walked: &Walked) -> f64 {
+    walked.frames.iter().map(|row| row.frame_ms).sum::<f64>() / walked.frames.len() as f64
+}
+
+/// Full detail of a play, played where it was not yet.
+fn reference(play: &Play, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
+    let mut known = REFERENCES.lock().unwrap_or_else(PoisonError::into_inner);
+    let here = |r: &&Reference| (r.0, r.1, r.2) == (play.paper.name(), frames, times);
+    if let Some((.., walked)) = known.iter().find(here) {
+        return Ok(Arc::clone(walked));
+    }
+    let case = Case { scene: play.paper.name().to_owned(), policy: "full".to_owned(), frames };
+    // no target: full detail has none to miss
+    let full = Arc::new(walked(play, &case, (1.0, times))?);
+    known.push((play.paper.name(), frames, times, Arc::clone(&full)));
+    Ok(full)
+}
+
+fn walked(play: &Play, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
+    let (adapter, mut walk) = opened(play.paper, times)?;
+    let control = walk.session().control();
+    control.set_target_hz(1.0 / target_s);
+    control.set_policy(Policy::named(&case.policy).context("no such policy")?);
+    for _ in 0..LEAD_IN {
+        walk.step(0.0)?;
+    }
+    let mut walked = Walked { adapter, frames: Vec::with_capacity(case.frames), pictures: Vec::new() };
+    for frame in 0..case.frames {
+        walked.frames.push(walk.step(frame as f64 / case.frames as f64)?);
+        if frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
+            walked.pictures.extend(walk.picture()?);
+        }
+    }
+    Ok(walked)
+}
+
+/// What was foretold of one picture, and what it took each time it was drawn, milliseconds.
+pub(in super::super) struct Foretold {
+    pub(in super::super) told_ms: f64,
+    pub(in super::super) took_ms: Vec<f64>,
+}
+
+/// Frames until a picture is itself: meshes of levels that were never drawn are made, and all are at the end of their way.
+const SETTLED: usize = 8;
+
+/// Pictures at places of a scene's path under targets in seconds, as `policy` foretells and chooses them, each drawn several times; and
+/// the adapter.
+///
+/// # Errors
+/// Of the scene, of the adapter.
+pub(in super::super) fn predicted(
+    paper: Paper,
+    policy: Policy,
+    (asked, times): (&[(f64, f64)], usize),
+) -> anyhow::Result<(String, Vec<Foretold>)> {
+    let (adapter, mut walk) = opened(paper, Times::Measured)?;
+    walk.session().control().set_policy(policy);
+    for _ in 0..LEAD_IN {
+        walk.step(0.0)?;
+    }
+    let mut pictures = Vec::with_capacity(asked.len());
+    for (part, target_s) in asked {
+        walk.session().control().set_target_hz(1.0 / target_s);
+        walk.step(*part)?;
+        let told = walk.step(*part)?.predicted_ms;
+        walk.session().control().freeze(true);
+        for _ in 2..SETTLED {
+            walk.step(*part)?;
+        }
+        let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
+        walk.session().control().freeze(false);
+        let took_ms = took?.iter().map(|record| record.frame_ms).collect();
+        pictures.extend(told.map(|told_ms| Foretold { told_ms, took_ms }));
+    }
+    Ok((adapter, pictures))
+}
+
+/// A scene of the papers before the first frame, and the adapter that draws it.
+fn opened(paper: Paper, times: Times) -> anyhow::Result<(String, Walk)> {
+    let text = paper.text(&Choices::default());
+    let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
+    let scene = load(&Source::memory(paper.name(), text.as_bytes())?, overrides)?;
+    let gpu = match times {
+        Times::Measured => Some(Gpu::headless()?),
+        Times::Declared => Gpu::headless().ok(),
+    };
+    let adapter = gpu.as_ref().map(Gpu::describe).unwrap_or_default();
+    let screen = |gpu: Gpu| {
+        let options = RendererOptions::for_adapter(&gpu.info);
+        Offscreen::new(gpu, SIZE, options).map(Box::new)
+    };
+    let drawing = match (gpu.map(screen).transpose()?, times) {
+        (Some(screen), Times::Measured) => Drawing::Every(screen),
+        (Some(screen), Times::Declared) => Drawing::Last(screen),
+        (None, _) => Drawing::Nothing,
+    };
+    Ok((adapter, Walk::open(scene, drawing, SIZE)?))
+}
+
+/// One view of a scene after a policy has come to rest on it.
+pub(in super::super) struct Still {
+    pub(in super::super) adapter: String,
+    pub(in super::super) target_s: f64,
+    /// The median of the last frames.
+    pub(in super::super) frame_ms: f64,
+    pub(in super::super) triangles: u64,
+    pub(in super::super) picture: PictureFile,
+}
+
+/// Frames that are drawn of one view; the last half of them counts.
+const STOOD: usize = 40;
+
+/// Stands still at a part of a scene's path.
+///
+/// # Errors
+/// Of the scene, of the adapter.
+pub(in super::super) fn still(paper: Paper, part: f64, policy: &str, target_s: f64) -> anyhow::Result<Still> {
+    let (adapter, mut walk) = opened(paper, Times::Measured)?;
+    let control = walk.session().control();
+    control.set_target_hz(1.0 / target_s);
+    control.set_policy(Policy::named(policy).context("no such policy")?);
+    let mut records = (0..STOOD).map(|_| walk.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(STOOD / 2);
+    let triangles = records.last().map_or(0, |row| row.triangles);
+    records.sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
+    let frame_ms = records[records.len() / 2].frame_ms;
+    Ok(Still { adapter, target_s, frame_ms, triangles, picture: walk.picture()?.context("nothing draws")? })
+}
