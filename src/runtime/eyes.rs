@@ -9,7 +9,7 @@ use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
 use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, owns};
-use metachron_agents::{AgentId, Bounds, Inertia, Neighbour, SimSpan, SimTime, Snapshot};
+use metachron_agents::{AgentId, Neighbour, SimSpan, SimTime, Snapshot};
 use std::sync::Arc;
 
 /// What is known of all agents of a run from the start.
@@ -38,8 +38,6 @@ pub(super) struct Eyes {
     links: usize,
     /// Only in a crowd.
     sight: Option<Box<Sight>>,
-    /// Where it stands itself, if anything could push it.
-    bounds: Option<Bounds>,
     /// Whom it wants to see besides its links.
     wanted: Vec<AgentId>,
 }
@@ -111,15 +109,9 @@ impl Eyes {
 
     /// The state this agent has written last: it tells the crowd where that is.
     pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
-        self.bounds = state.bounds.filter(|_| !matches!(state.inertia, Inertia::Immovable));
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
             sight.stand(crowd, state.bounds.as_ref(), state.time);
         }
-    }
-
-    /// Where it stood when it wrote its last state; `None` where nothing of it can be touched, or nothing pushes it.
-    pub fn bounds(&self) -> Option<&Bounds> {
-        self.bounds.as_ref()
     }
 
     /// Looks at those it saw last, and at nobody else.
@@ -158,7 +150,7 @@ impl Eyes {
     /// Gathers whom it must see: who is near, who has called, who is neither but has an account to settle, and who gives to
     /// somebody that it gives to.
     fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
-        let Self { neighbours, links, sight, wanted, looks, .. } = self;
+        let Self { neighbours, links, sight, wanted, looks } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
         let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
         wanted.clear();
@@ -232,7 +224,7 @@ fn others_who_give(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentI
 }
 
 /// The state that was written last, published or not.
-fn newest<R>(writer: &SlotWriter<Snapshot>, read: impl FnOnce(&Snapshot) -> R) -> R {
+pub(super) fn newest<R>(writer: &SlotWriter<Snapshot>, read: impl FnOnce(&Snapshot) -> R) -> R {
     match writer.filled() {
         Some(state) => read(state),
         None => read(&writer.slot().latest()),

@@ -17,12 +17,12 @@ use std::time::Duration;
 /// Shorter, a hiccup of the machine costs simulated time; longer, an overload shows as old states (MuJoCo resyncs at the same lag).
 pub const LAG_CAP: Duration = Duration::from_millis(100);
 
-/// The same of an agent that is near others: what it gives up, they go through without it.
+/// The same of an agent that is near others, until its steps are as long as they may be: what it gives up, they go through without it.
 pub const LAG_CAP_NEAR: Duration = Duration::from_millis(500);
 
-/// How long an agent waits at once for others that are behind it, and how long in all until they have caught up, wall time.
-const MOMENT: Duration = Duration::from_millis(1);
-const PATIENCE: Duration = LAG_CAP_NEAR;
+/// So often an agent waits for others that are behind it, two milliseconds of wall time at once; each turn that finds nobody behind
+/// gives it one wait more. Who is held up for a moment is waited for, and who never keeps up is not.
+const PATIENCE: u8 = 125;
 
 /// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
@@ -44,10 +44,10 @@ pub struct Pace {
     stretched: SimSpan,
     dropped: SimSpan,
     rested: SimSpan,
-    /// No step before this wall time: it waits for others.
-    held_until: Duration,
-    /// Since when it waits, and has not seen them catch up.
-    waits_since: Option<Duration>,
+    /// No step before this wall time, milliseconds: it waits for others.
+    held_until_ms: u32,
+    /// How much of its patience is spent.
+    waited: u8,
 }
 
 /// How a turn begins.
@@ -70,8 +70,8 @@ impl Pace {
             stretched: SimSpan::ZERO,
             dropped: SimSpan::ZERO,
             rested: SimSpan::ZERO,
-            held_until: Duration::ZERO,
-            waits_since: None,
+            held_until_ms: 0,
+            waited: 0,
         }
     }
 
@@ -118,27 +118,29 @@ impl Pace {
     /// The wall time at which the next step is released; `None` while the timeline stands still before it.
     #[must_use]
     pub fn due(&self, timeline: &Timeline) -> Option<Duration> {
-        timeline.wall_of(self.time).map(|due| due.max(self.held_until))
+        timeline.wall_of(self.time).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
     }
 
-    /// Waits a moment from wall time `wall` for others that are behind; whether it does, for it has waited long enough some time.
+    /// Waits a moment from wall time `wall` for others that are behind; whether it has the patience.
     pub fn wait(&mut self, wall: Duration) -> bool {
-        let waits = wall.saturating_sub(*self.waits_since.get_or_insert(wall)) < PATIENCE;
+        let waits = self.waited < PATIENCE;
         if waits {
-            self.held_until = wall + MOMENT;
+            self.waited += 1;
+            self.held_until_ms = u32::try_from(wall.as_millis()).map_or(u32::MAX, |now| now.saturating_add(2));
         }
         waits
     }
 
-    /// Nobody has to be waited for any more.
+    /// Nobody is behind.
     pub const fn go_on(&mut self) {
-        self.waits_since = None;
+        self.waited = self.waited.saturating_sub(1);
     }
 
     /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap, that of agents that are
     /// `near` others for one that is.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration, near: bool) -> Start {
-        let cap = if near { LAG_CAP_NEAR } else { LAG_CAP };
+        // whose steps are as long as they may be cannot make it up
+        let cap = if near && self.stretched < STRETCHED_MAX { LAG_CAP_NEAR } else { LAG_CAP };
         let now = timeline.sim_at(wall);
         let lag = now.since(self.time);
         let late = timeline.wall_span(lag);

@@ -9,7 +9,7 @@
 //! leads ([`super::island`]).
 
 use super::account::{Diary, SMOOTHING};
-use super::eyes::{Eyes, Peers};
+use super::eyes::{Eyes, Peers, newest};
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
@@ -20,7 +20,7 @@ use super::slot::SlotWriter;
 use metachron_agents::coupling::Link;
 use metachron_agents::coupling::beside::leaves_behind;
 use metachron_agents::{
-    Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
+    Agent, AgentId, Inertia, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -105,7 +105,7 @@ pub(super) enum Next {
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Rhythm {
     last: Option<(Duration, u64)>,
-    period_s: Option<f64>,
+    period_s: Option<f32>,
 }
 
 impl Rhythm {
@@ -114,8 +114,8 @@ impl Rhythm {
         match self.last.filter(|&(_, p)| p == piece) {
             None => self.period_s = None,
             Some((last, _)) => {
-                let sample = wall.saturating_sub(last).as_secs_f64();
-                self.period_s = Some(self.period_s.map_or(sample, |old| old + SMOOTHING * (sample - old)));
+                let sample = wall.saturating_sub(last).as_secs_f32();
+                self.period_s = Some(self.period_s.map_or(sample, |old| old + SMOOTHING as f32 * (sample - old)));
             }
         }
         self.last = Some((wall, piece));
@@ -296,10 +296,12 @@ impl Actor {
     }
 
     fn leaves_behind(&self) -> bool {
-        let Self { eyes, hands, links, pace, .. } = self;
+        let Self { eyes, hands, links, pace, writer, .. } = self;
         let around =
             Surroundings { me: self.shared.id, time: pace.time(), neighbours: eyes.neighbours(), hands, links };
-        eyes.bounds().is_some_and(|bounds| leaves_behind(pace.dt(), &around, bounds))
+        let is_pushed = |state: &Snapshot| !matches!(state.inertia, Inertia::Immovable);
+        let bounds = || newest(writer, |state| state.bounds.filter(|_| is_pushed(state)));
+        leaves_behind(pace.dt(), &around, bounds)
     }
 
     /// Steps by itself, by `wanted` or what the agent makes of that.
@@ -338,7 +340,7 @@ impl Actor {
         let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
             work_s,
             wanted_period_s,
-            real_period_s: self.rhythm.period_s.unwrap_or(wanted_period_s),
+            real_period_s: self.rhythm.period_s.map_or(wanted_period_s, f64::from),
             lateness_s: open.start.late.as_secs_f64(),
             dropped: open.start.dropped,
             dt: open.dt,

@@ -60,11 +60,14 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
 }
 
 /// Whether somebody who owns contact with the body, and whom it may touch in a step of `dt`, stands so far behind its time that it
-/// would go through them before they know: [`AHEAD_S`] and one of their steps.
-pub fn leaves_behind(dt: SimSpan, around: &Surroundings<'_>, bounds: &Bounds) -> bool {
+/// would go through them before they know: [`AHEAD_S`] and one of their steps. `bounds` are those of the body, if anything can push it.
+pub fn leaves_behind(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Option<Bounds>) -> bool {
     let behind = |n: &Neighbour| around.time.secs_after(n.snapshot.time) > AHEAD_S + n.step_s;
-    let near = |n: &Neighbour| may_touch(n, around, bounds, dt.as_secs_f64());
-    around.neighbours.iter().any(|n| !n.owned && !n.snapshot.at_rest && behind(n) && near(n))
+    let mut owners = around.neighbours.iter().filter(|n| !n.owned && !n.snapshot.at_rest && behind(n)).peekable();
+    if owners.peek().is_none() {
+        return false;
+    }
+    bounds().is_some_and(|bounds| owners.any(|n| may_touch(n, around, &bounds, dt.as_secs_f64())))
 }
 
 /// Whether a link by the ledger joins a neighbour to this body.
