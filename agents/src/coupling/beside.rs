@@ -60,7 +60,7 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
 }
 
 /// Whether somebody who owns contact with the body, and whom it may touch in a step of `dt`, stands so far behind its time that it
-/// would go through them before they know: [`AHEAD_S`] and one of their steps. `bounds` are those of the body, if anything can push it.
+/// would go through them before they know: by 20 ms and one of their steps. `bounds` are those of the body, if anything can push it.
 pub fn leaves_behind(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Option<Bounds>) -> bool {
     let behind = |n: &Neighbour| around.time.secs_after(n.snapshot.time) > AHEAD_S + n.step_s;
     let mut owners = around.neighbours.iter().filter(|n| !n.owned && !n.snapshot.at_rest && behind(n)).peekable();
