@@ -22,7 +22,7 @@ pub const LAG_CAP_NEAR: Duration = Duration::from_millis(500);
 
 /// So often an agent waits for others that are behind it, two milliseconds of wall time at once; each turn that finds nobody behind
 /// gives it one wait more. Who is held up for a moment is waited for, and who never keeps up is not.
-const PATIENCE: u8 = 200;
+const PATIENCE: u8 = 125;
 
 /// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
@@ -220,7 +220,7 @@ mod tests {
             assert_eq!(pace.due(&line), Some(wall + ms(2)));
             wall += ms(2);
         }
-        assert_eq!(wall, ms(400));
+        assert_eq!(wall, ms(250));
         assert!(wall < LAG_CAP_NEAR, "what it waited it can make up");
         pace.go_on();
         assert!(pace.wait(wall) && !pace.wait(wall + ms(2)));
