@@ -39,9 +39,11 @@ const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG
 impl Scene {
     /// Moves every loose agent that bends out of what it is inside, the shortest way that leaves it clear of all; of two that
     /// bend the later one. A loose rigid body is moved out of what bends and is held. Where there is no such way, nothing is moved.
-    pub(super) fn set_apart(&mut self) {
-        let inside = self.inside_each_other();
+    pub(super) fn set_apart(&mut self, inside: &[(AgentId, Inside, f64)]) {
         let movers: BTreeSet<AgentId> = inside.iter().filter_map(|(a, b, _)| self.mover(*a, *b)).collect();
+        if movers.is_empty() {
+            return;
+        }
         let mut figures: Vec<Figure> = self.agents.iter().filter_map(figure).collect();
         for mover in movers {
             let Some(at) = figures.iter().position(|figure| figure.id == mover) else { continue };

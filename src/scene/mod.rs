@@ -71,8 +71,9 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
     match (scene, c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
-            scene.overlaps = scene.name_overlaps();
-            scene.set_apart();
+            let inside = scene.inside_each_other();
+            scene.overlaps = scene.name_overlaps(&inside);
+            scene.set_apart(&inside);
             Ok(scene)
         }
         (_, problems) => Err(problems),

@@ -39,18 +39,18 @@ pub(super) enum Inside {
 }
 
 impl Scene {
-    /// All that is inside each other where the scene puts it, named: pairs of agents in the order of their numbers, then agents
-    /// inside fixed solids.
-    pub(super) fn name_overlaps(&self) -> Vec<Overlap> {
+    /// What is inside each other, named.
+    pub(super) fn name_overlaps(&self, inside: &[(AgentId, Inside, f64)]) -> Vec<Overlap> {
         let name = |b: Inside| match b {
             Inside::Agent(id) => self.name_of(id).to_owned(),
             Inside::Fixed(at) => self.obstacles[at].name.clone(),
         };
-        let named = |(a, b, depth_m)| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
-        self.inside_each_other().into_iter().map(named).collect()
+        let named = |&(a, b, depth_m): &_| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
+        inside.iter().map(named).collect()
     }
 
-    /// All that is inside each other, and how deep, metres.
+    /// All that is inside each other where the scene puts it, and how deep, metres: pairs of agents in the order of their numbers,
+    /// then agents inside fixed solids.
     ///
     /// What bends and is held may be meant to be held inside a fixed solid.
     pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {

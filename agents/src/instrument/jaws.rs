@@ -99,17 +99,25 @@ impl Jaws {
 
 /// The nearest point within reach of what may be grasped.
 pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<Near> {
-    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id));
-    let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= spec.reach_m);
-    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+    nearest_of(spec, tip, (around, spec.reach_m), |_| true)
 }
 
 /// The rigid body that open jaws may take, or have just let go: the nearest within `reach_m` of the tip.
 pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundings<'_>, f64)) -> Option<AgentId> {
-    let rigid = |other: &&Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
-    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id)).filter(rigid);
+    let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
+    nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
+}
+
+/// The nearest point within `reach_m` of those that may be grasped and are `wanted`.
+fn nearest_of(
+    spec: &ToolSpec,
+    tip: DVec3,
+    (around, reach_m): (&Surroundings<'_>, f64),
+    wanted: impl Fn(&Neighbour) -> bool,
+) -> Option<Near> {
+    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
     let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= reach_m);
-    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).map(|near| near.target)
+    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
 }
 
 /// The nearest point of what can be held.

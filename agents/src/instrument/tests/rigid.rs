@@ -24,20 +24,9 @@ const RATES: [(f64, f64); 5] = [(240.0, 240.0), (60.0, 600.0), (600.0, 60.0), (1
 const DOWN: DQuat = DQuat::from_xyzw(1.0, 0.0, 0.0, 0.0);
 
 fn cube(position: DVec3) -> RigidSpec {
-    RigidSpec {
-        solid: Solid::Box { half_extents_m: DVec3::splat(HALF_M) },
-        position,
-        rotation: DQuat::IDENTITY,
-        velocity: DVec3::ZERO,
-        spin: DVec3::ZERO,
-        mass_kg: MASS_KG,
-        restitution: 0.0,
-        friction: 0.3,
-        gravity: DVec3::Z * -G,
-        obstacles: [].into(),
-        joints: [].into(),
-        sleep: true,
-    }
+    let solid = Solid::Box { half_extents_m: DVec3::splat(HALF_M) };
+    let gravity = DVec3::Z * -G;
+    RigidSpec { friction: 0.3, gravity, sleep: true, ..RigidSpec::free(solid, position, MASS_KG) }
 }
 
 fn on_floor(spec: RigidSpec) -> RigidSpec {
