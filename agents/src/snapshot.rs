@@ -3,7 +3,11 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
-use crate::coupling::{Impulse, Ledger, PairState, Rebound, Sprung};
+mod stand;
+
+pub use stand::Stand;
+
+use crate::coupling::{Ledger, PairState, Rebound, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
 use crate::{AgentId, Rare, Resolution, SimTime};
@@ -71,58 +75,6 @@ pub enum Inertia {
     Curve(CurveInertia),
     /// A soft body.
     Soft(SoftInertia),
-}
-
-/// How a body stands on something fixed: pushed towards it, near the middle of its feet, the body does not yield.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Stand {
-    /// Unit normal, from what it stands on towards the body.
-    pub normal: DVec3,
-    /// The middle of the places where it stands, metres.
-    pub centre: DVec3,
-    /// A push whose line passes the middle no farther than this does not tip it, metres.
-    pub reach_m: f64,
-    /// How fast it would fall into the ground without it, m/s², ≥ 0: what is lifted off the ground loses that.
-    pub weight_m_s2: f64,
-}
-
-impl Stand {
-    /// Whether an impulse on a body whose centre of mass is at `centre` only presses it down: its line meets the ground
-    /// between the feet (docs/theory/coupling.md, eq. 7a).
-    #[must_use]
-    pub fn bears(&self, centre: DVec3, impulse: Impulse) -> bool {
-        let Self { normal, centre: feet, reach_m, .. } = *self;
-        let along = impulse.linear.dot(normal);
-        if along >= 0.0 {
-            return false;
-        }
-        let feet = feet - centre;
-        let depth = feet.dot(normal);
-        let met = (normal.cross(impulse.angular) + (impulse.linear - normal * along) * depth) / along;
-        met.distance(feet - normal * depth) <= reach_m
-    }
-
-    /// What is left of the change of velocity that impulses made off the ground and of the way that it has carried the body,
-    /// where they came `since_s` seconds ago: the ground lets go of what is lifted, and its weight pulls it back
-    /// (docs/theory/coupling.md, eq. 7f).
-    #[must_use]
-    pub fn lifted(&self, [change, way]: [DVec3; 2], since_s: f64) -> [DVec3; 2] {
-        let (speed_m_s, height_m) = (change.dot(self.normal), way.dot(self.normal));
-        if speed_m_s <= 0.0 || height_m <= 0.0 {
-            return [change, way];
-        }
-        let (slower_m_s, lower_m) = (self.weight_m_s2 * since_s, 0.5 * self.weight_m_s2 * since_s * since_s);
-        // it may have come down again
-        let lost = if lower_m < height_m { [slower_m_s, lower_m] } else { [speed_m_s, height_m] };
-        [change - self.normal * lost[0], way - self.normal * lost[1]]
-    }
-
-    /// What the ground leaves of an impulse that it bears, and of the way that it would have carried the body.
-    #[must_use]
-    pub fn leaves(&self, impulse: Impulse) -> Impulse {
-        let linear = impulse.linear - self.normal * impulse.linear.dot(self.normal);
-        Impulse { linear, angular: DVec3::ZERO }
-    }
 }
 
 /// Where matter is and how fast it may leave.
