@@ -35,6 +35,8 @@ pub struct Lockstep {
     handles: Vec<AgentHandle>,
     board: Arc<Switchboard>,
     batch: CpuBatch,
+    /// Who has made turns in the batch that is open.
+    unsettled: Vec<u32>,
 }
 
 /// An agent and where it is in its turns.
@@ -72,8 +74,9 @@ impl Lockstep {
         };
         let lives = actors.into_iter().map(|actor| Life { phase: phase(&actor), actor, turns: 0 }).collect();
         let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
-        let (due, batch) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default());
-        let mut run = Self { machine, timeline, now: Duration::ZERO, lives, due, cores, handles, board, batch };
+        let (due, batch, unsettled) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default(), Vec::new());
+        let now = Duration::ZERO;
+        let mut run = Self { machine, timeline, now, lives, due, cores, handles, board, batch, unsettled };
         run.schedule_all();
         Ok(run)
     }
@@ -197,6 +200,7 @@ impl Lockstep {
 
     /// Hands an agent over to `leader`, if that takes it in now.
     fn hand_over(&mut self, whose: usize, leader: AgentId) {
+        self.settle();
         let life = &mut self.lives[whose];
         life.actor = life.actor.take().and_then(|actor| move_in(actor, leader).err());
         if life.actor.is_none() {
@@ -206,6 +210,9 @@ impl Lockstep {
 
     fn count_cpu(&mut self, whose: usize, wall: Duration) {
         if let Some(actor) = &mut self.lives[whose].actor {
+            if actor.unsettled.is_zero() {
+                self.unsettled.push(whose as u32);
+            }
             actor.count(wall);
         }
         if self.batch.add(wall) {
@@ -225,8 +232,11 @@ impl Lockstep {
             return;
         }
         let share = self.batch.close();
-        let actors = self.lives.iter_mut().filter_map(|life| life.actor.as_mut());
-        actors.filter(|actor| !actor.unsettled.is_zero()).for_each(|actor| actor.settle(share));
+        for whose in self.unsettled.drain(..) {
+            if let Some(actor) = &mut self.lives[whose as usize].actor {
+                actor.settle(share);
+            }
+        }
     }
 }
 

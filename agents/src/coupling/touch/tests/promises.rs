@@ -26,6 +26,10 @@ fn curved((position, rotation): (DVec3, DQuat)) -> Vec<DVec3> {
     (-3..=4).map(|i| position + rotation * node(i)).collect()
 }
 
+fn is_cylinder(form: &Form) -> bool {
+    matches!(&form.kind, FormKind::Solid(form) if matches!(form.solid, Solid::Cylinder { .. }))
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
@@ -67,9 +71,13 @@ proptest! {
                 let b = place(second, (DVec3::ZERO, s), &v);
                 let before = all(&place(first, (p, r), &u), &b, 4e-3);
                 let after = all(&place(first, (p + shift, r), &w), &b, 4e-3);
+                let round = is_cylinder(first) || is_cylinder(second);
                 for m in before.iter().filter(|m| m.gap_m < 3.9e-3) {
                     let Some(n) = after.iter().find(|n| n.key == m.key) else { continue };
-                    prop_assert!((m.gap_m - n.gap_m).abs() < 1e-4, "{} and {}", m.gap_m, n.gap_m);
+                    // the corners that stand for a cylinder's rim turn with the place where the parts face each other, which
+                    // is any of a whole line where they lie flat: a gap then changes by the way to the other corner at most
+                    let turned_m = if round { axis(m.on_a, &u).0.distance(axis(n.on_a, &w).0) } else { 0.0 };
+                    prop_assert!((m.gap_m - n.gap_m).abs() < 1e-4 + turned_m, "{} and {}", m.gap_m, n.gap_m);
                 }
             }
         }
