@@ -82,22 +82,40 @@ impl<const B: usize> Envelope<B> {
 
     /// Replaces the matrix by its factor; `false` where it is not positive.
     pub(crate) fn factor(&mut self) -> bool {
-        for i in 0..self.first.len() {
-            let (done, rest) = self.values.split_at_mut(self.start[i]);
-            let first_i = self.first[i];
-            for j in first_i..i {
-                let first_j = self.first[j];
-                let from = first_i.max(first_j);
-                let row_j = &done[self.start[j]..self.start[j] + j + 1 - first_j];
-                let sum = dot(&rest[from - first_i..j - first_i], &row_j[from - first_j..j - first_j]);
-                rest[j - first_i] = (rest[j - first_i] - sum) / row_j[j - first_j];
+        (0..self.rows() / B).all(|body| self.factor_body(B * body))
+    }
+
+    /// Finds the rows of a body, which begin with row `i`: side by side as far as the bodies before it go, which takes each number of
+    /// those once for B of its own.
+    fn factor_body(&mut self, i: usize) -> bool {
+        let Self { first, start, values } = self;
+        let (done, mut rest) = values.split_at_mut(start[i]);
+        let (first_i, width) = (first[i], i - first[i]);
+        let mut rows: [&mut [f64]; B] = std::array::from_fn(|k| {
+            let (row, after) = std::mem::take(&mut rest).split_at_mut(width + k + 1);
+            rest = after;
+            row
+        });
+        for j in first_i..i {
+            let (first_j, at) = (first[j], j - first_i);
+            let from = first_i.max(first_j);
+            let row_j = &done[start[j]..=start[j] + j - first_j];
+            let sums = dots(rows.each_ref().map(|row| &row[from - first_i..at]), &row_j[from - first_j..j - first_j]);
+            rows.iter_mut().zip(sums).for_each(|(row, sum)| row[at] = (row[at] - sum) / row_j[j - first_j]);
+        }
+        for k in 0..B {
+            let (above, below) = rows.split_at_mut(k);
+            let row = &mut *below[0];
+            for (l, upper) in above.iter().enumerate() {
+                let at = width + l;
+                row[at] = (row[at] - dot(&row[..at], &upper[..at])) / upper[at];
             }
-            let own = &rest[..i - first_i];
-            let left = rest[i - first_i] - dot(own, own);
+            let own = &row[..width + k];
+            let left = row[width + k] - dot(own, own);
             if left.is_nan() || left <= 0.0 {
                 return false;
             }
-            rest[i - first_i] = left.sqrt();
+            row[width + k] = left.sqrt();
         }
         true
     }
@@ -159,13 +177,24 @@ fn dot_vectors(a: &[f64], b: &[DVec3]) -> f64 {
 
 /// A sum of products in four lanes: a fixed order, so the same bits everywhere.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut lanes = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4.remainder().iter().zip(b4.remainder()).map(|(x, y)| x * y).sum();
-    for (x, y) in a4.zip(b4) {
-        (0..4).for_each(|k| lanes[k] += x[k] * y[k]);
+    dots([a], b)[0]
+}
+
+/// The same of several with one: the bits of each are those of [`dot`].
+fn dots<const N: usize>(all: [&[f64]; N], b: &[f64]) -> [f64; N] {
+    let (b4, rest) = b.as_chunks::<4>();
+    let all = all.map(|a| (&a.as_chunks::<4>().0[..b4.len()], &a[4 * b4.len()..b.len()]));
+    let mut lanes = [[0.0; 4]; N];
+    for (at, b) in b4.iter().enumerate() {
+        for (lanes, (a, _)) in lanes.iter_mut().zip(&all) {
+            (0..4).for_each(|k| lanes[k] += a[at][k] * b[k]);
+        }
     }
-    (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
+    std::array::from_fn(|n| {
+        let [a, b, c, d] = lanes[n];
+        let last: f64 = all[n].1.iter().zip(rest).map(|(x, y)| x * y).sum();
+        (a + b) + (c + d) + last
+    })
 }
 
 #[cfg(test)]

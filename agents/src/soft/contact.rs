@@ -129,7 +129,8 @@ impl Contacts {
 
     /// Finds what may close within the substep, and says how well it is to be solved.
     fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
-        let Self { form, walls, list, touches: places, room, slack_m, .. } = self;
+        let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
+        let mut stands = false;
         let here = Placed { form, view: View::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
@@ -141,7 +142,12 @@ impl Contacts {
                 let mut slots = Slots::default();
                 place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
                 let closing = slots.velocity(velocities).dot(place.normal);
-                if place.gap_m + closing * h <= *slack_m {
+                if place.gap_m + closing * h > *slack_m {
+                    continue;
+                }
+                stands = true;
+                // where it is held it needs no contact to stay
+                if slots.mobility(mobilities) > 0.0 {
                     let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
                     let Touch { normal, gap_m, .. } = *place;
                     list.push(Contact { key, slots, normal, gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 });
@@ -150,7 +156,7 @@ impl Contacts {
         }
         let fixed = list.len();
         company.find(&here, (h, *slack_m, speed), velocities, (room, list));
-        if fixed > 0 && list.len() > fixed { SQUEEZED } else { SETTINGS }
+        if stands && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 
     /// The mean length of an edge of the skin, metres.

@@ -194,18 +194,19 @@ impl Lattice {
         self.radius_m = radius_m;
     }
 
-    /// The system of this body: who is joined to whom.
+    /// The system of this body: who of those that move is joined to whom.
     pub fn system(&self) -> System {
         let mut first: Vec<u32> = (0..self.rest.len() as u32).collect();
         let mut join = |vertices: &[u32]| {
-            let lowest = vertices.iter().copied().min().unwrap_or(0);
-            vertices.iter().for_each(|v| first[*v as usize] = first[*v as usize].min(lowest));
+            let moving = || vertices.iter().copied().filter(|v| !self.held[*v as usize]);
+            let lowest = moving().min().unwrap_or(0);
+            moving().for_each(|v| first[v as usize] = first[v as usize].min(lowest));
         };
         self.struts.iter().for_each(|strut| join(&strut.ends));
         self.triangles.iter().for_each(|corners| join(corners));
         self.folds.iter().for_each(|fold| join(&fold.vertices()));
         self.bricks.iter().for_each(|brick| join(&brick.vertices));
-        System::new(first, self.held.clone())
+        System::new(&first, &self.held)
     }
 
     /// Adds what all elements do at these positions; cells follow their turns.

@@ -22,7 +22,7 @@ impl SoftBody {
         soft.positions.clone_from(&self.positions);
         soft.velocities.clone_from(&self.velocities);
         if self.company.is_watched() && self.steps > 0 {
-            into.inertia.soft_mut().copy_from(&self.system, &self.contacts.mobilities);
+            into.inertia.soft_mut().copy_from(self.system.answer(), &self.contacts.mobilities);
         } else {
             into.inertia = Inertia::Immovable;
         }

@@ -8,34 +8,44 @@ use glam::{DMat3, DVec3};
 /// A = (1 + h c) M + h² K, vertices that are held left out.
 #[derive(Debug, Clone, Default)]
 pub(super) struct System {
-    matrix: Envelope<3>,
-    /// Lowest vertex that each vertex is joined to.
+    matrix: Factor,
+    /// Lowest row that each row is joined to.
     first: Vec<u32>,
-    held: Vec<bool>,
     /// Force on each vertex at the start of the substep, N.
     pub forces: Vec<DVec3>,
     /// h², s²: what a stiffness counts.
     square: f64,
 }
 
+/// The matrix of the vertices that move, and then its factor.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Factor {
+    matrix: Envelope<3>,
+    /// The row of each vertex; none for those that are held. Rows rise with the vertices.
+    rows: Vec<Option<u32>>,
+}
+
 impl System {
-    /// A system in which vertex i is joined to none lower than `first[i]`.
-    pub fn new(first: Vec<u32>, held: Vec<bool>) -> Self {
+    /// A system in which vertex i, where it moves, is joined to none lower than `first[i]` of those that move.
+    pub fn new(first: &[u32], held: &[bool]) -> Self {
+        let mut next = 0..;
+        let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
+        let first: Vec<u32> =
+            rows.iter().zip(first).filter_map(|(row, first)| row.and(rows[*first as usize])).collect();
         let mut matrix = Envelope::default();
         matrix.shape(&first);
-        let forces = vec![DVec3::ZERO; held.len()];
-        Self { matrix, first, held, forces, square: 0.0 }
+        Self { matrix: Factor { matrix, rows }, first, forces: vec![DVec3::ZERO; held.len()], square: 0.0 }
     }
 
     /// How many vertices there are.
     pub const fn vertices(&self) -> usize {
-        self.held.len()
+        self.forces.len()
     }
 
     /// Begins a substep of `h` seconds: no force, no stiffness.
     pub fn begin(&mut self, h: f64) {
         // the factor overwrote the matrix in place, of the same shape
-        self.matrix.clear();
+        self.matrix.matrix.clear();
         self.forces.fill(DVec3::ZERO);
         self.square = h * h;
     }
@@ -47,46 +57,43 @@ impl System {
 
     /// Adds the stiffness −∂fᵢ/∂xⱼ, N/m, where `i` is not below `j`: the matrix is symmetric.
     pub fn stiffen(&mut self, i: u32, j: u32, stiffness: DMat3) {
-        let (row, column) = (i as usize, j as usize);
-        if i >= j && !self.held[row] && !self.held[column] {
-            self.add((row, column), stiffness * self.square);
+        if i >= j {
+            self.add((i as usize, j as usize), stiffness * self.square);
         }
     }
 
     /// Adds an inertia to a vertex, kg.
     pub fn weigh(&mut self, vertex: usize, inertia: DMat3) {
-        if !self.held[vertex] {
-            self.add((vertex, vertex), inertia);
-        }
+        self.add((vertex, vertex), inertia);
     }
 
-    fn add(&mut self, at: (usize, usize), block: DMat3) {
-        self.matrix.add_block(at, block.transpose().to_cols_array_2d());
+    fn add(&mut self, (i, j): (usize, usize), block: DMat3) {
+        let Factor { matrix, rows } = &mut self.matrix;
+        if let (Some(row), Some(column)) = (rows[i], rows[j]) {
+            matrix.add_block((row as usize, column as usize), block.transpose().to_cols_array_2d());
+        }
     }
 
     /// Factors the matrix; `false` where it is not positive.
     pub fn factor(&mut self) -> bool {
-        for vertex in (0..self.held.len()).filter(|&vertex| self.held[vertex]) {
-            self.matrix.add_block((vertex, vertex), DMat3::IDENTITY.to_cols_array_2d());
-        }
-        self.matrix.factor()
+        self.matrix.matrix.factor()
+    }
+
+    /// The factor.
+    pub const fn answer(&self) -> &Factor {
+        &self.matrix
     }
 
     /// Turns impulses, one a vertex (N·s), into the velocities they cause (m/s) by the factor (eq. 2).
     pub fn respond(&self, impulses: &mut [DVec3]) {
-        respond(&self.matrix, &self.held, impulses);
+        self.matrix.respond(impulses);
     }
 
     /// The size of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
     pub fn mobility(&self, vertex: usize) -> f64 {
-        let trace: f64 = (0..3).map(|axis| self.matrix.diagonal(3 * vertex + axis)).sum();
-        if self.held[vertex] { 0.0 } else { 3.0 / trace }
-    }
-
-    /// Writes the factor and who is held into `matrix` and `held`.
-    pub fn write(&self, matrix: &mut Envelope<3>, held: &mut Vec<bool>) {
-        matrix.copy_from(&self.matrix);
-        held.clone_from(&self.held);
+        let Factor { matrix, rows } = &self.matrix;
+        let trace = |row: u32| (0..3).map(|axis| matrix.diagonal(3 * row as usize + axis)).sum::<f64>();
+        rows[vertex].map_or(0.0, |row| 3.0 / trace(row))
     }
 
     /// What a factorisation costs, multiplications.
@@ -95,8 +102,25 @@ impl System {
     }
 }
 
-/// A⁻¹ on impulses, one a vertex; those that are held stay still.
-pub(super) fn respond(factor: &Envelope<3>, held: &[bool], impulses: &mut [DVec3]) {
-    impulses.iter_mut().zip(held).filter(|(_, held)| **held).for_each(|(impulse, _)| *impulse = DVec3::ZERO);
-    factor.solve_vectors(impulses);
+impl Factor {
+    /// How many vertices there are; none before the first step.
+    pub const fn vertices(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Takes over `other` into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.matrix.copy_from(&other.matrix);
+        self.rows.clone_from(&other.rows);
+    }
+
+    /// A⁻¹ on impulses, one a vertex; those that are held stay still.
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
+        rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);
+        self.matrix.solve_vectors(&mut impulses[..self.matrix.rows() / 3]);
+        for (vertex, row) in self.rows.iter().enumerate().rev() {
+            impulses[vertex] = row.map_or(DVec3::ZERO, |row| impulses[row as usize]);
+        }
+    }
 }
