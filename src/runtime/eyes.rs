@@ -69,16 +69,17 @@ impl Peer {
     /// Whether the two could ever touch.
     pub fn touches(&self, other: &Self) -> bool {
         let (Some(mine), Some(theirs)) = (&self.form, &other.form) else { return false };
-        let led = |form: &Form| matches!(form.kind, FormKind::Tool(_));
-        !(led(mine) && led(theirs)) && self.law(other.shared.id) != Law::Off
+        !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
     /// `other` as this agent sees it.
     fn meets(&self, other: &Self) -> Neighbour {
+        // jaws take hold of a form, also where the tool passes through it
+        let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
         Neighbour {
             id: other.shared.id,
             snapshot: other.shared.slot.latest(),
-            form: if self.touches(other) { other.form.clone() } else { None },
+            form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
             owned: owns(self.standing(), other.standing()),
             step_s: other.shared.wanted_hz.recip(),
@@ -197,6 +198,11 @@ impl Eyes {
         self.neighbours.push(mine.meets(theirs));
         self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
     }
+}
+
+/// Whether it is a tool's.
+const fn is_led(form: &Form) -> bool {
+    matches!(form.kind, FormKind::Tool(_))
 }
 
 /// Sees `neighbour` as a fellow of the same world, or again as a stranger.

@@ -62,3 +62,18 @@ fn a_cube_that_a_scene_lets_a_tool_grasp_is_lifted_weighed_and_let_go() {
         assert!(x.hypot(y) < 1e-3 && (z - 0.02).abs() < 1e-3, "{rates:?}: it fell to [{x}, {y}, {z}]");
     }
 }
+
+#[test]
+fn a_tool_lifts_a_cube_that_it_passes_through() {
+    for off in ["[[coupling]]\na = \"tool\"\nb = \"cube\"\nlaw = \"off\"\n", "[world]\ncontacts = false\n"] {
+        for rates in [(240, 240), (60, 600), (600, 60)] {
+            // the tip goes to the cube's middle, and takes it there
+            let tool = tool("\"cube\"", ([0.0, 0.0, 0.02], rates.1), 9);
+            let report = Folder::with(&format!("{off}{}{tool}", cube(rates.0))).lockstep(&["--seconds", "4"]);
+            let force_n = number(coupling(&report, ["tool", "cube"], "grasp"), "/force_n");
+            assert!((force_n - 0.981).abs() < 0.01 * 0.981, "{off}{rates:?}: {force_n} N");
+            let [x, y, z] = point(&report, "/probes/0/position_m");
+            assert!(x.hypot(y) < 1e-5 && (z - (0.22 - 0.981 / 2000.0)).abs() < 1e-5, "{off}{rates:?}: [{x}, {y}, {z}]");
+        }
+    }
+}
