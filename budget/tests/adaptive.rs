@@ -168,6 +168,25 @@ fn by_default_a_warm_start_keeps_what_a_cold_one_would_not_choose() {
     assert_eq!(chosen(&[[1.0, 0.5], [1.0, 1.3]]), [Some(0), Some(1)]);
 }
 
+/// Two objects, the second of worth `second`: there is time for one, after ten frames for both, and then for one again; what is left.
+fn after_a_short_rise(second: f64) -> Vec<Level> {
+    let mut adaptive = Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, ..Settings::default() });
+    (0..2).for_each(|id| adaptive.set(id, 0, false, &offers(&[(1.0, 0.0), (100.0, 1.0)])));
+    for frame in 0..12 {
+        (0..2).for_each(|id| _ = adaptive.weigh(id, [1.0, second][id as usize]));
+        adaptive.choose(frame, time(if frame == 10 { 220.0 } else { 110.0 }));
+    }
+    levels(&adaptive, 2)
+}
+
+/// What has just risen is not taken back at once: others fall that are worth a little more, but not four times as much.
+#[test]
+fn object_that_has_just_risen_falls_after_others_unless_they_are_worth_four_times_as_much() {
+    assert_eq!(after_a_short_rise(0.9), [Some(0), Some(1)]);
+    // 0.2 · 4 is less than 1 + h
+    assert_eq!(after_a_short_rise(0.2), [Some(1), Some(0)]);
+}
+
 fn any_number() -> impl Strategy<Value = f64> {
     prop_oneof![4 => 0.0..1000.0_f64, 1 => Just(0.0), 1 => Just(f64::NAN), 1 => Just(f64::INFINITY), 1 => Just(-1.0), 1 => any::<f64>()]
 }
@@ -240,6 +259,34 @@ fn still_picture_on_a_trembling_machine_never_changes_once_it_knows_the_machine(
         adaptive.observe(frame, 0, plan.predicted / kappa(&adaptive) * tremble(frame));
         assert_eq!(levels(&adaptive, 200), before, "frame {frame}");
     }
+}
+
+#[test]
+fn still_picture_on_a_wandering_machine_changes_ever_less_often_and_is_not_late() {
+    // 5 % that stay by nine tenths from frame to frame; news without a pattern, of variance 1
+    let news = |frame: u64| {
+        2.45 * (((frame as f64 * 12.9898).sin() * 43_758.547).rem_euclid(1.0)
+            + ((frame as f64 * 78.233).sin() * 12_543.123).rem_euclid(1.0)
+            - 1.0)
+    };
+    let mut slower = vec![0.0];
+    (1..1200).for_each(|k| slower.push(0.9 * slower[k as usize - 1] + 0.19_f64.sqrt() * 0.05 * news(k)));
+    let (mut adaptive, mut changed, mut late, mut last) = (scene(200, Settings::default()), vec![], 0, vec![]);
+    for frame in 0..1200 {
+        let plan = adaptive.choose(frame, time(T));
+        let now = levels(&adaptive, 200);
+        if frame > 0 && now != last {
+            changed.push(frame);
+        }
+        last = now;
+        let took = plan.predicted / kappa(&adaptive) * (1.0 + slower[frame as usize]);
+        late += usize::from(frame >= 30 && took > 1.05 * T);
+        adaptive.observe(frame, 0, took);
+        adaptive.finished(frame, took);
+    }
+    let after = |frame: u64| changed.iter().filter(|k| **k >= frame).count();
+    // 90 changes after the first hundred frames where it always waits for eight
+    assert!(after(100) <= 3 && late <= 12, "changed at {changed:?}, {late} of 1170 late");
 }
 
 #[test]

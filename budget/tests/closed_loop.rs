@@ -69,7 +69,8 @@ fn few_levels_are_changed_and_changed_back() {
     let shy = Settings { hysteresis: 0.0, dwell: 0, ..Settings::default() };
     let free = s1(|| Box::new(Ours::new(shy)));
     let freely = free.iter().map(|r| r.reversals).sum::<usize>() as f64 / sum(|r| r.object_frames);
-    assert!(reversals <= 0.002 && 2.0 * reversals < freely, "{reversals} and {freely}");
+    // the goal is 0.002; 0.00003 is reached
+    assert!(reversals <= 0.0002 && 10.0 * reversals < freely, "{reversals} and {freely}");
 }
 
 #[test]

@@ -13,6 +13,10 @@ use super::groups::Groups;
 /// A group changes where that gains this part of what its members cost at least: the price trembles.
 const WORTH_IT: f64 = 0.1;
 
+/// The share of a new price in the one that groups go by, about ten frames of memory: one group changes the price of all others, and by
+/// the price of one frame they would all change at once.
+const PRICE_NEWS: f64 = 0.1;
+
 /// Frames that a closed group waits at first and at most before it may open again.
 const PATIENCE: (u32, u32) = (8, 512);
 
@@ -40,6 +44,8 @@ pub(super) struct Closing {
     doors: Vec<Option<Door>>,
     sums: Vec<Sum>,
     worth: Vec<f64>,
+    /// Gain of a tick by the prices, smoothed; 0 before anything had a price.
+    price: f64,
 }
 
 impl Closing {
@@ -50,7 +56,9 @@ impl Closing {
             return;
         }
         groups.lowest_worth(ask, &mut self.worth);
-        let price = lambda * kappa;
+        let now = lambda * kappa;
+        let price = if self.price > 0.0 { self.price + PRICE_NEWS * (now - self.price) } else { now };
+        self.price = price;
         self.sum_leaves(ask, groups, price);
         let mut spare = TICKS * ask.budget_s() / kappa - self.least(ask, groups);
         for &group in groups.all() {

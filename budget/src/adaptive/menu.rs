@@ -53,15 +53,31 @@ pub(crate) struct Object {
     pub steps: u16,
     /// Steps taken in the last choice.
     pub taken: u16,
-    /// It may not rise while this is above 1; one less every frame.
+    /// It is slow to turn back while this is above 1; one less every frame.
     pub dwell: u8,
+    /// Whether its last change was a rise.
+    pub rose: bool,
 }
 
 impl Object {
-    /// Has `taken` steps from now on; having fallen it may not rise for `dwell` frames.
+    /// Has `taken` steps from now on, and is slow to turn back for `dwell` frames after a change.
     pub(crate) fn settle(&mut self, taken: u16, dwell: u8) {
-        self.dwell = if taken < self.taken { dwell } else { self.dwell.saturating_sub(1) };
+        if taken == self.taken {
+            self.dwell = self.dwell.saturating_sub(1);
+        } else {
+            (self.dwell, self.rose) = (dwell, taken > self.taken);
+        }
         self.taken = taken;
+    }
+
+    /// Whether it fell so lately that it may not rise.
+    pub(crate) fn just_fell(&self) -> bool {
+        self.dwell > 1 && !self.rose
+    }
+
+    /// Whether it rose so lately that others fall before it.
+    pub(crate) fn just_rose(&self) -> bool {
+        self.dwell > 1 && self.rose
     }
 }
 
@@ -141,6 +157,7 @@ impl Menu {
             taken: 0,
             stage: stage as u8,
             dwell: 0,
+            rose: false,
         };
         match self.objects.binary_search_by_key(&id, |o| o.id) {
             Ok(at) => {
@@ -154,8 +171,8 @@ impl Menu {
                     return;
                 }
                 self.forget(&old);
-                let taken = old.taken.min(steps);
-                self.objects[at] = Object { weight: old.weight, taken, dwell: old.dwell, ..new };
+                let Object { weight, dwell, rose, .. } = old;
+                self.objects[at] = Object { weight, taken: old.taken.min(steps), dwell, rose, ..new };
             }
             Err(at) => self.objects.insert(at, new),
         }

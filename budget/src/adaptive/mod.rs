@@ -50,11 +50,12 @@ pub struct Settings {
     /// The least margin, as a part of T; 0 … 0.5. Below what the machine's noise is, every other frame is late.
     pub margin: f64,
     /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. Where the machine errs by 5 %, 0.5 is
-    /// late by 5 % once in 200 frames and leaves 2 % of the time; 1.5 once in 1200, and leaves 4 %.
+    /// late by 5 % once in 400 frames and leaves 2 % of the time; 1.5 not once in 1250, and leaves 4 %.
     pub sigmas: f64,
     /// h: what a step that was taken counts more; 0 … 2. 0 changes more levels than the eye likes; above 1 little is gained.
     pub hysteresis: f64,
-    /// Frames for which an object that fell may not rise; 0 … 255.
+    /// Frames after a change for which an object is slow to turn back: one that fell may not rise, one that rose falls after others;
+    /// 0 … 255. Below 4 what comes and goes within three frames is seen.
     pub dwell: u8,
     /// Whether [`Trim`] corrects the budget as well.
     pub trim: bool,
@@ -284,6 +285,9 @@ impl Adaptive {
         let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
         let predicted = (self.cost(terms) + fixed) / target;
         let goal = (terms.budget + fixed) / target;
+        if !still {
+            self.hold = Hold::default();
+        }
         self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
         self.plan.held
     }

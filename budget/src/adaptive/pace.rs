@@ -9,14 +9,11 @@ const MISS: f64 = 0.10;
 const MISSES: u8 = 2;
 /// … for so many frames.
 const WARY: u8 = 30;
-/// A still picture is chosen anew where it is predicted late so often in a row …
-const LATE_IN_A_ROW: u8 = 3;
-/// … or once by more than this part of T.
-const LATE_AT_ONCE: f64 = 0.05;
 /// A still picture rises where this part of T was to spare …
 const SPARE: f64 = 0.05;
-/// … so often in a row: about as long as it takes to see that a machine has calmed down.
-const SPARE_IN_A_ROW: u8 = 8;
+/// … so often in a row: at first about as long as it takes to see that a machine has calmed down, twice as often after each time that it
+/// had to fall, up to the most, some ten seconds.
+const SPARE_IN_A_ROW: (u16, u16) = (8, 512);
 
 /// Two misses in a row make the budget wary for half a second or so.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -52,23 +49,32 @@ pub fn is_late(elapsed: f64, target: f64) -> bool {
 }
 
 /// Whether the choice for a picture in which nothing moves still holds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Hold {
-    late: u8,
-    spare: u8,
+    /// Frames in a row in which time was to spare, and how many it takes to rise.
+    spare: u16,
+    patience: u16,
+}
+
+impl Default for Hold {
+    fn default() -> Self {
+        Self { spare: 0, patience: SPARE_IN_A_ROW.0 }
+    }
 }
 
 impl Hold {
     /// Whether the last choice may stay: `predicted` is what it would take now, `goal` the budget, both as parts of T; `can_rise`
     /// where not everything is at its most.
     pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
-        self.late = if predicted > 1.0 { self.late.saturating_add(1) } else { 0 };
         self.spare = if can_rise && goal - predicted > SPARE { self.spare.saturating_add(1) } else { 0 };
-        let keeps = predicted <= 1.0 + LATE_AT_ONCE && self.late < LATE_IN_A_ROW && self.spare < SPARE_IN_A_ROW;
-        if !keeps {
-            *self = Self::default();
+        let (late, rises) = (predicted > 1.0, self.spare >= self.patience);
+        if late {
+            self.patience = (2 * self.patience).min(SPARE_IN_A_ROW.1);
         }
-        keeps
+        if late || rises {
+            self.spare = 0;
+        }
+        !(late || rises)
     }
 }
 

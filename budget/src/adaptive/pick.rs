@@ -23,6 +23,9 @@ const BUCKETS: usize = (OCTAVES << BITS) as usize;
 /// Fewer objects than this go on below the bucket in which the budget ends: with few, large steps much would stay unspent.
 const FEW: usize = 32;
 
+/// What the steps count of an object that has just risen: where accuracy is 1 − ½/polygons, it falls again once it is an octave too fine.
+const YOUNG: f64 = 4.0;
+
 /// What a choice came to.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Picked {
@@ -79,15 +82,15 @@ impl Terms {
     /// What a gain per tick of the table is worth per measured tick, for an object's steps: others, and those it had.
     fn worth(&self, object: &Object) -> [f64; 2] {
         let worth = object.weight * self.per_kappa[usize::from(object.stage)];
-        [worth, worth * self.loyalty]
+        [worth, worth * if object.just_rose() { YOUNG.max(self.loyalty) } else { self.loyalty }]
     }
 
-    /// How many steps of an object are on offer: all that are worth something and can ever fit; while it dwells, those it had.
+    /// How many steps of an object are on offer: all that are worth something and can ever fit; having just fallen, those it had.
     fn on_offer(&self, object: &Object, steps: &[Step]) -> usize {
-        let most = match (object.weight > 0.0, object.dwell) {
+        let most = match (object.weight > 0.0, object.just_fell()) {
             (false, _) => 0,
-            (true, 0 | 1) => object.steps,
-            (true, _) => object.taken,
+            (true, false) => object.steps,
+            (true, true) => object.taken,
         };
         let mut left = self.reach[usize::from(object.stage)];
         if object.span <= left {
@@ -146,7 +149,7 @@ pub(crate) struct Picker {
 }
 
 impl Picker {
-    /// Chooses; the menu remembers what was taken, and an object that fell dwells.
+    /// Chooses; the menu remembers what was taken, and what changed is slow to turn back.
     pub(crate) fn pick(&mut self, menu: &mut Menu, mut terms: Terms, dwell: u8) -> Picked {
         let mut picked = Picked { table: menu.least, ..Picked::default() };
         let spare = terms.budget - terms.cost(&menu.least);
