@@ -194,6 +194,88 @@ fn what_falls_on_a_light_box_comes_to_lie_on_it_at_any_rates() {
     }
 }
 
+/// Half size (metres), mass (kilograms), rate (hertz), restitution and start of a box.
+type Boxed = (f64, f64, f64, f64, [f64; 3]);
+
+/// Piles that once flew or fell through the floor: what stood was met by a law that changed with the line of the impulse, bounced on
+/// what pressed it, or threw up what lay on it.
+const PILES: [&[Boxed]; 10] = [
+    &[
+        (0.08, 0.27, 20.0, 0.5, [-0.0052, -0.0052, 0.1667]),
+        (0.08, 0.11, 1000.0, 0.2, [-0.0099, 0.0056, 0.3986]),
+        (0.05, 64.32, 10.0, 0.0, [-0.0014, 0.0016, 0.5633]),
+    ],
+    &[
+        (0.1, 0.10, 20.0, 0.5, [0.0010, 0.0068, 0.1170]),
+        (0.1, 0.63, 500.0, 0.2, [-0.0097, -0.0095, 0.3517]),
+        (0.1, 0.44, 240.0, 0.0, [-0.0025, 0.0096, 0.6113]),
+    ],
+    &[
+        (0.1, 0.12, 30.0, 0.0, [-0.0098, -0.0005, 0.1856]),
+        (0.05, 0.65, 60.0, 0.5, [0.0039, 0.0061, 0.3449]),
+        (0.1, 13.07, 20.0, 0.0, [0.0039, -0.0037, 0.5870]),
+        (0.05, 0.32, 120.0, 0.0, [0.0073, -0.0053, 0.7847]),
+    ],
+    &[
+        (0.08, 0.30, 20.0, 0.2, [0.0027, 0.0032, 0.1242]),
+        (0.1, 94.27, 120.0, 0.5, [-0.0052, -0.0035, 0.3415]),
+        (0.08, 0.15, 30.0, 0.2, [0.0015, 0.0051, 0.5800]),
+        (0.1, 3.55, 20.0, 0.0, [-0.0061, 0.0077, 0.7943]),
+    ],
+    &[
+        (0.08, 0.62, 30.0, 0.2, [-0.0006, -0.0018, 0.1254]),
+        (0.1, 1.39, 1000.0, 0.2, [0.0047, 0.0030, 0.3202]),
+        (0.08, 0.22, 10.0, 0.5, [0.0044, 0.0087, 0.5685]),
+    ],
+    &[(0.1, 0.11, 10.0, 0.0, [0.0015, -0.0072, 0.1533]), (0.1, 27.59, 500.0, 0.2, [0.0022, -0.0078, 0.3583])],
+    &[
+        (0.08, 1.38, 60.0, 0.0, [-0.0033, 0.0054, 0.1796]),
+        (0.05, 0.73, 500.0, 0.5, [-0.0097, 0.0088, 0.3660]),
+        (0.08, 19.15, 240.0, 0.2, [0.0094, -0.0048, 0.5103]),
+    ],
+    &[
+        (0.1, 0.40, 10.0, 0.5, [0.0058, -0.0016, 0.1811]),
+        (0.05, 0.52, 20.0, 0.0, [0.0061, -0.0029, 0.4267]),
+        (0.1, 13.82, 60.0, 0.0, [0.0044, 0.0021, 0.6702]),
+    ],
+    &[
+        (0.1, 0.27, 10.0, 0.2, [-0.0050, 0.0035, 0.1164]),
+        (0.05, 36.64, 1000.0, 0.0, [0.0014, -0.0065, 0.2777]),
+        (0.08, 0.47, 10.0, 0.0, [0.0012, 0.0005, 0.4758]),
+    ],
+    &[
+        (0.08, 0.33, 10.0, 0.5, [-0.0009, 0.0025, 0.1768]),
+        (0.08, 15.69, 30.0, 0.2, [0.0012, 0.0099, 0.3664]),
+        (0.05, 39.31, 240.0, 0.2, [0.0071, 0.0024, 0.5436]),
+        (0.05, 12.98, 500.0, 0.5, [-0.0046, 0.0008, 0.7417]),
+    ],
+];
+
+#[test]
+fn piles_of_any_masses_and_rates_neither_fly_nor_fall_through_the_floor() {
+    for pile in PILES {
+        let cube = |(i, (half, kg, hz, e, at)): (usize, &Boxed)| {
+            format!(
+                "[[object]]\nname = \"b{i}\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [{half}, {half}, {half}]\n\
+                 mass_kg = {kg}\nposition_m = {at:?}\nrate_hz = {hz}\nrestitution = {e}\n[[probe]]\nobject = \"b{i}\"\n"
+            )
+        };
+        let ground = "[[object]]\nname = \"ground\"\nmodel = \"rigid\"\nshape = \"plane\"\n";
+        let boxes: String = pile.iter().enumerate().map(cube).collect();
+        let folder = Folder::with(&format!("{ground}{boxes}"));
+        let start_j: f64 = pile.iter().map(|(_, kg, .., at)| kg * 9.81 * at[2]).sum();
+        for seconds in ["0.5", "2"] {
+            let report = folder.lockstep(&["--seconds", seconds]);
+            let energy_j: f64 = report["agents"].as_array().unwrap().iter().map(|a| number(a, "/energy_j")).sum();
+            assert!(energy_j < start_j, "{energy_j} J of {start_j} J after {seconds} s: {pile:?}");
+            for (k, (half, ..)) in pile.iter().enumerate() {
+                let height = point(&report, &format!("/probes/{k}/position_m"))[2];
+                assert!(height > half - 2e-3, "b{k} lies at {height} m after {seconds} s: {pile:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn the_oracle_tells_what_different_clocks_changed() {
     let report = balls(0.1, WEIGHTLESS).lockstep(&["--seconds", "0.5", "--oracle"]);

@@ -95,6 +95,12 @@ impl Solver {
         self.known.clear();
     }
 
+    /// Forgets all of the solves before, the bound of eq. 11 with them.
+    pub fn start_afresh(&mut self) {
+        self.known.clear();
+        self.stiffness = 1.0;
+    }
+
     /// The impulse of each contact of the last solve, N·s, in the order the contacts were given.
     #[must_use]
     pub fn impulses(&self) -> &[DVec3] {

@@ -20,8 +20,8 @@ use crate::coupling::{Form, FormKind, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
-    Agent, AgentId, Body, Companion, Grip, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport,
-    Surroundings, check_span,
+    Agent, AgentId, Body, Companion, Grip, Neighbour, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError,
+    StepReport, Surroundings, check_span,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -51,8 +51,10 @@ pub struct RigidBody {
     pub(super) coupled: DVec3,
     /// Where it then was, metres, and its angular momentum, kg·m²/s.
     pub(super) begun_at: (DVec3, DVec3),
-    /// The velocity that was received at the step's start, m/s.
-    pub(super) received: DVec3,
+    /// The velocity and the spin that were received at the step's start, m/s and rad/s.
+    pub(super) received: Twist,
+    /// The velocity that was received at the start of the step before, m/s.
+    pub(super) received_before: DVec3,
     /// What fixed solids gave lately.
     pub(super) borne: Borne,
     /// What others may expect, m/s².
@@ -124,7 +126,8 @@ impl RigidBody {
             begun: spec.velocity,
             coupled: DVec3::ZERO,
             begun_at: (spec.position, DVec3::ZERO),
-            received: DVec3::ZERO,
+            received: [DVec3::ZERO; 2],
+            received_before: DVec3::ZERO,
             borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
@@ -305,14 +308,17 @@ impl Agent for RigidBody {
         }
     }
 
-    /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one.
+    /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one. Nor does a
+    /// rigid one foresee what the ground makes of its blows on this one.
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         // what is caught this step may fall in the next
         let soon_s = 2.0 * dt.as_secs_f64();
-        let lands = || !self.stays() && self.world.free_time(&self.motion, fall, soon_s) < soon_s;
+        let lands = || self.world.free_time(&self.motion, fall, soon_s) < soon_s;
         let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
-        beside::longest_step(dt, around, || self.bounds(), |n| !n.owned && bends(n) && (owners > 1 || lands()))
+        let squeezes = |n: &Neighbour| bends(n) && (owners > 1 || (!self.stays() && lands()));
+        let strikes = |n: &Neighbour| matches!(n.snapshot.body, Body::Rigid(_)) && lands();
+        beside::longest_step(dt, around, || self.bounds(), |n| !n.owned && (squeezes(n) || strikes(n)))
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -224,6 +224,29 @@ impl Company {
         (&mut guests[..*count], exchange, pairs, room, form)
     }
 
+    /// Begins a solve: whether somebody stands on something fixed, which is taken to carry what presses it (eq. 7a).
+    pub(super) fn press(&mut self) -> bool {
+        self.guests_mut().iter_mut().map(|guest| guest.other.press()).filter(|stands| *stands).count() > 0
+    }
+
+    /// Whether what a solve `gives`, one impulse a slot, tips or lifts somebody who stands: the first of them. Their slots start at
+    /// `bases`.
+    pub(super) fn gives_way(&mut self, bases: &[u32], gives: &[DVec3]) -> bool {
+        self.guests_mut().iter_mut().zip(bases).filter(|(guest, _)| guest.touchable).any(|(guest, &base)| {
+            let from = base as usize;
+            guest.other.gives_way(&gives[from..from + guest.other.velocities().len()])
+        })
+    }
+
+    /// Ends a solve.
+    pub(super) fn release(&mut self) {
+        self.guests_mut().iter_mut().for_each(|guest| guest.other.release());
+    }
+
+    fn guests_mut(&mut self) -> &mut [Guest] {
+        &mut self.guests[..self.count]
+    }
+
     /// Who lies ahead of a flight of `horizon` seconds.
     ///
     /// Tubes do not bounce: contact with them is foreseen from part to part instead.

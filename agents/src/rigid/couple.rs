@@ -31,7 +31,7 @@ impl RigidBody {
     ///
     /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
     pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
-        let before = self.motion.velocity;
+        let before = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.company.exchange.open(around);
         self.company.pairs.open();
         if self.hold.is_known() {
@@ -39,7 +39,8 @@ impl RigidBody {
         } else {
             self.take(around, dt);
         }
-        self.received = self.motion.velocity - before;
+        self.received_before = self.received[0];
+        self.received = [self.motion.velocity - before[0], self.motion.spin(&self.spread) - before[1]];
         let held = self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
         self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
         self.company.gather(around, (&self.world.mover, &self.motion), fellows);
@@ -130,7 +131,7 @@ impl RigidBody {
         self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
         self.bear();
         self.company.knock(around, &self.world.mover, &self.motion, dt);
-        let held = self.held_up || self.received != DVec3::ZERO;
+        let held = self.held_up || self.received[0] != DVec3::ZERO;
         let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
         let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || told();
         let flight = (&self.world.mover, &self.motion);
@@ -162,7 +163,7 @@ impl RigidBody {
             return DVec3::ZERO;
         }
         let measured = (self.motion.velocity - self.begun - self.coupled) / dt - self.gravity;
-        let received = self.received / dt;
+        let received = self.received[0] / dt;
         let taken_back = -(measured + self.gravity).dot(received) / received.length_squared();
         if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
     }
@@ -220,7 +221,7 @@ impl RigidBody {
 
     /// Whether what it stands on will hold it up: nobody lifts it.
     pub(super) fn stays(&self) -> bool {
-        self.stand.is_some_and(|stand| stand.normal.dot(self.received) <= 0.0)
+        self.stand.is_some_and(|stand| stand.normal.dot(self.received[0]) <= 0.0)
     }
 
     /// Writes what others couple by.

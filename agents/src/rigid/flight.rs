@@ -6,6 +6,7 @@
 use super::RigidBody;
 use super::clearance::{Ahead, Fall};
 use super::meeting::{Me, Scope, Strike};
+use crate::coupling::Twist;
 use glam::DVec3;
 
 /// A touching body has left when it would fly for at least this long, seconds.
@@ -31,9 +32,12 @@ impl RigidBody {
                 if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s) {
                     continue;
                 }
-                // until then it stays in touch with what does not bounce
-                let span = if coming < TOUCH_S { left } else { coming.min(left) };
-                self.stay(span, gravity, ahead.map(|side| side.near_s < horizon.min(span.max(LEAVE_S))))?;
+                // until then it stays in touch with what does not bounce, and with what a blow did not send away
+                let here = coming < TOUCH_S;
+                let span = if here { left } else { coming.min(left) };
+                let within = horizon.min(span.max(LEAVE_S));
+                let near = |side: Ahead| if here { side.free_s() } else { side.near_s };
+                self.stay(span, gravity, ahead.map(|side| near(side) < within))?;
                 span
             } else {
                 self.touching = soonest < left && soonest < TOUCH_S;
@@ -71,9 +75,8 @@ impl RigidBody {
     /// The blow of a touch, with others where `met`. Whether it changed anything.
     fn take_blow(&mut self, met: bool) -> bool {
         self.steady = false;
-        let carried_m_s = if self.stand.is_some() { self.received } else { DVec3::ZERO };
         let before = self.motion.velocity;
-        let approached = self.strike(Strike { met, carried_m_s });
+        let approached = self.strike(Strike { met, pressed: self.pressed(), stood: self.stand.is_some() });
         approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
     }
 
@@ -88,9 +91,18 @@ impl RigidBody {
     /// What the body was given while it stood has pressed it on the ground all the time: the ground has taken it, before a world
     /// that it shares moves anybody.
     pub(super) fn stand_fast(&mut self) {
-        if self.received != DVec3::ZERO && (self.touching || self.stand.is_some()) {
-            self.strike(Strike { met: false, carried_m_s: self.received });
+        if self.received[0] != DVec3::ZERO && (self.touching || self.stand.is_some()) {
+            self.strike(Strike { met: false, pressed: self.received, stood: true });
         }
+    }
+
+    /// What of the velocity and the spin received in this step others press it by: all of it where it stands, else what it received in
+    /// the step before too, for a blow comes once.
+    fn pressed(&self) -> Twist {
+        let [now, before] = [self.received[0], self.received_before];
+        let lasts = (before.dot(now) / now.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let share = if self.stand.is_some() { 1.0 } else { lasts };
+        self.received.map(|all| all * share)
     }
 
     /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.

@@ -12,7 +12,7 @@ use super::company::Company;
 use super::mass::Spread;
 use super::motion::Motion;
 use super::obstacles::Obstacles;
-use crate::coupling::{Contact, Problem, Settings, Solver, Touch, inverse_mass};
+use crate::coupling::{Contact, Problem, Settings, Solver, Touch, Twist, inverse_mass};
 use glam::{DMat3, DVec3};
 
 /// The body itself, as a solve needs it.
@@ -36,8 +36,10 @@ pub(super) struct Scope {
 pub(super) struct Strike {
     /// Whether others take part; fixed solids always do.
     pub met: bool,
-    /// The velocity that a body was given while it stood, m/s: what it stands on carries that, and does not throw it back.
-    pub carried_m_s: DVec3,
+    /// The velocity and the spin that the body was pressed by in the step, m/s and rad/s.
+    pub pressed: Twist,
+    /// It stood when it was: what it stands on carries that, and does not throw it back.
+    pub stood: bool,
 }
 
 /// What a press did.
@@ -61,6 +63,8 @@ pub(super) struct Meeting {
     /// Where each guest's slots begin.
     pub(super) bases: Vec<u32>,
     given: Vec<DVec3>,
+    /// The velocities of all slots before a solve.
+    free: Vec<DVec3>,
     room: Vec<DVec3>,
     pub(super) touches: Vec<Touch>,
     press: Solver,
@@ -103,7 +107,7 @@ impl Meeting {
             return false;
         }
         self.wake(company);
-        self.blow.forget();
+        self.blow.start_afresh();
         self.solve(company, 1.0, true);
         self.strike_in_turn(company);
         self.give(me, company, 0.0);
@@ -115,7 +119,7 @@ impl Meeting {
     /// Newton's law of restitution asks every contact at once for its own speed. A light body that bounces to and fro between
     /// two heavy ones may not leave the one and stay on the other: both would be driven apart. It leaves the one, and strikes
     /// the other in its turn.
-    fn strike_in_turn(&mut self, company: &Company) {
+    fn strike_in_turn(&mut self, company: &mut Company) {
         for round in 0..2 {
             if !self.makes_energy() {
                 return;
@@ -126,7 +130,7 @@ impl Meeting {
                 self.found.iter_mut().for_each(|found| found.contact.rebound_m_s = 0.0);
             }
             self.velocities.clone_from(&self.before);
-            self.blow.forget();
+            self.blow.start_afresh();
             self.solve(company, 1.0, true);
         }
     }
@@ -214,12 +218,28 @@ impl Meeting {
         }
     }
 
-    /// Solves what was found; the velocities of all slots are then those after it.
-    fn solve(&mut self, company: &Company, h: f64, is_blow: bool) {
+    /// Solves what was found; the velocities of all slots are then those after it. Who stands is taken to be pressed, and where
+    /// that was wrong to be free (coupling.md, eq. 7a).
+    fn solve(&mut self, company: &mut Company, h: f64, is_blow: bool) {
         self.found.sort_unstable_by_key(|found| found.contact.key);
         self.contacts.clear();
         self.contacts.extend(self.found.iter().map(|found| found.contact));
         self.probe(company);
+        let stands = company.press();
+        self.free.clone_from(&self.velocities);
+        loop {
+            self.find_impulses(company, h, is_blow);
+            // each time round one more who stands gives way
+            if !stands || !company.gives_way(&self.bases, &self.given) {
+                break;
+            }
+            self.velocities.clone_from(&self.free);
+        }
+        company.release();
+    }
+
+    /// Solves the contacts; writes what each slot is given.
+    fn find_impulses(&mut self, company: &Company, h: f64, is_blow: bool) {
         let Self { inverse, bases, contacts, mobilities, velocities, press, blow, .. } = self;
         let mut answer = |impulses: &mut [DVec3]| {
             impulses[0] *= inverse.0;

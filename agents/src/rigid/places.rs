@@ -15,6 +15,8 @@ use glam::DVec3;
 const SLACK_M: f64 = 1e-5;
 /// What comes to a fixed solid more slowly than this does not bounce, m/s: else nothing would ever lie.
 const BOUNCE_M_S: f64 = 0.01;
+/// What has more restitution bounces on what presses it, too.
+const LIVELY: f64 = 0.5;
 /// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by.
 const BOUND_SHARE: f64 = 2e-5;
 
@@ -44,8 +46,12 @@ impl Meeting {
             let from = self.found.len();
             self.take_up(me, None, (friction, still, 0.0));
             for found in &mut self.found[from..] {
-                let carried_m_s = -strike.carried_m_s.dot(found.contact.normal);
-                let thrown_m_s = found.approach_m_s - carried_m_s.max(0.0);
+                let pressed_m_s = -found.contact.slots.velocity(&strike.pressed).dot(found.contact.normal);
+                // a hop that gravity and what presses would end within the step is none; what hardly loses anything hops on
+                let hop_m_s = 2.0 * restitution * found.approach_m_s;
+                let is_short = hop_m_s < span.gravity.length() * span.dt_s + pressed_m_s;
+                let stays = strike.stood || (restitution <= LIVELY && is_short);
+                let thrown_m_s = found.approach_m_s - if stays { pressed_m_s.max(0.0) } else { 0.0 };
                 let bounces = thrown_m_s > BOUNCE_M_S;
                 found.contact.rebound_m_s = if bounces { restitution * thrown_m_s } else { 0.0 };
             }

@@ -27,6 +27,12 @@ pub(super) fn weigh(members: &[Member], masses: &mut Vec<Mass>, velocities: &mut
     }
 }
 
+/// The energy of motion, joules.
+pub(super) fn energy_j(masses: &[Mass], velocities: &[Twist]) -> f64 {
+    let of = |(mass, [v, w]): (&Mass, &Twist)| 0.5 * (mass.mass_kg * v.length_squared() + w.dot(mass.inertia * *w));
+    masses.iter().zip(velocities).map(of).sum()
+}
+
 /// Whether a spring may act as a force at both ends of a part: slow against it, damping included.
 pub(super) fn is_soft(row: &Row, (k, c): (f64, f64), h: f64, masses: &[Mass]) -> bool {
     h * (h * k + c) * row.mobility(masses) < SOFT

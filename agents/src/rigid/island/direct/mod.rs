@@ -20,7 +20,7 @@ mod row;
 use super::Held;
 use super::member::{Ground, Member};
 use crate::rigid::motion::Motion;
-use bodies::{contact_rows, gap_now, is_soft, middle, push, spring_rows, weigh};
+use bodies::{contact_rows, energy_j, gap_now, is_soft, middle, push, spring_rows, weigh};
 use glam::DVec3;
 use joints::JointRow;
 use near::{Near, Warm};
@@ -50,6 +50,8 @@ pub(super) struct Direct {
     given: Vec<Warm>,
     /// How fast each contact closed at the part's start, m/s.
     approach: Vec<f64>,
+    /// What the impulses of the way took out of the motion, joules: bounces give back no more.
+    taken_j: f64,
 }
 
 /// A part's flight is corrected at most this often for the turning of the bodies: each time leaves a hundredth.
@@ -166,6 +168,7 @@ impl Direct {
             }
         }
         self.remember(0, h);
+        self.taken_j = energy_j(&self.masses, &self.free) - energy_j(&self.masses, &self.velocities);
         for (member, (now, free)) in members.iter_mut().zip(self.velocities.iter().zip(&self.free)) {
             member.bent = [now[0] - free[0], now[1] - free[1]];
         }
@@ -265,9 +268,29 @@ impl Direct {
         any
     }
 
-    /// The impulses at the part's end: joints and closed contacts keep their velocities there, and bounces leave.
+    /// The impulses at the part's end: joints and closed contacts keep their velocities there, and bounces leave. A contact that
+    /// closed fast because what lies on it pressed it would throw that up with it: where bounces give more than the way took, there
+    /// are none.
     fn arrive(&mut self, members: &mut [Member], h: f64) {
         weigh(members, &mut self.masses, &mut self.free);
+        self.list_ends(members, h, true);
+        self.solve();
+        if energy_j(&self.masses, &self.velocities) - energy_j(&self.masses, &self.free) > self.taken_j.max(0.0) {
+            self.list_ends(members, h, false);
+            self.solve();
+        }
+        for ((member, now), free) in members.iter_mut().zip(&self.velocities).zip(&self.free) {
+            member.motion.velocity = now[0];
+            member.motion.angular += member.motion.inertia_times(&member.spread, now[1] - free[1]);
+        }
+        self.remember(1, h);
+        for (i, warm) in self.given.iter().enumerate() {
+            self.near.remember(i, *warm);
+        }
+    }
+
+    /// Writes the rows of joints and contacts for the part's end, with or without bounces.
+    fn list_ends(&mut self, members: &[Member], h: f64, bounces: bool) {
         self.rows.clear();
         for (joint, known) in self.ahead.iter().zip(&self.known) {
             let mut row = joint.row;
@@ -286,19 +309,10 @@ impl Direct {
             let closing = -self.approach[i];
             let fall = BOUNCE_PARTS * h * members[contact.a as usize].gravity.length();
             self.rows[at].bias = match pressed {
-                true if closing > fall => -contact.restitution * closing,
+                true if bounces && closing > fall => -contact.restitution * closing,
                 true => 0.0,
                 false => gap_now(contact, members).max(0.0) / h,
             };
-        }
-        self.solve();
-        for ((member, now), free) in members.iter_mut().zip(&self.velocities).zip(&self.free) {
-            member.motion.velocity = now[0];
-            member.motion.angular += member.motion.inertia_times(&member.spread, now[1] - free[1]);
-        }
-        self.remember(1, h);
-        for (i, warm) in self.given.iter().enumerate() {
-            self.near.remember(i, *warm);
         }
     }
 
