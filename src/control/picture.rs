@@ -39,6 +39,8 @@ const FIXED_TREMBLE: f64 = 0.01;
 
 /// The part of a frame that policies with a prediction leave free where nobody says otherwise.
 const MARGIN: f64 = 0.02;
+/// The same of a lag, which is a bound and no goal: a camera that sets off makes a frame 2.4 % dearer than was foretold.
+const LAG_MARGIN: f64 = 0.03;
 
 /// Chooses the level of every picture.
 #[derive(Debug, Clone)]
@@ -179,6 +181,12 @@ impl PictureControl {
         self.pipeline.map_or(f64::INFINITY, |pipeline| pipeline.lag).min(1.0 / self.target_hz)
     }
 
+    /// The part of a frame that is left free by policies with a prediction.
+    fn margin_now(&self) -> f64 {
+        let bound = self.pipeline.is_some_and(|pipeline| pipeline.lag * self.target_hz < 1.0);
+        self.margin.unwrap_or(if bound { LAG_MARGIN } else { MARGIN })
+    }
+
     fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
         let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.policy.prices(&self.prices));
         self.ladders.update(&self.views, raised, &prices, &self.sliders);
@@ -198,7 +206,7 @@ impl PictureControl {
             value: self.value,
             target_s,
             choose_s: split.map(|split| split.choose),
-            margin: self.margin.unwrap_or(MARGIN),
+            margin: self.margin_now(),
             fixed_s: self.fixed_s,
         };
         let mut promise = match self.policy {
@@ -310,7 +318,7 @@ impl PictureControl {
         let share = match self.policy {
             Policy::Feedback => self.law().set_share(),
             Policy::Adaptive => 1.0 - self.adaptive.margin(),
-            _ => 1.0 - self.margin.unwrap_or(MARGIN),
+            _ => 1.0 - self.margin_now(),
         };
         share / self.target_hz
     }
