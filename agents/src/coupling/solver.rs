@@ -97,7 +97,7 @@ impl Solver {
 
     /// Forgets all of the solves before, the bound of eq. 11 with them.
     pub fn start_afresh(&mut self) {
-        self.known.clear();
+        self.forget();
         self.stiffness = 1.0;
     }
 

@@ -226,7 +226,9 @@ impl Meeting {
         self.contacts.extend(self.found.iter().map(|found| found.contact));
         self.probe(company);
         let stands = company.press();
-        self.free.clone_from(&self.velocities);
+        if stands {
+            self.free.clone_from(&self.velocities);
+        }
         loop {
             self.find_impulses(company, h, is_blow);
             // each time round one more who stands gives way
