@@ -10,7 +10,7 @@ use super::ties::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_agents::AgentId;
 use metachron_agents::coupling::touch::{TouchRoom, touches};
-use metachron_agents::coupling::{FormKind, Law, Touch};
+use metachron_agents::coupling::{FormKind, Law, Place, Touch};
 use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
@@ -51,8 +51,6 @@ impl Scene {
 
     /// All that is inside each other where the scene puts it, and how deep, metres: pairs of agents in the order of their numbers,
     /// then agents inside fixed solids.
-    ///
-    /// What bends and is held may be meant to be held inside a fixed solid.
     pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {
         let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
@@ -65,16 +63,21 @@ impl Scene {
         pairs
     }
 
-    /// Appends the agents that start inside fixed solids.
+    /// Appends the agents that start inside fixed solids. Where a tube is held it may be held to the wall of one: not before its axis is
+    /// inside is it told of.
     fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
         let (mut room, mut found) = (TouchRoom::default(), Vec::new());
-        let free =
-            self.agents.iter().filter(|member| self.is_loose(member.id) || matches!(member.spec, Spec::Rigid(_)));
-        for figure in free.filter_map(figure) {
+        let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Instrument(_)));
+        for figure in unled.filter_map(figure) {
+            let held = !(self.is_loose(figure.id) || matches!(self.agents[figure.id.0 as usize].spec, Spec::Rigid(_)));
             for (at, obstacle) in self.obstacles.iter().enumerate() {
                 let Some(fixed) = figure.over(obstacle) else { continue };
                 touches(&figure.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
-                let depth_m = found.iter().map(|touch: &Touch| -touch.gap_m).fold(0.0, f64::max);
+                let told = |touch: &&Touch| match touch.on_a {
+                    Place::Chain { radius_m, .. } if held => touch.gap_m < -radius_m - OVERLAP_MIN_M,
+                    _ => true,
+                };
+                let depth_m = found.iter().filter(told).map(|touch| -touch.gap_m).fold(0.0, f64::max);
                 if depth_m >= OVERLAP_MIN_M {
                     pairs.push((figure.id, Inside::Fixed(at), depth_m));
                 }

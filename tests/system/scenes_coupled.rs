@@ -167,6 +167,43 @@ fn agents_that_start_inside_fixed_solids_are_named() {
     assert_eq!(overlaps.len(), 3);
 }
 
+#[test]
+fn what_is_held_through_a_solid_is_named_and_gains_nothing() {
+    let scene = r#"
+        [[object]]
+        name = "hose"
+        model = "tube"
+        path_m = [[-0.5, 0, 0.2], [0.5, 0, 0.2]]
+        radius_m = 0.015
+        young_pa = 1e6
+        density_kg_m3 = 1050
+        clamp = ["start", "end"]
+        rate_hz = 240
+        [[object]]
+        name = "block"
+        model = "rigid"
+        fixed = true
+        shape = "box"
+        half_extents_m = [0.1, 0.1, 0.1]
+        position_m = [0, 0, 0.2]
+        [[object]]
+        name = "wall"
+        model = "rigid"
+        fixed = true
+        shape = "box"
+        half_extents_m = [0.1, 0.1, 0.1]
+        position_m = [0.6, 0, 0.2]
+    "#;
+    let report = Folder::with(scene).lockstep(&["--seconds", "1"]);
+    let overlaps = report["overlaps"].as_array().unwrap();
+    // half the block and the radius; held to the wall it is only beside it
+    assert_eq!((overlaps.len(), overlaps[0]["b"].as_str()), (1, Some("block")), "{overlaps:?}");
+    assert!((number(&report, "/overlaps/0/depth_m") - 0.115).abs() < 1e-6, "{overlaps:?}");
+    // at the start 0.742 kg at a height of 0.2 m; 220 J where it was pushed out on all sides
+    let energy_j = number(&report, "/agents/0/energy_j");
+    assert!((0.9..1.01).contains(&(energy_j / 1.456)), "{energy_j} J");
+}
+
 /// The slow light body gets in one piece what the fast heavy one gave it bit by bit, while it stood on the ground, which took it.
 #[test]
 fn what_falls_on_a_light_box_comes_to_lie_on_it_at_any_rates() {

@@ -39,5 +39,8 @@ pub use texture::{Pattern, Texture, Wrap};
 pub use tom::{Cut, Tom, TomError};
 pub use tool::{ToolPart, ToolShape};
 
+/// Ways out of a solid whose cosine is below this have none in common: what starts inside would be torn apart on them.
+pub(crate) const PARTED: f64 = 0.5;
+
 #[cfg(test)]
 mod field_tests;

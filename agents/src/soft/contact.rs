@@ -3,6 +3,7 @@
 //! In: free velocities, the factor, fixed solids, the company. Out: velocities that keep the skin apart.
 //! Never here: where two forms touch ([`crate::coupling::touch`]). Theory: docs/theory/contact.md, eq. 5–11.
 
+use super::bores::Bores;
 use super::company::Company;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
@@ -17,6 +18,8 @@ const SETTINGS: Settings = Settings { iterations: 40, tolerance_m_s: 1e-5 };
 const SQUEEZED: Settings = Settings { iterations: 300, ..SETTINGS };
 /// Contacts are foreseen this far beyond where they close within a substep, as a share of the mean edge.
 const SLACK_SHARE: f64 = 0.02;
+/// Deeper than this share of the mean edge is through a solid, not beside it.
+const DEEP_SHARE: f64 = 0.5;
 /// Where the number of a fixed solid stands in a key; the bit above tells agents from them.
 const WALL_SHIFT: u32 = 48;
 
@@ -41,6 +44,8 @@ struct Wall {
     form: Form,
     position: DVec3,
     rotation: DQuat,
+    /// What of the body passes through.
+    bores: Bores,
 }
 
 impl Contacts {
@@ -53,7 +58,8 @@ impl Contacts {
             let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
                 .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
             let form = Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
-            Ok(Wall { form, position: obstacle.position, rotation: obstacle.rotation.normalize() })
+            let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
+            Ok(Wall { form, position, rotation, bores: Bores::default() })
         };
         let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
         Ok(Self {
@@ -131,14 +137,16 @@ impl Contacts {
     fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
         let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
         let mut stands = false;
+        let (held, deep_m) = (mobilities.contains(&0.0), DEEP_SHARE / SLACK_SHARE * *slack_m);
         let here = Placed { form, view: View::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
-        for (wall, number) in walls.iter().zip(0_u64..) {
+        for (wall, number) in walls.iter_mut().zip(0_u64..) {
             let view = View::Solid { position: wall.position, rotation: wall.rotation };
             touches(&here, &Placed { form: &wall.form, view }, *slack_m + speed * h, room, places);
+            wall.bores.follow(places, held, deep_m);
             let friction = (form.friction * wall.form.friction).sqrt();
-            for place in places.iter() {
+            for place in places.iter().filter(|place| !wall.bores.pass(place)) {
                 let mut slots = Slots::default();
                 place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
                 let closing = slots.velocity(velocities).dot(place.normal);

@@ -6,6 +6,7 @@
 //! (`elements`, `system`), solves for the free velocities, lets contacts act through A⁻¹ (`contact`), and moves (`step`).
 
 mod body;
+mod bores;
 mod brick;
 mod company;
 mod contact;

@@ -4,6 +4,7 @@
 //! Out: velocities that keep the skin apart. Never here: the rod's elasticity. Theory: `docs/theory/contact.md`.
 
 mod act;
+mod bores;
 mod pairs;
 mod walls;
 

@@ -225,3 +225,33 @@ fn a_ball_that_flies_past_a_ball_is_not_stopped() {
     assert_eq!(pass(0.08), 0); // clears the ball by 2 cm on its way of 40 cm
     assert!(pass(0.04) > 0); // hits it, though it ends far behind it
 }
+
+/// A chain through a wall, whose last part is then drawn out of it and laid against it.
+#[test]
+fn what_has_left_a_solid_that_it_started_through_touches_it() {
+    let wall = Obstacle {
+        name: String::new(),
+        solid: Solid::Box { half_extents_m: DVec3::new(0.1, 1.0, 0.1) },
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.0,
+        restitution: 0.0,
+    };
+    let arc_m: Vec<f64> = (0..=12).map(|i| 0.05 * f64::from(i)).collect();
+    let along = |height: f64| arc_m.iter().map(|at| DVec3::new(at - 0.3, 0.0, height)).collect::<Vec<_>>();
+    let mut chain =
+        Chain { positions: along(0.0), slots: vec![DVec3::ZERO; 25], radii_m: vec![0.01; 13], arc_m: arc_m.clone() };
+    let mut contacts = TubeContacts::new(std::slice::from_ref(&wall), false, 0.0).unwrap();
+    let mut count = |chain: &Chain| found(&mut contacts, &Skin { held: [true, false], ..chain.skin() }).len();
+    assert_eq!(count(&chain), 0);
+    // out of it but for two nodes of its middle: of three that are a millimetre deep on the top two are at the mouths
+    let mut raised = along(0.109);
+    raised[6..=7].iter_mut().for_each(|at| at.z = 0.05);
+    chain.positions = raised;
+    assert_eq!(count(&chain), 1);
+    chain.positions = along(0.109);
+    assert_eq!(count(&chain), 5);
+    // and no more is let through again
+    chain.positions = along(0.0);
+    assert!(count(&chain) > 3);
+}

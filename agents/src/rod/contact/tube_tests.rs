@@ -353,3 +353,30 @@ fn contact_gives_the_same_bits_every_time() {
     };
     assert_eq!(go(), go());
 }
+
+/// Pushed out to both sides of the block and up it would hold a hundred times the energy that it starts with.
+#[test]
+fn a_hose_that_is_held_through_a_block_hangs_as_if_it_were_bored() {
+    let block = solid(Solid::Box { half_extents_m: DVec3::splat(0.1) }, DVec3::ZERO, 0.5);
+    let held = |obstacles| TubeSpec {
+        clamp: [true; 2],
+        ..spec(line(DVec3::new(-0.5, 0.0, 0.0), DVec3::new(0.5, 0.0, 0.0)), 20, obstacles)
+    };
+    let (mut through, mut lonely) = (Tube::new(held(vec![block.clone()])).unwrap(), Tube::new(held(vec![])).unwrap());
+    for tube in [&mut through, &mut lonely] {
+        run(tube, 4.0, 0.08);
+    }
+    assert_eq!(nodes(&through), nodes(&lonely));
+    // what sags out below is touched again, and gains nothing by it
+    for _ in 0..25 {
+        run(&mut through, 4.0, 0.04);
+        let all_j = through.energy_j() + through.mass_kg() * 9.81 * centre(&through).z;
+        assert!(all_j < 1e-3, "0 J -> {all_j} J");
+    }
+    // one that lies along its top, half sunk, has one way out
+    let sunk = line(DVec3::new(-0.09, 0.0, 0.099), DVec3::new(0.09, 0.0, 0.099));
+    let mut sunk = Tube::new(TubeSpec { clamp: [true, false], ..spec(sunk, 20, vec![block]) }).unwrap();
+    run(&mut sunk, 4.0, 1.0);
+    let end = nodes(&sunk)[20];
+    assert!(end.z > 0.1 + RADIUS - 1e-3, "{end}");
+}

@@ -4,6 +4,7 @@
 //! (eq. 19). Never here: forces. Theory: `docs/theory/contact.md`.
 
 use super::Skin;
+use super::bores::Bores;
 use crate::shape::field::{Ball, Field, Touch};
 use crate::shape::{Obstacle, ShapeError};
 use glam::DVec3;
@@ -19,6 +20,8 @@ pub(super) struct Walls {
     travel_m: f64,
     last: Vec<DVec3>,
     last_radius_m: f64,
+    /// Whether the tube has been looked at: what it starts through is known.
+    begun: bool,
 }
 
 /// One fixed solid, and how near each node was when it was last measured.
@@ -32,6 +35,8 @@ struct Wall {
     near: Vec<Option<Touch>>,
     /// No node or span is nearer than this at the travel beside it.
     clear: (f64, f64),
+    /// What of the tube passes through.
+    bores: Bores,
 }
 
 /// A node or a place inside a segment that touches a wall.
@@ -69,6 +74,7 @@ impl Walls {
                 nodes: vec![],
                 near: vec![],
                 clear: (f64::NEG_INFINITY, 0.0),
+                bores: Bores::default(),
             })
         };
         let walls = obstacles.iter().map(wall).collect::<Result<_, ShapeError>>()?;
@@ -90,6 +96,7 @@ impl Walls {
         if self.walls.is_empty() {
             return;
         }
+        self.begin(skin);
         self.follow(skin);
         let margin_m = slack_m + skin.speed() * skin.h_s;
         for (number, wall) in (0_u32..).zip(&mut self.walls) {
@@ -98,6 +105,13 @@ impl Walls {
                 continue;
             }
             wall.measure(skin, slack_m, self.travel_m, &mut |touch| visit(WallTouch { wall: number, ..touch }));
+        }
+    }
+
+    /// Finds, once, what of a tube that is held starts through a solid; one that is not is pushed out as a whole.
+    fn begin(&mut self, skin: &Skin<'_>) {
+        if !std::mem::replace(&mut self.begun, true) && skin.held.contains(&true) {
+            self.walls.iter_mut().for_each(|wall| wall.bores = Bores::new(skin, &wall.field));
         }
     }
 
@@ -126,6 +140,9 @@ impl Wall {
     /// Measures the nodes that may be near, then the spans that may be nearer than their nodes.
     fn measure(&mut self, skin: &Skin<'_>, slack_m: f64, travel_m: f64, visit: &mut impl FnMut(WallTouch)) {
         let look_m = LOOK_RADII * skin.widest_m();
+        if !self.bores.is_empty() {
+            self.bores.leave(skin, &self.field);
+        }
         for node in 0..skin.positions.len() {
             let margin_m = slack_m + skin.velocity(node).length() * skin.h_s;
             let (gap_m, at_m) = self.nodes[node];
@@ -160,7 +177,7 @@ impl Wall {
         let way = skin.velocity(node) * skin.h_s;
         self.near[node] = touches.iter().next();
         self.nodes[node].0 = touches.clear_m - ball.radius_m;
-        if skin.is_held(node) {
+        if skin.is_held(node) || self.bores.meet(skin.arc_m[node], skin.arc_m[node]) {
             return;
         }
         for (place, touch) in (0_u32..).zip(touches.iter()) {
@@ -181,6 +198,9 @@ impl Wall {
         visit: &mut impl FnMut(WallTouch),
     ) {
         let ends = [skin.ball(segment), skin.ball(segment + 1)];
+        if self.bores.meet(skin.arc_m[segment], skin.arc_m[segment + 1]) {
+            return;
+        }
         let Some((share, touch)) = self.field.touches_span(ends, reach_m) else { return };
         let ball = ends[0].toward(ends[1], share);
         let way = skin.velocity(segment).lerp(skin.velocity(segment + 1), share) * skin.h_s;

@@ -4,7 +4,7 @@ use super::meetings::floor;
 use super::*;
 use crate::coupling::harness::{Faults, Stage};
 use crate::rigid::{RigidBody, RigidSpec};
-use crate::shape::Solid;
+use crate::shape::{Obstacle, Solid};
 
 /// A box of 10 cm and `mass_kg` that stands on the floor, and a block of 25 × 25 × 10 cm in so many cells that falls on it from
 /// `drop_m`.
@@ -88,5 +88,36 @@ fn a_ball_that_starts_in_the_skin_of_a_block_comes_out_where_it_is_nearer() {
         let at = stage.settled(ball, 0.5).state.position;
         println!("{depth_m} {rates:?}: {at:.4}");
         assert!((0.015..0.04).contains(&at.z), "{depth_m} m deep at {rates:?}: it is at {at}");
+    }
+}
+
+/// Pushed out on all sides of the post the sheet would hold a hundred joules.
+#[test]
+fn a_sheet_that_is_held_around_a_post_hangs_as_if_it_were_bored() {
+    let post = |half_m: f64| Obstacle {
+        name: String::new(),
+        solid: Solid::Box { half_extents_m: DVec3::new(half_m, half_m, 0.1) },
+        position: DVec3::new(0.2, 0.2, 0.0),
+        rotation: DQuat::IDENTITY,
+        friction: 0.5,
+        restitution: 0.0,
+    };
+    let shape = SoftShape::Sheet { size_m: [0.4, 0.4], thickness_m: 0.002, segments: [8, 8] };
+    let held =
+        |obstacles| SoftSpec { held: vec![Side::Left, Side::Right], gravity: G, obstacles, ..spec(shape.clone()) };
+    let mut lonely = SoftBody::new(held([].into())).unwrap();
+    let mut through = SoftBody::new(held([post(0.08)].into())).unwrap();
+    let total_j = |body: &SoftBody| {
+        let at = state(body).positions;
+        let mass_kg = 1000.0 * 0.4 * 0.4 * 0.002;
+        body.energy_j() + mass_kg * 9.81 * at.iter().map(|x| x.z).sum::<f64>() / at.len() as f64
+    };
+    for body in [&mut lonely, &mut through] {
+        run(body, 0.004, 10);
+    }
+    assert_eq!(state(&lonely).positions, state(&through).positions);
+    for _ in 0..100 {
+        run(&mut through, 0.004, 2);
+        assert!(total_j(&through) < 1e-2, "0 J -> {} J", total_j(&through));
     }
 }
