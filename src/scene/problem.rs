@@ -130,6 +130,7 @@ impl Problem {
         let Some((wrong, known)) = words.split_first() else { return Self::new(span, "unknown key".to_owned()) };
         let mut known: Vec<&str> = also.iter().chain(known).copied().collect();
         known.sort_unstable();
+        known.dedup();
         let near = did_you_mean(wrong, known.iter().copied());
         let expected = near.unwrap_or_else(|| "expected one of the keys below".to_owned());
         let problem = Self::new(span, format!("there is no key `{wrong}` in this table")).expecting(expected);
