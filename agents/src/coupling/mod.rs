@@ -8,6 +8,7 @@ pub mod beside;
 mod contact;
 mod exchange;
 mod form;
+mod formed;
 mod knock;
 mod law;
 pub mod laws;

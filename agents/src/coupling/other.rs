@@ -28,6 +28,8 @@ pub struct Other {
     /// Room for two answers.
     answer: Vec<DVec3>,
     carried: Vec<DVec3>,
+    /// Of a soft body: by how much what is on its way changes how each vertex accelerates, m/s²; empty for nothing.
+    taken_back: Vec<DVec3>,
     age_s: f64,
     held: bool,
     /// How far impulses have lifted it off what it stood on, metres, ≥ 0; `None` while none has.
@@ -87,6 +89,7 @@ impl Other {
         (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
         self.coming.clear();
         self.lasting.clear();
+        self.taken_back.clear();
         self.positions.clear();
         self.velocities.clear();
         match &snapshot.body {
@@ -245,26 +248,30 @@ impl Other {
         }
     }
 
-    /// The same of a node or vertex: a tube tells how each of its nodes accelerates.
+    /// The same of a node or vertex: a tube tells how each of its nodes accelerates, a soft body of its vertices.
     #[must_use]
     pub fn acceleration_of(&self, node: usize) -> DVec3 {
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
             Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == self.positions.len() => {
                 curve.accelerations[node]
             }
+            Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == self.positions.len() => {
+                soft.accelerations[node] + self.taken_back.get(node).copied().unwrap_or_default()
+            }
             _ => self.acceleration(),
         }
     }
 
-    /// Makes the published velocities of a tube, which are means over its last substep, those at its end (eq. 6a).
+    /// Makes the published velocities of a tube or soft body, which are means over its last substep, those at its end (eq. 6a).
     fn reckon(&mut self) {
         let half_s = self.reckoned_s();
         if half_s == 0.0 {
             return;
         }
+        let stride = self.stride();
         for node in 0..self.positions.len() {
             let gained = self.acceleration_of(node) * half_s;
-            self.velocities[2 * node] += gained;
+            self.velocities[stride * node] += gained;
         }
     }
 

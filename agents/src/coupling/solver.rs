@@ -1,9 +1,10 @@
 //! The impulses of many contacts at once: accelerated projected gradient (MHNT15) on Signorini's and Coulomb's laws.
 //!
 //! In: contacts, the free velocities, and a body's answer to impulses. Out: the impulses, and the velocities after them.
-//! Each iteration costs one answer, however many contacts there are. Theory: docs/theory/contact.md, eq. 5–11.
+//! Each iteration costs one answer, however many contacts there are, or none where W is formed. Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::Contact;
+use super::formed::Formed;
 use glam::DVec3;
 
 /// How a body answers impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
@@ -46,7 +47,7 @@ pub struct Problem<'a> {
 /// How a solve went.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SolverReport {
-    /// Answers asked for.
+    /// Products with W, each an answer of the body where W is not formed.
     pub iterations: u32,
     /// The largest velocity by which a contact still fails its law, m/s.
     pub residual_m_s: f64,
@@ -64,6 +65,11 @@ pub struct Solver {
     ahead: Iterate,
     next: Iterate,
     answer: Vec<DVec3>,
+    /// Whether W may be formed: an answer is dear beside a product with the W of as many contacts.
+    forms: bool,
+    formed: Formed,
+    /// Products that the last solve took.
+    products: u32,
 }
 
 /// The impulse of a contact of the last solve.
@@ -88,8 +94,16 @@ const BOUND_MARGIN: f64 = 1.02;
 const BOUND_DECAY: f64 = 0.9;
 /// The least mobility, 1/kg: a contact between held matter only has none, and any number will do.
 const MOBILITY_MIN: f64 = 1e-12;
+/// The most products with a W that is formed.
+const FORMED_PRODUCTS: u32 = 2_000;
 
 impl Solver {
+    /// A solver that forms W where the last solve took more answers than that costs.
+    #[must_use]
+    pub fn that_forms() -> Self {
+        Self { forms: true, ..Self::default() }
+    }
+
     /// Forgets every warm start: keys have lost their meaning (the body was divided anew).
     pub fn forget(&mut self) {
         self.known.clear();
@@ -173,11 +187,12 @@ impl Solver {
     /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `answer`.
     fn iterate(&mut self, problem: &Problem<'_>, body: &mut impl Response, slots: usize) -> SolverReport {
         let Problem { contacts, settings, .. } = *problem;
-        let mut report = SolverReport::default();
         self.answer.clear();
         self.answer.resize(slots, DVec3::ZERO);
+        let most = self.form(problem, body);
+        let mut report = SolverReport::default();
         if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
-            self.now.cause(contacts, body, &mut self.answer);
+            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
             report.iterations += 1;
         } else {
             self.now.caused.clear();
@@ -189,16 +204,32 @@ impl Solver {
             self.descend(contacts);
             report.residual_m_s = self.residual();
             // `answer` must belong to `now`: no stop between a refused move and the next one
-            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= settings.iterations) {
-                return report;
+            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= most) {
+                break;
             }
-            self.next.cause(contacts, body, &mut self.answer);
+            self.next.cause(contacts, (&self.formed, body), &mut self.answer);
             report.iterations += 1;
-            taken = self.bound_holds() || report.iterations >= settings.iterations;
+            taken = self.bound_holds() || report.iterations >= most;
             if taken {
                 momentum = self.advance(momentum);
             }
         }
+        if self.formed.is_known() {
+            self.formed.forget();
+            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+        }
+        self.products = report.iterations;
+        report
+    }
+
+    /// Forms W where that costs less than the last solve did; the most products that may be taken.
+    fn form(&mut self, problem: &Problem<'_>, body: &mut impl Response) -> u32 {
+        let Problem { contacts, settings, .. } = *problem;
+        if !self.forms || self.products as usize <= 3 * contacts.len() {
+            return settings.iterations;
+        }
+        self.formed.form(contacts, body, &mut self.answer);
+        FORMED_PRODUCTS
     }
 
     /// next ← P(ahead − (W ahead + b) / (L d)) (eq. 10).
@@ -272,8 +303,11 @@ pub fn inverse_mass(
 }
 
 impl Iterate {
-    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards.
-    fn cause(&mut self, contacts: &[Contact], body: &mut impl Response, answer: &mut [DVec3]) {
+    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
+    fn cause(&mut self, contacts: &[Contact], (formed, body): (&Formed, &mut impl Response), answer: &mut [DVec3]) {
+        if formed.is_known() {
+            return formed.times(&self.lambda, &mut self.caused);
+        }
         answer.fill(DVec3::ZERO);
         contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.slots.scatter(*lambda, answer));
         body.respond(answer);

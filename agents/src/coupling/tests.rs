@@ -110,6 +110,37 @@ fn the_solve_agrees_with_gauss_seidel_on_random_problems() {
     }
 }
 
+/// The first solve asks the body, the second one finds that W costs less.
+#[test]
+fn a_solve_that_forms_its_matrix_gives_what_one_that_does_not_gives() {
+    let mut noise = Noise(13);
+    let mut formed = 0;
+    for trial in 0..20 {
+        let mut body = Dense::random(6, &mut noise);
+        let contacts = random_contacts(5, 6, 0.3, &mut noise);
+        let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
+        let (wanted, _) = after(&contacts, &free, &mut body, PATIENT);
+        let mobilities = body.mobilities();
+        let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings: PATIENT };
+        let (mut solver, mut asked) = (Solver::that_forms(), 0);
+        for again in [false, true] {
+            // no warm start: what the second gives is found by W alone
+            solver.forget();
+            asked = 0;
+            let mut velocities = free.clone();
+            let report = solver.solve(&problem, &mut velocities, &mut |impulses: &mut [DVec3]| {
+                asked += 1;
+                body.respond(impulses);
+            });
+            let error = velocities.iter().zip(&wanted).map(|(a, b)| (*a - *b).length()).fold(0.0, f64::max);
+            assert!(error < 1e-9, "trial {trial}, again {again}: {error} m/s after {report:?}");
+        }
+        // three a contact, and the one that says what the impulses do
+        formed += usize::from(asked == 16);
+    }
+    assert!(formed >= 10, "W was formed {formed} times");
+}
+
 #[test]
 fn every_law_holds_after_the_solve() {
     let mut noise = Noise(11);

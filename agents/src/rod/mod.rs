@@ -54,6 +54,7 @@ pub(crate) use holds::Far;
 pub use inertia::CurveInertia;
 pub(crate) use mate::Mate;
 pub use method::Integrator;
+pub(crate) use publish::smooth;
 pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec};
 pub(crate) use tank::Tanks;
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};

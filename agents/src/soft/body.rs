@@ -12,6 +12,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::{Form, FormKind, Law, Link};
+use crate::rod::smooth;
 use crate::{
     Agent, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, Surroundings,
     check_span,
@@ -28,6 +29,8 @@ pub struct SoftBody {
     pub(super) velocities: Vec<DVec3>,
     /// The velocities a substep would end with, if nothing were touched.
     pub(super) free: Vec<DVec3>,
+    /// What others gave since the last step, N·s a vertex, until it is taken in; empty for nothing.
+    pub(super) given: Vec<DVec3>,
     pub(super) ties: Vec<Tie>,
     pub(super) company: Company,
     pub(super) contacts: Contacts,
@@ -35,6 +38,10 @@ pub struct SoftBody {
     pub(super) touching: bool,
     /// Of the centre of mass in the last step, without what others gave, m/s².
     pub(super) acceleration: DVec3,
+    /// How each vertex will accelerate without what others give, m/s²; empty where nobody wants to know.
+    pub(super) accelerations: Vec<DVec3>,
+    /// The length of the last substep, seconds.
+    pub(super) span_s: f64,
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
     before: Vec<DVec3>,
@@ -73,11 +80,14 @@ impl SoftBody {
             velocities,
             lattice,
             contacts,
+            given: vec![],
             ties: vec![],
             company: Company::default(),
             grips: vec![],
             touching: false,
             acceleration: spec.gravity,
+            accelerations: vec![],
+            span_s: 0.0,
             at_rest: false,
             doubling: Doubling::default(),
             quiet_s: 0.0,
@@ -146,6 +156,25 @@ impl SoftBody {
         at_rest
     }
 
+    /// Works out how it will accelerate in a substep like the last one without what others gave, where somebody wants to know
+    /// (docs/theory/soft.md, eq. 16a). What contact of its own did may have been a blow.
+    fn foretell(&mut self) {
+        let Self { accelerations, system, lattice, velocities, free: before, given, .. } = self;
+        accelerations.clear();
+        if !self.company.is_watched() {
+            return;
+        }
+        let damped = 2.0 + self.span_s * self.spec.matter.damping_per_s;
+        let moves = velocities.iter().zip(&*before).zip(&lattice.mass_kg);
+        accelerations.extend(moves.map(|((now, before), mass)| (*now * damped - *before) * *mass));
+        accelerations.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum -= *given);
+        system.respond(accelerations);
+        for (a, now) in accelerations.iter_mut().zip(&*velocities) {
+            let gained = (*a - *now) / self.span_s;
+            *a = if self.touching { smooth(gained, self.spec.gravity) } else { gained };
+        }
+    }
+
     /// Ends a step of `dt` seconds: books, grips, what others may expect.
     fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let mass_kg = self.mass_kg();
@@ -154,6 +183,7 @@ impl SoftBody {
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
         self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
+        self.foretell();
         self.steps += 1;
         self.at_rest = self.watch_rest(dt);
     }

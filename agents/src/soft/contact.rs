@@ -66,7 +66,7 @@ impl Contacts {
             form,
             walls,
             list: vec![],
-            solver: Solver::default(),
+            solver: Solver::that_forms(),
             touches: vec![],
             mobilities: vec![],
             room: TouchRoom::default(),

@@ -11,6 +11,13 @@ pub struct SoftInertia {
     factor: Factor,
     /// Of each vertex by itself, 1/kg.
     mobilities: Vec<f64>,
+    /// How each vertex will accelerate without what others give, m/s².
+    pub accelerations: Vec<DVec3>,
+    /// The length of the substep that ended last, seconds: published velocities are the means over it.
+    pub span_s: f64,
+    /// Mass of each vertex, kg, and damping, 1/s.
+    pub(super) mass_kg: Vec<f64>,
+    pub(super) damping_per_s: f64,
 }
 
 impl SoftInertia {
@@ -30,6 +37,16 @@ impl SoftInertia {
     /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
     pub(crate) fn scale(&self, into: &mut Vec<f64>) {
         into.extend_from_slice(&self.mobilities);
+    }
+
+    /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), add to its mean velocity in the step
+    /// that comes: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
+    pub(crate) fn take_back(&self, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
+        room.clear();
+        room.extend(shares.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
+        self.respond(room);
+        let damped = 2.0 + self.span_s * self.damping_per_s;
+        shares.iter_mut().zip(room).for_each(|(share, moved)| *share = *moved * damped - *share * 2.0);
     }
 
     /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s).

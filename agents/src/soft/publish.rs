@@ -22,7 +22,12 @@ impl SoftBody {
         soft.positions.clone_from(&self.positions);
         soft.velocities.clone_from(&self.velocities);
         if self.company.is_watched() && self.steps > 0 {
-            into.inertia.soft_mut().copy_from(self.system.answer(), &self.contacts.mobilities);
+            let inertia = into.inertia.soft_mut();
+            inertia.copy_from(self.system.answer(), &self.contacts.mobilities);
+            inertia.accelerations.clone_from(&self.accelerations);
+            inertia.span_s = self.span_s;
+            inertia.mass_kg.clone_from(&self.lattice.mass_kg);
+            inertia.damping_per_s = self.spec.matter.damping_per_s;
         } else {
             into.inertia = Inertia::Immovable;
         }

@@ -35,14 +35,18 @@ impl SoftBody {
             }
             self.act(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
+            if left > 0 {
+                self.given.clear();
+            }
         }
+        self.span_s = dt / f64::from(parts);
         self.judge(dt, done);
         Ok((done, doubled))
     }
 
     /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
     pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
-        let Self { system, lattice, positions, velocities, free, spec, ties, company, contacts, .. } = self;
+        let Self { system, lattice, positions, velocities, free, given, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
         lattice.add(positions, system);
@@ -60,6 +64,7 @@ impl SoftBody {
         free.clear();
         let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
         free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
+        free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
         system.respond(free);
         company.share(ties, free, system);
         Ok(())
@@ -83,9 +88,17 @@ impl SoftBody {
 
     /// Takes in what others gave since the last step, and looks who is near.
     fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
-        let Self { system, positions, velocities, company, .. } = self;
+        let Self { system, positions, velocities, given, company, .. } = self;
+        given.clear();
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
+            // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
+            given.extend_from_slice(sums);
+            for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
+                let past = moment.dot(*sum) / (dt * sum.length_squared()).max(f64::MIN_POSITIVE);
+                *sum *= past.clamp(0.0, 1.0);
+                *given -= *sum;
+            }
             system.respond(sums);
             system.respond(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);

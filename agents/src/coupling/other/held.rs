@@ -19,7 +19,9 @@ impl Other {
                 let [a, b] = [segment, segment + 1].map(|node| self.acceleration_of(node as usize));
                 a.lerp(b, share) * (h - self.reckoned_s()).max(0.5 * h)
             }
-            Place::Surface { vertices, .. } => self.acceleration_of(vertices[0] as usize) * h,
+            Place::Surface { vertices, .. } => {
+                self.acceleration_of(vertices[0] as usize) * (h - self.reckoned_s()).max(0.5 * h)
+            }
         };
         Some((point, velocity + gain))
     }
@@ -31,10 +33,11 @@ impl Other {
         if self.is_many() { (h / step_s.max(1e-3) + 1e-6).floor().max(1.0) as u32 } else { 1 }
     }
 
-    /// By how much the velocities of a tube are reckoned ahead, seconds of its acceleration.
+    /// By how much the velocities of a tube or soft body are reckoned ahead, seconds of its acceleration.
     pub(super) fn reckoned_s(&self) -> f64 {
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
             Some(Inertia::Curve(curve)) => 0.5 * curve.span_s,
+            Some(Inertia::Soft(soft)) => 0.5 * soft.span_s,
             _ => 0.0,
         }
     }

@@ -355,15 +355,21 @@ impl Meeting<'_> {
         }
     }
 
-    /// The spot inside a triangle of `surface` that is nearest to a point, within reach.
+    /// The spot of a triangle of `surface` that is nearest to a point, within reach; of a rope, which has none, that of an edge.
     fn nearest_on(&self, surface: &Surface<'_>, at: DVec3) -> Option<(Spot, DVec3)> {
         let within_m = self.reach_m + surface.form.radius_m + self.surface.form.radius_m;
-        let near = surface.triangles_in((at - within_m, at + within_m));
-        let spots = near.filter_map(|(_, triangle, corners)| {
+        let within = (at - within_m, at + within_m);
+        let spots = surface.triangles_in(within).filter_map(|(_, triangle, corners)| {
             let near = near_triangle(at, corners);
             Some((Spot { vertices: triangle, shares: shares(near, corners)? }, near))
         });
-        spots.min_by(|a, b| a.1.distance_squared(at).total_cmp(&b.1.distance_squared(at)))
+        let is_rope = surface.form.triangles.is_empty();
+        let lines = surface.edges_in(within).filter(|_| is_rope).map(|(_, edge, ends)| {
+            let along = ends[1] - ends[0];
+            let share = ((at - ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            (Spot::edge(edge, share), ends[0].lerp(ends[1], share))
+        });
+        spots.chain(lines).min_by(|a, b| a.1.distance_squared(at).total_cmp(&b.1.distance_squared(at)))
     }
 }
 

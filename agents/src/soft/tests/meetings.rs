@@ -262,3 +262,59 @@ fn a_heavy_ball_comes_off_the_floor_under_the_sheet_that_it_fell_on() {
         assert!(low > 5e-3, "{rates:?}, {mass_kg} kg: {low} m above the floor");
     }
 }
+
+/// What a block on a block would do in its next step was taken for less than it is: it sank in by 5 to 25 mm, and through.
+#[test]
+fn a_soft_block_lies_on_a_soft_block_at_any_rates() {
+    let matter = SoftMatter { young_pa: 5e4, damping_per_s: 4.0, ..MATTER };
+    let block = |size_m, segments, position| SoftSpec {
+        matter,
+        gravity: G,
+        position,
+        obstacles: [floor()].into(),
+        ..spec(SoftShape::Box { size_m, segments })
+    };
+    for rates in
+        [(100.0, 100.0), (1000.0, 1000.0), (60.0, 60.0), (240.0, 60.0), (60.0, 240.0), (1000.0, 60.0), (60.0, 1000.0)]
+    {
+        let low = block(DVec3::new(0.2, 0.2, 0.1), [4, 4, 2], DVec3::ZERO);
+        let high = block(DVec3::splat(0.1), [2; 3], DVec3::new(0.05, 0.05, 0.11));
+        let mut stage = Stage::new(Faults::default());
+        let low = stage.add(SoftBody::new(low).unwrap(), rates.0);
+        let high = stage.add(SoftBody::new(high).unwrap(), rates.1);
+        let energy_j = |stage: &Stage| stage.newest(low).energy_j + stage.newest(high).energy_j;
+        let (start_j, mut most_j) = (energy_j(&stage), f64::NEG_INFINITY);
+        stage.run(2.0, |stage| most_j = most_j.max(energy_j(stage) - start_j));
+        let owner = if rates.1 > rates.0 { high } else { low };
+        let deep_m = stage.newest(owner).pairs[0].penetration_m;
+        let lowest = stage.newest(high).bounds.unwrap().low.z;
+        println!("{rates:?}: bottom at {lowest}, {deep_m} m deep, {most_j} J");
+        assert!(most_j < 0.0, "{rates:?}: it gained {most_j} J");
+        // the lower one gives way under it by 2 mm, and by as much again where it hears of its load four steps late
+        assert!(deep_m < 2e-3 && lowest > 0.094, "{rates:?}: at {lowest}, {deep_m} m deep");
+    }
+}
+
+/// Two ropes that cross where one of them, or both, have a vertex once had no contact.
+#[test]
+fn a_rope_lies_across_a_rope_wherever_their_vertices_are() {
+    let rope = |from: DVec3, to: DVec3, segments, held| SoftSpec {
+        matter: SoftMatter { young_pa: 1e7, damping_per_s: 4.0, ..MATTER },
+        gravity: G,
+        held,
+        friction: 0.5,
+        ..spec(SoftShape::Rope { path_m: vec![from, to], radius_m: 0.01, segments })
+    };
+    for (segments, aside) in [([10, 10], 0.0), ([9, 10], 0.0), ([10, 9], 0.0), ([9, 9], 0.013)] {
+        let low = rope(DVec3::X * -0.5, DVec3::X * 0.5, segments[0], vec![Side::Left, Side::Right]);
+        let high = rope(DVec3::new(aside, -0.1, 0.025), DVec3::new(aside, 0.1, 0.025), segments[1], vec![]);
+        let mut stage = Stage::new(Faults::default());
+        let low = stage.add(SoftBody::new(low).unwrap(), 240.0);
+        let high = stage.add(SoftBody::new(high).unwrap(), 120.0);
+        stage.run(0.3, |_| {});
+        let lowest = |id| stage.newest(id).bounds.unwrap().low.z;
+        // the ends of the upper one hang down on both sides of the lower one
+        assert!(stage.newest(low).pairs[0].contacts > 0, "{segments:?}: at {} and {}", lowest(low), lowest(high));
+        assert!(lowest(high) > -0.15, "{segments:?}: at {} and {}", lowest(low), lowest(high));
+    }
+}

@@ -1,0 +1,50 @@
+//! W of a few contacts written out, where many products with it are to come.
+//!
+//! In: contacts, a body's answer to impulses. Out: products W λ at the cost of the contacts alone. Never here: when that pays
+//! ([`super::solver`]). Theory: docs/theory/contact.md, eq. 5.
+
+use super::{Contact, Response};
+use glam::{DMat3, DVec3};
+
+/// W = J A⁻¹ Jᵀ (1/kg): what an impulse at each contact does to each.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Formed {
+    /// One a pair of contacts, those that one impulse moves one after the other; none while it is not formed.
+    blocks: Vec<DMat3>,
+}
+
+impl Formed {
+    /// Forms W by three answers a contact; `room` has one entry a slot.
+    pub fn form(&mut self, contacts: &[Contact], body: &mut impl Response, room: &mut [DVec3]) {
+        self.blocks.clear();
+        for pushed in contacts {
+            let from = self.blocks.len();
+            self.blocks.resize(from + contacts.len(), DMat3::ZERO);
+            for (axis, unit) in DVec3::AXES.into_iter().enumerate() {
+                room.fill(DVec3::ZERO);
+                pushed.slots.scatter(unit, room);
+                body.respond(room);
+                for (block, moved) in self.blocks[from..].iter_mut().zip(contacts) {
+                    *block.col_mut(axis) = moved.slots.velocity(room);
+                }
+            }
+        }
+    }
+
+    pub fn forget(&mut self) {
+        self.blocks.clear();
+    }
+
+    pub fn is_known(&self) -> bool {
+        !self.blocks.is_empty()
+    }
+
+    /// W λ, a velocity a contact.
+    pub fn times(&self, lambda: &[DVec3], caused: &mut Vec<DVec3>) {
+        caused.clear();
+        caused.resize(lambda.len(), DVec3::ZERO);
+        for (impulse, column) in lambda.iter().zip(self.blocks.chunks(lambda.len())) {
+            caused.iter_mut().zip(column).for_each(|(sum, block)| *sum += *block * *impulse);
+        }
+    }
+}
