@@ -100,11 +100,15 @@ impl Source {
 }
 
 fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
-    let file = File::open(path).map_err(|e| e.to_string())?;
-    let kind = file.metadata().map_err(|e| e.to_string())?;
+    // asked before it is opened: to open a pipe waits for whoever writes into it
+    let kind = std::fs::metadata(path).map_err(|e| e.to_string())?;
     if kind.is_dir() {
         return Err("it is a folder".to_owned());
     }
+    if !kind.is_file() {
+        return Err("it is a pipe, a device or a socket; expected a plain file".to_owned());
+    }
+    let file = File::open(path).map_err(|e| e.to_string())?;
     let mut bytes = Vec::new();
     file.take(most + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
     if bytes.len() as u64 > most {
@@ -127,4 +131,22 @@ fn missing(name: &str, path: &Path, why: &str) -> SceneError {
         format!("there is no built-in scene `{name}`, and no file of that name ({why})")
     };
     SceneError::unreadable(name, message, Some(help))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_plain_file_is_refused_and_not_waited_for() {
+        // a device that never ends; a socket stands for a pipe: both are told before they are opened
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("socket.obj");
+        let _listens = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        for path in [Path::new("/dev/zero"), &socket] {
+            let told = read_bounded(path, SIBLING_BYTES_MAX).unwrap_err();
+            assert!(told.contains("expected a plain file"), "{path:?}: {told}");
+        }
+        assert_eq!(read_bounded(folder.path(), 9).unwrap_err(), "it is a folder");
+    }
 }

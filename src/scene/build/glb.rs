@@ -1,8 +1,9 @@
 //! glTF's binary form (.glb) as points and triangles.
 //!
 //! In: any bytes. Out: the triangles of every mesh that a node of the scene shows, placed as the nodes say, z up, and the image that is
-//! painted on them; or what is wrong with the file. Never here: light, skins, files beside the file, what an image's bytes mean. Every number in it is doubted: it may be hostile
-//! (the crate `gltf` panics on a number of an accessor that is not there, so the few tables needed are read here).
+//! painted on them; or what is wrong with the file. Never here: light, skins, files beside the file, what an image's bytes mean. Every
+//! number in it is doubted: it may be hostile (the crate `gltf` panics on a number of an accessor that is not there, so the few tables
+//! needed are read here), and what many nodes show of one list is counted before it is read.
 
 mod tables;
 
@@ -13,8 +14,10 @@ use tables::{Node, Tables};
 
 /// What such a file begins with.
 pub(super) const MAGIC: &[u8] = b"glTF";
-/// Most nodes that are looked at: one that is its own ancestor would never end.
+/// Most nodes that are looked at, and primitives of their meshes: a node that is its own ancestor would never end.
 const NODES_MAX: usize = 100_000;
+/// Most points of all primitives that nodes show together: no triangle can need more than three.
+const POINTS_MAX: usize = 3 * TRIANGLES_MAX;
 /// Deepest nesting of nodes.
 const DEPTH_MAX: usize = 64;
 /// glTF has y up: it becomes z.
@@ -33,6 +36,8 @@ struct Reader<'d> {
     /// For each primitive of a mesh of a node its first point, its mesh and its number in it.
     primitives: Vec<(u32, [usize; 2])>,
     nodes: usize,
+    /// How many primitives were looked at, those of points and lines too.
+    looked_at: usize,
 }
 
 /// Points, their places on the image of [`image`], and triangles of a file.
@@ -49,6 +54,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
         meshes: 0,
         primitives: Vec::new(),
         nodes: 0,
+        looked_at: 0,
     };
     for node in roots {
         reader.node(node, UPRIGHT, 0)?;
@@ -80,6 +86,9 @@ impl Reader<'_> {
         let node =
             self.tables.nodes.get(number).ok_or_else(|| format!("it names node {number}, which is not there"))?;
         let place = above * node.matrix();
+        if node.children.len() > NODES_MAX {
+            return Err(format!("its node {number} has more than {NODES_MAX} children"));
+        }
         let (mesh, children) = (node.mesh, node.children.clone());
         if let Some(mesh) = mesh {
             self.mesh(mesh, place)?;
@@ -90,42 +99,52 @@ impl Reader<'_> {
     fn mesh(&mut self, number: usize, place: DMat4) -> Result<(), String> {
         let mesh =
             self.tables.meshes.get(number).ok_or_else(|| format!("it names mesh {number}, which is not there"))?;
-        self.meshes += 1;
-        for (part, primitive) in mesh.primitives.iter().enumerate() {
-            // triangles, strips and fans; points and lines are left out
-            let Some(mode @ 4..=6) = Some(primitive.mode.unwrap_or(4)) else { continue };
-            let positions = primitive.attributes.get("POSITION").ok_or("a primitive has no positions")?;
-            let first = u32::try_from(self.points.len()).map_err(|_| "too many points")?;
-            let points = tables::points(&self.tables, *positions, self.data)?;
-            let count = points.len() as u32;
-            let corners = match primitive.indices {
-                Some(accessor) => tables::indices(&self.tables, accessor, self.data)?,
-                None => (0..count).collect(),
-            };
-            if let Some(bad) = corners.iter().find(|&&i| i >= count) {
-                return Err(format!("a face uses point {bad} of {count}"));
-            }
-            if mode == 4 && !corners.len().is_multiple_of(3) || corners.len() < 3 {
-                let (count, expected) =
-                    (corners.len(), if mode == 4 { "a multiple of three" } else { "three or more" });
-                return Err(format!("primitive {part} of mesh {number} has {count} corners; expected {expected}"));
-            }
-            self.primitives.push((first, [number, part]));
-            self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
-            let coordinates = self.tables.painted(primitive).map_or(0, |on| on.tex_coord);
-            if let Some(&accessor) = primitive.attributes.get(&format!("TEXCOORD_{coordinates}")) {
-                let uvs = tables::uvs(&self.tables, accessor, self.data)?;
-                self.uvs.extend(uvs.into_iter().take(points.len()));
-            }
-            self.uvs.resize(self.points.len(), Vec2::ZERO);
-            let turned = place.determinant() < 0.0;
-            let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
-            self.triangles.extend(triangles(&corners, mode).into_iter().map(|t| side(t).map(|i| i + first)));
-            self.objects.resize(self.triangles.len(), self.meshes);
-            if self.triangles.len() > TRIANGLES_MAX {
-                return Err(format!("it has more than {TRIANGLES_MAX} triangles"));
-            }
+        self.looked_at += mesh.primitives.len();
+        if self.looked_at > NODES_MAX {
+            return Err(format!("the meshes that its nodes show have more than {NODES_MAX} primitives"));
         }
+        self.meshes += 1;
+        (0..mesh.primitives.len()).try_for_each(|part| self.primitive([number, part], place))
+    }
+
+    /// One primitive of a mesh: triangles, strips and fans; points and lines are left out.
+    fn primitive(&mut self, [number, part]: [usize; 2], place: DMat4) -> Result<(), String> {
+        let primitive = &self.tables.meshes[number].primitives[part];
+        let Some(mode @ 4..=6) = Some(primitive.mode.unwrap_or(4)) else { return Ok(()) };
+        let positions = *primitive.attributes.get("POSITION").ok_or("a primitive has no positions")?;
+        let first = self.points.len();
+        if first.saturating_add(self.tables.count(positions)?) > POINTS_MAX {
+            return Err(format!("the meshes that its nodes show have more than {POINTS_MAX} points"));
+        }
+        let points = tables::points(&self.tables, positions, self.data)?;
+        let (first, count) = (first as u32, points.len() as u32);
+        let corners = match primitive.indices {
+            Some(accessor) => tables::indices(&self.tables, accessor, self.data)?,
+            None => (0..count).collect(),
+        };
+        if let Some(bad) = corners.iter().find(|&&i| i >= count) {
+            return Err(format!("a face uses point {bad} of {count}"));
+        }
+        if mode == 4 && !corners.len().is_multiple_of(3) || corners.len() < 3 {
+            let (count, expected) = (corners.len(), if mode == 4 { "a multiple of three" } else { "three or more" });
+            return Err(format!("primitive {part} of mesh {number} has {count} corners; expected {expected}"));
+        }
+        let more = if mode == 4 { corners.len() / 3 } else { corners.len() - 2 };
+        if self.triangles.len() + more > TRIANGLES_MAX {
+            return Err(format!("it has more than {TRIANGLES_MAX} triangles"));
+        }
+        let coordinates = self.tables.painted(primitive).map_or(0, |on| on.tex_coord);
+        if let Some(&accessor) = primitive.attributes.get(&format!("TEXCOORD_{coordinates}")) {
+            let uvs = tables::uvs(&self.tables, accessor, self.data)?;
+            self.uvs.extend(uvs.into_iter().take(points.len()));
+        }
+        self.primitives.push((first, [number, part]));
+        self.points.extend(points.iter().map(|&p| place.transform_point3(p)));
+        self.uvs.resize(self.points.len(), Vec2::ZERO);
+        let turned = place.determinant() < 0.0;
+        let side = |t: [u32; 3]| if turned { [t[0], t[2], t[1]] } else { t };
+        self.triangles.extend(triangles(&corners, mode).into_iter().map(|t| side(t).map(|i| i + first)));
+        self.objects.resize(self.triangles.len(), self.meshes);
         Ok(())
     }
 
@@ -189,12 +208,16 @@ mod tests {
     }
 
     fn file(json: &str) -> Vec<u8> {
-        let mut text = json.as_bytes().to_vec();
-        text.resize(text.len().next_multiple_of(4), b' ');
         let points = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]];
         let corners: [u16; 12] = [0, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3];
         let mut data: Vec<u8> = points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
         data.extend(corners.iter().flat_map(|i| i.to_le_bytes()));
+        packed(json, &data)
+    }
+
+    fn packed(json: &str, data: &[u8]) -> Vec<u8> {
+        let mut text = json.as_bytes().to_vec();
+        text.resize(text.len().next_multiple_of(4), b' ');
         let mut bytes = b"glTF".to_vec();
         let length = 12 + 8 + text.len() + 8 + data.len();
         for (word, body) in [(2_u32, &[][..]), (length as u32, &[]), (text.len() as u32, b"JSON"), (0, &text)] {
@@ -271,6 +294,32 @@ mod tests {
         let edge = "4 triangles share the edge from vertex 0 of primitive 1 of mesh 0 to vertex";
         assert!(told_twice.contains("not manifold") && told_twice.contains(edge), "{told_twice}");
         assert_eq!(told("\"nodes\":[0]", "\"nodes\":[0,0]"), "");
+    }
+
+    #[test]
+    fn points_and_primitives_that_many_nodes_show_are_counted_before_they_are_read() {
+        // the tetrahedron's four points as 30 000, shown by 101 nodes: 3 030 000 points for 404 triangles
+        let points = 30_000_usize;
+        let text = json(12 * points + 24, points, 12)
+            .replace("\"byteLength\":48},", &format!("\"byteLength\":{}}},", 12 * points))
+            .replace("\"byteOffset\":48", &format!("\"byteOffset\":{}", 12 * points));
+        let shown = |times: usize| {
+            let nodes = vec!["0"; times].join(",");
+            let mut data = [[0.0_f32, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 2.0, 0.0], [0.0, 0.0, 1.0]].to_vec();
+            data.resize(points, [0.0; 3]);
+            let mut data: Vec<u8> = data.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+            data.extend([0_u16, 2, 1, 0, 1, 3, 1, 2, 3, 2, 0, 3].iter().flat_map(|i| i.to_le_bytes()));
+            let text = text.replace("[{\"nodes\":[0]}]", &format!("[{{\"nodes\":[{nodes}]}}]"));
+            read(&packed(&text, &data), 1.0).err().unwrap_or_default()
+        };
+        assert_eq!(shown(2), "");
+        assert_eq!(shown(101), "the meshes that its nodes show have more than 3000000 points");
+        let line = r#"{"attributes":{},"mode":1}"#;
+        let lines = format!("{line},").repeat(60_000) + line;
+        let text = json(72, 4, 12).replace("\"primitives\":[", &format!("\"primitives\":[{lines},"));
+        let twice = text.replace("[{\"nodes\":[0]}]", "[{\"nodes\":[0,0]}]");
+        assert_eq!(read(&file(&text), 1.0).err(), None);
+        assert!(read(&file(&twice), 1.0).unwrap_err().contains("more than 100000 primitives"));
     }
 
     #[test]

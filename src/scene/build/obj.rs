@@ -13,8 +13,14 @@ use glam::{DVec3, Vec2};
 use metachron_agents::shape::branch;
 use std::collections::HashMap;
 
+/// What editors of texts put before UTF-8; it says nothing.
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 /// Stands for the number of what a corner does not have.
 const NONE: u32 = u32::MAX;
+
+/// Most corners of one face: the slivers of a fan all lie in each other's boxes, and the search for what is nearest among them
+/// takes time that grows faster than they do.
+const CORNERS_MAX: usize = 1 << 16;
 
 /// Numbers of a corner's point, place on the texture and normal, from 0.
 type Corner = [u32; 3];
@@ -41,6 +47,7 @@ struct Face {
 
 /// Points, their places on a texture and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
+    let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = Reader::default();
     let mut begun = Vec::new();
     let last = bytes.split(|b| *b == b'\n').count();
@@ -96,6 +103,9 @@ impl Reader {
         let corners = words.map(|word| corner(word, counts)).collect::<Result<Vec<Corner>, String>>()?;
         if corners.len() < 3 {
             return Err(format!("a face has {} corners; expected three or more", corners.len()));
+        }
+        if corners.len() > CORNERS_MAX {
+            return Err(format!("a face has {} corners, more than {CORNERS_MAX}", corners.len()));
         }
         if self.faces.len() + corners.len() - 2 > TRIANGLES_MAX {
             return Err(format!("the file has more than {TRIANGLES_MAX} triangles"));
@@ -216,6 +226,7 @@ mod tests {
             format!("{SQUARE}vn 0 0 1\nf 1//1 2//1 3//-1 4//1 # a square\r\n"),
             format!("{SQUARE}f 1 2 \\\n3 4\ns off\nusemtl none\n"),
             format!("f 1 2 3 4\no square\n{SQUARE}"),
+            format!("\u{feff}{SQUARE}f 1 2 3 4\n"),
         ] {
             assert_eq!(read(text.as_bytes()).unwrap(), plain, "{text}");
         }
@@ -246,6 +257,8 @@ mod tests {
             assert!(told.starts_with(why) || told.contains(why) && why.starts_with('`'), "{more}: {told}");
             assert_eq!(told.contains("cut short"), !more.ends_with('\n'), "{more}: {told}");
         }
+        let wide = format!("{SQUARE}f {}\n", "1 2 3 ".repeat(30_000));
+        assert_eq!(told(&wide), "line 5: a face has 90000 corners, more than 65536");
     }
 
     #[test]

@@ -166,6 +166,11 @@ impl Tables {
         entry.source.ok_or_else(|| format!("its texture {texture} has no image that is understood"))
     }
 
+    /// How many items an accessor says that it has.
+    pub(super) fn count(&self, accessor: usize) -> Result<usize, String> {
+        self::accessor(self, accessor).map(|accessor| accessor.count)
+    }
+
     /// The bytes of a view, checked to lie inside the file.
     pub(super) fn bytes<'d>(&self, view: usize, data: &'d [u8]) -> Result<&'d [u8], String> {
         let outside = || OUTSIDE.to_owned();
