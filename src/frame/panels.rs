@@ -93,6 +93,7 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     let policy = control.policy();
     status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
     status.sliders = policy.predicts().then(|| control.sliders());
+    status.damped = policy == Policy::Adaptive;
     status.frozen = control.is_frozen();
     status.loop_value = Some(control.eps_hat());
     status.policy = session.policy_name().to_owned();
@@ -127,7 +128,8 @@ fn shares(session: &Session, meter: &Meter) -> Shares {
     let mean =
         |of: fn(&FrameRecord) -> f64| newest.iter().map(of).sum::<f64>() / (newest.len().max(1) as f64 * target_ms);
     Shares {
-        simulation: meter.shares.iter().sum::<f64>() / f64::from(session.cores()),
+        // begun at 0: the sum of no numbers at all is −0
+        simulation: meter.shares.iter().fold(0.0, |sum, share| sum + share) / f64::from(session.cores()),
         cull: mean(|row| row.cull_ms),
         select: mean(|row| row.select_ms),
         draw: mean(|row| row.draw_ms),

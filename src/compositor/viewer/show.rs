@@ -202,6 +202,8 @@ pub struct Status {
     pub law: Option<Law>,
     /// How much each factor counts in what a level is worth; `None` where the policy does not weigh levels.
     pub sliders: Option<Sliders>,
+    /// Whether the policy heeds the slider of hysteresis.
+    pub damped: bool,
     /// Whether levels are kept as they are.
     pub frozen: bool,
     /// Where the time goes.

@@ -87,25 +87,20 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
         out.push(Action::Freeze(frozen));
     }
     if let Some(sliders) = status.sliders {
-        worth(ui, sliders, out);
+        worth(ui, (sliders, status.damped), out);
     }
     if let Some(law) = status.law {
         feedback(ui, law, status, out);
     }
 }
 
-/// How much each factor counts in what a level is worth.
-fn worth(ui: &mut Ui, sliders: Sliders, out: &mut Vec<Action>) {
+/// How much each factor counts in what a level is worth; hysteresis only where it is heeded.
+fn worth(ui: &mut Ui, (sliders, damped): (Sliders, bool), out: &mut Vec<Action>) {
     let mut wanted = sliders;
     let Sliders { size, accuracy, importance, focus, motion, hysteresis } = &mut wanted;
-    for (name, value) in [
-        ("Size", size),
-        ("Accuracy", accuracy),
-        ("Importance", importance),
-        ("Focus", focus),
-        ("Motion", motion),
-        ("Hysteresis", hysteresis),
-    ] {
+    let factors =
+        [("Size", size), ("Accuracy", accuracy), ("Importance", importance), ("Focus", focus), ("Motion", motion)];
+    for (name, value) in factors.into_iter().chain(damped.then_some(("Hysteresis", hysteresis))) {
         slider(ui, name, value, (0.0, 1.0), |s| s.max_decimals(2));
     }
     if wanted != sliders {
@@ -284,6 +279,19 @@ fn slider(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
+
+    #[test]
+    fn the_slider_of_hysteresis_is_there_only_where_it_is_heeded() {
+        let sliders = Some(Sliders::default());
+        for (damped, there) in [(true, 1), (false, 0)] {
+            let status = Status { sliders, damped, ..Status::default() };
+            let harness = Harness::new_ui(|ui| control(ui, &status, &mut Vec::new()));
+            let count = |name| harness.query_all_by_role_and_label(egui::Role::Slider, name).count();
+            assert_eq!((count("Motion"), count("Hysteresis")), (1, there));
+        }
+    }
 
     #[test]
     fn copied_gains_are_valid_toml() {
