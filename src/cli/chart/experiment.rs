@@ -36,8 +36,11 @@ pub(in crate::cli) trait Experiment: Sync {
     fn figure(rows: &[Self::Row]) -> Figure;
 
     /// Pictures that show more than the figure tells, each with the end of its file's name.
-    fn pictures(_: &[Self::Row]) -> Vec<(String, PictureFile)> {
-        Vec::new()
+    ///
+    /// # Errors
+    /// What cannot be drawn.
+    fn pictures(_: &[Self::Row]) -> anyhow::Result<Vec<(String, PictureFile)>> {
+        Ok(Vec::new())
     }
 
     /// The table that is printed.

@@ -261,7 +261,7 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
         let written = picture.save(&path).with_context(|| format!("{} cannot be written", path.display()));
         written.map(|()| path)
     };
-    E::pictures(rows).into_iter().map(write).collect()
+    E::pictures(rows)?.into_iter().map(write).collect()
 }
 
 /// An experiment's table, findings and files as text.

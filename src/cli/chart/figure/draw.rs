@@ -54,6 +54,24 @@ pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
     Ok(bytes.into_inner())
 }
 
+/// Names in black on white side by side, each at the left of a column of this width and height in pixels.
+///
+/// # Errors
+/// What cannot be drawn.
+pub(in crate::cli) fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<RgbImage> {
+    bring_font(FONT)?;
+    let all = (width * names.len() as u32, height);
+    let mut pixels = vec![255; all.0 as usize * all.1 as usize * 3];
+    let root = BitMapBackend::with_buffer(&mut pixels, all).into_drawing_area();
+    let letters = (FONT, 3 * height / 4).into_font().color(&BLACK);
+    for (column, name) in (0..).zip(names) {
+        root.draw_text(name, &letters, (column * width as i32 + 8, height as i32 / 8)).map_err(undrawn)?;
+    }
+    root.present().map_err(undrawn)?;
+    drop(root);
+    RgbImage::from_raw(all.0, all.1, pixels).context("there is nothing to name")
+}
+
 fn columns(figure: &Figure) -> usize {
     figure.columns.clamp(1, figure.panels.len().max(1))
 }

@@ -6,7 +6,7 @@ mod draw;
 mod font;
 mod scale;
 
-pub(in crate::cli) use draw::{png, svg};
+pub(in crate::cli) use draw::{headings, png, svg};
 
 /// Some panels under one title.
 #[derive(Debug, Clone, Default)]

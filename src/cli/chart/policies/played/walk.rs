@@ -194,28 +194,33 @@ fn opened(paper: Paper, times: Times) -> anyhow::Result<(String, Walk)> {
 /// One view of a scene after a policy has come to rest on it.
 pub(in super::super) struct Still {
     pub(in super::super) adapter: String,
-    pub(in super::super) target_s: f64,
     /// The median of the last frames.
     pub(in super::super) frame_ms: f64,
     pub(in super::super) triangles: u64,
     pub(in super::super) picture: PictureFile,
 }
 
-/// Frames that are drawn of one view; the last half of them counts.
-const STOOD: usize = 40;
+/// A place on a scene's path, the wanted time of a frame, and how many frames are drawn there; the last half of them counts.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Stood {
+    pub(in super::super) part: f64,
+    pub(in super::super) target_s: f64,
+    pub(in super::super) frames: usize,
+}
 
-/// Stands still at a part of a scene's path.
+/// Stands still on a scene's path.
 ///
 /// # Errors
 /// Of the scene, of the adapter.
-pub(in super::super) fn still(paper: Paper, part: f64, policy: &str, target_s: f64) -> anyhow::Result<Still> {
+pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
+    let Stood { part, target_s, frames } = stood;
     let (adapter, mut walk) = opened(paper, Times::Measured)?;
     let control = walk.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(policy).context("no such policy")?);
-    let mut records = (0..STOOD).map(|_| walk.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(STOOD / 2);
+    let mut records = (0..frames).map(|_| walk.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(frames / 2);
     let triangles = records.last().map_or(0, |row| row.triangles);
     records.sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
-    let frame_ms = records[records.len() / 2].frame_ms;
-    Ok(Still { adapter, target_s, frame_ms, triangles, picture: walk.picture()?.context("nothing draws")? })
+    let frame_ms = records.get(records.len() / 2).context("no frames")?.frame_ms;
+    Ok(Still { adapter, frame_ms, triangles, picture: walk.picture()?.context("nothing draws")? })
 }
