@@ -49,11 +49,11 @@ impl Experiment for Auditorium {
     fn figure(_: &[Row]) -> Figure {
         let show = show(Fault::NONE, LAP, 1);
         let panels = vec![
-            curves("no choice (five times the scale, as in the paper)", &show, &[Policy::Full], 12.5),
-            curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 2.5),
-            curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 2.5),
+            curves("no choice (four times the scale)", &show, &[Policy::Full], 12.0),
+            curves("by size", &show, &[Policy::StaticFine, Policy::Threshold], 3.0),
+            curves("by prediction", &show, &[Policy::Greedy, Policy::Adaptive], 3.0),
         ];
-        figure("The walk through the auditorium (FS93, fig. 7)", panels, 3)
+        figure("The walk through the auditorium (FS93, fig. 7)", panels, 1)
     }
 
     fn table(rows: &[Row]) -> Table {
