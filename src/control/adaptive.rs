@@ -1,6 +1,7 @@
 //! The default: every frame's time goes where it gains most, by prices that are corrected while it runs.
 //!
-//! In: ladders, groups, a time; what frames took. Out: a rung or a proxy for everything in view, and a promise with its certificate.
+//! In: ladders, groups, a time; what frames took. Out: a rung or an impostor for everything in view, and a promise with its
+//! certificate.
 //! Never here: the law (`metachron_budget::adaptive` has it). Theory: `docs/theory/budget.md`, section 7; `docs/theory/control.md`,
 //! section 6.
 
@@ -8,7 +9,7 @@ use super::ask::{Ask, Promise, TICKS, demand};
 use super::closing::Closing;
 use super::groups::Groups;
 use super::hierarchy::leave_out_members;
-use super::ladder::Ladder;
+use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
 use super::status::Status;
 use metachron_agents::AgentId;
@@ -28,8 +29,9 @@ const ON_TARGET: f64 = 0.05;
 #[derive(Debug, Clone, Copy)]
 struct Dish {
     id: AgentId,
-    /// The ladder it was put there with; 0 while it is not on it.
+    /// The ladder it was put there with, 0 while it is not on it; and how many of its rungs.
     version: u64,
+    rungs: usize,
     /// What its gains were last multiplied by.
     weight: Option<f64>,
 }
@@ -152,31 +154,37 @@ impl AdaptiveChoice {
         let same = self.dishes.len() == ask.views.len();
         if !same || self.dishes.iter().zip(ask.views).any(|(dish, (view, _))| dish.id != view.id) {
             self.clear();
-            self.dishes.extend(ask.views.iter().map(|(view, _)| Dish { id: view.id, version: 0, weight: None }));
+            self.dishes.extend(ask.views.iter().map(|(view, _)| Dish {
+                id: view.id,
+                version: 0,
+                rungs: 0,
+                weight: None,
+            }));
         }
         for at in 0..self.dishes.len() {
             let within = groups.parent(at).is_some() && groups.is_within(at, |group| self.closing.is_closed(group));
-            let ladder = ask.ladders.of(at);
-            let proxy = self.closing.is_closed(at).then_some(ladder.proxy).flatten();
-            let offered = ask.views[at].0.visible && (proxy.is_some() || !ladder.rungs.is_empty());
-            if within || !offered {
+            let (view, ladder) = (&ask.views[at].0, ask.ladders.of(at));
+            let (rungs, weight) = match view.is_group() {
+                false => (ladder.rungs.as_slice(), ask.weight(at)),
+                true if self.closing.is_closed(at) => self.closing.impostors(ask, at),
+                true => (&[][..], 0.0),
+            };
+            if within || !view.visible || rungs.is_empty() {
                 self.take_off(at);
                 continue;
             }
-            let weight = if proxy.is_some() { self.closing.proxy_worth(at) } else { ask.weight(at) };
-            self.put_on(at, ladder, weight);
+            self.put_on(at, (ladder, rungs), weight);
         }
     }
 
-    fn put_on(&mut self, at: usize, ladder: &Ladder, weight: f64) {
+    /// Offers the first of a ladder's rungs, or all.
+    fn put_on(&mut self, at: usize, (ladder, rungs): (&Ladder, &[Rung]), weight: f64) {
         let dish = &mut self.dishes[at];
         let id = u64::from(dish.id.0);
-        if dish.version != ladder.version {
-            let rungs = ladder.rungs.iter().map(|rung| Offer { cost: TICKS * rung.cost_s, gain: rung.accuracy });
-            let proxy = ladder.proxy.iter().map(|proxy| Offer { cost: TICKS * proxy.cost_s, gain: 1.0 });
+        if (dish.version, dish.rungs) != (ladder.version, rungs.len()) {
             self.offers.clear();
-            self.offers.extend(rungs.chain(proxy));
-            dish.version = ladder.version;
+            self.offers.extend(rungs.iter().map(|rung| Offer { cost: TICKS * rung.cost_s, gain: rung.accuracy }));
+            (dish.version, dish.rungs) = (ladder.version, rungs.len());
             self.law.set(id, DRAWING, false, &self.offers);
         }
         if dish.weight.is_none_or(|held| (weight - held).abs() > TREMBLE * held) {
@@ -204,7 +212,7 @@ impl AdaptiveChoice {
         for (at, dish) in self.dishes.iter().enumerate().filter(|(_, dish)| dish.version > 0) {
             let ladder = ask.ladders.of(at);
             let level = self.law.level(u64::from(dish.id.0)).map_or(0, |level| level as usize);
-            if let Some(rung) = ladder.rungs.get(level).or(ladder.proxy.as_ref()) {
+            if let Some(rung) = ladder.rungs.get(level) {
                 levels[at] = demand(at, ask.views, rung);
             }
         }

@@ -3,8 +3,8 @@
 //! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
 
 use super::ladder::{Ladder, Ladders, Rung};
+use super::level;
 use super::plan::{LevelDemand, Seen};
-use super::view::Kind;
 use super::worth;
 use metachron_agents::Resolution;
 use metachron_budget::cost::benefit::Sliders;
@@ -75,10 +75,10 @@ impl Ask<'_> {
         libm::floor(self.budget_s() * TICKS) as i64
     }
 
-    /// Numbers of the objects in view that have levels of their own.
+    /// Numbers of the objects in view that are drawn as themselves.
     pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
-        let ladder = |at: &usize| !self.ladders.of(*at).rungs.is_empty();
-        (0..self.views.len()).filter(|at| self.views[*at].0.visible).filter(ladder)
+        let itself = |at: &usize| !self.views[*at].0.is_group() && !self.ladders.of(*at).rungs.is_empty();
+        (0..self.views.len()).filter(|at| self.views[*at].0.visible).filter(itself)
     }
 
     /// What an object in view is worth at an accuracy of 1.
@@ -102,6 +102,6 @@ pub(super) fn left_out(at: usize, views: &[Seen], ladder: &Ladder) -> LevelDeman
     let view = &views[at].0;
     let usual = Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 };
     let resolution = ladder.rungs.first().map_or(usual, |rung| rung.resolution);
-    let n = if matches!(view.kind, Kind::Group { .. }) { super::level::OPEN } else { resolution.n };
+    let n = if view.is_group() { level::open(view) } else { resolution.n };
     LevelDemand { id: view.id, resolution: Resolution { n, ..resolution }, polygons: 0.0, shading: view.shading.1 }
 }

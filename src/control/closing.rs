@@ -1,14 +1,15 @@
-//! Which groups the default draws by their proxy: those whose members are worth less than their time at its price.
+//! Which groups the default draws by an impostor: those whose members are worth less than their time at its price.
 //!
-//! In: groups, λ and κ of the last plan. Out: which are closed. Never here: levels of what is not in a closed group.
+//! In: groups, λ and κ of the last plan. Out: which are closed. Never here: by which impostor, or levels of members.
 //! Theory: `docs/theory/control.md`, eq. 24.
 //!
-//! At a price λ of a second every part of a tree can be decided by itself: it is closed where its proxy leaves more of its worth after
-//! its cost is paid than the best of its members do. Where even the least of what is open does not fit, those are closed that lose
-//! least. A group that was opened too soon waits longer the next time.
+//! At a price λ of a second every part of a tree can be decided by itself: it is closed where the best of its impostors leaves more of its
+//! worth after its cost is paid than the best of its members do. Where even the least of what is open does not fit, those are closed that
+//! lose least. A group that was opened too soon waits longer the next time.
 
 use super::ask::{Ask, TICKS};
-use super::groups::Groups;
+use super::groups::{Groups, Impostors};
+use super::ladder::Rung;
 
 /// A group changes where that gains this part of what its members cost at least: the price trembles.
 const WORTH_IT: f64 = 0.1;
@@ -43,7 +44,7 @@ struct Sum {
 pub(super) struct Closing {
     doors: Vec<Option<Door>>,
     sums: Vec<Sum>,
-    worth: Vec<f64>,
+    impostors: Impostors,
     /// Gain of a tick by the prices, smoothed; 0 before anything had a price.
     price: f64,
 }
@@ -55,54 +56,69 @@ impl Closing {
         if groups.all().is_empty() {
             return;
         }
-        groups.lowest_worth(ask, &mut self.worth);
+        self.impostors.update(ask, groups);
         let now = lambda * kappa;
         let price = if self.price > 0.0 { self.price + PRICE_NEWS * (now - self.price) } else { now };
         self.price = price;
         self.sum_leaves(ask, groups, price);
-        let mut spare = TICKS * ask.budget_s() / kappa - self.least(ask, groups);
+        let mut spare = self.spare(ask, groups, kappa);
         for &group in groups.all() {
-            let Some(closed) = self.proxy(ask, group, price) else { continue };
-            let open = self.sums[group];
-            let door = self.doors[group].get_or_insert(Door { closed: false, still: u32::MAX, patience: PATIENCE.0 });
-            let (bar, more) = (WORTH_IT * price * open.least, open.least - closed.least);
-            door.still = door.still.saturating_add(1);
-            if !door.closed && closed.net > open.net + bar {
-                door.close();
-                spare += more;
-            } else if door.closed && open.net > closed.net + bar && door.still > door.patience && spare >= more {
-                door.open();
-                spare -= more;
+            if !self.impostors.is_in_view(group) {
+                continue;
             }
-            let taken = if door.closed { closed } else { open };
+            let (open, closed) = (self.sums[group], self.closed(ask, group, price));
+            let door = self.doors[group].get_or_insert(Door { closed: false, still: u32::MAX, patience: PATIENCE.0 });
+            door.still = door.still.saturating_add(1);
+            let taken = match closed {
+                Some(closed) => door.pass((open, closed), WORTH_IT * price * open.least, &mut spare),
+                None => {
+                    // its members cost less than any impostor
+                    if door.closed {
+                        door.open();
+                    }
+                    open
+                }
+            };
             if let Some(parent) = groups.parent(group) {
                 self.sums[parent].add(taken);
             }
         }
-        self.make_room(ask, groups, spare);
+        self.make_room(ask, groups, kappa);
     }
 
     /// Closes groups until the least of what is open fits, those first that lose least for the time they save.
-    fn make_room(&mut self, ask: &Ask<'_>, groups: &Groups, mut spare: f64) {
+    fn make_room(&mut self, ask: &Ask<'_>, groups: &Groups, kappa: f64) {
+        let mut spare = self.spare(ask, groups, kappa);
         while spare < 0.0 {
-            let open = groups.all().iter().filter(|group| !self.is_closed(**group));
+            let shut = |at: usize| self.is_closed(at) || groups.is_within(at, |group| self.is_closed(group));
+            let open = groups.all().iter().filter(|group| !shut(**group));
             let saves = |&group: &usize| {
-                let saved = self.sums[group].least - self.proxy(ask, group, 0.0)?.least;
-                (saved > 0.0).then(|| (group, saved, self.worth[group] / saved))
+                let coarsest = self.impostors.rungs(ask, group).first()?;
+                let saved = self.sums[group].least - TICKS * coarsest.cost_s;
+                let lost = self.impostors.members_worth(group) - self.impostors.worth(group) * coarsest.accuracy;
+                (saved > 0.0).then(|| (group, saved, lost / saved))
             };
             let Some((group, saved, _)) = open.filter_map(saves).min_by(|a, b| a.2.total_cmp(&b.2)) else { return };
             if let Some(door) = &mut self.doors[group] {
                 door.close();
             }
+            for above in groups.above(group) {
+                self.sums[above].least -= saved;
+            }
             spare += saved;
         }
     }
 
-    /// A group drawn by its proxy; `None` where nothing of it is in view.
-    fn proxy(&self, ask: &Ask<'_>, group: usize, price: f64) -> Option<Sum> {
-        let proxy = ask.ladders.of(group).proxy.filter(|_| self.worth[group] > 0.0)?;
-        let least = TICKS * proxy.cost_s;
-        Some(Sum { net: self.worth[group] - price * least, least })
+    /// Ticks by the prices that are left when everything costs its least as the doors are; below 0 where that does not fit.
+    fn spare(&self, ask: &Ask<'_>, groups: &Groups, kappa: f64) -> f64 {
+        TICKS * ask.budget_s() / kappa - self.least(ask, groups)
+    }
+
+    /// A group drawn by the impostor that is best at this price; `None` where its members in their lowest forms are cheaper than any.
+    fn closed(&self, ask: &Ask<'_>, group: usize, price: f64) -> Option<Sum> {
+        let (rungs, worth) = (self.impostors.rungs(ask, group), self.impostors.worth(group));
+        let nets = rungs.iter().map(|rung| worth * rung.accuracy - price * (TICKS * rung.cost_s));
+        Some(Sum { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs.first()?.cost_s })
     }
 
     /// What is drawn by itself, summed into its group.
@@ -124,24 +140,26 @@ impl Closing {
     fn least(&self, ask: &Ask<'_>, groups: &Groups) -> f64 {
         let cost = |at: usize| {
             let hidden = groups.parent(at).is_some() && groups.is_within(at, |group| self.is_closed(group));
-            match ask.ladders.of(at).proxy {
-                _ if hidden => 0.0,
-                Some(_) if !self.is_closed(at) => 0.0,
-                Some(_) => self.proxy(ask, at, 0.0).map_or(0.0, |proxy| proxy.least),
-                None => self.sums[at].least,
+            match () {
+                () if hidden => 0.0,
+                () if !ask.views[at].0.is_group() => self.sums[at].least,
+                () if self.is_closed(at) => self.impostors.rungs(ask, at).first().map_or(0.0, |it| TICKS * it.cost_s),
+                () => 0.0,
             }
         };
         (0..self.sums.len()).map(cost).sum()
     }
 
-    /// Whether this object is a group that is drawn by its proxy.
+    /// Whether this object is a group that is drawn by an impostor.
     pub fn is_closed(&self, at: usize) -> bool {
         self.doors.get(at).copied().flatten().is_some_and(|door| door.closed)
     }
 
-    /// What the proxy of a group is worth.
-    pub fn proxy_worth(&self, at: usize) -> f64 {
-        self.worth[at]
+    /// What a closed group can be drawn by, and what the finest that it has is worth; its coarsest where nothing of it is in view.
+    pub fn impostors<'a>(&self, ask: &Ask<'a>, group: usize) -> (&'a [Rung], f64) {
+        let (rungs, ladder) = (self.impostors.rungs(ask, group), ask.ladders.of(group));
+        let drawn = if rungs.is_empty() { &ladder.rungs[..ladder.rungs.len().min(1)] } else { rungs };
+        (drawn, self.impostors.worth(group))
     }
 }
 
@@ -153,6 +171,19 @@ impl Sum {
 }
 
 impl Door {
+    /// Closes or opens where that gains more than `bar` and `spare` ticks allow it; gives what the group then comes to.
+    fn pass(&mut self, (open, closed): (Sum, Sum), bar: f64, spare: &mut f64) -> Sum {
+        let more = open.least - closed.least;
+        if !self.closed && closed.net > open.net + bar {
+            self.close();
+            *spare += more;
+        } else if self.closed && open.net > closed.net + bar && self.still > self.patience && *spare >= more {
+            self.open();
+            *spare -= more;
+        }
+        if self.closed { closed } else { open }
+    }
+
     fn close(&mut self) {
         // it was opened too soon
         let soon = self.still < 4 * self.patience;

@@ -106,7 +106,7 @@ impl Feedback {
         self.water = water_level(budget, in_view(views).map(share), self.water);
         let water = self.water;
         levels.extend(views.iter().map(|(view, _)| unseen(view)));
-        self.choose((views, levels), water, |view| !is_tube(view) && !is_group(view));
+        self.choose((views, levels), water, |view| !is_tube(view) && !view.is_group());
         let bodies = views.iter().zip(&*levels).filter(|((view, _), _)| view.visible && !is_tube(view));
         let taken: f64 = bodies.map(|(_, level)| level.polygons).sum();
         let tubes = in_view(views).filter(|(view, _)| is_tube(view)).map(share);
@@ -147,7 +147,7 @@ impl Feedback {
                 Kind::Primitive { .. } | Kind::Counted { .. } | Kind::Group { .. } => view.range.eps_m.1,
             };
             let wish = Resolution { eps_m, n: self.printed.n() };
-            let chosen = view.visible && !is_group(view);
+            let chosen = view.visible && !view.is_group();
             let resolution = if chosen { view.range.clamp(wish) } else { coarsest(view) };
             let polygons = level::polygons(view, resolution);
             levels.push(LevelDemand { id: view.id, resolution, polygons, shading: view.shading.1 });
@@ -245,10 +245,6 @@ fn is_tube(view: &ObjectView) -> bool {
     matches!(view.kind, Kind::Tube { .. })
 }
 
-fn is_group(view: &ObjectView) -> bool {
-    matches!(view.kind, Kind::Group { .. })
-}
-
 /// What an object in view may get of the polygons (control.md, eq. 14).
 fn share((view, span): &Seen) -> Share {
     Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
@@ -262,7 +258,7 @@ pub(super) fn unseen(view: &ObjectView) -> LevelDemand {
 
 /// Groups are opened by this law, always: their members make room for each other.
 fn coarsest(view: &ObjectView) -> Resolution {
-    let n = if is_group(view) { level::OPEN } else { view.range.n.0 };
+    let n = if view.is_group() { level::open(view) } else { view.range.n.0 };
     Resolution { eps_m: view.range.eps_m.1, n }
 }
 

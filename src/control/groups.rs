@@ -1,13 +1,16 @@
-//! Which objects belong to which group, and what the groups' proxies are worth.
+//! Which objects belong to which group, and which impostors of a group are to be had and what they are worth.
 //!
-//! In: objects of which some are groups. Out: a forest. Never here: which group is opened.
+//! In: objects of which some are groups. Out: a forest, and [`Impostors`]. Never here: which group is opened.
+//! Theory: `docs/theory/budget.md`, section 4 (MB97, §3).
 
 use super::ask::Ask;
+use super::ladder::Rung;
 use super::plan::Seen;
 use super::view::Kind;
 
-/// What a proxy is worth of what its members are worth in their lowest forms.
-const PROXY_WORTH: f64 = 0.5;
+/// What a group's finest impostor is worth of what its members are worth in their lowest forms: less than any form of theirs, as (MB97,
+/// §3) assumes.
+const IMPOSTOR_WORTH: f64 = 0.5;
 
 /// The groups among the objects, members before their groups.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -45,21 +48,73 @@ impl Groups {
 
     /// Whether an object belongs to a group of which `closed` says yes, or to a group in such a group.
     pub fn is_within(&self, at: usize, closed: impl Fn(usize) -> bool) -> bool {
-        std::iter::successors(self.parent(at), |group| self.parent(*group)).any(closed)
+        self.above(at).any(closed)
     }
 
-    /// What each object is worth in its lowest form, a group by its proxy: half of its members; 0 for what is out of view.
-    pub fn lowest_worth(&self, ask: &Ask<'_>, worth: &mut Vec<f64>) {
-        worth.clear();
-        worth.resize(ask.views.len(), 0.0);
+    /// The group of an object, the group of that, and so on.
+    pub fn above(&self, at: usize) -> impl Iterator<Item = usize> + '_ {
+        std::iter::successors(self.parent(at), |group| self.parent(*group))
+    }
+}
+
+/// What the members of groups come to in their lowest forms, and so which impostors are to be had for less.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Impostors {
+    /// Of a group what its finest impostor is worth, of others what they are worth in their lowest form; 0 of what is out of view.
+    worth: Vec<f64>,
+    /// Of a group what its members cost in their lowest forms, of others what they do, seconds.
+    least_s: Vec<f64>,
+}
+
+impl Impostors {
+    /// Looks at the members again: what is in view, and how large, is another in every frame.
+    pub fn update(&mut self, ask: &Ask<'_>, groups: &Groups) {
+        for sums in [&mut self.worth, &mut self.least_s] {
+            sums.clear();
+            sums.resize(ask.views.len(), 0.0);
+        }
         for at in ask.drawable() {
-            worth[at] = ask.weight(at) * ask.ladders.of(at).rungs[0].accuracy;
+            let lowest = &ask.ladders.of(at).rungs[0];
+            (self.worth[at], self.least_s[at]) = (ask.weight(at) * lowest.accuracy, lowest.cost_s);
         }
         for at in 0..ask.views.len() {
-            if let Some(group) = self.parent(at) {
-                worth[group] += PROXY_WORTH * worth[at];
-            }
+            let Some(group) = groups.parent(at) else { continue };
+            let (worth, least_s) = self.lowest(ask, at);
+            self.worth[group] += IMPOSTOR_WORTH * worth;
+            self.least_s[group] += least_s;
         }
+    }
+
+    /// What an object is worth and costs in its lowest form: a group by its coarsest impostor, or its members where none is to be had.
+    fn lowest(&self, ask: &Ask<'_>, at: usize) -> (f64, f64) {
+        if !ask.views[at].0.is_group() {
+            return (self.worth[at], self.least_s[at]);
+        }
+        let coarsest = self.rungs(ask, at).first();
+        coarsest.map_or((self.members_worth(at), self.least_s[at]), |it| (self.worth[at] * it.accuracy, it.cost_s))
+    }
+
+    /// The impostors of a group that cost less than its members in their lowest forms: who pays for more has the members, which are worth
+    /// more. None of a group of which nothing is in view.
+    pub fn rungs<'a>(&self, ask: &Ask<'a>, group: usize) -> &'a [Rung] {
+        let rungs = &ask.ladders.of(group).rungs;
+        let cheaper = rungs.iter().take_while(|rung| rung.cost_s < self.least_s[group]).count();
+        if self.is_in_view(group) { &rungs[..cheaper] } else { &[] }
+    }
+
+    /// What a group's finest impostor is worth.
+    pub fn worth(&self, group: usize) -> f64 {
+        self.worth[group]
+    }
+
+    /// What a group's members are worth in their lowest forms.
+    pub fn members_worth(&self, group: usize) -> f64 {
+        self.worth[group] / IMPOSTOR_WORTH
+    }
+
+    /// Whether anything of a group is in view that is worth something.
+    pub fn is_in_view(&self, group: usize) -> bool {
+        self.worth[group] > 0.0
     }
 }
 
@@ -91,7 +146,8 @@ mod tests {
     #[test]
     fn groups_hold_what_stands_before_them_and_nothing_twice() {
         let leaf = Kind::Counted { radius_m: 0.1, least: 4, most: 100 };
-        let group = |members| Kind::Group { radius_m: 1.0, members, proxy_triangles: 12 };
+        let impostors = [12, 0, 0, 0, 0, 0, 0, 0];
+        let group = |members| Kind::Group { radius_m: 1.0, members, impostors };
         let kinds = [leaf, leaf, group((0, 2)), leaf, group((1, 9)), group((usize::MAX, usize::MAX)), group((6, 3))];
         let views: Vec<_> = kinds.into_iter().enumerate().map(|(id, kind)| object(id, kind)).collect();
         let mut groups = Groups::default();

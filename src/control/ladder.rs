@@ -3,7 +3,7 @@
 //! In: what objects are, prices. Out: a [`Ladder`] an object, made anew only where something it depends on has changed.
 //! Never here: a choice, or what an object is worth now ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
 
-use super::level::{Held, Span, polygons};
+use super::level::{Held, Span, open, polygons};
 use super::plan::Seen;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
@@ -32,7 +32,7 @@ pub(super) struct Rung {
     pub shading: Shading,
     /// Seconds by the prices.
     pub cost_s: f64,
-    /// Part of the object's pixels that it draws right, 0 … 1.
+    /// Part of the object's pixels that it draws right, 0 … 1; of a group's impostor, of what the finest of them draws right.
     pub accuracy: f64,
 }
 
@@ -50,7 +50,7 @@ struct Key {
     raise: bool,
 }
 
-/// The levels of one object, cheapest first; none of a group, whose proxy is [`Ladder::proxy`].
+/// The levels of one object, cheapest first; of a group its impostors.
 #[derive(Debug, Clone)]
 pub(super) struct Ladder {
     key: Key,
@@ -59,8 +59,6 @@ pub(super) struct Ladder {
     pub rungs: Vec<Rung>,
     /// How many of the rungs it asks for itself; those after them raise its quality further.
     pub asked: usize,
-    /// Of a group, what it is drawn as where it is not opened.
-    pub proxy: Option<Rung>,
 }
 
 /// The ladders of all objects, in the order in which they are given.
@@ -143,7 +141,7 @@ impl Key {
             }
             (Kind::Primitive { triangles: a, .. }, Kind::Primitive { triangles: b, .. }) => a == b,
             (Kind::Counted { least: a, most: b, .. }, Kind::Counted { least, most, .. }) => (a, b) == (least, most),
-            (Kind::Group { proxy_triangles: a, .. }, Kind::Group { proxy_triangles: b, .. }) => a == b,
+            (Kind::Group { impostors: a, .. }, Kind::Group { impostors: b, .. }) => a == b,
             _ => false,
         };
         kinds
@@ -169,10 +167,9 @@ fn is_near(a: f64, b: f64) -> bool {
 impl Ladder {
     fn new(key: Key, version: u64, (view, span): (&ObjectView, Span), with: (&Prices, &Sliders)) -> Self {
         let rung = |(resolution, polygons), shading| key.rung(resolution, polygons, shading, with);
-        if let Kind::Group { proxy_triangles, .. } = key.kind {
-            let closed = Resolution { eps_m: key.range.eps_m.1, n: 0 };
-            let proxy = rung((closed, f64::from(proxy_triangles.max(1))), key.shading.1);
-            return Self { key, version, rungs: Vec::new(), asked: 0, proxy: Some(proxy) };
+        if view.is_group() {
+            let rungs = key.impostors(view, rung);
+            return Self { key, version, asked: rungs.len(), rungs };
         }
         let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
         let mut rungs: Vec<Rung> = Vec::new();
@@ -184,7 +181,7 @@ impl Ladder {
         if key.raise {
             key.raise(view, &mut rungs, rung);
         }
-        Self { key, version, rungs, asked, proxy: None }
+        Self { key, version, rungs, asked }
     }
 
     /// What its triangles are to the eye, pixels across, halfway up the ladder: by it the blur of motion is judged.
@@ -208,6 +205,16 @@ impl Key {
         cuts.sort_by(|a, b| a.1.total_cmp(&b.1));
         cuts.dedup_by(|a, b| a.1 <= b.1);
         cuts
+    }
+
+    /// The impostors of a group, each with the best shading; their accuracy is told of the finest, whose worth [`super::groups`] knows.
+    fn impostors(&self, view: &ObjectView, rung: impl Fn((Resolution, f64), Shading) -> Rung) -> Vec<Rung> {
+        let at = |n| Resolution { eps_m: self.range.eps_m.1, n };
+        let one = |n| rung((at(n), polygons(view, at(n))), self.shading.1);
+        let mut rungs: Vec<_> = (0..open(view)).map(one).collect();
+        let finest = rungs.last().map_or(1.0, |finest| finest.accuracy);
+        rungs.iter_mut().for_each(|rung| rung.accuracy /= finest);
+        rungs
     }
 
     /// Adds what is better than the best that it asks for: a smoother shape, soft shadows, both. They are worth next to nothing, so that
@@ -246,5 +253,55 @@ impl Key {
         let accuracy = worth::accuracy(&self.kind, polygons, (shading, self.shading.1), pixels);
         let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
         Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ladder(impostors: [u32; 8]) -> Ladder {
+        let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
+        let kind = Kind::Group { radius_m: 1.0, members: (0, 0), impostors };
+        let view = ObjectView {
+            id: AgentId(0),
+            kind,
+            range,
+            shading: Default::default(),
+            pixels: 1e4,
+            distance_m: 1.0,
+            speed_px_s: 0.0,
+            importance: 1.0,
+            off_centre: 0.0,
+            from_focus_m: 0.0,
+            visible: true,
+        };
+        let mut ladders = Ladders::default();
+        ladders.update(&[(view, Span::of(&view))], true, &Prices::default(), &Sliders::default());
+        ladders.of(0).clone()
+    }
+
+    #[test]
+    fn a_group_has_a_rung_for_each_impostor_and_the_finest_counts_whole() {
+        let Ladder { rungs, asked, .. } = ladder([20, 80, 320, 0, 0, 0, 0, 0]);
+        assert_eq!(
+            rungs.iter().map(|r| (r.resolution.n, r.polygons)).collect::<Vec<_>>(),
+            [(0, 20.0), (1, 80.0), (2, 320.0)]
+        );
+        // 1 - 1/2 a coarsest: half, 7/8 and 31/32 of what they cover; nothing better is offered of a group
+        let parts: Vec<f64> = rungs.iter().map(|rung| rung.accuracy).collect();
+        let expected = [0.5 / (31.0 / 32.0), (7.0 / 8.0) / (31.0 / 32.0), 1.0];
+        assert!(parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12) && asked == 3, "{parts:?}");
+        let costs: Vec<f64> = rungs.iter().map(|rung| 1e6 * rung.cost_s).collect();
+        let by_hand = [20.0, 80.0, 320.0].map(|polygons| 5.0 + 0.22 * polygons);
+        assert!(costs.iter().zip(by_hand).all(|(a, b)| (a - b).abs() < 1e-9), "{costs:?}");
+    }
+
+    #[test]
+    fn one_impostor_counts_whole_to_the_bit_and_none_is_no_rung() {
+        let one = ladder([37, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
+        assert!(ladder([0; 8]).rungs.is_empty());
+        assert_eq!(ladder([1, 2, 3, 4, 5, 6, 7, 8]).rungs.len(), 8);
     }
 }

@@ -11,6 +11,9 @@ use std::f64::consts::PI;
 /// How many levels n a primitive has: `0..=N_MAX`.
 pub const PRIMITIVE_LEVELS: usize = N_MAX as usize + 1;
 
+/// Most impostors of a group.
+pub const IMPOSTORS_MAX: usize = 8;
+
 /// Triangles of a tube's patch at level 0; level n has 2ⁿ times as many (6·2^⌈n/2⌉ sides, 2^⌊n/2⌋ rings of quads).
 const PATCH_TRIANGLES: f64 = 12.0;
 
@@ -96,7 +99,7 @@ impl Held {
             Kind::Tube { length_m, radius_m } => tube_level(polygons, (length_m, radius_m), view.range, before),
             Kind::Primitive { ref triangles, .. } => primitive_level(polygons, triangles, view.range.n, before),
             Kind::Counted { least, .. } => octaves(polygons / f64::from(least.max(1))),
-            Kind::Group { .. } => OPEN,
+            Kind::Group { .. } => open(view),
         };
         let n = n.clamp(view.range.n.0, view.range.n.1);
         self.cut = Some((polygons, n));
@@ -120,18 +123,16 @@ pub(super) fn polygons(view: &ObjectView, at: Resolution) -> f64 {
         Kind::Counted { least, most, .. } => {
             (f64::from(least.max(1)) * two_to(at.n)).min(f64::from(most.max(least).max(1)))
         }
-        Kind::Group { proxy_triangles, .. } => {
-            if at.n == OPEN {
-                0.0
-            } else {
-                f64::from(proxy_triangles)
-            }
-        }
+        // its members have polygons of their own
+        Kind::Group { impostors, .. } => impostors.get(usize::from(at.n)).map_or(0.0, |count| f64::from(*count)),
     }
 }
 
-/// Level n of a group whose members are drawn as themselves.
-pub(super) const OPEN: u8 = 1;
+/// Level n of a group whose members are drawn as themselves, one past its finest impostor; 0 of what is no group.
+pub(super) fn open(view: &ObjectView) -> u8 {
+    let Kind::Group { impostors, .. } = view.kind else { return 0 };
+    impostors.iter().take_while(|count| **count > 0).count() as u8
+}
 
 fn within(polygons: f64, span: Span) -> f64 {
     polygons.max(span.least).min(span.full)

@@ -28,7 +28,7 @@ mod worth;
 
 pub use area::{AREAS_PX, Areas};
 pub use ask::Promise;
-pub use level::PRIMITIVE_LEVELS;
+pub use level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
 pub use metachron_budget::cost::benefit::Sliders;
 pub use metachron_budget::cost::stages::Stages;
 pub use metachron_budget::cost::value::Value;

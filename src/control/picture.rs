@@ -20,7 +20,7 @@ use super::price::{Backdrop, Prices};
 use super::raise::Raise;
 use super::select::Select;
 use super::status::Status;
-use super::view::{Kind, ObjectView};
+use super::view::ObjectView;
 use super::worth;
 use ahead::Ahead;
 use metachron_agents::{AgentId, Resolution};
@@ -266,7 +266,7 @@ impl PictureControl {
 
     fn plan_full(&self, levels: &mut Vec<LevelDemand>) {
         levels.extend(self.views.iter().map(|(view, span)| {
-            let n = if matches!(view.kind, Kind::Group { .. }) { level::OPEN } else { view.range.n.1 };
+            let n = if view.is_group() { level::open(view) } else { view.range.n.1 };
             let resolution = Resolution { eps_m: view.range.eps_m.0, n };
             LevelDemand { id: view.id, resolution, polygons: span.full, shading: view.shading.1 }
         }));

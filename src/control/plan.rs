@@ -3,7 +3,7 @@
 //! In: nothing but words. Out: [`Plan`], and [`FrameWork`] that answers it. Never here: a choice.
 
 use super::ask::Promise;
-use super::level::Span;
+use super::level::{self, Span};
 use super::view::{ObjectView, Shading};
 use metachron_agents::{AgentId, Resolution};
 use std::time::Duration;
@@ -25,18 +25,22 @@ pub struct FrameWork {
 pub struct LevelDemand {
     /// Which one.
     pub id: AgentId,
-    /// Its pair (ε, n), inside its range; of a group n = 0 is its proxy, 1 its members.
+    /// Its pair (ε, n), inside its range; of a group n is the number of its impostor, past the last its members.
     pub resolution: Resolution,
     /// Triangles to draw it with: of what is cut by triangles exactly so many. 0: it is left out of the picture, as members of a group
-    /// are that is drawn by its proxy, and groups that are drawn as their members. Out of sight: its coarsest, for its shadow.
+    /// are that is drawn by an impostor, and groups that are drawn as their members. Out of sight: its coarsest, for its shadow.
     pub polygons: f64,
     /// How to shade it.
     pub shading: Shading,
 }
 
-/// How much of what it can have an object is drawn with: 0 its coarsest … 1 its finest, by the logarithm of its triangles.
+/// How much of what it can have an object is drawn with: 0 its coarsest … 1 its finest, by the logarithm of its triangles; of a group
+/// by its levels, of which its members are the finest.
 #[must_use]
 pub fn detail(view: &ObjectView, demand: &LevelDemand) -> f64 {
+    if view.is_group() {
+        return f64::from(demand.resolution.n) / f64::from(level::open(view).max(1));
+    }
     let span = Span::of(view);
     let part = libm::log(demand.polygons / span.least) / libm::log(span.full / span.least);
     if part.is_nan() { 1.0 } else { part.clamp(0.0, 1.0) }

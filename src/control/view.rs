@@ -2,7 +2,7 @@
 //!
 //! In: plain numbers. Out: the weight by which an object shares in the picture's polygons. Never here: state.
 
-use super::level::PRIMITIVE_LEVELS;
+use super::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
 use metachron_agents::{AgentId, ResolutionRange};
 
 /// How the light on a surface is worked out: the rendering algorithm of (FS93), cheapest first.
@@ -52,14 +52,14 @@ pub enum Kind {
         /// All its triangles, ≥ `least`.
         most: u32,
     },
-    /// Objects that can be drawn as one: at n = 0 by a proxy, at n = 1 as themselves.
+    /// Objects that can be drawn as one: at n = 0, 1 … by an impostor, at n past the last of them as themselves.
     Group {
         /// Radius of a ball that holds it, metres, > 0.
         radius_m: f64,
         /// Its members among the objects given with it: the number of the first, and how many.
         members: (usize, usize),
-        /// Triangles of its proxy, ≥ 1.
-        proxy_triangles: u32,
+        /// Triangles of its impostors, rising; 0 past the last.
+        impostors: [u32; IMPOSTORS_MAX],
     },
 }
 
@@ -98,6 +98,11 @@ const DISTANCE_MIN_M: f64 = 0.05;
 const SPEED_HALF_PX_S: f64 = 600.0;
 
 impl ObjectView {
+    /// Whether it stands for others.
+    pub(super) fn is_group(&self) -> bool {
+        matches!(self.kind, Kind::Group { .. })
+    }
+
     /// Area of a quad in square metres for each steradian of the scene's quads (control.md, eq. 14): far or fast is coarser.
     pub(super) fn coarseness_m2(&self) -> f64 {
         let distance = if self.distance_m.is_finite() { self.distance_m.max(DISTANCE_MIN_M) } else { 1.0 };

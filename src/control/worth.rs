@@ -44,8 +44,8 @@ pub(super) fn accuracy(kind: &Kind, polygons: f64, (shading, best): (Shading, Sh
     let (pieces, coarsest) = match *kind {
         // as many balls in a row as make its length
         Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),
-        Kind::Primitive { .. } | Kind::Group { .. } => (1.0, COARSEST),
-        Kind::Counted { least, .. } => (1.0, f64::from(least.max(1))),
+        Kind::Primitive { .. } => (1.0, COARSEST),
+        Kind::Counted { least, .. } | Kind::Group { impostors: [least, ..], .. } => (1.0, f64::from(least.max(1))),
     };
     let most = (pixels / pieces).max(1.0);
     let samples = (polygons / pieces / coarsest).min(most).max(1.0);

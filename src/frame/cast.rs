@@ -343,8 +343,8 @@ fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
     }
     let group = &scene.groups[at - agents - members];
     let members = (agents + group.members.start, group.members.len());
-    let proxy_triangles = group.proxy.model.range().1;
-    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, proxy_triangles })
+    let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
+    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, impostors })
 }
 
 fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
@@ -468,6 +468,11 @@ mod tests {
     #[test]
     fn a_scene_may_ask_for_as_many_threads_as_the_runtime_gives() {
         assert_eq!(crate::scene::THREADED_MAX, crate::runtime::THREADS_MAX);
+    }
+
+    #[test]
+    fn a_group_may_have_as_many_levels_as_control_chooses_among() {
+        assert_eq!(crate::scene::GROUP_LEVELS_MAX, control::IMPOSTORS_MAX);
     }
 
     #[test]

@@ -224,11 +224,16 @@ pub struct Scenery {
     pub texture: Option<Arc<Texture>>,
 }
 
+/// Most levels of a group.
+pub const GROUP_LEVELS_MAX: usize = 8;
+
 /// Scenery that may be drawn as one.
 #[derive(Debug, Clone)]
 pub struct Group {
-    /// What stands for all of it, with the group's name.
+    /// The mesh that stands for all of it, with the group's name.
     pub proxy: Scenery,
+    /// Triangles that it is drawn with, one impostor each: rising, 1 … [`GROUP_LEVELS_MAX`] of them, each a cut of the mesh.
+    pub levels: Vec<u32>,
     /// Which of [`Scene::scenery`] it is.
     pub members: Range<usize>,
 }

@@ -19,7 +19,9 @@ mod source;
 pub mod ties;
 
 pub use apart::Moved;
-pub use cast::{Camera, Gains, Group, Look, Machine, Member, PaceWish, Probe, Scene, Scenery, Spec, Target, View};
+pub use cast::{
+    Camera, GROUP_LEVELS_MAX, Gains, Group, Look, Machine, Member, PaceWish, Probe, Scene, Scenery, Spec, Target, View,
+};
 pub use overlap::Overlap;
 pub use problem::{SceneError, SceneProblem};
 pub use schema::json_schema;

@@ -5,6 +5,7 @@ mod chart_policies;
 mod cli;
 mod coupling;
 mod fit;
+mod groups;
 mod idle;
 mod painting;
 mod picture;

@@ -115,6 +115,7 @@ const POLICIES: &[Entry] = &[
     entry::<policies::library::Library>(),
     entry::<policies::walkthrough::Walkthrough>(),
     entry::<policies::disturbed::Disturbed>(),
+    entry::<policies::levels::Levels>(),
     entry::<policies::still::Still>(),
     entry::<policies::selection::Selection>(),
     entry::<policies::bound::Bound>(),

@@ -3,12 +3,12 @@
 //! In: what is in view now, then what is in view when its turn has come. Out: the plan of that frame. Never here: who draws meanwhile.
 //! Theory: `docs/theory/control.md`, section 6.
 
-use super::super::ask::Promise;
+use super::super::ask::{Promise, demand};
 use super::super::feedback::unseen;
 use super::super::level::Span;
 use super::super::plan::LevelDemand;
 use super::super::policy::Policy;
-use super::super::view::{Kind, ObjectView};
+use super::super::view::ObjectView;
 use super::PictureControl;
 
 /// A choice that nothing is drawn with yet.
@@ -63,16 +63,21 @@ impl PictureControl {
         true
     }
 
-    /// Draws all that is in view in its lowest form: most of the frame's time is gone before anything is drawn. Groups stay as they are, and what is frozen.
+    /// Draws all that is in view in its lowest form: most of the frame's time is gone before anything is drawn. What is frozen stays as it
+    /// is, and a group that is open stays open.
     pub fn hurry(&mut self) {
         if self.frozen {
             return;
         }
         let chosen_s = self.drawn_s(&self.plan.levels);
-        for ((view, _), level) in self.views.iter().zip(&mut self.plan.levels) {
-            if view.visible && level.polygons > 0.0 && !matches!(view.kind, Kind::Group { .. }) {
-                *level = LevelDemand { shading: view.shading.0, ..unseen(view) };
+        for (at, ((view, _), level)) in self.views.iter().zip(&mut self.plan.levels).enumerate() {
+            if !(view.visible && level.polygons > 0.0) {
+                continue;
             }
+            *level = match self.ladders.get(at).and_then(|ladder| ladder.rungs.first()) {
+                Some(coarsest) if view.is_group() => demand(at, &self.views, coarsest),
+                _ => LevelDemand { shading: view.shading.0, ..unseen(view) },
+            };
         }
         self.drawn_otherwise(chosen_s);
         let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);

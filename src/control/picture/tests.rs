@@ -1,9 +1,10 @@
 //! The picture's controller against declared plants: a frame takes setup + fill + c · triangles.
 
 mod ahead;
+mod groups;
 mod policies;
 
-use super::super::view::Shading;
+use super::super::view::{Kind, Shading};
 use super::*;
 use metachron_agents::ResolutionRange;
 use metachron_budget::Bound;
@@ -228,7 +229,7 @@ fn what_is_out_of_sight_takes_nothing_and_comes_back_at_once() {
 #[test]
 fn feedback_draws_the_members_of_a_group_as_themselves() {
     let mut run = Run::new(Law::CORRECTED, 30.0, 1.0);
-    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), proxy_triangles: 12 };
+    let kind = Kind::Group { radius_m: 1.0, members: (0, 6), impostors: [12, 0, 0, 0, 0, 0, 0, 0] };
     run.objects.push(object(9, kind, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 1) }));
     let mesh = Kind::Counted { radius_m: 0.1, least: 20, most: 50_000 };
     run.objects.push(object(7, mesh, ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) }));

@@ -1,23 +1,17 @@
 //! Groups of the file: whose members may be drawn as one mesh.
 //!
 //! In: `[[group]]` tables and all scenery. Out: groups, and the scenery put in order so that members stand side by side.
-//! Never here: when a group is drawn as one.
+//! Never here: the mesh that stands for them, and when it does.
 
+use super::impostors::impostors;
 use super::object::{Named, Objects};
-use super::scenery::mesh_model;
-use crate::scene::cast::{Group, Look, Scenery};
-use crate::scene::check::{Checker, Place, allowed};
+use crate::scene::cast::Group;
+use crate::scene::check::{Checker, Place};
 use crate::scene::format::GroupFile;
 use crate::scene::source::Source;
-use glam::{DQuat, DVec3};
-use metachron_agents::shape::{Model, Placement, proxy};
-use std::sync::Arc;
 
 /// Most groups of a scene.
 const GROUPS_MAX: usize = 1000;
-/// A proxy has this share of its members' triangles where a scene does not say, within these bounds.
-const PROXY_SHARE: f64 = 0.05;
-const PROXY_TRIANGLES: (f64, f64) = (12.0, 2000.0);
 
 /// Reads every group and puts the scenery in order.
 pub(in crate::scene) fn groups(
@@ -47,8 +41,8 @@ pub(in crate::scene) fn groups(
     for (number, file) in files.iter().enumerate() {
         let end = start + owner.iter().filter(|group| **group == Some(number)).count();
         let place = Place::new(format!("group.{number}"), format!("of group `{}`", file.name));
-        if let Some(proxy) = proxy_of(c, &place, file, (&objects.scenery[start..end], source)) {
-            made.push(Group { proxy, members: start..end });
+        if let Some((proxy, levels)) = impostors(c, &place, file, (&objects.scenery[start..end], source)) {
+            made.push(Group { proxy, levels, members: start..end });
         }
         start = end;
     }
@@ -92,47 +86,6 @@ fn is_meant(name: &str, wanted: &str) -> bool {
         Some(start) => name.starts_with(start),
         None => name == wanted || name.strip_suffix(".leaves") == Some(wanted),
     }
-}
-
-fn proxy_of(
-    c: &mut Checker<'_, '_>,
-    place: &Place,
-    file: &GroupFile,
-    (members, source): (&[Scenery], &Source),
-) -> Option<Scenery> {
-    let first = members.first()?;
-    let all: f64 = members.iter().map(|m| f64::from(m.model.range().1)).sum();
-    let usual = (PROXY_SHARE * all).clamp(PROXY_TRIANGLES.0, PROXY_TRIANGLES.1).round();
-    let wanted = (file.proxy_triangles.map(f64::from), usual);
-    let triangles = c.number_or(place, "proxy_triangles", wanted, &allowed(1.0..=1e5, "")) as u32;
-    let importance = members.iter().map(|m| m.look.importance).fold(0.0, f64::max);
-    let look = Look { colour: mean_colour(members), importance, ..first.look };
-    let name = file.name.clone();
-    if let Some(given) = &file.proxy {
-        let (tom, at) = mesh_model(c, &place.table("proxy"), given, source)?;
-        return Some(Scenery { name, model: Model::Mesh(tom), at, look, texture: None });
-    }
-    let origin = members.iter().map(|m| m.at.position).sum::<DVec3>() / members.len() as f64;
-    let parts: Vec<(Model, Placement)> = members.iter().map(|m| (m.model.clone(), m.at)).collect();
-    match proxy(&parts, origin, triangles) {
-        Ok(tom) => {
-            let at = Placement { position: origin, rotation: DQuat::IDENTITY, scale: 1.0 };
-            Some(Scenery { name, model: Model::Mesh(Arc::new(tom)), at, look, texture: None })
-        }
-        Err(why) => {
-            c.wrong(place, "members", format_args!("cannot be drawn as one: {why}"), "expected meshes with an area");
-            None
-        }
-    }
-}
-
-/// The members' colours, each as often as it has triangles.
-fn mean_colour(members: &[Scenery]) -> [u8; 3] {
-    let weight = |m: &Scenery| f64::from(m.model.range().1);
-    let all: f64 = members.iter().map(weight).sum();
-    std::array::from_fn(|i| {
-        (members.iter().map(|m| weight(m) * f64::from(m.look.colour[i])).sum::<f64>() / all.max(1.0)).round() as u8
-    })
 }
 
 #[cfg(test)]

@@ -8,6 +8,7 @@ mod coupling;
 mod glb;
 mod grid;
 mod group;
+mod impostors;
 mod instrument;
 mod joint;
 mod joint_keys;

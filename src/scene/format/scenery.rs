@@ -69,7 +69,7 @@ pub struct TreeFile {
     pub rotation_deg: Option<Point>,
 }
 
-/// Meshes and trees that may be drawn as one mesh instead of themselves.
+/// Meshes and trees that may be drawn as one mesh instead of themselves, at levels of its own.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GroupFile {
@@ -79,11 +79,13 @@ pub struct GroupFile {
     /// Names of its meshes and trees; one that ends in `*` stands for all that begin so. Nothing is in two groups.
     #[schemars(length(min = 1, max = 10_000))]
     pub members: Vec<String>,
-    /// The mesh that stands for all of them. Default: one made of their own coarsest meshes.
+    /// The mesh that stands for all of them, and is cut to `levels`. Default: one made of their own coarse meshes.
     pub proxy: Option<MeshFile>,
-    /// Triangles of the proxy, 1 … 100000. Default: a twentieth of the members', 12 … 2000.
-    #[schemars(range(min = 1, max = 100_000))]
-    pub proxy_triangles: Option<u32>,
+    /// Triangles of the group's impostors, coarsest first: 1 to 8 rising numbers, each 1 … 100000, to which its mesh is cut. The more
+    /// there is time for, the finer an impostor it is drawn by, and past the finest as its members. Default: the finest has a twentieth
+    /// of the members' triangles, 12 … 2000 (of a `proxy` all that it has), each coarser one a quarter, down to 12.
+    #[schemars(length(min = 1, max = 8), inner(range(min = 1, max = 100_000)))]
+    pub levels: Option<Vec<u32>>,
 }
 
 /// A mesh from a formula.

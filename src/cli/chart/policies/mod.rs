@@ -13,6 +13,7 @@ mod forest;
 mod geodesic;
 pub(super) mod grove;
 mod hall;
+pub(super) mod levels;
 pub(super) mod library;
 pub(super) mod live;
 mod machine;

@@ -9,8 +9,8 @@ use super::super::figure::{Axis, Colour, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::metrics::Row;
 use crate::control::Policy;
-use crate::scene::papers::Paper;
-pub(super) use walk::Times;
+use crate::scene::papers::{Choices, Paper};
+pub(super) use walk::{Shown, Times};
 
 /// A scene, its frames, and how little time there is.
 #[derive(Debug, Clone, Copy)]
@@ -34,9 +34,9 @@ pub(super) const PLAYS: [Play; 5] = [
 /// A policy on a scene, of so many frames.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
-    scene: String,
-    policy: String,
-    frames: usize,
+    pub(super) scene: String,
+    pub(super) policy: String,
+    pub(super) frames: usize,
 }
 
 impl Case {
@@ -48,11 +48,19 @@ impl Case {
     /// Its row; one of no frames where it could not be played.
     pub(super) fn measure(&self, times: Times) -> Row {
         let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
-        play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), |play| walk::measure(play, self, times))
+        let measure = |play: &Play| {
+            let text = play.paper.text(&Choices::default());
+            walk::measure(&play.shown(&text), self, times)
+        };
+        play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), measure)
     }
 }
 
 impl Play {
+    fn shown<'a>(&self, text: &'a str) -> Shown<'a> {
+        Shown { name: self.paper.name(), text, times_over: self.times_over }
+    }
+
     /// Every policy that the program knows.
     pub(super) fn cases(&self, quick: bool) -> impl Iterator<Item = Case> {
         let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);

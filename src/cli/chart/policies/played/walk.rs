@@ -1,12 +1,12 @@
-//! One walk through a scene of the papers under one policy, compared with full detail.
+//! One walk through a scene under one policy, compared with full detail.
 //!
-//! In: a play, a case, whether times are measured or declared. Out: a row; where times are measured and there is no adapter that draws,
+//! In: a scene, a case, whether times are measured or declared. Out: a row; where times are measured and there is no adapter that draws,
 //! one without frames. Never here: figures.
-//! Full detail is played once for all policies of a play: its times give the target, its pictures what the others are held against.
+//! Full detail is played once for all policies of a scene: its times give the target, its pictures what the others are held against.
 
 use super::super::metrics::Row;
+use super::Case;
 use super::row::Played;
-use super::{Case, Play};
 use crate::compositor::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
 use crate::control::Policy;
 use crate::frame::{Drawing, FrameRecord, Walk};
@@ -63,12 +63,22 @@ type Reference = (&'static str, usize, Times, Arc<Walked>);
 
 static REFERENCES: Mutex<Vec<Reference>> = Mutex::new(Vec::new());
 
+/// A scene that policies are played on.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Shown<'a> {
+    /// What full detail of it is remembered by: scenes that look the same in full may share a name.
+    pub(in super::super) name: &'static str,
+    pub(in super::super) text: &'a str,
+    /// How many targets full detail takes in the mean.
+    pub(in super::super) times_over: f64,
+}
+
 /// The row of a case.
-pub(super) fn measure(play: &Play, case: &Case, times: Times) -> Row {
-    let measured = reference(play, case.frames, times).and_then(|full| {
-        let target_s = 1e-3 * mean_ms(&full) / play.times_over;
+pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) -> Row {
+    let measured = reference(shown, case.frames, times).and_then(|full| {
+        let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
         let full_itself = case.policy == "full";
-        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(play, case, (target_s, times))?) };
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(shown, case, (target_s, times))?) };
         Ok((full, own, target_s))
     });
     let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
@@ -76,7 +86,7 @@ pub(super) fn measure(play: &Play, case: &Case, times: Times) -> Row {
     let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
     let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
     let played = Played {
-        scene: play.paper.name(),
+        scene: &case.scene,
         policy: &case.policy,
         adapter: &own.adapter,
         target_ms: 1e3 * target_s,
@@ -95,22 +105,22 @@ fn mean_ms(walked: &Walked) -> f64 {
     walked.frames.iter().map(|row| row.frame_ms).sum::<f64>() / walked.frames.len() as f64
 }
 
-/// Full detail of a play, played where it was not yet.
-fn reference(play: &Play, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
+/// Full detail of a scene, played where it was not yet.
+fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
     let mut known = REFERENCES.lock().unwrap_or_else(PoisonError::into_inner);
-    let here = |r: &&Reference| (r.0, r.1, r.2) == (play.paper.name(), frames, times);
+    let here = |r: &&Reference| (r.0, r.1, r.2) == (shown.name, frames, times);
     if let Some((.., walked)) = known.iter().find(here) {
         return Ok(Arc::clone(walked));
     }
-    let case = Case { scene: play.paper.name().to_owned(), policy: "full".to_owned(), frames };
+    let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
     // no target: full detail has none to miss
-    let full = Arc::new(walked(play, &case, (1.0, times))?);
-    known.push((play.paper.name(), frames, times, Arc::clone(&full)));
+    let full = Arc::new(walked(shown, &case, (1.0, times))?);
+    known.push((shown.name, frames, times, Arc::clone(&full)));
     Ok(full)
 }
 
-fn walked(play: &Play, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
-    let (adapter, mut walk) = opened(play.paper, times)?;
+fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
+    let (adapter, mut walk) = opened((shown.name, shown.text), times)?;
     let control = walk.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(&case.policy).context("no such policy")?);
@@ -146,7 +156,7 @@ pub(in super::super) fn predicted(
     policy: Policy,
     (asked, times): (&[(f64, f64)], usize),
 ) -> anyhow::Result<(String, Vec<Foretold>)> {
-    let (adapter, mut walk) = opened(paper, Times::Measured)?;
+    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
     walk.session().control().set_policy(policy);
     for _ in 0..LEAD_IN {
         walk.step(0.0)?;
@@ -168,12 +178,11 @@ pub(in super::super) fn predicted(
     Ok((adapter, pictures))
 }
 
-/// A scene of the papers before the first frame, and the adapter that draws it.
-fn opened(paper: Paper, times: Times) -> anyhow::Result<(String, Walk)> {
-    let text = paper.text(&Choices::default());
+/// A scene by its name and text before the first frame, and the adapter that draws it.
+fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, Walk)> {
     let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
-    let scene = load(&Source::memory(paper.name(), text.as_bytes())?, overrides)?;
+    let scene = load(&Source::memory(name, text.as_bytes())?, overrides)?;
     let gpu = match times {
         Times::Measured => Some(Gpu::headless()?),
         Times::Declared => Gpu::headless().ok(),
@@ -214,7 +223,7 @@ pub(in super::super) struct Stood {
 /// Of the scene, of the adapter.
 pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
     let Stood { part, target_s, frames } = stood;
-    let (adapter, mut walk) = opened(paper, Times::Measured)?;
+    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
     let control = walk.session().control();
     control.set_target_hz(1.0 / target_s);
     control.set_policy(Policy::named(policy).context("no such policy")?);
