@@ -79,7 +79,7 @@ impl Experiment for Traversal {
             Axis::log("millions of triangles a second", least, most),
         );
         let title = "Traversal of a mesh of 100,000 triangles (GB99)".to_owned();
-        let of = "the whole mesh, at 1, is a plain list: nothing is followed to a substitute".to_owned();
+        let of = "the whole mesh, at 1, is a plain list".to_owned();
         Figure { title, panels: vec![Panel { title: of, x, y, layers }], columns: 1 }
     }
 
