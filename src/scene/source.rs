@@ -93,20 +93,25 @@ impl Source {
             Beside::BuiltIn => {
                 builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
             }
-            Beside::Folder(folder) => read_bounded(&folder.join(path), SIBLING_BYTES_MAX),
+            Beside::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
             Beside::Nowhere => Err("this scene has no folder".to_owned()),
         }
     }
 }
 
-fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+/// What a scene names is no stream: only who calls the program may have it wait for one.
+fn read_plain(path: &Path, most: u64) -> Result<Vec<u8>, String> {
     // asked before it is opened: to open a pipe waits for whoever writes into it
     let kind = std::fs::metadata(path).map_err(|e| e.to_string())?;
-    if kind.is_dir() {
-        return Err("it is a folder".to_owned());
-    }
-    if !kind.is_file() {
+    if !(kind.is_file() || kind.is_dir()) {
         return Err("it is a pipe, a device or a socket; expected a plain file".to_owned());
+    }
+    read_bounded(path, most)
+}
+
+fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    if path.is_dir() {
+        return Err("it is a folder".to_owned());
     }
     let file = File::open(path).map_err(|e| e.to_string())?;
     let mut bytes = Vec::new();
@@ -144,9 +149,11 @@ mod tests {
         let socket = folder.path().join("socket.obj");
         let _listens = std::os::unix::net::UnixListener::bind(&socket).unwrap();
         for path in [Path::new("/dev/zero"), &socket] {
-            let told = read_bounded(path, SIBLING_BYTES_MAX).unwrap_err();
+            let told = read_plain(path, SIBLING_BYTES_MAX).unwrap_err();
             assert!(told.contains("expected a plain file"), "{path:?}: {told}");
         }
-        assert_eq!(read_bounded(folder.path(), 9).unwrap_err(), "it is a folder");
+        assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
+        // a scene may come out of a pipe, but never without end
+        assert!(read_bounded(Path::new("/dev/zero"), 9).unwrap_err().contains("more than 9 bytes"));
     }
 }
