@@ -100,7 +100,7 @@ const FORMED_PRODUCTS: u32 = 2_000;
 impl Solver {
     /// A solver that forms W where the last solve took more answers than that costs.
     #[must_use]
-    pub fn that_forms() -> Self {
+    pub fn forming() -> Self {
         Self { forms: true, ..Self::default() }
     }
 

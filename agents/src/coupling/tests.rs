@@ -112,7 +112,7 @@ fn the_solve_agrees_with_gauss_seidel_on_random_problems() {
 
 /// The first solve asks the body, the second one finds that W costs less.
 #[test]
-fn a_solve_that_forms_its_matrix_gives_what_one_that_does_not_gives() {
+fn a_solve_forming_its_matrix_gives_what_one_that_does_not_gives() {
     let mut noise = Noise(13);
     let mut formed = 0;
     for trial in 0..20 {
@@ -122,7 +122,7 @@ fn a_solve_that_forms_its_matrix_gives_what_one_that_does_not_gives() {
         let (wanted, _) = after(&contacts, &free, &mut body, PATIENT);
         let mobilities = body.mobilities();
         let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings: PATIENT };
-        let (mut solver, mut asked) = (Solver::that_forms(), 0);
+        let (mut solver, mut asked) = (Solver::forming(), 0);
         for again in [false, true] {
             // no warm start: what the second gives is found by W alone
             solver.forget();

@@ -66,7 +66,7 @@ impl Contacts {
             form,
             walls,
             list: vec![],
-            solver: Solver::that_forms(),
+            solver: Solver::forming(),
             touches: vec![],
             mobilities: vec![],
             room: TouchRoom::default(),
@@ -135,9 +135,9 @@ impl Contacts {
 
     /// Finds what may close within the substep, and says how well it is to be solved.
     fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
+        let deep_m = DEEP_SHARE * self.edge_m();
         let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
-        let mut stands = false;
-        let (held, deep_m) = (mobilities.contains(&0.0), DEEP_SHARE / SLACK_SHARE * *slack_m);
+        let (mut stands, held) = (false, mobilities.contains(&0.0));
         let here = Placed { form, view: View::Surface(positions) };
         let own = &velocities[..positions.len()];
         let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
