@@ -123,23 +123,9 @@ mod tests {
     use super::super::level::Span;
     use super::super::view::ObjectView;
     use super::*;
-    use metachron_agents::{AgentId, Resolution, ResolutionRange};
 
     fn object(id: usize, kind: Kind) -> Seen {
-        let range = ResolutionRange::fixed(Resolution { eps_m: 1.0, n: 0 });
-        let view = ObjectView {
-            id: AgentId(id as u32),
-            kind,
-            range,
-            shading: Default::default(),
-            pixels: 100.0,
-            distance_m: 1.0,
-            speed_px_s: 0.0,
-            importance: 1.0,
-            off_centre: 0.0,
-            from_focus_m: 0.0,
-            visible: true,
-        };
+        let view = ObjectView::plain(id as u32, kind);
         (view, Span::of(&view))
     }
 

@@ -142,17 +142,9 @@ mod tests {
         kinds.push(mesh(900));
         let pixels = |at: usize| if at < 5 { 3000.0 } else { 700.0 };
         let view = |(at, kind)| ObjectView {
-            id: AgentId(at as u32),
-            kind,
             range: ResolutionRange { eps_m: (1.0, 1.0), n: (0, 10) },
-            shading: Default::default(),
             pixels: pixels(at),
-            distance_m: 1.0,
-            speed_px_s: 0.0,
-            importance: 1.0,
-            off_centre: 0.0,
-            from_focus_m: 0.0,
-            visible: true,
+            ..ObjectView::plain(at as u32, kind)
         };
         let views = kinds.into_iter().enumerate().map(view);
         views.map(|view| (view, Span::of(&view))).collect()

@@ -263,19 +263,7 @@ mod tests {
     fn ladder(impostors: [u32; 8]) -> Ladder {
         let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
         let kind = Kind::Group { radius_m: 1.0, members: (0, 0), impostors };
-        let view = ObjectView {
-            id: AgentId(0),
-            kind,
-            range,
-            shading: Default::default(),
-            pixels: 1e4,
-            distance_m: 1.0,
-            speed_px_s: 0.0,
-            importance: 1.0,
-            off_centre: 0.0,
-            from_focus_m: 0.0,
-            visible: true,
-        };
+        let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
         let mut ladders = Ladders::default();
         ladders.update(&[(view, Span::of(&view))], true, &Prices::default(), &Sliders::default());
         ladders.of(0).clone()

@@ -189,26 +189,11 @@ fn primitive_level(wish: f64, triangles: &[u32; PRIMITIVE_LEVELS], range: (u8, u
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_agents::AgentId;
 
     fn tube(eps_m: (f64, f64), n: (u8, u8)) -> ObjectView {
         let range = ResolutionRange { eps_m, n };
         let kind = Kind::Tube { length_m: 1.5, radius_m: 0.015 };
-        let (pixels, distance_m, speed_px_s) = (1e9, 0.5, 0.0);
-        let shading = Default::default();
-        ObjectView {
-            id: AgentId(0),
-            kind,
-            range,
-            shading,
-            pixels,
-            distance_m,
-            speed_px_s,
-            importance: 1.0,
-            off_centre: 0.0,
-            from_focus_m: 0.0,
-            visible: true,
-        }
+        ObjectView { range, pixels: 1e9, distance_m: 0.5, ..ObjectView::plain(0, kind) }
     }
 
     /// Length of a ring over length of a side.

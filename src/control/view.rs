@@ -122,3 +122,23 @@ impl ObjectView {
         if area.is_finite() { area.max(1e-12) } else { 1.0 }
     }
 }
+
+#[cfg(test)]
+impl ObjectView {
+    /// Seen whole and still, a metre away, in a hundred pixels and one resolution: tests say what is else.
+    pub(super) fn plain(id: u32, kind: Kind) -> Self {
+        Self {
+            id: AgentId(id),
+            kind,
+            range: ResolutionRange::fixed(metachron_agents::Resolution { eps_m: 1.0, n: 0 }),
+            shading: Default::default(),
+            pixels: 100.0,
+            distance_m: 1.0,
+            speed_px_s: 0.0,
+            importance: 1.0,
+            off_centre: 0.0,
+            from_focus_m: 0.0,
+            visible: true,
+        }
+    }
+}

@@ -29,21 +29,8 @@ impl Plant {
 }
 
 fn object(id: u32, kind: Kind, range: ResolutionRange) -> ObjectView {
-    let (pixels, distance_m, speed_px_s) = (3e5, 0.6, 0.0);
-    let kind_pixels = if matches!(kind, Kind::Tube { .. }) { f64::INFINITY } else { pixels };
-    ObjectView {
-        id: AgentId(id),
-        kind,
-        range,
-        shading: Default::default(),
-        pixels: kind_pixels,
-        distance_m,
-        speed_px_s,
-        importance: 1.0,
-        off_centre: 0.0,
-        from_focus_m: 0.0,
-        visible: true,
-    }
+    let pixels = if matches!(kind, Kind::Tube { .. }) { f64::INFINITY } else { 3e5 };
+    ObjectView { range, pixels, distance_m: 0.6, ..ObjectView::plain(id, kind) }
 }
 
 fn tube(id: u32) -> ObjectView {
