@@ -3,7 +3,8 @@
 //! In: a point, and the step of whoever holds it. Out: its mean velocity in that step; into how many parts an impulse falls.
 //! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a.
 
-use super::{Other, Place};
+use super::Other;
+use crate::coupling::Place;
 use crate::{Anchor, Inertia};
 use glam::DVec3;
 

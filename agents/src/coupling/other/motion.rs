@@ -1,0 +1,129 @@
+//! How another agent moves as its neighbour expects it: freely, on what it stands on, on its springs, or bending as it told.
+//!
+//! Theory: docs/theory/coupling.md, eq. 6a and 7d.
+
+use super::{Lean, Other, Pose};
+use crate::Inertia;
+use crate::coupling::{Sprung, Twist};
+use glam::{DQuat, DVec3};
+
+impl Other {
+    /// Its smooth acceleration, m/s²: none where impulses do not move it.
+    #[must_use]
+    pub fn acceleration(&self) -> DVec3 {
+        match (&self.neighbour, &self.lean) {
+            (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
+            (Some(neighbour), None) if !self.held => neighbour.snapshot.acceleration + self.carried_by_others()[0],
+            _ => DVec3::ZERO,
+        }
+    }
+
+    /// The same of a node or vertex: a tube tells how each of its nodes accelerates, a soft body of its vertices.
+    #[must_use]
+    pub fn acceleration_of(&self, node: usize) -> DVec3 {
+        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == self.positions.len() => {
+                curve.accelerations[node]
+            }
+            Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == self.positions.len() => {
+                soft.accelerations[node] + self.taken_back.get(node).copied().unwrap_or_default()
+            }
+            _ => self.acceleration(),
+        }
+    }
+
+    /// What the next `h` seconds add to the velocities of its first two slots, for who gives an impulse at their start: half of
+    /// it where it falls freely, all of it where springs hold it and the impulse lasts (docs/theory/coupling.md, eq. 7d).
+    #[must_use]
+    pub fn gain(&self, h: f64) -> Twist {
+        match &self.lean {
+            Some(lean) => lean.acceleration(h).map(|a| a * h),
+            None => {
+                let falling = self.fall(h).map_or(DVec3::ZERO, |fall| fall.normal * (fall.way_m / h - fall.speed_m_s));
+                [self.acceleration() * (0.5 * h) + falling, self.carried_by_others()[1] * (0.5 * h)]
+            }
+        }
+    }
+
+    /// Impulses will last for `h` seconds: what springs hold answers by that.
+    pub fn foresee(&mut self, h: f64) {
+        if let Some(lean) = &mut self.lean {
+            lean.foresee(h);
+        }
+    }
+
+    /// The mean inverse mass (1/kg) and inverse inertia of a body on springs.
+    #[must_use]
+    pub fn mobility(&self) -> Option<[f64; 2]> {
+        self.lean.as_ref().map(Lean::mobility)
+    }
+
+    pub(super) fn lean_of(&self, sprung: Option<Sprung>, velocity: Twist) -> Option<Lean> {
+        match (sprung.filter(|_| !self.held), &self.neighbour.as_ref()?.snapshot.inertia) {
+            (Some(sprung), Inertia::Rigid { inverse_mass, inverse_inertia }) => {
+                Some(Lean::new(sprung, (*inverse_mass, *inverse_inertia), velocity))
+            }
+            _ => None,
+        }
+    }
+
+    /// Makes the published velocities of a tube or soft body, which are means over its last substep, those at its end (eq. 6a).
+    pub(super) fn reckon(&mut self) {
+        let half_s = self.reckoned_s();
+        if half_s == 0.0 {
+            return;
+        }
+        let stride = self.stride();
+        for node in 0..self.positions.len() {
+            let gained = self.acceleration_of(node) * half_s;
+            self.velocities[stride * node] += gained;
+        }
+    }
+
+    /// Lets `h` seconds pass: x + v h + a h²/2, v + a h.
+    pub fn go_on(&mut self, h: f64) {
+        if let Some(lean) = &mut self.lean {
+            let way = lean.go_on(h);
+            self.velocities.copy_from_slice(&lean.velocity());
+            self.shift(&way);
+            return;
+        }
+        if self.positions.is_empty() {
+            let (a, [_, turning]) = (self.acceleration(), self.carried_by_others());
+            let fall = self.fall(h);
+            let Pose { centre, rotation } = &mut self.pose;
+            *centre += self.velocities[0] * h + a * (0.5 * h * h);
+            *rotation = turned(*rotation, self.velocities[1] * h + turning * (0.5 * h * h));
+            self.velocities[0] += a * h;
+            self.velocities[1] += turning * h;
+            if let Some(fall) = fall {
+                self.settle(&fall, h);
+            }
+            self.receive(h);
+            return;
+        }
+        let stride = self.stride();
+        for node in 0..self.positions.len() {
+            let a = self.acceleration_of(node);
+            let v = &mut self.velocities[stride * node];
+            self.positions[node] += *v * h + a * (0.5 * h * h);
+            *v += a * h;
+        }
+    }
+
+    /// Moves by what each slot is carried.
+    pub(super) fn shift(&mut self, by: &[DVec3]) {
+        if self.positions.is_empty() {
+            self.pose.centre += by[0];
+            self.pose.rotation = turned(self.pose.rotation, by[1]);
+        } else {
+            let stride = self.stride();
+            self.positions.iter_mut().zip(by.iter().step_by(stride)).for_each(|(x, dx)| *x += *dx);
+        }
+    }
+}
+
+/// A rotation turned on by a small or large rotation vector in world axes.
+pub(in crate::coupling) fn turned(rotation: DQuat, by: DVec3) -> DQuat {
+    if by == DVec3::ZERO { rotation } else { (DQuat::from_scaled_axis(by) * rotation).normalize() }
+}
