@@ -3,13 +3,14 @@
 //! In: the ledgers of those who touch it or are held by it. Out: a force. Never here: where the tool goes; nothing moves it.
 
 use crate::coupling::{Exchange, Impulse};
-use crate::{AgentId, SimTime, Snapshot, Surroundings};
+use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
 
 /// The forces on one tool.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Felt {
     exchange: Exchange,
+    /// Everybody near, by rising ids: who gives nothing yet is read too, so that it is known since when its first impulses count.
     from: Vec<From>,
 }
 
@@ -33,26 +34,24 @@ impl Felt {
         from.iter_mut().for_each(|f| (f.here, f.given) = (false, DVec3::ZERO));
         exchange.open(around);
         for other in around.neighbours {
-            match from.iter_mut().find(|f| f.id == other.id) {
-                Some(known) => known.here = true,
-                None if other.snapshot.given.iter().any(|ledger| ledger.with == around.me) => {
-                    let until = around.time.min(other.snapshot.time);
-                    from.push(From { id: other.id, until, given: DVec3::ZERO, force_n: DVec3::ZERO, here: true });
-                }
-                None => {}
+            match from.binary_search_by_key(&other.id, |f| f.id) {
+                Ok(at) => from[at].here = true,
+                Err(at) => from.insert(at, From::new(other, around.me)),
             }
         }
         from.retain(|f| f.here);
         // all of it, what is still to act too: the mean is over all of the giver's time
         let newest = around.neighbours.iter().map(|other| other.snapshot.time).fold(around.time, SimTime::max);
         exchange.take(around, newest, |id, _, Impulse { linear, .. }, _| {
-            from.iter_mut().filter(|f| f.id == id).for_each(|f| f.given += linear);
+            if let Ok(at) = from.binary_search_by_key(&id, |f| f.id) {
+                from[at].given += linear;
+            }
         });
         for other in around.neighbours {
-            let Some(known) = from.iter_mut().find(|f| f.id == other.id) else { continue };
-            let since_s = other.snapshot.time.secs_after(known.until);
+            let Ok(at) = from.binary_search_by_key(&other.id, |f| f.id) else { continue };
+            let since_s = other.snapshot.time.secs_after(from[at].until);
             if since_s > 0.0 {
-                (known.force_n, known.until) = (known.given / since_s, other.snapshot.time);
+                (from[at].force_n, from[at].until) = (from[at].given / since_s, other.snapshot.time);
             }
         }
     }
@@ -65,5 +64,15 @@ impl Felt {
     /// Writes what was taken.
     pub(super) fn write(&self, into: &mut Snapshot) {
         self.exchange.write(into);
+    }
+}
+
+impl From {
+    /// Who is seen for the first time: what it has given already counts from when it began the page that it writes on.
+    fn new(other: &Neighbour, me: AgentId) -> Self {
+        let account = other.snapshot.given.iter().find(|ledger| ledger.with == me);
+        let since = account.and_then(|ledger| ledger.pages.last()).map(|page| page.origin);
+        let until = since.map_or(other.snapshot.time, |since| since.min(other.snapshot.time));
+        Self { id: other.id, until, given: DVec3::ZERO, force_n: DVec3::ZERO, here: true }
     }
 }
