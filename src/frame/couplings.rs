@@ -18,7 +18,7 @@ pub struct Coupling {
     pub a: AgentId,
     /// The other.
     pub b: AgentId,
-    /// How they are coupled: `ledger`, `penalty`, `tlm`, `island`, `grasp`, `attach`.
+    /// How they are coupled: `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `island`, `grasp`, `attach`.
     pub kind: &'static str,
     /// Contacts or holds at the end of the run.
     pub contacts: u32,
@@ -271,8 +271,7 @@ impl Couplings {
 
 /// The state of the same pair as its other side publishes it, where both sides push.
 fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Option<&'s PairState> {
-    let pushes = state.kind == PairKind::Penalty;
-    theirs.pairs.iter().find(|back| pushes && back.with == owner && back.kind == PairKind::Penalty)
+    theirs.pairs.iter().find(|back| state.kind.is_penalty() && back.with == owner && back.kind == state.kind)
 }
 
 /// By how much the accounts of what `owner` gave and what `other` took differ, N·s, and whether both are of the same reading.
@@ -345,14 +344,16 @@ mod tests {
 
     #[test]
     fn the_two_sides_of_a_penalty_are_one_coupling_with_what_they_differ_by() {
-        let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), PairKind::Penalty) };
-        let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
-        let scene = two_balls();
-        let mut couplings = Couplings::of(&scene);
-        note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
-        let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
-        assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, "penalty"));
-        assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
+        for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
+            let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
+            let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
+            let scene = two_balls();
+            let mut couplings = Couplings::of(&scene);
+            note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
+            let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
+            assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, name));
+            assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
+        }
     }
 
     #[test]

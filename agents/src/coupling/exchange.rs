@@ -18,6 +18,8 @@ pub enum PairKind {
     Ledger,
     /// Contact by penalty forces from stale states.
     Penalty,
+    /// Contact by penalty forces from states that are brought forward.
+    PenaltyExtrapolated,
     /// Contact or link by wave variables.
     Tlm,
     /// A tool's hold.
@@ -27,12 +29,25 @@ pub enum PairKind {
 }
 
 impl PairKind {
+    /// Contact by penalty forces, whose two sides each push themselves.
+    #[must_use]
+    pub const fn of_penalty(extrapolate: bool) -> Self {
+        if extrapolate { Self::PenaltyExtrapolated } else { Self::Penalty }
+    }
+
+    /// Whether it is a contact by penalty forces.
+    #[must_use]
+    pub const fn is_penalty(self) -> bool {
+        matches!(self, Self::Penalty | Self::PenaltyExtrapolated)
+    }
+
     /// The word of reports.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ledger => "ledger",
             Self::Penalty => "penalty",
+            Self::PenaltyExtrapolated => "penalty-extrapolated",
             Self::Tlm => "tlm",
             Self::Grasp => "grasp",
             Self::Attachment => "attach",
@@ -218,7 +233,7 @@ impl Exchange {
     /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
     pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         for owned in &mut self.owned {
-            if !matches!(owned.state.kind, PairKind::Penalty | PairKind::Tlm) {
+            if !(owned.state.kind.is_penalty() || owned.state.kind == PairKind::Tlm) {
                 owned.state.force_n = owned.step_impulse.length() / dt_s;
             }
             owned.go_on(dt_s);

@@ -45,9 +45,7 @@ impl Sided {
         for i in 0..company.guests().len() {
             let Some(law) = company.guests()[i].other.neighbour().map(|n| n.law) else { continue };
             match law {
-                Law::Penalty { stiffness_n_m, damping_n_s_m, .. } => {
-                    self.push_off((motion, spread), (company, i), (stiffness_n_m, damping_n_s_m), span);
-                }
+                Law::Penalty { .. } => self.push_off((motion, spread), (company, i), law, span),
                 Law::Tlm { stiffness_n_m, damping_n_s_m } => {
                     self.lean((motion, spread), (company, i), (stiffness_n_m, damping_n_s_m), span);
                 }
@@ -67,9 +65,10 @@ impl Sided {
         &mut self,
         (motion, spread): (&mut Motion, &Spread),
         (company, i): (&mut Company, usize),
-        law: (f64, f64),
+        law: Law,
         span: Span,
     ) {
+        let Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate } = law else { return };
         self.find((motion, spread), (company, i));
         let (mut force, mut depth_m, mut places) = (DVec3::ZERO, 0.0_f64, 0);
         self.given.clear();
@@ -78,7 +77,8 @@ impl Sided {
             let guest = &company.guests()[i];
             let slots = slots_of(touch, motion, guest);
             let velocity = slots.velocity(&self.velocities);
-            let push = push_off_n((touch.gap_m, touch.normal, velocity), law, guest.friction);
+            let push =
+                push_off_n((touch.gap_m, touch.normal, velocity), (stiffness_n_m, damping_n_s_m), guest.friction);
             slots.scatter(push * span.dt_s, &mut self.given);
             force += push;
             depth_m = depth_m.max(-touch.gap_m);
@@ -87,7 +87,7 @@ impl Sided {
         motion.velocity += self.given[0] / spread.mass_kg;
         motion.angular += self.given[1];
         if places > 0 {
-            tell(company, i, PairKind::Penalty, (force, depth_m, places, span.dt_s));
+            tell(company, i, PairKind::of_penalty(extrapolate), (force, depth_m, places, span.dt_s));
         }
     }
 

@@ -60,9 +60,7 @@ impl Company {
                 continue;
             }
             match neighbour.law {
-                Law::Penalty { stiffness_n_m, damping_n_s_m, .. } => {
-                    sided.push_off(self, (neighbour, now), (stiffness_n_m, damping_n_s_m));
-                }
+                law @ Law::Penalty { .. } => sided.push_off(self, (neighbour, now), law),
                 Law::Tlm { stiffness_n_m, damping_n_s_m } => {
                     sided.lean(self, (neighbour, now), (stiffness_n_m, damping_n_s_m), around);
                 }
@@ -99,11 +97,13 @@ impl Sided {
     }
 
     /// Penalty contact.
-    fn push_off(&mut self, company: &mut Company, (neighbour, now): (&Neighbour, &Now<'_>), law: (f64, f64)) {
+    fn push_off(&mut self, company: &mut Company, (neighbour, now): (&Neighbour, &Now<'_>), law: Law) {
+        let Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate } = law else { return };
         let list = self.find(company, now);
         let (mut force, mut depth_m, mut places) = (DVec3::ZERO, 0.0_f64, 0);
         for touch in list.iter().filter(|touch| touch.gap_m < 0.0) {
             let velocity = self.mate.slots_of(touch).velocity(&self.velocities);
+            let law = (stiffness_n_m, damping_n_s_m);
             let push = push_off_n((touch.gap_m, touch.normal, velocity), law, self.mate.friction());
             company.received().add_slots(&mine(touch), push * now.dt);
             force += push;
@@ -112,7 +112,7 @@ impl Sided {
         }
         company.give_back(list);
         if places > 0 && neighbour.owned {
-            tell(company, neighbour.id, PairKind::Penalty, (force, depth_m, places, now.dt));
+            tell(company, neighbour.id, PairKind::of_penalty(extrapolate), (force, depth_m, places, now.dt));
         }
     }
 

@@ -131,7 +131,7 @@ pub struct CouplingReport {
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// How they were coupled: `ledger`, `tlm`, `penalty`, `island`, `grasp` or `attach`.
+    /// How they were coupled: `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
     pub kind: String,
     /// Contacts, holds or joints at the end of the run.
     pub contacts: u64,

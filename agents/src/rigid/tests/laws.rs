@@ -35,7 +35,10 @@ fn collide(law: Law, rates: [f64; 2], faults: Faults) -> ([f64; 2], f64, Stage) 
 #[test]
 fn a_penalty_at_fine_steps_is_an_elastic_blow() {
     let law = Law::Penalty { stiffness_n_m: 500.0, damping_n_s_m: 0.0, extrapolate: true };
-    let ([first, second], ..) = collide(law, [10_000.0, 10_000.0], Faults::default());
+    let ([first, second], _, stage) = collide(law, [10_000.0, 10_000.0], Faults::default());
+    let kinds = [(0, 1), (1, 0)]
+        .map(|(a, b)| stage.newest(AgentId(a)).pairs.iter().find(|pair| pair.with == AgentId(b)).map(|pair| pair.kind));
+    assert!(kinds.contains(&Some(PairKind::PenaltyExtrapolated)), "{kinds:?}");
     // in the frame of their common centre the two swap their signs; stale by a step in some 100 of a half swing
     assert!((first + 0.75).abs() < 0.03 && (second - 0.25).abs() < 0.03, "{first} {second}");
 }
