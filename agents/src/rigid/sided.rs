@@ -9,7 +9,7 @@ use super::motion::Motion;
 use super::places::halfway;
 use crate::coupling::laws::{Drawn, End, Line, push_off_n};
 use crate::coupling::touch::touches;
-use crate::coupling::{Impulse, Law, Link, PairKind, Slots, Touch};
+use crate::coupling::{Impulse, Law, Link, PairKind, Place, Slots, Touch};
 use crate::{AgentId, Anchor, SimTime, Stand, Surroundings};
 use glam::{DMat3, DVec3};
 
@@ -30,6 +30,18 @@ struct Span {
     gravity: DVec3,
     /// How the body stands on something fixed.
     stand: Option<Stand>,
+}
+
+/// Where a guest presses on the body, all places as one.
+struct Pressed {
+    /// The velocity of the body in their middle.
+    slots: Slots,
+    /// Away from the guest, of length one.
+    normal: DVec3,
+    /// That of the body against the guest, m/s.
+    velocity: DVec3,
+    depth_m: f64,
+    places: u32,
 }
 
 impl Sided {
@@ -91,7 +103,7 @@ impl Sided {
         }
     }
 
-    /// Contact with guest `i` by wave variables, at the deepest place: a line along the normal that only pushes.
+    /// Contact with guest `i` by wave variables: one line along the normal, in the middle of what presses, that only pushes.
     fn lean(
         &mut self,
         (motion, spread): (&mut Motion, &Spread),
@@ -101,30 +113,48 @@ impl Sided {
     ) {
         let arriving = self.listen((company, i), stiffness, span);
         self.find((motion, spread), (company, i));
-        let deepest = self.touches.iter().min_by(|a, b| a.gap_m.total_cmp(&b.gap_m)).filter(|touch| touch.gap_m < 0.0);
-        let Some(touch) = deepest.copied() else { return self.answer((company, i), None, span) };
-        let slots = slots_of(&touch, motion, &company.guests()[i]);
-        let normal = touch.normal;
-        let velocity = slots.velocity(&self.velocities);
-        self.velocities[2..].fill(DVec3::ZERO);
+        let guest = &company.guests()[i];
+        let Some(pressed) = self.pressed(motion, guest) else { return self.answer((company, i), None, span) };
+        let Pressed { slots, normal, velocity, depth_m, places } = pressed;
         let mut own = (slots.velocity(&self.velocities) + span.gravity * span.dt_s).dot(normal);
+        let friction = guest.friction;
         let (z, c) = (self.line(company.guests()[i].id(), stiffness).impedance(), arriving.dot(normal));
-        let mut yields = answer_of(motion, spread, &only_mine(&touch, motion), normal).dot(normal);
-        if span.bears(&only_mine(&touch, motion), normal, motion) {
+        let mut yields = answer_of(motion, spread, &slots, normal).dot(normal);
+        if span.bears(&slots, normal, motion) {
             // what it stands on takes its weight and the push
             (own, yields) = (own.min(0.0), 0.0);
         }
         let push = (-(z * own + c) / (1.0 + z * yields * span.dt_s)).max(0.0);
         let damped = (push - damping * velocity.dot(normal)).max(0.0);
         let slip = velocity - normal * velocity.dot(normal);
-        let rub = slip * (company.guests()[i].friction * damped / slip.length().max(1e-3));
+        let rub = slip * (friction * damped / slip.length().max(1e-3));
         let force = normal * damped - rub;
         let mut given = [DVec3::ZERO; 2];
-        only_mine(&touch, motion).scatter(force * span.dt_s, &mut given);
+        slots.scatter(force * span.dt_s, &mut given);
         motion.velocity += given[0] / spread.mass_kg;
         motion.angular += given[1];
         self.answer((company, i), Some((normal * c, normal * -push)), span);
-        tell(company, i, PairKind::Tlm, (force, -touch.gap_m, 1, span.dt_s));
+        tell(company, i, PairKind::Tlm, (force, depth_m, places, span.dt_s));
+    }
+
+    /// Where a guest presses on the body, all places as one: each counts by its depth, so that a side that sinks in deeper bears
+    /// more. At the deepest place alone a box rocks from corner to corner on its line and sinks.
+    fn pressed(&self, motion: &Motion, guest: &Guest) -> Option<Pressed> {
+        let overlapping = || self.touches.iter().filter(|touch| touch.gap_m < 0.0);
+        let depth_m = overlapping().map(|touch| -touch.gap_m).fold(0.0, f64::max);
+        let whole: f64 = overlapping().map(|touch| -touch.gap_m).sum();
+        let (mut point, mut normal, mut velocity, mut places) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, 0);
+        for touch in overlapping() {
+            let (Place::Point(at), share) = (halfway(touch).0, -touch.gap_m / whole) else { continue };
+            point += at * share;
+            normal += touch.normal * share;
+            velocity += slots_of(touch, motion, guest).velocity(&self.velocities) * share;
+            places += 1;
+        }
+        let normal = normal.try_normalize()?;
+        let mut slots = Slots::default();
+        Place::Point(point).join(&mut slots, 0, motion.position, (-normal, 1.0));
+        Some(Pressed { slots, normal, velocity, depth_m, places })
     }
 
     /// A link to guest `i` by wave variables.
