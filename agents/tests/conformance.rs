@@ -183,6 +183,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
         reach_m: 0.02,
         stiffness_n_m: 100.0,
         damping_n_s_m: 1.0,
+        max_force_n: 50.0,
         graspable: vec![held],
     };
     let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
@@ -211,6 +212,7 @@ fn a_tool_led_at_even_speed_keeps_every_promise() {
         reach_m: 0.02,
         stiffness_n_m: 100.0,
         damping_n_s_m: 1.0,
+        max_force_n: 50.0,
         graspable: vec![],
     };
     let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;

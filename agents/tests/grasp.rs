@@ -34,6 +34,7 @@ fn tool() -> Instrument {
         reach_m: 0.02,
         stiffness_n_m: STIFFNESS_N_M,
         damping_n_s_m: 0.5,
+        max_force_n: 50.0,
         graspable: vec![TUBE],
     })
     .unwrap()

@@ -20,7 +20,8 @@ use super::slot::SlotWriter;
 use metachron_agents::coupling::Link;
 use metachron_agents::coupling::beside::leaves_behind;
 use metachron_agents::{
-    Agent, AgentId, Inertia, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
+    Agent, AgentId, Body, Inertia, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport,
+    Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -299,7 +300,8 @@ impl Actor {
         let Self { eyes, hands, links, pace, writer, .. } = self;
         let around =
             Surroundings { me: self.shared.id, time: pace.time(), neighbours: eyes.neighbours(), hands, links };
-        let is_pushed = |state: &Snapshot| !matches!(state.inertia, Inertia::Immovable);
+        let is_led = |state: &Snapshot| matches!(state.body, Body::Tool(_));
+        let is_pushed = |state: &Snapshot| !is_led(state) && !matches!(state.inertia, Inertia::Immovable);
         let bounds = || newest(writer, |state| state.bounds.filter(|_| is_pushed(state)));
         leaves_behind(pace.dt(), &around, bounds)
     }

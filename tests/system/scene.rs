@@ -230,6 +230,18 @@ fn a_tool_and_the_tubes_it_can_hold_see_each_other() {
 }
 
 #[test]
+fn a_drive_without_force_is_refused_with_its_line() {
+    for weak in ["0", "-1", "inf", "nan"] {
+        let tool = format!(
+            "format = 1\n[[object]]\nname = \"t\"\nmodel = \"instrument\"\nmax_force_n = {weak}\nkeyframe = [{{ tip_m = [0, 0, 0] }}]\n"
+        );
+        let (line, _, text, said) = problem(&tool);
+        assert_eq!((line, text.as_str()), (5, weak));
+        assert!(said.contains("`max_force_n`") && said.contains("N"), "{said}");
+    }
+}
+
+#[test]
 fn keyframes_follow_in_time() {
     let tool = "format = 1\n[[object]]\nname = \"t\"\nmodel = \"instrument\"\n[[object.keyframe]]\nat_s = 1\ntip_m = [0, 0, 0]\n[[object.keyframe]]\nat_s = 1\ntip_m = [0, 0, 0]\n";
     let (line, _, _, said) = problem(tool);

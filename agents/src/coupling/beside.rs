@@ -82,11 +82,17 @@ pub fn bends(neighbour: &Neighbour) -> bool {
     matches!(neighbour.snapshot.body, Body::Curve(_) | Body::Soft(_))
 }
 
-/// Whether a neighbour bends, or moves as somebody else near here pushes it.
+/// Whether a neighbour is a tool whose drive has a say in how it moves: to whom is linked to it it is led.
+#[must_use]
+pub fn is_driven(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    matches!(neighbour.snapshot.body, Body::Tool(_)) && !is_linked(neighbour, around)
+}
+
+/// Whether a neighbour bends, is driven, or moves as somebody else near here pushes it.
 #[must_use]
 pub fn has_a_say(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
     let gives = |n: &Neighbour| n.id != neighbour.id && n.snapshot.given.iter().any(|l| l.with == neighbour.id);
-    bends(neighbour) || around.neighbours.iter().any(gives)
+    bends(neighbour) || is_driven(neighbour, around) || around.neighbours.iter().any(gives)
 }
 
 /// Whether a neighbour may come near enough to a body within `bounds` to touch it in the next `dt` seconds.

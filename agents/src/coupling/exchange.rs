@@ -175,14 +175,13 @@ impl Exchange {
     }
 
     /// Takes what owners give to a body as a whole as forces that go on: what each gave in its last step goes on evenly, until
-    /// the next reading tells better. `apply` gets dJ and t dJ − dS at the step's start, and what acts over its `dt_s` seconds.
-    pub fn follow(&mut self, around: &Surroundings<'_>, dt_s: f64, mut apply: impl FnMut(Impulse, Impulse, Impulse)) {
+    /// the next reading tells better. `apply` gets who, dJ and t dJ − dS at the step's start, and what acts over its `dt_s` seconds.
+    pub fn follow(&mut self, around: &Surroundings<'_>, dt_s: f64, mut apply: impl FnMut(AgentId, [Impulse; 3])) {
         for neighbour in around.neighbours {
             let ledger = neighbour.snapshot.given.iter().find(|l| l.with == around.me && l.is_finite());
             if ledger.is_some() || self.taken.iter().any(|t| t.copy.with == neighbour.id) {
-                let [sum, carried, lasting] =
-                    self.taken_mut(neighbour.id).follow(ledger, neighbour, (around.time, dt_s));
-                apply(sum, carried, lasting);
+                let taken = self.taken_mut(neighbour.id);
+                apply(neighbour.id, taken.follow(ledger, neighbour, (around.time, dt_s)));
             }
         }
     }

@@ -36,6 +36,8 @@ pub struct Other {
     taken_back: Vec<DVec3>,
     age_s: f64,
     held: bool,
+    /// It is a tool that holds the neighbour or is linked to it: led, whatever pushes it.
+    led: bool,
     /// How far impulses have lifted it off what it stood on, metres, ≥ 0; `None` while none has.
     height_m: Option<f64>,
     /// Whether impulses only press it on what it stands on, while a solve takes that for granted.
@@ -77,6 +79,9 @@ impl Other {
         let known = self.see(neighbour);
         if known {
             self.reckon();
+            if holds_on(neighbour, around) {
+                (self.held, self.led, self.lean) = (true, true, None);
+            }
             self.age_s = around.time.secs_after(neighbour.snapshot.time);
             self.foresee(self.age_s);
             // what bends accelerates as told for about a step, and forwards: back by more of them its nodes would fly apart
@@ -90,7 +95,9 @@ impl Other {
     pub fn see(&mut self, neighbour: &Neighbour) -> bool {
         let snapshot = &neighbour.snapshot;
         self.neighbour = Some(neighbour.clone());
-        self.held = snapshot.at_rest || matches!(snapshot.inertia, Inertia::Immovable);
+        // a tool that rests is pushed as any that moves: its drive keeps it there
+        let sleeps = snapshot.at_rest && !matches!(snapshot.body, Body::Tool(_));
+        (self.held, self.led) = (sleeps || matches!(snapshot.inertia, Inertia::Immovable), false);
         (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
         self.coming.clear();
         self.lasting.clear();
@@ -108,6 +115,7 @@ impl Other {
             Body::Tool(ToolState { tip, rotation, velocity, .. }) => {
                 self.pose = Pose { centre: *tip, rotation: *rotation };
                 self.velocities.extend([*velocity, DVec3::ZERO]);
+                self.lean = self.lean_of(snapshot.sprung.get().copied(), [*velocity, DVec3::ZERO]);
                 true
             }
             Body::Curve(curve) => {
@@ -174,7 +182,8 @@ impl Other {
     /// Whether it only rests: impulses would move it if it woke.
     #[must_use]
     pub fn is_asleep(&self) -> bool {
-        self.held && self.neighbour.as_ref().is_some_and(|n| !matches!(n.snapshot.inertia, Inertia::Immovable))
+        let moves = |n: &Neighbour| !matches!(n.snapshot.inertia, Inertia::Immovable);
+        self.held && !self.led && self.neighbour.as_ref().is_some_and(moves)
     }
 
     /// Whether springs hold it, as its owner knows.
@@ -185,7 +194,8 @@ impl Other {
 
     /// Wakes a body that rests: from now on impulses move it.
     pub fn wake(&mut self) {
-        self.held = self.neighbour.as_ref().is_none_or(|n| matches!(n.snapshot.inertia, Inertia::Immovable));
+        let stays = |n: &Neighbour| matches!(n.snapshot.inertia, Inertia::Immovable);
+        self.held = self.led || self.neighbour.as_ref().is_none_or(stays);
     }
 
     /// Wakes a body that rests if a blow is on its way to it: it only rests until it reads of that.
@@ -222,4 +232,11 @@ impl Other {
             }
         }
     }
+}
+
+/// Whether `neighbour` is a tool that holds who looks, or is linked to them.
+fn holds_on(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
+    let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
+    let linked = || around.links.iter().any(|link| link.other == neighbour.id);
+    tool.grasp.is_some_and(|grasp| grasp.target == around.me) || linked()
 }

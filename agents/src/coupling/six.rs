@@ -41,6 +41,14 @@ impl Six {
         }
     }
 
+    /// Adds g m gᵀ: what `m` along the direction `g` is.
+    pub fn add_outer(&mut self, g: Twist, m: f64) {
+        let g = flat(g);
+        for (row, a) in self.0.iter_mut().zip(g) {
+            row.iter_mut().zip(g).for_each(|(x, b)| *x += m * a * b);
+        }
+    }
+
     /// Adds stiffness against turning across the arm `r`; about every axis where that has no length.
     pub fn add_turning(&mut self, r: DVec3, stiffness: f64) {
         let axis = r.normalize_or_zero();

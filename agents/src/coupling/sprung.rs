@@ -24,6 +24,8 @@ pub struct Sprung {
     pub past: Twist,
     /// The step by which the body goes on, seconds: it takes impulses as (M + h C + h² K)⁻¹ of that step.
     pub span_s: f64,
+    /// The most that the springs give, newtons; past it their far ends are held back. Infinite where they give any force.
+    pub limit_n: f64,
 }
 
 impl Sprung {
@@ -105,9 +107,25 @@ impl Lean {
     /// Takes impulses that last for `h` seconds, or for the body's own step where that is longer, from now on.
     pub(super) fn foresee(&mut self, h: f64) {
         let h = h.max(self.sprung.span_s);
+        self.give_way(h);
         if h != self.horizon_s {
             (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
         }
+    }
+
+    /// Springs that would have to give more than they can in the next `h` seconds give that and no more, however far the body goes
+    /// (eq. 9f).
+    fn give_way(&mut self, h: f64) {
+        let limit_n = self.sprung.limit_n;
+        let pull = if limit_n.is_finite() { self.pull(h)[0] } else { DVec3::ZERO };
+        if pull.length() <= limit_n {
+            return;
+        }
+        let none = [DVec3::ZERO; 2];
+        self.sprung.force = [pull.clamp_length_max(limit_n), DVec3::ZERO];
+        (self.sprung.rising, self.sprung.stiffness) = (none, Six::ZERO);
+        (self.off, self.faster, self.fresh, self.steady) = (none, none, none, None);
+        (self.horizon_s, self.answer) = (h, self.sprung.answer(self.inertia, h));
     }
 
     /// The velocities that an impulse causes.
@@ -143,11 +161,17 @@ impl Lean {
 
     /// The mean acceleration past the published state.
     fn ahead(&self, h: f64) -> Twist {
-        let Self { sprung, off, .. } = self;
         let since = (-self.left_s).max(0.0);
-        if let Some((a, _)) = self.steady.filter(|(_, until)| since < *until && self.horizon_s <= sprung.span_s) {
+        if let Some((a, _)) = self.steady.filter(|(_, until)| since < *until && self.horizon_s <= self.sprung.span_s) {
             return a;
         }
+        self.answer.times(self.pull(h))
+    }
+
+    /// The force of the springs at the end of the next `h` seconds, had nothing else changed the velocities by then.
+    fn pull(&self, h: f64) -> Twist {
+        let Self { sprung, off, .. } = self;
+        let since = (-self.left_s).max(0.0);
         // what the body took ahead will have been given by the time of its state
         let there = if self.left_s > 0.0 { 0.0 } else { 1.0 };
         let without = |all: &Twist| [0, 1].map(|i| all[i] - self.fresh[i]);
@@ -157,7 +181,7 @@ impl Lean {
         let late = h.max(self.horizon_s);
         let force =
             |i: usize| sprung.force[i] + sprung.rising[i] * (since + late) - pulled[i] - damped[i] - falling[i] * late;
-        self.answer.times([0, 1].map(force))
+        [0, 1].map(force)
     }
 
     /// Adds to its velocities what an impulse has caused, which `lasts` through the next stretch or was a blow.

@@ -1,7 +1,11 @@
-//! What a tool feels: the impulses that others gave it, as a force.
+//! What a tool feels: the impulses that others gave it, as a force; and what of it moves the tool.
 //!
-//! In: the ledgers of those who touch it or are held by it. Out: a force. Never here: where the tool goes; nothing moves it.
+//! In: the ledgers of those who touch it or are held by it. Out: a force, and what contact gives the drive ([`super::drive`]).
+//! Never here: where the tool goes.
+//!
+//! Whom the tool holds, and who is linked to it, sees it as led; it takes what they give without yielding.
 
+use super::drive::Given;
 use crate::coupling::{Exchange, Impulse};
 use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
@@ -10,8 +14,16 @@ use glam::DVec3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Felt {
     exchange: Exchange,
-    /// Everybody near, by rising ids: who gives nothing yet is read too, so that it is known since when its first impulses count.
+    /// Everybody who holds on to it, by rising ids: who gives nothing yet is read too, so that it is known since when its first
+    /// impulses count.
     from: Vec<From>,
+    /// Those who see the tool as led, and the others, while it reads.
+    held: Vec<Neighbour>,
+    touching: Vec<Neighbour>,
+    /// The force of contact, newtons.
+    pushed_n: DVec3,
+    /// Whether only agents at rest push it.
+    lain_on: bool,
 }
 
 /// The force of one agent.
@@ -28,11 +40,41 @@ struct From {
 }
 
 impl Felt {
-    /// Reads what was given since the last reading: a force is the mean over the giver's own time between two readings.
-    pub(super) fn read(&mut self, around: &Surroundings<'_>) {
+    /// Reads what was given since the last reading, by those to whom the tool `is_led` and by the others, and what the others
+    /// give in a step of `dt` seconds.
+    pub(super) fn read(&mut self, around: &Surroundings<'_>, is_led: impl Fn(&Neighbour) -> bool, dt: f64) -> Given {
+        self.exchange.open(around);
+        let [mut held, mut touching] = [&mut self.held, &mut self.touching].map(std::mem::take);
+        for other in around.neighbours {
+            if is_led(other) { held.push(other.clone()) } else { touching.push(other.clone()) }
+        }
+        self.hold(&Surroundings { neighbours: &held, ..*around });
+        let given = self.touch(&Surroundings { neighbours: &touching, ..*around }, dt);
+        held.clear();
+        touching.clear();
+        (self.held, self.touching) = (held, touching);
+        given
+    }
+
+    /// Takes what contact gives, as forces that go on.
+    fn touch(&mut self, around: &Surroundings<'_>, dt: f64) -> Given {
+        let (mut given, mut awake) = (Given::default(), false);
+        self.exchange.follow(around, dt, |id, [sum, carried, lasting]| {
+            given.sum += sum.linear;
+            given.carried += carried.linear;
+            given.lasting += lasting.linear;
+            let rests = around.neighbours.iter().any(|other| other.id == id && other.snapshot.at_rest);
+            awake |= !rests && lasting != Impulse::ZERO;
+        });
+        self.pushed_n = given.lasting / dt;
+        self.lain_on = !awake && given.lasting != DVec3::ZERO;
+        given
+    }
+
+    /// Reads what those gave to whom the tool is led: a force is the mean over the giver's own time between two readings.
+    fn hold(&mut self, around: &Surroundings<'_>) {
         let Self { exchange, from, .. } = self;
         from.iter_mut().for_each(|f| (f.here, f.given) = (false, DVec3::ZERO));
-        exchange.open(around);
         for other in around.neighbours {
             match from.binary_search_by_key(&other.id, |f| f.id) {
                 Ok(at) => from[at].here = true,
@@ -58,7 +100,12 @@ impl Felt {
 
     /// The magnitude of all forces on the tool, newtons.
     pub(super) fn force_n(&self) -> f64 {
-        self.from.iter().map(|f| f.force_n).sum::<DVec3>().length()
+        (self.from.iter().map(|f| f.force_n).sum::<DVec3>() + self.pushed_n).length()
+    }
+
+    /// Whether only agents at rest push it: they lie on it.
+    pub(super) const fn is_lain_on(&self) -> bool {
+        self.lain_on
     }
 
     /// Writes what was taken.

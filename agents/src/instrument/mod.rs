@@ -3,9 +3,10 @@
 //! In: a [`ToolSpec`], steps, the user's hand, the snapshots of what it can grasp. Out: a tip, jaws, a hold.
 //! Never here: the force of the hold. What is held solves it in its own step and books it in a ledger (`felt.rs` reads it).
 //!
-//! A tool weighs nothing and nothing stops it: it is led. `script.rs` says where the keyframes lead, `jaws.rs` what the
+//! `script.rs` says where the keyframes lead, `drive.rs` how far the tip gets there against what it touches, `jaws.rs` what the
 //! jaws catch, `tool.rs` is the agent.
 
+mod drive;
 mod felt;
 mod jaws;
 mod script;

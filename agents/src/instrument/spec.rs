@@ -18,6 +18,8 @@ pub struct ToolSpec {
     pub stiffness_n_m: f64,
     /// Damping of the hold, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
+    /// The most that its drive pushes with, newtons, > 0: what is stronger holds the tip back from its path.
+    pub max_force_n: f64,
     /// What it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
 }
@@ -95,6 +97,8 @@ impl ToolSpec {
         let k = self.stiffness_n_m;
         number("the stiffness", k, within(k, f64::MIN_POSITIVE, 1e9), "above zero and at most 1e9 N/m")?;
         let c = self.damping_n_s_m;
+        let f = self.max_force_n;
+        number("the greatest force", f, within(f, 1e-6, 1e9), "between 1e-6 and 1e9 N")?;
         number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
         let mut before_s = f64::NEG_INFINITY;
         for (index, key) in self.keyframes.iter().enumerate() {

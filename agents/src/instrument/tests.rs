@@ -1,6 +1,7 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
 mod holds;
+mod pushes;
 mod rigid;
 
 use super::{Instrument, Keyframe, ToolError, ToolSpec};
@@ -27,6 +28,7 @@ fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
         reach_m: 0.02,
         stiffness_n_m: 200.0,
         damping_n_s_m: 1.0,
+        max_force_n: 50.0,
         graspable: vec![TUBE],
     }
 }
@@ -291,6 +293,7 @@ fn scripts_that_are_none_are_refused() {
         let good = spec(vec![key(0.0, DVec3::Y, 1.0)]);
         assert!(matches!(refuse(ToolSpec { reach_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
         assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber { .. }));
         let damped = Instrument::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
     }

@@ -4,16 +4,18 @@
 //!
 //! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
 //! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
+//! What touches the tip moves it off the led point as far as the drive is strong ([`super::drive`]).
 
+use super::drive::{Drive, Led};
 use super::felt::Felt;
 use super::jaws::{GRASP_BELOW, Jaws, let_in, nearest};
 use super::script::{Pose, Script};
 use super::spec::REACH_MAX_M;
 use super::{ToolError, ToolSpec};
-use crate::coupling::{Form, FormKind, Knock, Placed, View};
+use crate::coupling::{Form, FormKind, Knock, Placed, View, beside};
 use crate::shape::ToolShape;
 use crate::{
-    Agent, AgentId, Anchor, Body, Bounds, Inertia, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport,
+    Agent, AgentId, Anchor, Body, Bounds, Neighbour, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport,
     Surroundings, ToolState, check_span,
 };
 use glam::{DQuat, DVec3};
@@ -26,6 +28,11 @@ pub struct Instrument {
     spec: ToolSpec,
     script: Script,
     tool: ToolState,
+    /// Where the tip is led, and how fast: where it is, if nothing pushes it.
+    led: Led,
+    drive: Drive,
+    /// How far the tip is from where the script or the hand wants it, metres.
+    lag_m: f64,
     jaws: Jaws,
     felt: Felt,
     knock: Knock,
@@ -55,6 +62,8 @@ const JAW_RATE_PER_S: f64 = 4.0;
 const CATCH_SHARE: f64 = 0.5;
 /// A tip nearer than this to its script has arrived, metres (and m/s).
 const ARRIVED: f64 = 1e-7;
+/// A tool on which others sleep keeps still below this, m/s.
+const LAIN_M_S: f64 = 2e-3;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
@@ -71,7 +80,22 @@ impl Instrument {
         let tool = ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0 };
         let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
-        Ok(Self { spec, script, tool, jaws, felt, knock, form, speed_m_s: 0.0, at_rest: false, steps: 0 })
+        let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
+        Ok(Self {
+            spec,
+            script,
+            tool,
+            led,
+            drive,
+            lag_m: 0.0,
+            jaws,
+            felt,
+            knock,
+            form,
+            speed_m_s: 0.0,
+            at_rest: false,
+            steps: 0,
+        })
     }
 
     /// Where the hand wants the tip, and how fast it moves there.
@@ -83,10 +107,11 @@ impl Instrument {
     /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on what is near.
     fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
         let (target, target_velocity) = self.hand_target(hand);
-        let now = (self.tool.tip - target, self.tool.velocity - target_velocity);
+        let now = (self.led.0 - target, self.led.1 - target_velocity);
         let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
         let tip = target + target_velocity * dt + off;
-        let near = nearest(&self.spec, tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
+        let near =
+            nearest(&self.spec, self.tool.tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
         let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
         let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
         ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
@@ -94,7 +119,7 @@ impl Instrument {
 
     /// Follows the script; what separates the tool from it dies out.
     fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
-        let now = (self.tool.tip - from.tip, self.tool.velocity - from.velocity);
+        let now = (self.led.0 - from.tip, self.led.1 - from.velocity);
         let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
         let jaw_off = self.tool.jaw - from.jaw;
         let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
@@ -112,6 +137,22 @@ impl Instrument {
             jaw: jaw.clamp(0.0, 1.0),
             ..self.tool
         }
+    }
+
+    /// Whether the tool holds a neighbour or is linked to it: they see it as led, and so it is to them.
+    fn is_held_by(&self, other: &Neighbour, around: &Surroundings<'_>) -> bool {
+        let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
+        held || around.links.iter().any(|link| link.other == other.id)
+    }
+
+    /// The drive takes the tip along, against what others gave it in contact.
+    fn drive_on(&mut self, led: ToolState, around: &Surroundings<'_>, dt_s: f64) -> ToolState {
+        let mut felt = std::mem::take(&mut self.felt);
+        let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
+        self.felt = felt;
+        let (tip, velocity);
+        [self.led, (tip, velocity)] = self.drive.go_on([self.led, (led.tip, led.velocity)], &given, dt_s);
+        ToolState { tip, velocity, ..led }
     }
 
     /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
@@ -133,10 +174,14 @@ impl Instrument {
 
     /// Whether the tool has come to the end of its script and waits there, empty.
     fn rests(&mut self, end: &Pose, time_s: f64) -> bool {
-        let there = (self.tool.tip - end.tip).length() < ARRIVED && self.tool.velocity.length() < ARRIVED;
-        let rests = there && self.script.is_over(time_s) && !self.jaws.holds() && self.tool.jaw == end.jaw;
+        let there = (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED;
+        // who sleeps on it gives no more: it keeps still as well, or it would rise into them
+        let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
+        let rests = there && still && self.script.is_over(time_s) && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
-            (self.tool.tip, self.tool.velocity) = (end.tip, DVec3::ZERO);
+            self.led = (end.tip, DVec3::ZERO);
+            self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
+            self.tool.velocity = DVec3::ZERO;
         }
         rests
     }
@@ -205,21 +250,34 @@ impl Agent for Instrument {
             return Err(StepError::Diverged { model: "instrument", dt_s, what });
         }
         let was = self.tool.jaw;
+        let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).0);
+        let led = self.drive_on(led, around, dt_s);
+        self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
         self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), ..led };
         self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.tool.lets_in = self.let_in(around, dt_s);
         self.wake_others(around, dt_s);
-        self.felt.read(around);
         self.tool.force_n = self.felt.force_n();
         self.steps += 1;
         self.at_rest = hand.is_none() && self.rests(&end, end_s);
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
+    /// What its drive and a body that it pushes together make of each other neither foresees.
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
+        beside::longest_step(dt, around, || bounds(&self.tool, self.speed_m_s), |n| !spared(n))
+    }
+
     fn resolution(&self) -> Option<Resolution> {
         None
+    }
+
+    /// Tells how long a step is before it has made one: others foresee its drive over that.
+    fn look(&mut self, dt: SimSpan, _around: &Surroundings<'_>) {
+        self.drive.look(dt.as_secs_f64());
     }
 
     /// A tool has no samples to spread: nothing changes.
@@ -231,12 +289,13 @@ impl Agent for Instrument {
         into.resolution = None;
         into.body = Body::Tool(self.tool);
         into.energy_j = 0.0;
-        into.residual_m = 0.0;
+        into.residual_m = self.lag_m;
         into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
         into.touches
             .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
         into.at_rest = self.at_rest;
-        into.inertia = Inertia::Immovable;
+        into.inertia = self.drive.inertia();
+        into.sprung.set(Some(self.drive.sprung(self.led.1)));
         into.bounds = Some(bounds(&self.tool, self.speed_m_s));
         self.felt.write(into);
     }

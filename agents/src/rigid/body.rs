@@ -7,6 +7,7 @@ use super::clearance::Fall;
 use super::company::Company;
 use super::hold::Hold;
 use super::island::{self, Island};
+use super::leant::{self, Leant};
 use super::mass::Spread;
 use super::meeting::Meeting;
 use super::motion::Motion;
@@ -15,7 +16,7 @@ use super::sided::Sided;
 use super::ties::Ties;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
-use crate::coupling::beside::{self, bends};
+use crate::coupling::beside::{self, bends, is_driven};
 use crate::coupling::{Form, FormKind, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
@@ -69,6 +70,8 @@ pub struct RigidBody {
     pub(super) steps: u64,
     pub(super) grips: Vec<Grip>,
     pub(super) ties: Ties,
+    /// The tools that pressed it in the last part of a world that it shares.
+    pub(super) leant: Vec<Leant>,
     /// The fixed solids and the joints of the scene, for the world that it may share.
     pub(super) scenery: (Arc<[Obstacle]>, Arc<[Joint]>),
     /// That world, where this body leads it or a joint holds it.
@@ -138,6 +141,7 @@ impl RigidBody {
             steps: 0,
             grips: Vec::with_capacity(4),
             ties: Ties::default(),
+            leant: Vec::new(),
             scenery: (spec.obstacles, spec.joints),
             island: None,
             jointed: None,
@@ -188,16 +192,17 @@ impl RigidBody {
         if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
     }
 
-    /// Books what the springs of the last part, which took `h` seconds, gave besides because a shared world changed the velocities
-    /// by so much within it.
+    /// Books what the springs of the last part, which took `h` seconds, and the tools that press the body gave besides because a shared
+    /// world changed the velocities by so much within it.
     pub(super) fn give_way(&mut self, change: Twist, h: f64) {
         springs::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
         for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
             grip.force_n += tie.impulse / h;
         }
-        let after_s = self.company.after_s - h;
+        let after_s = self.company.after_s;
         self.ties.give(&mut self.company, (after_s, h));
-        self.coupled += self.ties.linked() / self.spread.mass_kg;
+        let pushed = leant::give(&self.leant, &mut self.company, change, (after_s, h));
+        self.coupled += (self.ties.linked() + pushed) / self.spread.mass_kg;
     }
 
     /// Ends a step in which a shared world has moved it.
@@ -309,7 +314,7 @@ impl Agent for RigidBody {
     }
 
     /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one. Nor does a
-    /// rigid one foresee what the ground makes of its blows on this one.
+    /// rigid one foresee what the ground makes of its blows on this one, nor this one what it makes of a tool's drive.
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         // what is caught this step may fall in the next
@@ -318,7 +323,12 @@ impl Agent for RigidBody {
         let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
         let squeezes = |n: &Neighbour| bends(n) && (owners > 1 || (!self.stays() && lands()));
         let strikes = |n: &Neighbour| matches!(n.snapshot.body, Body::Rigid(_)) && lands();
-        beside::longest_step(dt, around, || self.bounds(), |n| !n.owned && (squeezes(n) || strikes(n)))
+        beside::longest_step(
+            dt,
+            around,
+            || self.bounds(),
+            |n| is_driven(n, around) || (!n.owned && (squeezes(n) || strikes(n))),
+        )
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -343,8 +343,8 @@ impl Guest {
 
     /// Whether it is a rigid body that moves.
     pub(super) fn is_rigid(&self) -> bool {
-        let inertia = self.other.neighbour().map(|neighbour| &neighbour.snapshot.inertia);
-        matches!(inertia, Some(Inertia::Rigid { .. })) && !self.other.is_held()
+        let body = self.other.neighbour().map(|neighbour| &neighbour.snapshot.body);
+        matches!(body, Some(Body::Rigid(_))) && !self.other.is_held()
     }
 
     /// The reduced mass of it and a body of `mass_kg`, which it is alone beside what is led, and beside tubes.
@@ -383,6 +383,11 @@ impl Guest {
         let held = span.held || self.other.acceleration().distance(span.gravity) > HELD_M_S2;
         let hop_m_s = 2.0 * self.restitution * closing_m_s;
         if held && hop_m_s < span.gravity.length() * span.dt_s { 0.0 } else { self.restitution }
+    }
+
+    /// Whether it is a tool that its drive moves.
+    pub(super) fn is_tool(&self) -> bool {
+        self.touchable && self.other.is_sprung() && !self.is_rigid()
     }
 
     /// Whether it is a tube.

@@ -7,10 +7,11 @@
 use super::RigidBody;
 use super::clearance::Fall;
 use super::company::Span;
+use super::leant;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
-use crate::coupling::{Impulse, Law, Place};
+use crate::coupling::{Impulse, Law, Place, Six};
 use crate::{AgentId, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
@@ -107,18 +108,24 @@ impl RigidBody {
     }
 
     /// Solves the contacts that this body owns over the next `h` seconds for a world that moves it and has its gravity: the
-    /// velocities change, nothing moves but the others. Comes after [`Self::receive`], as often as the step has parts.
-    pub fn meet(&mut self, h: f64) {
-        let Self { motion, spread, world, company, meeting, obstacles, gravity, .. } = self;
+    /// velocities change, nothing moves but the others. Comes after [`Self::receive`], as often as the step has parts. How tools resist
+    /// what else happens in it, where some press the body.
+    pub fn meet(&mut self, h: f64) -> Option<Six> {
+        self.leant.clear();
+        if self.company.guests().is_empty() {
+            return None;
+        }
+        let Self { motion, spread, world, company, meeting, obstacles, gravity, leant, .. } = self;
         let scope = Scope { solids: true, fixed: false };
         let before = motion.velocity;
         let mut me = Me { motion, spread, mover: &world.mover };
         if meeting.press(&mut me, company, (obstacles, scope), (h, *gravity)).is_some() {
+            meeting.lean_on(company, leant);
             self.motion.velocity -= self.gravity * h;
             self.coupled += self.motion.velocity - before;
             self.world.moved();
         }
-        self.company.go_on(h);
+        leant::resistance(&self.leant)
     }
 
     /// Ends a step of `dt` seconds: what was given is booked, and the acceleration that others may expect is known.

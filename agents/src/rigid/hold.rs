@@ -57,7 +57,7 @@ impl RigidBody {
     pub(super) fn follow(&mut self, around: &Surroundings<'_>, dt: f64) {
         let Some((_, answer)) = self.hold.known else { return };
         let (mut sum, mut carried, mut lasting) = (Impulse::ZERO, Impulse::ZERO, Impulse::ZERO);
-        self.company.exchange.follow(around, dt, |new, way, on| {
+        self.company.exchange.follow(around, dt, |_, [new, way, on]| {
             (sum, carried, lasting) = (sum + new, carried + way, lasting + on);
         });
         self.hold.lasting = [lasting.linear / dt, lasting.angular / dt];

@@ -9,6 +9,7 @@
 
 use super::clearance::Mover;
 use super::company::Company;
+use super::leant::Leant;
 use super::mass::Spread;
 use super::motion::Motion;
 use super::obstacles::Obstacles;
@@ -319,6 +320,17 @@ impl Meeting {
                     guest.other.push(given, h);
                 }
             }
+        }
+    }
+
+    /// What each tool gave the body in the press just solved.
+    pub(super) fn lean_on(&self, company: &Company, leant: &mut Vec<Leant>) {
+        for i in (0..company.guests().len()).filter(|&i| company.guests()[i].is_tool()) {
+            let mut given = vec![DVec3::ZERO; self.velocities.len()];
+            for (found, impulse) in self.found.iter().zip(self.press.impulses()).filter(|(f, _)| f.guest == Some(i)) {
+                found.contact.slots.scatter(*impulse, &mut given);
+            }
+            leant.extend(Leant::new(company, i, [given[0], given[1]]));
         }
     }
 

@@ -21,6 +21,7 @@ mod flight;
 mod hold;
 mod island;
 mod joint;
+mod leant;
 mod mass;
 mod meeting;
 mod motion;

@@ -143,6 +143,7 @@ pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3)
         damping: Six::ZERO,
         past: [DVec3::ZERO; 2],
         span_s: 0.0,
+        limit_n: f64::INFINITY,
     };
     let spin = motion.spin(body);
     for tie in ties {

@@ -13,6 +13,8 @@ use metachron_agents::instrument::{Keyframe, ToolSpec};
 const KEYFRAMES_MAX: usize = 10_000;
 /// How far jaws reach where a scene does not say, metres.
 const REACH_DEFAULT_M: f64 = 0.02;
+/// What a tool's drive pushes with at most where a scene does not say, newtons: what an arm holds against without effort.
+const FORCE_DEFAULT_N: f64 = 50.0;
 
 /// Reads an instrument.
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Given<'_>, names: &Names) -> ToolSpec {
@@ -23,6 +25,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Give
         reach_m: c.number_or(place, "reach_m", (file.reach_m, REACH_DEFAULT_M), &allowed(1e-6..=100.0, "m")),
         stiffness_n_m: c.number_or(place, "stiffness_n_m", (file.stiffness_n_m, 200.0), &allowed(1e-3..=1e7, "N/m")),
         damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
+        max_force_n: c.number_or(place, "max_force_n", (file.max_force_n, FORCE_DEFAULT_N), &allowed(1e-3..=1e6, "N")),
         graspable: graspable(c, place, file, names),
     }
 }

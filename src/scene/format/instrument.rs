@@ -20,6 +20,9 @@ pub struct InstrumentFile {
     pub stiffness_n_m: Option<f64>,
     /// Damping of the hold, N·s/m, 0 … 1e5. Default 1.
     pub damping_n_s_m: Option<f64>,
+    /// The most that the drive pushes with, newtons, 1e-3 … 1e6. Default 50. The tip gives way to it by up to 5 mm; what is stronger
+    /// holds it back from its path. What it holds or is linked to does not count.
+    pub max_force_n: Option<f64>,
     /// Names of what it can grasp: tubes, sheets, solids, ropes, rigid objects that move. Default every tube of the scene.
     pub grasps: Option<Vec<String>>,
 }

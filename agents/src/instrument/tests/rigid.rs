@@ -7,7 +7,7 @@ use crate::coupling::harness::{Faults, Stage};
 use crate::rigid::{RigidBody, RigidSpec};
 use crate::shape::{Obstacle, Solid};
 
-const G: f64 = 9.81;
+pub(super) const G: f64 = 9.81;
 const HALF_M: f64 = 0.02;
 const MASS_KG: f64 = 0.1;
 const STIFFNESS_N_M: f64 = 2000.0;
@@ -29,7 +29,7 @@ fn cube(position: DVec3) -> RigidSpec {
     RigidSpec { friction: 0.3, gravity, sleep: true, ..RigidSpec::free(solid, position, MASS_KG) }
 }
 
-fn on_floor(spec: RigidSpec) -> RigidSpec {
+pub(super) fn on_floor(spec: RigidSpec) -> RigidSpec {
     let floor = Obstacle {
         name: "floor".to_owned(),
         solid: Solid::Plane,
@@ -42,7 +42,7 @@ fn on_floor(spec: RigidSpec) -> RigidSpec {
 }
 
 /// The jaws of a tool that comes from above.
-fn down(at_s: f64, tip_m: DVec3, jaw: f64) -> Keyframe {
+pub(super) fn down(at_s: f64, tip_m: DVec3, jaw: f64) -> Keyframe {
     Keyframe { rotation: DOWN, ..key(at_s, tip_m, jaw) }
 }
 
@@ -64,8 +64,8 @@ impl Pair {
         let mut stage = Stage::new(faults);
         let body = stage.add(RigidBody::new(on_floor(cube(START))).unwrap(), rates.0);
         let (reach_m, stiffness_n_m) = (REACH_M, STIFFNESS_N_M);
-        let graspable = vec![body];
-        let spec = ToolSpec { keyframes, repeat: false, reach_m, stiffness_n_m, damping_n_s_m, graspable };
+        let (graspable, max_force_n) = (vec![body], 50.0);
+        let spec = ToolSpec { keyframes, repeat: false, reach_m, stiffness_n_m, damping_n_s_m, max_force_n, graspable };
         let tool = stage.add(Instrument::new(spec).unwrap(), rates.1);
         Self { stage, body, tool }
     }

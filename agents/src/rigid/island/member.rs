@@ -32,9 +32,9 @@ pub(super) struct Member {
     pub motion: Motion,
     /// Gravity of the part being solved, m/s²; zero where a spring's solution has it already.
     pub gravity: DVec3,
-    /// How springs on it resist what the island does to it in the part being solved, about its centre of mass.
+    /// How springs on it, and tools that press it, resist what the island does to it in the part being solved, about its centre of mass.
     pub springs: Option<Six>,
-    /// By how much the island changed its velocities in the last part, for those springs.
+    /// By how much the island changed its velocities in the last part, for those springs and tools.
     pub bent: Twist,
     /// Nothing but gravity and the island moves it in this step: its body is asked for nothing between the parts.
     pub alone: bool,

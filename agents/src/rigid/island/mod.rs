@@ -19,6 +19,7 @@ mod watch;
 
 use super::motion::Motion;
 use super::{Joint, RigidBody, RigidError};
+use crate::coupling::Six;
 use crate::{AgentId, Companion, SimSpan, StepError, StepReport, Surroundings, check_span};
 use crew::Crew;
 use direct::{Direct, Reach};
@@ -92,6 +93,17 @@ pub(super) fn lead(
     let report = Crew::new(leader, around, others).and_then(|mut crew| island.run(&mut crew, dt_s, apart));
     leader.island = Some(island);
     report
+}
+
+/// The sum of two resistances.
+fn both(one: Option<Six>, other: Option<Six>) -> Option<Six> {
+    match (one, other) {
+        (Some(mut sum), Some(other)) => {
+            sum.add(&other, 1.0);
+            Some(sum)
+        }
+        (one, other) => one.or(other),
+    }
 }
 
 fn diverged(dt_s: f64, what: String) -> StepError {
@@ -246,16 +258,21 @@ impl Island {
         for member in self.members.iter_mut().filter(|m| !m.alone) {
             let body = crew.body(member.seat).0;
             body.motion = member.motion;
-            member.springs = body.pull(h)?;
-            if body.company.guests().is_empty() {
-                body.company.go_on(h);
-            } else {
-                body.meet(h);
-            }
+            let pulled = body.pull(h)?;
+            let pressed = body.meet(h);
             member.motion = body.motion;
             // the springs' solution has the gravity of this part in its velocity already
-            member.gravity = if member.springs.is_some() { DVec3::ZERO } else { body.gravity };
+            member.gravity = if pulled.is_some() { DVec3::ZERO } else { body.gravity };
+            member.springs = both(pulled, pressed);
         }
+        self.solve(crew, h, parts)?;
+        let met = self.members.iter().filter(|m| !m.alone);
+        met.for_each(|member| crew.body(member.seat).0.company.go_on(h));
+        Ok(())
+    }
+
+    /// Solves all contacts and joints of so many `parts`.
+    fn solve(&mut self, crew: &mut Crew<'_, '_>, h: f64, parts: u32) -> Result<(), &'static str> {
         if let Solver::Few(direct) = &mut self.solver {
             if direct.advance((&mut self.members, &self.ground), &self.held, h)? {
                 for member in self.members.iter().filter(|m| m.springs.is_some()) {

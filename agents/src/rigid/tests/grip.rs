@@ -59,8 +59,15 @@ fn hand(at: DVec3) -> Instrument {
         key(LIFTED_S, risen),
         key(END_S, risen),
     ];
-    let tool =
-        ToolSpec { keyframes, repeat: false, reach_m: 0.01, stiffness_n_m: 1.0, damping_n_s_m: 0.0, graspable: vec![] };
+    let tool = ToolSpec {
+        keyframes,
+        repeat: false,
+        reach_m: 0.01,
+        stiffness_n_m: 1.0,
+        damping_n_s_m: 0.0,
+        max_force_n: 50.0,
+        graspable: vec![],
+    };
     Instrument::new(tool).unwrap()
 }
 

@@ -93,6 +93,7 @@ impl Hanging {
             reach_m: 0.05,
             stiffness_n_m,
             damping_n_s_m: 20.0,
+            max_force_n: 50.0,
             graspable: vec![AgentId(0)],
         };
         Self { party, tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO }
@@ -145,5 +146,36 @@ fn a_chain_hangs_from_the_link_in_the_jaws_and_the_tool_reports_all_of_its_weigh
         assert!((sag_m - wanted_m).abs() < 0.01 * wanted_m, "{links}, {steps:?}: {sag_m} m, not {wanted_m} m");
         let pair = link.pairs.iter().find(|pair| pair.with == TOOL).expect("a pair");
         assert_eq!((pair.kind, pair.contacts), (PairKind::Grasp, 1));
+    }
+}
+
+#[test]
+fn a_tool_presses_what_shares_a_world_as_hard_as_a_lone_body() {
+    const LIMIT_N: f64 = 20.0;
+    for steps in [(240.0, 240.0), (240.0, 120.0), (60.0, 600.0), (600.0, 60.0)] {
+        let standing = |z: f64| RigidSpec { obstacles: floor(0.5, DQuat::IDENTITY), ..cube(0.05, DVec3::Z * z) };
+        let down = DQuat::from_rotation_x(std::f64::consts::PI);
+        let key = |at_s, z: f64| Keyframe { at_s, tip_m: DVec3::Z * z, rotation: down, jaw: 0.0 };
+        let spec = ToolSpec {
+            // to 20 mm below the top of the upper one
+            keyframes: vec![key(0.0, 0.3), key(1.0, 0.18)],
+            repeat: false,
+            reach_m: 0.02,
+            stiffness_n_m: 100.0,
+            damping_n_s_m: 1.0,
+            max_force_n: LIMIT_N,
+            graspable: vec![],
+        };
+        let (tool, party) = (Instrument::new(spec).unwrap(), Party::new([standing(0.15), standing(0.05)]));
+        let mut pressing = Hanging { party, tool, time: SimTime::ZERO };
+        pressing.run((1.0 / steps.0, 1.0 / steps.1), 3.0);
+        let (tip, force_n) = (pressing.state().tip, pressing.state().force_n);
+        let sunk_m = [0, 1].map(|i| 0.15 - 0.1 * i as f64 - pressing.party.state(i).position.z);
+        println!("{steps:?}: tip at {tip}, {force_n} N, boxes {sunk_m:?} m deep");
+        // the jaws reach 5 mm before the tip
+        assert!((tip.z - 0.205).abs() < 1e-3, "{steps:?}: {tip}");
+        // at one moment; a tool whose steps are ten times the island's stutters
+        assert!(force_n > 0.7 * LIMIT_N && force_n < 1.1 * LIMIT_N, "{steps:?}: {force_n} N");
+        assert!(sunk_m.iter().all(|m| m.abs() < 2e-4), "{steps:?}: {sunk_m:?}");
     }
 }

@@ -52,8 +52,15 @@ fn hand(side: f64, way_m: f64) -> Instrument {
         key(LIFTED_S, way_m, LIFT_M),
         key(END_S, way_m, LIFT_M),
     ];
-    let spec =
-        ToolSpec { keyframes, repeat: false, reach_m: 0.01, stiffness_n_m: 1.0, damping_n_s_m: 0.0, graspable: vec![] };
+    let spec = ToolSpec {
+        keyframes,
+        repeat: false,
+        reach_m: 0.01,
+        stiffness_n_m: 1.0,
+        damping_n_s_m: 0.0,
+        max_force_n: 50.0,
+        graspable: vec![],
+    };
     Instrument::new(spec).unwrap()
 }
 
