@@ -42,6 +42,9 @@ pub struct Snapshot {
     pub inertia: Inertia,
     /// How it stands on something fixed; `None` where it does not, or not on one level.
     pub stand: Option<Stand>,
+    /// In how many seconds of free flight something fixed may be in its way, ≥ 0; `None` where nothing is soon, and where that is not
+    /// told: it stands, or others hold it.
+    pub lands_s: Option<f64>,
     /// How springs on led points hold it; none where none do, or where nobody would have to know.
     pub sprung: Rare<Sprung>,
     /// What fixed solids gave it in its last step: it was not there before, and late impulses may have spared it.

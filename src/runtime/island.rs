@@ -4,7 +4,7 @@
 //! Out: every one's own states, account and ear, as if it made its turns itself: nobody else notices. One turn of a leader:
 //!
 //! take in    who waits at the door
-//! gather     each to the leader's time: who is behind steps alone, who is ahead waits
+//! gather     each to the leader's time: who is behind steps alone and shows what it gave, who is ahead waits
 //! lead       all that are at one time step as one; where that fails, each goes its own way, to fail alone or not at all
 //! write, conclude    every one's state by its own writer
 //! part       who has lost touch goes home; several that still belong together go as one, led by the lowest number
@@ -64,6 +64,10 @@ impl Actor {
             let entry = Entry { now: timeline.sim_at(wall), late: Duration::ZERO, missed: false, work_s };
             self.diary.write(&self.shared.gauges, &self.pace, entry);
             steps += 1;
+        }
+        if steps > 0 {
+            // what it has given on the way is settled before the first common step
+            self.show(timeline.sim_at(wall));
         }
         Ok(steps)
     }

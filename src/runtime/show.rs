@@ -17,8 +17,13 @@ impl Actor {
         // first the account: who sees a state finds it accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
         self.withheld = self.faults.loses(self.id(), self.diary.steps());
+        !self.withheld && self.show(now)
+    }
+
+    /// Publishes the state that was written last; whether it can be seen.
+    pub fn show(&mut self, now: SimTime) -> bool {
         let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
-        let published = !self.withheld && self.writer.publish();
+        let published = self.writer.publish();
         if published {
             self.tell();
             if concerns {

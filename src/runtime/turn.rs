@@ -187,8 +187,8 @@ impl Actor {
 
     /// Ends the turn that began: it took `work_s` seconds and it is wall time `wall`.
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
-        // it waited
-        let Some(open) = self.open.take() else { return Next::Due };
+        // it waited, or somebody leads it from now on
+        let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
         let mut published = self.conclude(&open, now, work_s);
         published &= self.conclude_led(now, work_s);
@@ -254,11 +254,11 @@ impl Actor {
         self.shut_door();
     }
 
-    /// `None` where it waits instead.
+    /// `None` where it waits instead, or hands its turns over before it steps.
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Option<(Open, Effort)>, String> {
         self.take_commands();
         let start = self.pace.begin(timeline, wall, !self.eyes.neighbours().is_empty());
-        if self.waits(wall) {
+        if self.waits(wall) || self.is_called() {
             return Ok(None);
         }
         if self.governor.is_some() {
@@ -294,6 +294,16 @@ impl Actor {
             self.pace.go_on();
         }
         behind && self.pace.wait(wall)
+    }
+
+    /// Whether somebody has found since its last step that it should lead this agent: a slow one that stepped once more alone would
+    /// be where nobody expects it.
+    fn is_called(&mut self) -> bool {
+        if self.shared.seating.is_none() || self.eyes.neighbours().is_empty() {
+            return false;
+        }
+        self.eyes.look_again();
+        self.seek_leader().is_some()
     }
 
     fn leaves_behind(&self) -> bool {

@@ -234,9 +234,10 @@ fn what_falls_on_a_light_box_comes_to_lie_on_it_at_any_rates() {
 /// Half size (metres), mass (kilograms), rate (hertz), restitution and start of a box.
 type Boxed = (f64, f64, f64, f64, [f64; 3]);
 
-/// Piles that once flew or fell through the floor: what stood was met by a law that changed with the line of the impulse, bounced on
-/// what pressed it, or threw up what lay on it.
-const PILES: [&[Boxed]; 10] = [
+/// Piles that once flew, fell through the floor or through each other: what stood was met by a law that changed with the line of the
+/// impulse, bounced on what pressed it, or threw up what lay on it; what hopped on the ground was passed through by what struck it,
+/// and what a late blow pressed was put below what it lay on.
+const PILES: [&[Boxed]; 17] = [
     &[
         (0.08, 0.27, 20.0, 0.5, [-0.0052, -0.0052, 0.1667]),
         (0.08, 0.11, 1000.0, 0.2, [-0.0099, 0.0056, 0.3986]),
@@ -286,10 +287,44 @@ const PILES: [&[Boxed]; 10] = [
         (0.05, 39.31, 240.0, 0.2, [0.0071, 0.0024, 0.5436]),
         (0.05, 12.98, 500.0, 0.5, [-0.0046, 0.0008, 0.7417]),
     ],
+    &[
+        (0.08, 58.63, 30.0, 0.2, [0.0029, 0.0059, 0.1701]),
+        (0.08, 0.26, 10.0, 0.5, [-0.0066, 0.0039, 0.3539]),
+        (0.08, 11.75, 10.0, 0.2, [0.0016, 0.0015, 0.5735]),
+        (0.08, 0.24, 500.0, 0.0, [0.0056, -0.0076, 0.7461]),
+    ],
+    &[(0.08, 0.13, 60.0, 0.0, [-0.0004, 0.0043, 0.1732]), (0.05, 2.47, 240.0, 0.2, [0.0094, -0.0060, 0.3840])],
+    &[
+        (0.08, 4.86, 20.0, 0.5, [-0.0092, -0.0052, 0.1733]),
+        (0.05, 53.76, 120.0, 0.2, [-0.0008, 0.0009, 0.3960]),
+        (0.08, 5.36, 30.0, 0.5, [0.0064, -0.0015, 0.5902]),
+    ],
+    &[
+        (0.05, 1.91, 10.0, 0.0, [0.0068, -0.0089, 0.1469]),
+        (0.08, 2.20, 500.0, 0.2, [0.0016, 0.0080, 0.2789]),
+        (0.05, 0.18, 10.0, 0.5, [0.0000, 0.0062, 0.4435]),
+        (0.08, 1.03, 60.0, 0.0, [-0.0043, -0.0001, 0.5955]),
+    ],
+    &[
+        (0.08, 0.28, 20.0, 0.2, [-0.0019, -0.0014, 0.1432]),
+        (0.05, 4.66, 10.0, 0.5, [0.0052, 0.0025, 0.3425]),
+        (0.08, 81.55, 20.0, 0.0, [0.0044, -0.0091, 0.4846]),
+    ],
+    &[
+        (0.1, 93.55, 10.0, 0.2, [0.0004, 0.0065, 0.1521]),
+        (0.08, 0.41, 10.0, 0.0, [-0.0067, 0.0068, 0.4085]),
+        (0.1, 1.87, 30.0, 0.2, [0.0009, 0.0095, 0.6804]),
+    ],
+    &[
+        (0.08, 0.30, 10.0, 0.2, [-0.0028, -0.0005, 0.0975]),
+        (0.1, 0.14, 240.0, 0.2, [0.0062, 0.0025, 0.3707]),
+        (0.1, 0.15, 20.0, 0.5, [-0.0024, -0.0091, 0.5998]),
+        (0.1, 3.35, 30.0, 0.2, [0.0096, 0.0008, 0.8600]),
+    ],
 ];
 
 #[test]
-fn piles_of_any_masses_and_rates_neither_fly_nor_fall_through_the_floor() {
+fn piles_of_any_masses_and_rates_neither_fly_nor_fall_through_the_floor_or_each_other() {
     for pile in PILES {
         let cube = |(i, (half, kg, hz, e, at)): (usize, &Boxed)| {
             format!(
@@ -305,9 +340,14 @@ fn piles_of_any_masses_and_rates_neither_fly_nor_fall_through_the_floor() {
             let report = folder.lockstep(&["--seconds", seconds]);
             let energy_j: f64 = report["agents"].as_array().unwrap().iter().map(|a| number(a, "/energy_j")).sum();
             assert!(energy_j < start_j, "{energy_j} J of {start_j} J after {seconds} s: {pile:?}");
+            let at = |k: usize| point(&report, &format!("/probes/{k}/position_m"));
             for (k, (half, ..)) in pile.iter().enumerate() {
-                let height = point(&report, &format!("/probes/{k}/position_m"))[2];
-                assert!(height > half - 2e-3, "b{k} lies at {height} m after {seconds} s: {pile:?}");
+                assert!(at(k)[2] > half - 2e-3, "b{k} lies at {} m after {seconds} s: {pile:?}", at(k)[2]);
+                for (below, (other, ..)) in pile[..k].iter().enumerate() {
+                    let aside_m = (0..2).map(|axis| (at(k)[axis] - at(below)[axis]).abs()).fold(0.0, f64::max);
+                    let swapped = aside_m < half.min(*other) && at(k)[2] < at(below)[2];
+                    assert!(!swapped, "b{k} lies under b{below} after {seconds} s: {pile:?}");
+                }
             }
         }
     }

@@ -61,6 +61,8 @@ pub struct RigidBody {
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
+    /// In how many seconds of free flight something fixed may be in its way, where others have to know.
+    pub(super) lands_s: Option<f64>,
     /// For how long it has stood, seconds.
     pub(super) stood_s: f64,
     /// How springs hold it in contact that others own.
@@ -134,6 +136,7 @@ impl RigidBody {
             borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
+            lands_s: None,
             stood_s: 0.0,
             hold: Hold::default(),
             at_rest: false,

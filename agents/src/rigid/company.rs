@@ -11,7 +11,7 @@ use super::pair::Pairs;
 use crate::coupling::touch::{TouchRoom, gap};
 use crate::coupling::{Exchange, Form, FormKind, Impulse, Law, Other, Placed, View};
 use crate::shape::Solid;
-use crate::{AgentId, Body, Inertia, Neighbour, Surroundings};
+use crate::{AgentId, Body, Inertia, Neighbour, Snapshot, Surroundings};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -49,6 +49,17 @@ pub(super) struct Span {
     pub held: bool,
 }
 
+/// A body, and whether something will hold it up.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Held {
+    /// Its mass, kg.
+    pub mass_kg: f64,
+    /// Whether something does already.
+    pub now: bool,
+    /// In how many seconds of free flight something fixed may be in its way.
+    pub lands_s: Option<f64>,
+}
+
 /// An agent that is met in this step.
 #[derive(Default)]
 pub(super) struct Guest {
@@ -74,7 +85,8 @@ pub(super) struct Guest {
 const HELD_M_S2: f64 = 0.1;
 /// Bodies that come together by more than this share of the smaller one's size in a step are too fast for their clocks.
 const COARSE_SHARE: f64 = 0.05;
-/// How many steps ahead a landing is foreseen: one to be told of, one to move in, one that is under way meanwhile.
+/// How many steps of the slower of two ahead their meeting is foreseen: one to be told of, one to move in, one that is under way
+/// meanwhile.
 const FORESEEN: f64 = 3.0;
 /// Who bounces by more than this does not stay where it lands.
 const STAYS: f64 = 0.5;
@@ -147,35 +159,36 @@ impl Company {
         }
     }
 
-    /// Finds who may land within three steps of `dt` seconds, while something holds one of the two up: they share a world from
-    /// before they touch.
+    /// Finds whom the body may meet within three steps of the slower of the two, while something holds one of them up or will by
+    /// then: they share a world from before they touch. `flight` is that of a body of `mass_kg` after a step of `dt` seconds.
     ///
     /// Who takes steps as long as a good part of its own size would else be stopped by several at once, each of whom knows
     /// nothing yet of what the others gave it, or by nobody. Whoever is held up, or is about to be, may have come to a stop by
-    /// then, though both fall alike now.
-    pub(super) fn foresee(
-        &mut self,
-        (mover, motion): (&Mover, &Motion),
-        (gravity, dt): (DVec3, f64),
-        (mass_kg, held): (f64, bool),
-    ) {
+    /// then, though both fall alike now. And who is light, on the ground or hopping there, is thrown into it by every blow of who
+    /// is heavy: it comes back before the other knows, until that has passed through it.
+    pub(super) fn foresee(&mut self, (mover, motion): (&Mover, &Motion), (gravity, dt): (DVec3, f64), held: &Held) {
         let Self { guests, count, room, form, pairs, .. } = self;
         let fall = Fall { gravity, spin_max: 0.0 };
         for guest in guests[..*count].iter().filter(|g| g.touchable && g.is_rigid() && g.restitution <= STAYS) {
             let Some(neighbour) = guest.other.neighbour() else { continue };
-            let moved = neighbour.snapshot.acceleration.distance(gravity) > HELD_M_S2;
-            if !(held || moved || !neighbour.snapshot.bonds.is_empty()) {
-                continue;
-            }
+            let step_s = dt.max(neighbour.step_s);
+            let soon_s = FORESEEN * step_s;
             let [mine, theirs] = [motion.velocity, guest.other.velocities()[0]];
-            let stopped = if held { mine - falling(mine, gravity) } else { mine + falling(theirs, gravity) };
-            let motion = Motion { velocity: stopped, ..*motion };
-            if guest.approach_m_s(stopped) * dt > COARSE_SHARE * mover.radius_m.min(guest.radius_m) {
-                let flight = (mover, &motion, fall);
-                let (free_s, closing) = guest.approach(&placed(form, &motion), flight, FORESEEN * dt, room);
-                if free_s < FORESEEN * dt && closing > 0.0 {
-                    pairs.of(neighbour.id, guest.reduced_kg(mass_kg)).expect_contact();
+            let stops = [
+                (held.within(soon_s), mine - falling(mine, gravity)),
+                (is_held_within(soon_s, &neighbour.snapshot, gravity), mine + falling(theirs, gravity)),
+            ];
+            let meets = |velocity: DVec3, room: &mut TouchRoom| {
+                let motion = Motion { velocity, ..*motion };
+                let coarse = guest.approach_m_s(velocity) * step_s > COARSE_SHARE * mover.radius_m.min(guest.radius_m);
+                coarse && {
+                    let (free_s, closing) =
+                        guest.approach(&placed(form, &motion), (mover, &motion, fall), soon_s, room);
+                    free_s < soon_s && closing > 0.0
                 }
+            };
+            if stops.into_iter().any(|(stops, velocity)| stops && meets(velocity, room)) {
+                pairs.of(neighbour.id, guest.reduced_kg(held.mass_kg)).expect_contact();
             }
         }
     }
@@ -270,6 +283,19 @@ impl Company {
         self.guests[..self.count].iter_mut().for_each(|guest| guest.other.go_on(h));
         self.after_s += h;
     }
+}
+
+impl Held {
+    /// Whether something holds it up within `soon_s` seconds.
+    fn within(&self, soon_s: f64) -> bool {
+        self.now || self.lands_s.is_some_and(|lands_s| lands_s < soon_s)
+    }
+}
+
+/// Whether something holds a body up within `soon_s` seconds of this state.
+fn is_held_within(soon_s: f64, state: &Snapshot, gravity: DVec3) -> bool {
+    let held = state.acceleration.distance(gravity) > HELD_M_S2 || !state.bonds.is_empty();
+    held || state.lands_s.is_some_and(|lands_s| lands_s < soon_s)
 }
 
 /// The part of a velocity that goes along gravity.

@@ -6,13 +6,13 @@
 
 use super::RigidBody;
 use super::clearance::Fall;
-use super::company::Span;
+use super::company::{Held, Span};
 use super::leant;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
 use crate::coupling::{Impulse, Law, Place, Six};
-use crate::{AgentId, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
+use crate::{AgentId, Body, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
 use glam::DVec3;
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -20,9 +20,11 @@ use glam::DVec3;
 const EXPECTED_G: f64 = 3.0;
 
 /// Places nearer than this to a fixed solid carry, beside the skin, metres.
-const FEET_M: f64 = 2e-5;
+pub(super) const FEET_M: f64 = 2e-5;
 /// A body whose feet leave the ground or come down on it faster than this does not stand, m/s.
 const STANDING_M_S: f64 = 0.05;
+/// What may be in the way of a free flight is looked for so far ahead, seconds: three steps of 10 Hz, and slower clocks are rare.
+const LANDS_S: f64 = 0.3;
 /// Feet whose normals differ by less than 8° stand on one level: the cosine.
 const LEVEL: f64 = 0.99;
 
@@ -141,8 +143,10 @@ impl RigidBody {
         let held = self.held_up || self.received[0] != DVec3::ZERO;
         let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
         let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || told();
+        self.lands_s = if seen_rigid(around) && !self.held_up { self.land() } else { None };
         let flight = (&self.world.mover, &self.motion);
-        self.company.foresee(flight, (self.gravity, dt), (self.spread.mass_kg, held || stands));
+        let company = Held { mass_kg: self.spread.mass_kg, now: held || stands, lands_s: self.lands_s };
+        self.company.foresee(flight, (self.gravity, dt), &company);
         self.company.settle(around, dt, (self.gravity, held));
     }
 
@@ -158,6 +162,13 @@ impl RigidBody {
         if let Some(Stand { normal, .. }) = self.stand {
             self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
         }
+    }
+
+    /// In how many seconds of free flight something fixed may be in its way, where that is soon.
+    fn land(&self) -> Option<f64> {
+        let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
+        let free_s = self.world.free_time(&self.motion, fall, LANDS_S);
+        (free_s < LANDS_S).then_some(free_s)
     }
 
     /// What holds a body up in lasting contact, beside gravity and couplings, m/s²; nothing in flight.
@@ -215,6 +226,18 @@ impl RigidBody {
         }
     }
 
+    /// Keeps only a `share` of the way on which impulses that came late have carried it from where it was `before`.
+    pub(super) fn go_part(&mut self, before: &Motion, share: f64) {
+        let Self { motion, gravity, .. } = self;
+        let way = motion.position - before.position;
+        motion.position = before.position + way * share;
+        motion.rotation = before.rotation.slerp(motion.rotation, share);
+        if !self.touching {
+            motion.slow_by(gravity.dot(way) * (1.0 - share), *gravity);
+        }
+        self.world.moved();
+    }
+
     /// The box around it.
     pub(super) fn bounds(&self) -> Bounds {
         let radius_m = self.world.mover.radius_m;
@@ -237,6 +260,7 @@ impl RigidBody {
         into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
         into.bounds = Some(self.bounds());
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
+        into.lands_s = self.lands_s;
         into.sprung.set(self.hold.published());
         into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
         self.company.exchange.write(into);
@@ -248,4 +272,9 @@ impl RigidBody {
             into.bonds.extend(self.company.pairs.bonds());
         }
     }
+}
+
+/// Whether a rigid body may touch the one that looks around.
+fn seen_rigid(around: &Surroundings<'_>) -> bool {
+    around.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
 }

@@ -12,7 +12,7 @@ use glam::DVec3;
 /// A touching body has left when it would fly for at least this long, seconds.
 const LEAVE_S: f64 = 4e-3;
 /// A flight shorter than this is a touch, seconds.
-const TOUCH_S: f64 = 1e-7;
+pub(super) const TOUCH_S: f64 = 1e-7;
 /// A blow of fixed solids that changes the velocity by less changes nothing, m/s.
 const CHANGED_M_S: f64 = 1e-3;
 /// After this many flights and blows within one part the contact solver carries the body to the part's end.

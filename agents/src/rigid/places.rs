@@ -4,6 +4,8 @@
 //! ([`super::meeting`]).
 
 use super::company::{Company, Guest, placed};
+use super::couple::FEET_M;
+use super::flight::TOUCH_S;
 use super::meeting::{Found, Me, Meeting, Strike};
 use super::obstacles::{Mine, Obstacles};
 use super::pair::RESERVE_M_S;
@@ -17,7 +19,8 @@ const SLACK_M: f64 = 1e-5;
 const BOUNCE_M_S: f64 = 0.01;
 /// What has more restitution bounces on what presses it, too.
 const LIVELY: f64 = 0.5;
-/// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by.
+/// How far past the skin a blow looks for places, as a share of the body's size: what a bound on a gap may be short by. And as far
+/// as a body flies in [`TOUCH_S`]: at a thousand metres a second that is more than the skin.
 const BOUND_SHARE: f64 = 2e-5;
 
 impl Meeting {
@@ -26,7 +29,8 @@ impl Meeting {
         let span = company.span;
         let (guests, _, pairs, room, form) = company.split();
         let mine = placed(form, me.motion);
-        let past = BOUND_SHARE * me.mover.radius_m;
+        let speed_m_s = me.motion.velocity.length() + self.before[1].length() * me.mover.swing_m;
+        let past = BOUND_SHARE * me.mover.radius_m + TOUCH_S * speed_m_s;
         for (i, guest) in
             guests.iter().enumerate().filter(|(_, guest)| strike.met && guest.touchable && !guest.is_chain())
         {
@@ -38,6 +42,8 @@ impl Meeting {
             self.take_up(me, Some((i, guest)), law);
         }
         let mine = Mine { form, mover: me.mover, motion: me.motion };
+        // who stands and is struck down on one foot would turn over it, and be thrown up from the next
+        let past = if strike.stood { past + FEET_M } else { past };
         for solid in fixed.iter_mut() {
             solid.touches(&mine, 2.0 * me.mover.skin_m() + past, room, &mut self.touches);
             let skin = &solid.form;

@@ -10,6 +10,7 @@ use crate::coupling::{Six, Twist};
 use crate::shape::{Obstacle, Solid};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::math::{Pose, Rotation};
+use rapier3d::parry::query::{DefaultQueryDispatcher, QueryDispatcher};
 use rapier3d::parry::shape::SharedShape;
 
 /// A body of the island.
@@ -70,6 +71,28 @@ impl Member {
     /// The fastest point of the body, m/s, at most.
     pub(super) fn speed_m_s(&self) -> f64 {
         self.motion.velocity.length() + self.motion.spin(&self.spread).length() * self.radius_m
+    }
+
+    /// Whether the balls around the two overlap.
+    pub(super) fn is_near(&self, other: &Self) -> bool {
+        self.motion.position.distance(other.motion.position) < self.radius_m + other.radius_m
+    }
+
+    /// The share of the way to `there` that it certainly gets before it may touch `other`.
+    pub(super) fn free_share(&self, there: &Motion, other: &Self) -> f64 {
+        let Motion { position, rotation, .. } = self.motion;
+        let way_m = there.position.distance(position) + there.rotation.angle_between(rotation) * self.radius_m;
+        if position.distance(other.motion.position) > self.radius_m + other.radius_m + way_m {
+            return 1.0;
+        }
+        let [mine, theirs] = [self, other].map(|member| pose_about(position, member.origin(), member.motion.rotation));
+        let gap = DefaultQueryDispatcher.distance(&mine.inv_mul(&theirs), self.shape.as_ref(), other.shape.as_ref());
+        (gap.map_or(0.0, |gap| f64::from(gap.distance)) / way_m).min(1.0)
+    }
+
+    /// Where its shape's axes start, metres.
+    fn origin(&self) -> DVec3 {
+        self.motion.position - self.motion.rotation * self.spread.com
     }
 
     /// How far any point of it gets within `h` seconds, metres, at most.

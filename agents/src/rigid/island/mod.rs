@@ -106,6 +106,15 @@ fn both(one: Option<Six>, other: Option<Six>) -> Option<Six> {
     }
 }
 
+/// Shows every pair of members that is near enough to touch by turning alone.
+fn near_pairs(members: &[Member], mut pair: impl FnMut(u32, u32)) {
+    for (a, member) in members.iter().enumerate() {
+        for b in (a + 1..members.len()).filter(|&b| member.is_near(&members[b])) {
+            pair(a as u32, b as u32);
+        }
+    }
+}
+
 fn diverged(dt_s: f64, what: String) -> StepError {
     StepError::Diverged { model: "rigid", dt_s, what }
 }
@@ -225,17 +234,29 @@ impl Island {
         self.solver = Solver::Few(Box::new(direct));
     }
 
-    /// Everybody takes what it was given since its last step.
+    /// Everybody takes what it was given since its last step. What that has carried it by goes through nobody here.
     fn begin(&mut self, crew: &mut Crew<'_, '_>, dt_s: f64) {
         self.before.clear();
-        for member in &mut self.members {
-            let (body, around) = crew.body(member.seat);
-            self.before.push((body.motion, body.touching));
+        for index in 0..self.members.len() {
+            let (body, around) = crew.body(self.members[index].seat);
+            let before = body.motion;
+            self.before.push((before, body.touching));
             body.begin(around, &self.fellows, dt_s);
+            if body.motion.position != before.position || body.motion.rotation != before.rotation {
+                body.go_part(&before, self.free_share(index, &body.motion));
+            }
             body.stand_fast();
+            let member = &mut self.members[index];
             (member.motion, member.gravity, member.springs) = (body.motion, body.gravity, None);
             member.alone = body.ties.is_empty() && body.company.guests().is_empty();
         }
+    }
+
+    /// The share of the way from where the member `index` is to `there` that it gets without touching another.
+    fn free_share(&self, index: usize, there: &Motion) -> f64 {
+        let member = &self.members[index];
+        let others = self.members.iter().enumerate().filter(|(other, _)| *other != index);
+        others.map(|(_, other)| member.free_share(there, other)).fold(1.0, f64::min)
     }
 
     /// The longest part that may come next, seconds.
@@ -295,19 +316,20 @@ impl Island {
         }
     }
 
-    /// Notes who touches whom; every [`APART_S`] tells who has come apart.
+    /// Notes who touches whom; every [`APART_S`] tells who has come apart. Who is merely near stays too: it comes back, and until it
+    /// has moved in again the others know it no better than anybody; a heap that parts gathers again at once.
     fn watch(&mut self, dt_s: f64, apart: &mut Vec<u32>) {
         let Self { watch, reach, members, held, solver, unseen_s, .. } = self;
         *unseen_s += dt_s;
         let shrunk = match solver {
             Solver::Few(direct) => {
                 direct.touches(members, |a, b| watch.join(a, b));
+                near_pairs(members, |a, b| watch.join(a, b));
                 false
             }
             Solver::Many(pile) if *unseen_s >= LOOK_S => {
                 *unseen_s = 0.0;
                 reach.clear();
-                // who is merely near stays too: a heap that parts gathers again at once, and both cost more than a hundred steps
                 let contacts = pile.touches(members, |a, b, touch| {
                     watch.join(a, b);
                     if touch {

@@ -234,7 +234,7 @@ impl Pile {
             let size = [a, b].iter().flatten().map(|&i| members[i].radius_m).fold(f64::INFINITY, f64::min);
             let touch = nearest(contact).filter(|(gap, _)| *gap <= MARGIN_SHARE * size);
             if let (Some(a), Some(b)) = (a, b)
-                && is_near(&members[a], &members[b])
+                && members[a].is_near(&members[b])
             {
                 pair(a as u32, b as u32, touch.is_some());
             }
@@ -257,11 +257,6 @@ fn is_same(a: &SharedShape, b: &SharedShape) -> bool {
         (TypedShape::Cuboid(a), TypedShape::Cuboid(b)) => a == b,
         _ => false,
     }
-}
-
-/// Whether the balls around two members overlap.
-fn is_near(a: &Member, b: &Member) -> bool {
-    a.motion.position.distance(b.motion.position) < a.radius_m + b.radius_m
 }
 
 /// The nearest gap of a pair, metres, and how many points it has; `None` where the shapes are far.

@@ -1,6 +1,6 @@
-//! Who has come apart: whom nobody else has touched, nor a joint held, for a while.
+//! Who has come apart: whom nobody else has been near, nor a joint held, for a while.
 //!
-//! In: pairs that touch or are jointed, in a pile also those that are near, step after step. Out: a number for each companion. Never here: contacts.
+//! In: pairs that touch, are near or are jointed, step after step. Out: a number for each companion. Never here: contacts.
 
 use super::groups::Groups;
 use super::member::Member;
