@@ -29,6 +29,8 @@ pub(crate) struct Stage {
     faults: Faults,
     noise: u64,
     looked: bool,
+    /// Whether nobody sees what others make of a step before their own that begins at the same time: as the executors have it.
+    pub at_once: bool,
 }
 
 struct Actor {
@@ -36,6 +38,8 @@ struct Actor {
     rate_hz: f64,
     time: SimTime,
     published: Vec<Arc<Snapshot>>,
+    /// When the step to the newest of these began.
+    begun: Option<SimTime>,
     hands: Vec<Pull>,
     links: Vec<Link>,
 }
@@ -64,7 +68,7 @@ impl Settled {
 impl Stage {
     pub(crate) fn new(faults: Faults) -> Self {
         let noise = faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1;
-        Self { actors: vec![], laws: vec![], faults, noise, looked: false }
+        Self { actors: vec![], laws: vec![], faults, noise, looked: false, at_once: false }
     }
 
     /// Adds an agent that steps `rate_hz` times a second.
@@ -78,7 +82,7 @@ impl Stage {
         agent.write_snapshot(&mut snapshot);
         let published = vec![Arc::new(snapshot)];
         let (hands, links) = (vec![], vec![]);
-        self.actors.push(Actor { agent, rate_hz, time: SimTime::ZERO, published, hands, links });
+        self.actors.push(Actor { agent, rate_hz, time: SimTime::ZERO, published, begun: None, hands, links });
         AgentId(self.actors.len() as u32 - 1)
     }
 
@@ -161,12 +165,14 @@ impl Stage {
             Surroundings { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
         let dt = actor.agent.longest_step(dt, &around);
         actor.agent.step(dt, &around).expect("a step that succeeds");
+        let began = actor.time;
         actor.time += dt;
         let mut snapshot = Snapshot::default();
         actor.agent.write_snapshot(&mut snapshot);
         snapshot.time = actor.time;
         if !lost {
             actor.published.push(Arc::new(snapshot));
+            actor.begun = Some(began);
         }
         let keep = self.faults.late + 2;
         let surplus = self.actors[i].published.len().saturating_sub(keep);
@@ -177,7 +183,8 @@ impl Stage {
     fn sight(&mut self, me: AgentId, id: AgentId) -> Neighbour {
         let late = (self.random() * (self.faults.late as f64 + 1.0)) as usize;
         let actor = &self.actors[id.0 as usize];
-        let newest = actor.published.len() - 1;
+        let unseen = self.at_once && actor.begun.is_some_and(|begun| begun >= self.actors[me.0 as usize].time);
+        let newest = actor.published.len() - 1 - usize::from(unseen);
         let snapshot = actor.published[newest.saturating_sub(late)].clone();
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
         let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);

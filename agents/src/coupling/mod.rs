@@ -27,7 +27,7 @@ pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, Vie
 pub(crate) use knock::Knock;
 pub use law::{Law, Link, Standing, owns};
 pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
-pub use other::{Other, WAKE_M_S};
+pub use other::{Astray, Other, WAKE_M_S};
 pub use rebound::Rebound;
 pub(crate) use rebound::{since_s, spared};
 pub use six::{Six, Twist};

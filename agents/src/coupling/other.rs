@@ -5,11 +5,14 @@
 //! Theory: docs/theory/coupling.md, eq. 5–7d: v* = v + a τ + W (J − J_ack), x* = x + v τ + a τ²/2 + W ((J − J_ack) t − (S − S_ack)).
 
 mod answer;
+mod astray;
 mod deliver;
 mod ground;
 mod held;
 mod motion;
 mod places;
+
+pub use astray::Astray;
 
 use super::sprung::Lean;
 use super::{Exchange, Form, Twist};
@@ -29,10 +32,12 @@ pub struct Other {
     lean: Option<Lean>,
     /// A tube's nodes, a soft body's vertices.
     positions: Vec<DVec3>,
+    /// How a tube's segments are turned.
+    frames: Vec<DQuat>,
     /// Room for two answers.
     answer: Vec<DVec3>,
     carried: Vec<DVec3>,
-    /// Of a soft body: by how much what is on its way changes how each vertex accelerates, m/s²; empty for nothing.
+    /// Of what bends: by how much what is on its way changes how each slot accelerates, m/s² and rad/s²; empty for nothing.
     taken_back: Vec<DVec3>,
     age_s: f64,
     held: bool,
@@ -104,6 +109,7 @@ impl Other {
         self.taken_back.clear();
         self.positions.clear();
         self.velocities.clear();
+        self.frames.clear();
         match &snapshot.body {
             Body::Nothing => false,
             Body::Rigid(body) => {
@@ -120,6 +126,7 @@ impl Other {
             }
             Body::Curve(curve) => {
                 self.positions.extend_from_slice(&curve.positions);
+                self.frames.extend_from_slice(&curve.frames);
                 self.interleave(&curve.velocities);
                 !self.positions.is_empty()
             }

@@ -94,6 +94,8 @@ const BOUND_MARGIN: f64 = 1.02;
 const BOUND_DECAY: f64 = 0.9;
 /// The least mobility, 1/kg: a contact between held matter only has none, and any number will do.
 const MOBILITY_MIN: f64 = 1e-12;
+/// Where the last solve ended before its tolerance W is formed for up to so many times the answers that it may take.
+const DEAR: usize = 3;
 /// The most products with a W that is formed.
 const FORMED_PRODUCTS: u32 = 2_000;
 
@@ -139,7 +141,7 @@ impl Solver {
     fn prepare(&mut self, problem: &Problem<'_>, velocities: &[DVec3]) {
         let Problem { contacts, h_s: h, mobilities, .. } = *problem;
         self.free.clear();
-        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h)));
+        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
         self.scale.clear();
         self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
         self.start(problem);
@@ -225,7 +227,9 @@ impl Solver {
     /// Forms W where that costs less than the last solve did; the most products that may be taken.
     fn form(&mut self, problem: &Problem<'_>, body: &mut impl Response) -> u32 {
         let Problem { contacts, settings, .. } = *problem;
-        if !self.forms || self.products as usize <= 3 * contacts.len() {
+        let (columns, taken) = (3 * contacts.len(), self.products as usize);
+        let gave_up = self.products >= settings.iterations && columns <= DEAR * settings.iterations as usize;
+        if !self.forms || !(taken > columns || gave_up) {
             return settings.iterations;
         }
         self.formed.form(contacts, body, &mut self.answer);

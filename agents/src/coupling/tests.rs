@@ -63,6 +63,7 @@ fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> 
             gap_m,
             friction,
             rebound_m_s: 0.0,
+            back_m_s: DVec3::ZERO,
             age_s: 0.0,
         }
     };
@@ -191,7 +192,16 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
     for (slot, weight) in [(0, 0.3), (1, 0.7), (2, -0.6), (3, -0.4)] {
         slots.add_linear(slot, weight);
     }
-    let contact = Contact { key: 1, slots, normal: DVec3::X, gap_m: 0.0, friction: 0.4, rebound_m_s: 0.0, age_s: 0.0 };
+    let contact = Contact {
+        key: 1,
+        slots,
+        normal: DVec3::X,
+        gap_m: 0.0,
+        friction: 0.4,
+        rebound_m_s: 0.0,
+        back_m_s: DVec3::ZERO,
+        age_s: 0.0,
+    };
     let free: Vec<DVec3> =
         [-1.0, -1.0, 1.0, 1.0].iter().map(|&x| DVec3::new(x, 0.1, 0.0) + noise.vector() * 0.1).collect();
     let (velocities, solver) = after(&[contact], &free, &mut body, PATIENT);
@@ -210,7 +220,16 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
         .map(|i| {
             let mut slots = Slots::default();
             slots.add_linear(i, 1.0);
-            Contact { key: u64::from(i), slots, normal: DVec3::Z, gap_m: 0.0, friction, rebound_m_s: 0.0, age_s: 0.0 }
+            Contact {
+                key: u64::from(i),
+                slots,
+                normal: DVec3::Z,
+                gap_m: 0.0,
+                friction,
+                rebound_m_s: 0.0,
+                back_m_s: DVec3::ZERO,
+                age_s: 0.0,
+            }
         })
         .collect();
     let (mut velocities, mut solver, mut way) = ([DVec3::ZERO; N as usize], Solver::default(), 0.0);
@@ -255,8 +274,16 @@ fn a_warm_start_saves_most_of_the_answers() {
 fn contacts_that_stay_open_cost_no_answer() {
     let mut slots = Slots::default();
     slots.add_linear(0, 1.0);
-    let contacts =
-        [Contact { key: 0, slots, normal: DVec3::Z, gap_m: 0.1, friction: 0.5, rebound_m_s: 0.0, age_s: 0.0 }];
+    let contacts = [Contact {
+        key: 0,
+        slots,
+        normal: DVec3::Z,
+        gap_m: 0.1,
+        friction: 0.5,
+        rebound_m_s: 0.0,
+        back_m_s: DVec3::ZERO,
+        age_s: 0.0,
+    }];
     let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
     let mut never = |_: &mut [DVec3]| unreachable!("nothing touches");
     let mut velocities = [DVec3::new(0.0, 0.0, -5.0)];
@@ -271,8 +298,16 @@ fn an_impulse_passes_to_the_next_of_kin() {
     slots.add_linear(0, 1.0);
     let mut solver = Solver::default();
     let mut press = |key: u64| {
-        let contacts =
-            [Contact { key, slots, normal: DVec3::Z, gap_m: 0.0, friction: 0.5, rebound_m_s: 0.0, age_s: 0.0 }];
+        let contacts = [Contact {
+            key,
+            slots,
+            normal: DVec3::Z,
+            gap_m: 0.0,
+            friction: 0.5,
+            rebound_m_s: 0.0,
+            back_m_s: DVec3::ZERO,
+            age_s: 0.0,
+        }];
         let mut velocities = [DVec3::new(0.1, 0.0, -1.0)];
         let problem = Problem { contacts: &contacts, kin: &[-1, 1], h_s: 0.01, mobilities: &[0.3], settings: PATIENT };
         solver.solve(&problem, &mut velocities, &mut body).iterations

@@ -115,6 +115,11 @@ impl Company {
         self.touches = list;
     }
 
+    /// What others gave that acts through the substep that comes, in slots; empty for nothing.
+    pub fn fresh(&self) -> &[DVec3] {
+        self.received.fresh()
+    }
+
     /// What others gave since the last step.
     pub fn received(&mut self) -> &mut Received {
         &mut self.received

@@ -51,7 +51,10 @@ impl Doubling {
     /// given once.
     pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&Config, &[Tie]), stepper: &Stepper) {
         let begins = self.watch.begins(steps, me);
-        if !stepper.company.is_empty() || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now)) {
+        if !stepper.company.is_empty()
+            || !stepper.company.fresh().is_empty()
+            || self.again.as_ref().is_some_and(|again| !begins && !again.fits(now))
+        {
             self.watch.give_up();
         }
         if !self.watch.is_on() {

@@ -1,16 +1,18 @@
-//! What a tube would do by itself in one step of a slower owner: how such an owner has to expect it.
+//! What a tube would do by itself in its next step, or in one of a slower owner: how an owner has to expect it.
 //!
-//! In: a tube between two of its steps, and who owns its contacts. Out: the factor and the accelerations of one implicit step of
-//! the owner's length. Never here: the tube's own motion. Theory: docs/theory/coupling.md, eq. 7e.
+//! In: a tube between two of its steps, and who owns its contacts. Out: the accelerations of one implicit step, of a slower
+//! owner's length with its factor. Never here: the tube's own motion. Theory: docs/theory/coupling.md, eq. 7e; soft.md, eq. 16e.
 
 use super::band::Factor;
 use super::config::Config;
+use super::holds::Tie;
+use super::method::Integrator;
 use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
 use super::tube::Tube;
 use crate::coupling::Law;
 use crate::coupling::beside::{PART_MAX_S, bends, is_linked};
-use crate::{Neighbour, Surroundings};
+use crate::{Body, Neighbour, Surroundings};
 use glam::DVec3;
 
 /// An owner is slower if its steps are longer by more than this share.
@@ -37,38 +39,64 @@ impl Horizon {
 }
 
 impl Tube {
-    /// Works out what slower owners may expect of a tube that has just made a step of `dt` seconds.
+    /// Works out what owners that bend may expect of a tube that has just made a step of `dt` seconds: of one that touches nothing else
+    /// its next step where they are soft, and where they are slower one step of theirs.
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
+        self.ahead_s = 0.0;
         // beside this one it makes no longer steps
         let steps_s = around.neighbours.iter().filter(|n| owns_it(n, around)).map(|n| n.step_s.min(PART_MAX_S));
         // to a faster one among them the tube must not look too heavy
         let span_s = steps_s.fold(f64::INFINITY, f64::min);
-        if !(span_s.is_finite() && span_s > SLOWER * dt) {
+        let slower = span_s > SLOWER * dt;
+        let mut owners = around.neighbours.iter().filter(|n| owns_it(n, around));
+        let soft = owners.all(|n| matches!(n.snapshot.body, Body::Soft(_)));
+        let alone = soft && self.spec.integrator == Integrator::ImplicitEuler && !self.stepper.contacts.is_touching();
+        if !(span_s.is_finite() && (slower || alone)) {
             return;
         }
         let mut gained = std::mem::take(&mut self.accelerations);
-        self.step_by(dt, |stepper, now, setting, _| stepper.look_ahead(now, setting, (span_s, &mut gained)));
+        let span_s = slower.then_some(span_s);
+        let look = |stepper: &mut Stepper, now: &mut Config, setting: &Setting<'_>, _: &mut [Tie]| {
+            stepper.look_ahead(now, setting, (span_s, &mut gained))
+        };
+        let ahead_s = self.step_by(dt, look);
         self.accelerations = gained;
+        if soft {
+            self.ahead_s = ahead_s.unwrap_or(0.0);
+        } else {
+            self.accelerations.iter_mut().skip(1).step_by(2).for_each(|turning| *turning = DVec3::ZERO);
+        }
     }
 }
 
 impl Stepper {
-    /// Solves one implicit step of `span_s` seconds from `now`: how it accelerates every node goes to `gained`, which stays as
-    /// it is where the step has no factor.
-    fn look_ahead(&mut self, now: &Config, setting: &Setting<'_>, (span_s, gained): (f64, &mut Vec<DVec3>)) {
+    /// Solves one implicit step from `now`, of `span_s` seconds by a factor of its own, or as long as the last substep and by the factor
+    /// of that. How it accelerates every slot goes to `gained`. Returns the length of the step; `None` where it has no factor.
+    fn look_ahead(
+        &mut self,
+        now: &Config,
+        setting: &Setting<'_>,
+        (span_s, gained): (Option<f64>, &mut Vec<DVec3>),
+    ) -> Option<f64> {
         let Setting { matter, division, springs, integrator, .. } = *setting;
-        let scene = Scene { matter, division, springs, ties: &[], h: span_s, until: span_s, integrator };
-        let Self { rows, rhs, horizon, .. } = self;
-        assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
-        if horizon.factor.factor(rows).is_err() {
-            return;
+        let h = span_s.unwrap_or(self.span_s);
+        if span_s.is_none() && (h <= 0.0 || self.factor.slots() != now.u.len()) {
+            return None;
         }
-        horizon.factor.solve(rhs);
-        horizon.span_s = span_s;
-        let changes = rhs.iter().step_by(2).zip(now.u.iter().step_by(2));
+        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        let Self { rows, rhs, factor, horizon, .. } = self;
+        assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
+        if span_s.is_some() {
+            horizon.factor.factor(rows).ok()?;
+            horizon.factor.solve(rhs);
+            horizon.span_s = h;
+        } else {
+            factor.solve(rhs);
+        }
         gained.clear();
-        gained.extend(changes.map(|(then, v)| (*then - *v) / span_s));
+        gained.extend(rhs.iter().zip(&now.u).map(|(then, now)| (*then - *now) / h));
+        Some(h)
     }
 }
 

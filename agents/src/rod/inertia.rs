@@ -3,6 +3,7 @@
 //! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::band::Factor;
+use super::config::Matter;
 use super::contact::respond;
 use glam::DVec3;
 
@@ -13,10 +14,19 @@ pub struct CurveInertia {
     held: [bool; 2],
     /// How fast each segment turns, rad/s, world axes.
     pub spins: Vec<DVec3>,
-    /// How each node accelerated in the last step, without what others gave at its start, m/s²; empty before the first.
+    /// How each slot will accelerate in its next step, or did in the last one without what others gave at its start, m/s² and rad/s²;
+    /// empty before the first.
     pub accelerations: Vec<DVec3>,
     /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
     pub span_s: f64,
+    /// The length of the step that the accelerations foretell, seconds; zero where they are those of the last one.
+    pub ahead_s: f64,
+    /// Of each segment: length (m) and direction.
+    segments: Vec<(f64, DVec3)>,
+    /// Mass per length, kg/m, rotary inertia per length, kg·m, and damping, 1/s.
+    mu: f64,
+    rotary: f64,
+    damping_per_s: f64,
 }
 
 impl CurveInertia {
@@ -27,6 +37,41 @@ impl CurveInertia {
         self.held = held;
         self.spins.clear();
         self.spins.extend(velocities.iter().skip(1).step_by(2));
+    }
+
+    /// Takes over what the tube weighs.
+    pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
+        (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
+        self.segments.clear();
+        self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));
+    }
+
+    /// What is on its way changes by how much how each slot accelerates in the step that is foretold: `changed` are the velocities that
+    /// it adds when that step begins, and `carried` how far it has moved the tube by then, divided by that step, m/s. The answer goes to
+    /// `changed`, m/s² (docs/theory/soft.md, eq. 16e).
+    pub(crate) fn take_back(&self, changed: &mut [DVec3], carried: &mut [DVec3]) {
+        let damped = self.ahead_s * self.damping_per_s;
+        for (v, c) in changed.iter_mut().zip(&mut *carried) {
+            let both = *v + *c;
+            *v = both + *c * damped;
+            *c = both;
+        }
+        self.momenta(changed);
+        self.respond(changed);
+        changed.iter_mut().zip(carried).for_each(|(v, both)| *v = (*v - *both) / self.ahead_s);
+    }
+
+    /// Turns velocities in slots into momenta (docs/theory/rod.md, eq. 11).
+    pub(crate) fn momenta(&self, list: &mut [DVec3]) {
+        let mut left = list[0];
+        list[0] = DVec3::ZERO;
+        for (k, (length_m, t)) in self.segments.iter().enumerate() {
+            let (right, spin, m) = (list[2 * k + 2], list[2 * k + 1], self.mu * length_m / 6.0);
+            list[2 * k] += (left * 2.0 + right) * m;
+            list[2 * k + 1] = (spin + *t * t.dot(spin)) * (self.rotary * length_m);
+            list[2 * k + 2] = (left + right * 2.0) * m;
+            left = right;
+        }
     }
 
     /// How many slots it knows: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.

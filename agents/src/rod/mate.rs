@@ -5,9 +5,9 @@
 
 use super::holds::Far;
 use super::tank::{Tank, Tanks};
-use crate::coupling::inverse_mass;
 use crate::coupling::{Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
-use crate::{Anchor, Inertia, Neighbour, Surroundings};
+use crate::coupling::{PUSH_OUT_SHARE, inverse_mass};
+use crate::{Anchor, Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
 
 /// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
@@ -18,6 +18,10 @@ const ID_SHIFT: u32 = 48;
 const PART_SHIFT: u32 = 44;
 /// See [`PART_SHIFT`].
 const TOUCH_PARTS_SHIFT: u32 = 58;
+
+/// The share of the way that a place came from where friction holds it that is taken back in a step, or in one of the other's where that
+/// is longer: as of a depth.
+const BACK_SHARE: f64 = PUSH_OUT_SHARE;
 
 /// One agent near a tube.
 #[derive(Clone, Default)]
@@ -48,6 +52,15 @@ pub struct Mate {
     span_s: f64,
     woken: bool,
     linked: bool,
+    /// The velocities of its slots by which friction takes back how far it is astray, and which share of that the step takes.
+    back: Vec<DVec3>,
+    back_share: f64,
+    /// Whether what lasts is given to it evenly.
+    evenly: bool,
+    /// What bends was given a second in the substep before, N and N·m in slots; empty for nothing.
+    lasts: Vec<DVec3>,
+    /// By how much its mean velocities in the substep tried are above those at its start, in slots.
+    gains: Vec<DVec3>,
     /// What links give it in the substep, in its slots: that lasts, and is no blow.
     lasting: Vec<DVec3>,
     room: Vec<DVec3>,
@@ -79,9 +92,12 @@ impl Mate {
     ) -> bool {
         let there = neighbour.form.as_ref().map_or(0.0, |form| form.friction);
         let (other, room) = (std::mem::take(&mut self.other), std::mem::take(&mut self.room));
-        let mut lasting = std::mem::take(&mut self.lasting);
-        lasting.clear();
-        *self = Self { other, room, lasting, friction: (friction * there).sqrt(), fade: 1.0, ..Self::default() };
+        let [mut lasting, mut back, mut lasts] =
+            [&mut self.lasting, &mut self.back, &mut self.lasts].map(std::mem::take);
+        [&mut lasting, &mut back, &mut lasts].into_iter().for_each(Vec::clear);
+        let gains = std::mem::take(&mut self.gains);
+        let kept = Self { other, room, lasting, back, lasts, gains, ..Self::default() };
+        *self = Self { friction: (friction * there).sqrt(), fade: 1.0, ..kept };
         if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, None) }
     }
 
@@ -118,6 +134,28 @@ impl Mate {
         }
     }
 
+    /// Recalls for a step of `dt` seconds from `now` what the pair's last step left: how far the other is from where friction holds it,
+    /// and what it was given.
+    pub fn recall(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
+        self.evenly = true;
+        let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) else { return };
+        tank.astray.learn(&self.other, now);
+        let span_s = self.other.neighbour().map_or(dt, |n| n.step_s.max(dt));
+        self.back_share = BACK_SHARE * dt / span_s;
+        self.back.extend(tank.astray.owed().iter().map(|owed| *owed * (BACK_SHARE / span_s)));
+        self.lasts.extend_from_slice(&tank.last);
+    }
+
+    /// Keeps that for the step that begins at `end`.
+    pub fn keep(&mut self, tanks: &mut Tanks, end: SimTime) {
+        let tank = self.other.id().filter(|_| self.acted).and_then(|id| tanks.get(id));
+        if let Some(tank) = tank {
+            std::mem::swap(&mut tank.last, &mut self.lasts);
+            tank.astray.pay(self.back_share);
+            tank.astray.expect(&self.other, end);
+        }
+    }
+
     /// Appends its velocities on the mean of a substep `h`.
     pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
         self.other.foresee(h);
@@ -126,8 +164,11 @@ impl Mate {
         self.slots = (velocities.len(), list.len());
         velocities.extend_from_slice(list);
         if self.other.is_many() {
-            let gaining = velocities[self.slots.0..].iter_mut().step_by(self.other.stride());
-            gaining.enumerate().for_each(|(node, v)| *v += self.other.acceleration_of(node) * (0.5 * h));
+            if self.lasts.len() != self.slots.1 {
+                self.lasts.clear();
+            }
+            self.other.gains(h, self.evenly.then_some(&self.lasts), [&mut self.gains, &mut self.room]);
+            velocities[self.slots.0..].iter_mut().zip(&self.gains).for_each(|(v, gain)| *v += *gain);
         } else {
             velocities[self.slots.0] += fall;
             velocities[self.slots.0 + 1..][..1].iter_mut().for_each(|spin| *spin += turn);
@@ -204,8 +245,21 @@ impl Mate {
             gap_m: if touch.gap_m < 0.0 { touch.gap_m * self.fade } else { touch.gap_m },
             friction: self.friction,
             rebound_m_s: 0.0,
+            back_m_s: self.back_m_s(touch),
             age_s: self.other.answers_within_s(),
         }
+    }
+
+    /// By which velocity across the normal a place is to come back to where friction holds it, with its sign turned, m/s
+    /// (docs/theory/soft.md, eq. 16g).
+    fn back_m_s(&self, touch: &Touch) -> DVec3 {
+        if self.back.len() != self.other.velocities().len() {
+            return DVec3::ZERO;
+        }
+        let mut slots = Slots::default();
+        self.other.join(&mut slots, 0, &touch.on_b, (touch.normal, -1.0));
+        let back = slots.velocity(&self.back) * self.fade;
+        back - touch.normal * touch.normal.dot(back)
     }
 
     /// The velocities that a place joins, arms brought to the middle of the gap: force and torque then balance exactly.
@@ -343,6 +397,9 @@ impl Mate {
         if self.acted {
             let (first, end) = (self.slots.0, self.end());
             let list = &mut impulses[first..end];
+            if self.evenly && self.other.parts(h) > 1 {
+                self.spread(list, h);
+            }
             self.other.book(exchange, (start, h), list);
             self.last(exchange, (start, h));
             list.iter_mut().zip(&self.lasting).for_each(|(all, part)| *all += *part);
@@ -351,7 +408,28 @@ impl Mate {
             self.given += list[..linear].iter().step_by(self.other.stride()).sum::<DVec3>();
             self.other.push(list, h);
         }
-        self.other.go_on(h);
+        if self.other.is_many() {
+            self.other.go_on_by(h, &self.gains);
+        } else {
+            self.other.go_on(h);
+        }
+    }
+
+    /// Takes from the impulses of a substep what lasts since the one before: it acts evenly, a part in each of the other's
+    /// steps (docs/theory/soft.md, eq. 16f).
+    fn spread(&mut self, list: &mut [DVec3], h: f64) {
+        let same = self.lasts.len() == list.len();
+        let size: f64 = self.lasts.iter().map(|l| l.length_squared()).sum::<f64>() * h;
+        let along: f64 = self.lasts.iter().zip(&*list).map(|(l, now)| l.dot(*now)).sum();
+        let share = if same && size > 0.0 { (along / size).clamp(0.0, 1.0) } else { 0.0 };
+        self.lasting.resize(list.len(), DVec3::ZERO);
+        self.lasts.resize(list.len(), DVec3::ZERO);
+        for ((now, lasting), before) in list.iter_mut().zip(&mut self.lasting).zip(&mut self.lasts) {
+            let (all, part) = (*now, *before * (h * share));
+            *now -= part;
+            *lasting += part;
+            *before = all / h;
+        }
     }
 
     /// Books what links give: it acts evenly through the substep.

@@ -31,6 +31,10 @@ impl Tube {
         let dt_s = dt.as_secs_f64();
         self.dt_s = dt_s;
         self.stepper.company.open(around, &self.division, around.time + dt);
+        if self.ahead_s > 0.0 && !self.stepper.company.received().is_empty() {
+            // as those foresaw it who were told
+            self.stepper.company.received().put_off(dt_s / f64::from(self.spec.substeps));
+        }
         // past a radius a tube could be found beyond a wall
         let way_m = if self.spec.obstacles.is_empty() { f64::INFINITY } else { self.spec.section.radius_m };
         if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {

@@ -63,6 +63,8 @@ impl Tube {
             let factor = self.stepper.horizon.factor().unwrap_or(own);
             inertia.copy_from((factor, span_s), self.matter.held, &self.now.u);
             inertia.accelerations.clone_from(&self.accelerations);
+            inertia.ahead_s = self.ahead_s;
+            inertia.weigh(&self.matter, &self.division.length, &self.now.t);
         } else {
             into.inertia = Inertia::Immovable;
         }

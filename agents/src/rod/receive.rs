@@ -18,6 +18,8 @@ pub struct Received {
     sum: Vec<DVec3>,
     /// t dJ − dS: seconds times that.
     carried: Vec<DVec3>,
+    /// The part of dJ that acts through the step that comes; empty for none.
+    fresh: Vec<DVec3>,
     slots: usize,
     any: bool,
 }
@@ -26,11 +28,34 @@ impl Received {
     /// Empties the slots of a tube of so many.
     pub fn clear(&mut self, slots: usize) {
         (self.slots, self.any) = (slots, false);
+        self.fresh.clear();
     }
 
     /// Whether nothing came.
     pub fn is_empty(&self) -> bool {
         !self.any
+    }
+
+    /// What of it acts through the substep that comes, N·s and N·m·s in slots; empty for nothing.
+    pub fn fresh(&self) -> &[DVec3] {
+        &self.fresh
+    }
+
+    /// That substep has been made.
+    pub fn spend(&mut self) {
+        self.fresh.clear();
+    }
+
+    /// Leaves what has not acted through a substep of `h` seconds to the one that comes (docs/theory/soft.md, eq. 16b).
+    pub fn put_off(&mut self, h: f64) {
+        let Self { sum, carried, fresh, .. } = self;
+        fresh.clear();
+        fresh.extend(sum.iter_mut().zip(&*carried).map(|(sum, carried)| {
+            let past = carried.dot(*sum) / (h * sum.length_squared()).max(f64::MIN_POSITIVE);
+            let fresh = *sum * (1.0 - past.clamp(0.0, 1.0));
+            *sum -= fresh;
+            fresh
+        }));
     }
 
     /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division does not lose any of it.

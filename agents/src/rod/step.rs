@@ -259,6 +259,7 @@ impl Stepper {
     fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
@@ -306,6 +307,9 @@ impl Stepper {
         let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
         // what friction takes is no licence to make as much elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
+        let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
+        work += fresh;
+        effort += fresh.abs();
         for tie in scene.ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             let x = tie.mix(self.next.x[a], self.next.x[b]);
@@ -338,6 +342,7 @@ impl Stepper {
     fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
+        self.company.received().spend();
         for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
             // constraints act after the tie did: what it gave is what it was solved with

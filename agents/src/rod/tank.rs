@@ -7,6 +7,7 @@
 //! that difference. What contact takes fills it.
 
 use crate::AgentId;
+use crate::coupling::Astray;
 use glam::DVec3;
 
 /// The tanks of all pairs that have touched lately.
@@ -14,7 +15,7 @@ use glam::DVec3;
 pub struct Tanks(Vec<Tank>);
 
 /// The tank of one pair.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct Tank {
     with: AgentId,
     /// What is left, joules.
@@ -23,6 +24,10 @@ pub struct Tank {
     /// How the other was expected to move when the step ended, m/s, and the impulse then on its way to it, N·s.
     expected: Option<(DVec3, DVec3)>,
     idle_s: f64,
+    /// How far the other is from where friction holds it.
+    pub astray: Astray,
+    /// What its slots were given a second in the step before.
+    pub last: Vec<DVec3>,
     /// Steps in which the two have pressed on each other since they met.
     pressed: u32,
 }
@@ -44,7 +49,17 @@ impl Tanks {
     pub fn of(&mut self, with: AgentId, mass_kg: f64) -> &mut Tank {
         let at = self.0.iter().position(|tank| tank.with == with).unwrap_or_else(|| {
             let reserve_j = 0.5 * mass_kg * RESERVE_M_S * RESERVE_M_S;
-            self.0.push(Tank { with, left_j: reserve_j, reserve_j, expected: None, idle_s: 0.0, pressed: 1 });
+            let astray = Astray::default();
+            self.0.push(Tank {
+                with,
+                left_j: reserve_j,
+                reserve_j,
+                expected: None,
+                idle_s: 0.0,
+                astray,
+                last: vec![],
+                pressed: 1,
+            });
             self.0.len() - 1
         });
         self.0[at].idle_s = 0.0;
@@ -63,6 +78,10 @@ impl Tanks {
             tank.left_j += missing.min(tank.reserve_j * dt / REFILL_S);
             if tank.idle_s > 0.0 {
                 tank.pressed = 0;
+                tank.last.clear();
+            }
+            if tank.idle_s > 0.05 {
+                tank.astray.forget();
             }
             tank.idle_s += dt;
         }

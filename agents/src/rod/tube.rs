@@ -48,6 +48,8 @@ pub struct Tube {
     pub(super) acceleration: DVec3,
     /// The same of each node; empty where nobody is near.
     pub(super) accelerations: Vec<DVec3>,
+    /// The length of the step that these foretell, seconds; zero where they are those of the last one.
+    pub(super) ahead_s: f64,
     pub(super) resolution: Resolution,
     time: SimTime,
     pub(super) dt_s: f64,
@@ -96,6 +98,7 @@ impl Tube {
             at_rest: false,
             acceleration: DVec3::ZERO,
             accelerations: vec![],
+            ahead_s: 0.0,
             time: SimTime::ZERO,
             dt_s: 0.0,
             steps: 0,
@@ -238,7 +241,7 @@ impl Tube {
     /// Notes how the tube moves before its step, for [`Self::end_watch`]: its momentum, where anybody wants to know.
     fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
         self.accelerations.clear();
-        self.accelerations.extend(self.now.u.iter().step_by(2).filter(|_| watched));
+        self.accelerations.extend(self.now.u.iter().filter(|_| watched));
         watched.then(|| self.momentum().0)
     }
 
@@ -249,9 +252,13 @@ impl Tube {
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
         // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
         let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
-        for (a, u) in self.accelerations.iter_mut().zip(self.now.u.iter().step_by(2)) {
+        for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {
             let gained = (*u - *a) / dt;
-            *a = if lasts { gained } else { smooth(gained, gravity) };
+            *a = match slot % 2 {
+                1 => DVec3::ZERO,
+                _ if lasts => gained,
+                _ => smooth(gained, gravity),
+            };
         }
     }
 

@@ -91,6 +91,7 @@ impl Company {
             }
             if mates[*count].meet(neighbour, around, exchange, (friction, touched)) {
                 mates[*count].ask(tanks);
+                mates[*count].recall(tanks, (around.time, dt));
                 *count += 1;
             }
         }
@@ -270,8 +271,10 @@ impl Company {
 
     /// Ends a step of `dt` seconds of a body of `mass_kg`.
     pub fn close(&mut self, around: &Surroundings<'_>, (dt, mass_kg): (f64, f64)) {
+        let end = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         for mate in &mut self.mates[..self.count] {
             mate.tell(&mut self.exchange, &mut self.tanks, mass_kg);
+            mate.keep(&mut self.tanks, end);
         }
         self.tanks.close(dt);
         if !self.exchange.is_empty() {

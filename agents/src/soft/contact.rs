@@ -158,7 +158,16 @@ impl Contacts {
                 if slots.mobility(mobilities) > 0.0 {
                     let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
                     let Touch { normal, gap_m, .. } = *place;
-                    list.push(Contact { key, slots, normal, gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 });
+                    list.push(Contact {
+                        key,
+                        slots,
+                        normal,
+                        gap_m,
+                        friction,
+                        rebound_m_s: 0.0,
+                        back_m_s: DVec3::ZERO,
+                        age_s: 0.0,
+                    });
                 }
             }
         }

@@ -39,14 +39,14 @@ impl SoftInertia {
         into.extend_from_slice(&self.mobilities);
     }
 
-    /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), add to its mean velocity in the step
-    /// that comes: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
+    /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), change of its acceleration in the step
+    /// that comes, m/s²: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
     pub(crate) fn take_back(&self, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
         room.clear();
         room.extend(shares.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
         self.respond(room);
         let damped = 2.0 + self.span_s * self.damping_per_s;
-        shares.iter_mut().zip(room).for_each(|(share, moved)| *share = *moved * damped - *share * 2.0);
+        shares.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
     }
 
     /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s).

@@ -6,6 +6,7 @@ mod falls;
 mod links;
 mod meetings;
 mod promises;
+mod slopes;
 mod statics;
 
 use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};

@@ -57,25 +57,33 @@ impl Other {
         (self.answer, self.carried) = (sums, carried);
     }
 
-    /// What a soft body has not taken yet has moved it by `carried` in the eyes of who gave it: what of that its elastic forces take back
-    /// in its next step (docs/theory/soft.md, eq. 16d).
+    /// What a body that bends has not taken yet, `sums` as velocities, has moved it by `carried` in the eyes of who gave it: what of
+    /// that its elastic forces take back in its next step (docs/theory/soft.md, eq. 16d, 16e).
     fn take_back(&mut self, sums: &[DVec3], carried: &mut Vec<DVec3>) {
         let Self { neighbour, taken_back, velocities, age_s, held, .. } = self;
-        let Some(Inertia::Soft(soft)) = neighbour.as_ref().map(|n| &n.snapshot.inertia) else { return };
-        if *held || soft.slots() != sums.len() || soft.span_s <= 0.0 {
+        let Some(inertia) = neighbour.as_ref().map(|n| &n.snapshot.inertia).filter(|_| !*held) else { return };
+        let (step_s, span_s) = match inertia {
+            Inertia::Soft(soft) if soft.slots() == sums.len() => (soft.span_s, soft.span_s),
+            Inertia::Curve(curve) if curve.slots() == sums.len() => (curve.ahead_s, curve.span_s),
+            _ => return,
+        };
+        if step_s <= 0.0 {
             return;
         }
-        let span_s = soft.span_s;
-        taken_back.extend(sums.iter().zip(&*carried).map(|(sum, carried)| {
-            let share = (carried.dot(*sum) / sum.length_squared().max(f64::MIN_POSITIVE) - *age_s) / span_s;
-            *sum * share.clamp(0.0, 1.0)
-        }));
-        soft.take_back(taken_back, carried);
-        let so_far_s = (0.5 * span_s + *age_s).min(span_s);
-        for (a, v) in taken_back.iter_mut().zip(velocities) {
-            *a /= span_s;
-            *v += *a * so_far_s;
+        // how far it will have been carried when it takes them, and which share of them then has acted through a whole step
+        carried.iter_mut().zip(sums).for_each(|(moved, v)| *moved = (*moved - *v * *age_s) / step_s);
+        taken_back.extend(
+            sums.iter()
+                .zip(&*carried)
+                .map(|(v, moved)| *v * (moved.dot(*v) / v.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)),
+        );
+        match inertia {
+            Inertia::Soft(soft) => soft.take_back(taken_back, carried),
+            Inertia::Curve(curve) => curve.take_back(taken_back, carried),
+            _ => {}
         }
+        let so_far_s = (0.5 * span_s + *age_s).min(step_s);
+        velocities.iter_mut().zip(taken_back).for_each(|(v, a)| *v += *a * so_far_s);
     }
 
     /// Adds what other owners have given a rigid body by the time `at`, and notes what they will give (eq. 6b); nothing of who

@@ -1,7 +1,7 @@
 //! Another agent at a point where a spring holds it: how that point is expected to move, and how it is given what the spring gives.
 //!
 //! In: a point, and the step of whoever holds it. Out: its mean velocity in that step; into how many parts an impulse falls.
-//! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a.
+//! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a; soft.md, eq. 16f.
 
 use super::Other;
 use crate::coupling::Place;
@@ -17,7 +17,7 @@ impl Other {
         let gain = match self.place(anchor)? {
             Place::Point(_) => self.gain(h)[0],
             Place::Chain { segment, share, .. } => {
-                let [a, b] = [segment, segment + 1].map(|node| self.acceleration_of(node as usize));
+                let [a, b] = [segment, segment + 1].map(|node| self.acceleration_of(2 * node as usize));
                 a.lerp(b, share) * (h - self.reckoned_s()).max(0.5 * h)
             }
             Place::Surface { vertices, .. } => {
@@ -27,7 +27,43 @@ impl Other {
         Some((point, velocity + gain))
     }
 
-    /// Into how many parts what a spring gives it in `h` seconds is divided: one a step of its own, a millisecond at least.
+    /// By how much the mean velocity of each slot of what bends in the next `h` seconds is above the one that is reckoned now, where
+    /// `lasts` goes on being given to it evenly, N and N·m in slots, empty for nothing; `None` where all is given at once
+    /// (docs/theory/soft.md, eq. 16f).
+    pub fn gains(&self, h: f64, lasts: Option<&Vec<DVec3>>, [into, room]: [&mut Vec<DVec3>; 2]) {
+        into.clear();
+        into.extend((0..self.velocities().len()).map(|slot| self.acceleration_of(slot) * h));
+        let parts = f64::from(self.parts(h));
+        let (curve, lasts) = match (self.neighbour.as_ref().map(|n| &n.snapshot.inertia), lasts) {
+            (Some(Inertia::Curve(curve)), Some(lasts)) if parts > 1.0 && curve.slots() == into.len() && !self.held => {
+                (curve, lasts)
+            }
+            _ => return into.iter_mut().for_each(|gain| *gain *= 0.5),
+        };
+        // in steps of its own what is free of both only comes so far
+        room.clear();
+        room.resize(into.len(), DVec3::ZERO);
+        room.iter_mut().zip(lasts).for_each(|(free, lasts)| *free = *lasts * h);
+        curve.respond(room);
+        room.iter_mut().zip(&*into).for_each(|(free, gain)| *free += *gain);
+        curve.momenta(room);
+        curve.respond(room);
+        let (late, reckoned) = (0.5 * (parts - 1.0) / parts, self.reckoned_s() / h);
+        into.iter_mut().zip(&*room).for_each(|(gain, free)| *gain -= *gain * reckoned + *free * late);
+    }
+
+    /// Lets `h` seconds pass in which what bends moves by its velocities and these `gains`.
+    pub fn go_on_by(&mut self, h: f64, gains: &[DVec3]) {
+        let mut beyond = std::mem::take(&mut self.answer);
+        beyond.clear();
+        beyond
+            .extend(gains.iter().enumerate().map(|(slot, gain)| (*gain - self.acceleration_of(slot) * (0.5 * h)) * h));
+        self.go_on(h);
+        self.shift(&beyond);
+        self.answer = beyond;
+    }
+
+    /// Into how many parts what lasts and is given it in `h` seconds is divided: one a step of its own, a millisecond at least.
     #[must_use]
     pub fn parts(&self, h: f64) -> u32 {
         let step_s = self.neighbour.as_ref().map_or(f64::INFINITY, |n| n.step_s);

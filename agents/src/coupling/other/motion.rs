@@ -18,17 +18,21 @@ impl Other {
         }
     }
 
-    /// The same of a node or vertex: a tube tells how each of its nodes accelerates, a soft body of its vertices.
+    /// The same of a slot of what bends, m/s² or rad/s²: a tube tells how each of its nodes and segments accelerates, a soft body of
+    /// its vertices.
     #[must_use]
-    pub fn acceleration_of(&self, node: usize) -> DVec3 {
+    pub fn acceleration_of(&self, slot: usize) -> DVec3 {
+        let slots = self.velocities.len();
+        let changed = || self.taken_back.get(slot).copied().unwrap_or_default();
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == self.positions.len() => {
-                curve.accelerations[node]
+            Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == slots => {
+                curve.accelerations[slot] + changed()
             }
-            Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == self.positions.len() => {
-                soft.accelerations[node] + self.taken_back.get(node).copied().unwrap_or_default()
+            Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == slots => {
+                soft.accelerations[slot] + changed()
             }
-            _ => self.acceleration(),
+            _ if slot.is_multiple_of(self.stride()) => self.acceleration(),
+            _ => DVec3::ZERO,
         }
     }
 
@@ -73,10 +77,9 @@ impl Other {
         if half_s == 0.0 {
             return;
         }
-        let stride = self.stride();
-        for node in 0..self.positions.len() {
-            let gained = self.acceleration_of(node) * half_s;
-            self.velocities[stride * node] += gained;
+        for slot in 0..self.velocities.len() {
+            let gained = self.acceleration_of(slot) * half_s;
+            self.velocities[slot] += gained;
         }
     }
 
@@ -103,11 +106,16 @@ impl Other {
             return;
         }
         let stride = self.stride();
-        for node in 0..self.positions.len() {
-            let a = self.acceleration_of(node);
-            let v = &mut self.velocities[stride * node];
-            self.positions[node] += *v * h + a * (0.5 * h * h);
+        for slot in 0..self.velocities.len() {
+            let a = self.acceleration_of(slot);
+            let v = &mut self.velocities[slot];
+            let way = *v * h + a * (0.5 * h * h);
             *v += a * h;
+            if slot.is_multiple_of(stride) {
+                self.positions[slot / stride] += way;
+            } else if let Some(frame) = self.frames.get_mut(slot / stride) {
+                *frame = turned(*frame, way);
+            }
         }
     }
 
@@ -119,6 +127,7 @@ impl Other {
         } else {
             let stride = self.stride();
             self.positions.iter_mut().zip(by.iter().step_by(stride)).for_each(|(x, dx)| *x += *dx);
+            self.frames.iter_mut().zip(by.iter().skip(1).step_by(2)).for_each(|(q, by)| *q = turned(*q, *by));
         }
     }
 }

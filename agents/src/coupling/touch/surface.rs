@@ -3,8 +3,8 @@
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
 //! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
 //!
-//! Vertices speak for a surface; an edge or a triangle adds its own place only where it is nearer than its corners by more than
-//! [`BETTER_SHARE`] of its size. A place of the other side is told in the surface itself, so that both sides are pushed at one point.
+//! Beside a block vertices speak for a surface; an edge or a triangle adds its own place only where it is nearer than its corners by
+//! more than [`BETTER_SHARE`] of its size. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is told in the surface itself, so that both sides are pushed at one point.
 
 use super::Touch;
 use super::pieces::{Block, Piece, Strand, Surface};
@@ -174,19 +174,16 @@ impl Meeting<'_> {
             }
         }
         for (number, edge, ends) in self.surface.edges_in(self.region) {
-            let better_m = BETTER_SHARE * ends[0].distance(ends[1]);
             for span in 0..strand.spans() {
                 let (share, at) = near_segments(strand.ends(span).map(|ball| ball.centre), ends);
                 if !(END_SHARE..=1.0 - END_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
                     continue;
                 }
                 let (point, ball) = (ends[0].lerp(ends[1], at), on_span(strand, span, share));
-                let nearer_m = ball.centre.distance(point) - ball.radius_m + better_m;
-                let corners = ends.into_iter().all(|end| nearer_m < gap_at(strand, end));
                 let outside = edge.iter().all(|vertex| {
                     self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(ball.centre - point) >= 0.0)
                 });
-                if corners && outside {
+                if outside {
                     let key = KINDS[1] | number << PART_SHIFT | span as u64;
                     into.extend(self.tell(key, (Spot::edge(edge, at), point), strand, (span, share)));
                 }
@@ -196,14 +193,9 @@ impl Meeting<'_> {
             for node in 0..strand.count() {
                 let ball = strand.ball(node);
                 let Some((spot, point)) = self.surface.inside(triangle, corners, ball.centre) else { continue };
-                let size = corners[0].distance(corners[1]);
-                let nearer_m = ball.centre.distance(point) - ball.radius_m + BETTER_SHARE * size;
-                if self.surface.form.closed || corners.into_iter().all(|corner| nearer_m < gap_at(strand, corner)) {
-                    let span = node.min(strand.spans() - 1);
-                    let share = (node - span) as f64;
-                    let key = KINDS[2] | number << PART_SHIFT | node as u64;
-                    into.extend(self.tell(key, (spot, point), strand, (span, share)));
-                }
+                let span = node.min(strand.spans() - 1);
+                let key = KINDS[2] | number << PART_SHIFT | node as u64;
+                into.extend(self.tell(key, (spot, point), strand, (span, (node - span) as f64)));
             }
         }
     }
@@ -407,11 +399,4 @@ fn nearest_span(strand: &Strand<'_>, at: DVec3) -> (usize, f64) {
         }
     }
     (best.0, best.1)
-}
-
-/// How far a point is from the skin of a strand, metres.
-fn gap_at(strand: &Strand<'_>, at: DVec3) -> f64 {
-    let (span, share) = nearest_span(strand, at);
-    let ball = on_span(strand, span, share);
-    at.distance(ball.centre) - ball.radius_m
 }

@@ -219,7 +219,16 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
     }
     let [first, second] = meeting.segments.map(u64::from);
     let key = first * KEY_STEPS[1] + second * KEY_STEPS[0] + u64::from(meeting.place);
-    Contact { key, slots, normal: meeting.normal, gap_m: meeting.gap_m, friction, rebound_m_s: 0.0, age_s: 0.0 }
+    Contact {
+        key,
+        slots,
+        normal: meeting.normal,
+        gap_m: meeting.gap_m,
+        friction,
+        rebound_m_s: 0.0,
+        back_m_s: DVec3::ZERO,
+        age_s: 0.0,
+    }
 }
 
 /// Contact with a wall, at a node or inside a segment (eq. 21).
@@ -249,6 +258,7 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
         gap_m: touch.gap_m,
         friction: (friction * touch.friction).sqrt(),
         rebound_m_s: 0.0,
+        back_m_s: DVec3::ZERO,
         age_s: 0.0,
     }
 }
