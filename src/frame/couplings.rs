@@ -157,7 +157,7 @@ impl Couplings {
     /// Keeps what the `newest` states say of those who were heard of, agent by agent; `leader` says in whose world one steps.
     pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
         self.open_anew();
-        self.note_resting(leader);
+        self.note_resting(&leader);
         let heard = std::mem::take(&mut self.heard);
         for &id in &heard {
             let Some(snapshot) = newest.get(id.0 as usize) else { continue };
@@ -171,6 +171,7 @@ impl Couplings {
                 coupling.contacts = coupling.contacts.max(1);
             }
         }
+        heard.iter().for_each(|id| self.note_led(*id, leader(*id)));
         heard.iter().for_each(|id| self.is_heard[id.0 as usize] = false);
         self.heard = heard;
         self.heard.clear();
@@ -191,7 +192,7 @@ impl Couplings {
         self.of = of;
     }
 
-    fn note_resting(&mut self, leader: impl Fn(AgentId) -> AgentId) {
+    fn note_resting(&mut self, leader: &impl Fn(AgentId) -> AgentId) {
         let mut resting = std::mem::take(&mut self.resting);
         resting.retain(|&(a, b)| {
             if ![a, b].iter().any(|id| self.is_heard.get(id.0 as usize) == Some(&true)) {
@@ -205,6 +206,14 @@ impl Couplings {
             together
         });
         self.resting = resting;
+    }
+
+    /// Who shares a world and has not said with whom: called before it touched anybody, it is told beside its leader.
+    fn note_led(&mut self, id: AgentId, leader: AgentId) {
+        let told = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
+        if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(told)) {
+            self.at(leader, id, ISLAND).contacts = 1;
+        }
     }
 
     /// What a tool says of its hold.
@@ -398,6 +407,19 @@ mod tests {
         note(&mut couplings, &[Arc::default(), Arc::default()]);
         assert_eq!(couplings.all()[0].contacts, 0);
     }
+
+    #[test]
+    fn who_shares_a_world_without_having_touched_is_an_island_with_its_leader() {
+        let mut couplings = Couplings::of(&two_balls());
+        let states = [Arc::default(), Arc::default()];
+        (0..2).for_each(|id| couplings.hear(AgentId(id)));
+        couplings.note(&states, |_| AgentId(0));
+        let told = |c: &Couplings| c.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>();
+        assert_eq!(told(&couplings), [(0, 1, "island", 1)]);
+        note(&mut couplings, &states);
+        assert_eq!(told(&couplings), [(0, 1, "island", 0)], "it has gone home");
+    }
+
     #[test]
     fn what_nobody_has_news_of_stays_and_either_side_opens_it_anew() {
         let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
