@@ -15,6 +15,8 @@ use crate::coupling::beside::{PART_MAX_S, bends, is_linked};
 use crate::{Body, Neighbour, Surroundings};
 use glam::DVec3;
 
+/// An owner that is behind by more of the longer of both steps does not keep up.
+const BEHIND_STEPS: f64 = 2.0;
 /// An owner is slower if its steps are longer by more than this share.
 const SLOWER: f64 = 1.01;
 
@@ -40,7 +42,7 @@ impl Horizon {
 
 impl Tube {
     /// Works out what owners that bend may expect of a tube that has just made a step of `dt` seconds: of one that touches nothing else
-    /// its next step where they are soft, and where they are slower one step of theirs.
+    /// its next step where they are soft, keep up with it, and no link joins it to them; and where they are slower one step of theirs.
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
         self.ahead_s = 0.0;
@@ -50,7 +52,8 @@ impl Tube {
         let span_s = steps_s.fold(f64::INFINITY, f64::min);
         let slower = span_s > SLOWER * dt;
         let mut owners = around.neighbours.iter().filter(|n| owns_it(n, around));
-        let soft = owners.all(|n| matches!(n.snapshot.body, Body::Soft(_)));
+        let soft = owners
+            .all(|n| matches!(n.snapshot.body, Body::Soft(_)) && !is_linked(n, around) && keeps_up(n, around, dt));
         let alone = soft && self.spec.integrator == Integrator::ImplicitEuler && !self.stepper.contacts.is_touching();
         if !(span_s.is_finite() && (slower || alone)) {
             return;
@@ -98,6 +101,11 @@ impl Stepper {
         gained.extend(rhs.iter().zip(&now.u).map(|(then, now)| (*then - *now) / h));
         Some(h)
     }
+}
+
+/// Whether an owner is not so far behind a tube with steps of `dt` that what it gives comes whole steps late.
+fn keeps_up(owner: &Neighbour, around: &Surroundings<'_>, dt: f64) -> bool {
+    around.time.secs_after(owner.snapshot.time) <= BEHIND_STEPS * owner.step_s.max(dt)
 }
 
 /// Whether a neighbour computes the contacts or links with this tube, and expects it by its factor.

@@ -137,7 +137,12 @@ impl Mate {
     /// Recalls for a step of `dt` seconds from `now` what the pair's last step left: how far the other is from where friction holds it,
     /// and what it was given.
     pub fn recall(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
-        self.evenly = true;
+        // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (rod/horizon.rs)
+        let blows = |n: &Neighbour| matches!(&n.snapshot.inertia, Inertia::Curve(curve) if curve.ahead_s == 0.0);
+        self.evenly = !self.other.neighbour().is_some_and(blows);
+        if !self.evenly {
+            return;
+        }
         let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) else { return };
         tank.astray.learn(&self.other, now);
         let span_s = self.other.neighbour().map_or(dt, |n| n.step_s.max(dt));

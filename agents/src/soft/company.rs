@@ -91,7 +91,9 @@ impl Company {
             }
             if mates[*count].meet(neighbour, around, exchange, (friction, touched)) {
                 mates[*count].ask(tanks);
-                mates[*count].recall(tanks, (around.time, dt));
+                if !linked {
+                    mates[*count].recall(tanks, (around.time, dt));
+                }
                 *count += 1;
             }
         }
