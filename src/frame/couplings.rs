@@ -288,7 +288,8 @@ fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapsh
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
     let mut apart = DVec3::ZERO;
-    given.since(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
+    // a force that is taken to go on is given in the owner's next step: no account is wrong for that
+    given.beyond(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
     Some((apart.length(), given.revision == taken.revision && taken.coming.is_empty()))
 }
 
@@ -296,7 +297,7 @@ fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapsh
 mod tests {
     use super::*;
     use crate::scene::{Source, load};
-    use metachron_agents::coupling::{Impulse, Ledger, Site};
+    use metachron_agents::coupling::{Ahead, Impulse, Ledger, Site};
     use metachron_agents::{SimTime, ToolState};
 
     fn two_balls() -> Scene {
@@ -341,6 +342,10 @@ mod tests {
         // two of four newton seconds are not taken yet, and the owner knows of one and a half
         assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
         note(&mut couplings, &states(&given, given.clone(), state));
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
+        // what goes on has been taken ahead
+        let ahead = Some(Ahead { sum: pushed(1.0), from: SimTime::ZERO, middle_s: 0.1 });
+        note(&mut couplings, &states(&given, Ledger { ahead, ..given.clone() }, state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
         // a reader that lost half of it and does not know
         note(&mut couplings, &states(&given, Ledger { revision: given.revision, ..early }, state));

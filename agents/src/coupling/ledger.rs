@@ -259,7 +259,7 @@ impl Ledger {
     }
 
     /// The same without what was taken ahead.
-    pub(super) fn beyond(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
+    pub fn beyond(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
         for page in &self.pages {
             let known = earlier.and_then(|e| e.page(page.number));
             let t = at.secs_after(page.origin);

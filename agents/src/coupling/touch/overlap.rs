@@ -50,6 +50,9 @@ impl Hull {
                 break;
             }
             self.grow(corner, size_m);
+            if self.faces.len() > 2 * self.corners.len() {
+                break; // rounding has torn it: a closed hull has twice as many faces as corners, less four
+            }
         }
         best
     }
