@@ -96,8 +96,7 @@ pub struct Contact {
     /// that does not bounce.
     pub rebound_m_s: f64,
     /// The velocity across the normal by which the two are to come back to where friction holds them, m/s, with its sign turned: what
-    /// friction
-    /// brings to zero is u + this.
+    /// friction brings to zero is u + this.
     pub back_m_s: DVec3,
     /// Age of what is known of the other body, seconds, ≥ 0. A depth is taken back over this where it is longer than the
     /// step: what has been pushed out already shows only that much later.
@@ -181,7 +180,7 @@ mod tests {
 
     #[test]
     fn a_depth_comes_out_over_the_age_of_the_data_where_that_is_longer_than_the_step() {
-        let deep = Contact { back_m_s: DVec3::ZERO, age_s: 0.02, ..at_rest(-0.01, 0.0) };
+        let deep = Contact { age_s: 0.02, ..at_rest(-0.01, 0.0) };
         assert_eq!(deep.bias_m_s(0.001), -0.01 * PUSH_OUT_SHARE / 0.02);
         assert_eq!(deep.bias_m_s(0.04), -0.01 * PUSH_OUT_SHARE / 0.04);
     }

@@ -38,6 +38,8 @@ const RESERVE_M_S: f64 = 0.1;
 const REFILL_S: f64 = 1.0;
 /// A pair that has not touched for this long is forgotten, seconds.
 const FORGET_S: f64 = 2.0;
+/// Friction holds a pair no longer where it did once the two have been apart for this long, seconds.
+const LOOSE_S: f64 = 0.05;
 /// What a contact weighs is found in the first step of a touch and in every so many from there on: an answer of what bends is up to a
 /// twentieth of its step (measured), and what a place weighs changes slowly.
 const WEIGH_EVERY: u32 = 4;
@@ -80,7 +82,7 @@ impl Tanks {
                 tank.pressed = 0;
                 tank.last.clear();
             }
-            if tank.idle_s > 0.05 {
+            if tank.idle_s > LOOSE_S {
                 tank.astray.forget();
             }
             tank.idle_s += dt;

@@ -69,15 +69,18 @@ fn speeds(mut stage: impl FnMut() -> (Stage, AgentId), [from, to]: [f64; 2]) -> 
     })
 }
 
+/// A tube on a soft body, with the rates of the body and the tube, Hz.
+fn laid(tube: TubeSpec, on: SoftSpec, rates: (f64, f64)) -> (Stage, AgentId) {
+    let mut stage = Stage::new(Faults::default());
+    stage.add(SoftBody::new(on).unwrap(), rates.0);
+    let id = stage.add(Tube::new(tube).unwrap(), rates.1);
+    (stage, id)
+}
+
 #[test]
 fn a_tube_on_a_soft_solid_does_not_creep_at_any_rates() {
     for rates in [(240.0, 240.0), (1000.0, 240.0), (240.0, 1000.0), (60.0, 60.0), (30.0, 1000.0), (1000.0, 30.0)] {
-        let made = || {
-            let mut stage = Stage::new(Faults::default());
-            stage.add(SoftBody::new(block(0.5)).unwrap(), rates.0);
-            let id = stage.add(Tube::new(piece(0.5)).unwrap(), rates.1);
-            (stage, id)
-        };
+        let made = || laid(piece(0.5), block(0.5), rates);
         let speeds = speeds(made, [1.0, 2.0]);
         println!("{rates:?}: {speeds:?} m/s");
         assert!(speeds.iter().all(|v| v.abs() < CREEP_M_S), "{rates:?}: it creeps at {speeds:?} m/s");
@@ -87,12 +90,7 @@ fn a_tube_on_a_soft_solid_does_not_creep_at_any_rates() {
 #[test]
 fn a_tube_on_a_sheet_does_not_creep_where_the_sheet_is_not_faster() {
     for rates in [(240.0, 240.0), (60.0, 60.0), (240.0, 1000.0), (60.0, 1000.0)] {
-        let made = || {
-            let mut stage = Stage::new(Faults::default());
-            stage.add(SoftBody::new(held_sheet()).unwrap(), rates.0);
-            let id = stage.add(Tube::new(piece(0.5)).unwrap(), rates.1);
-            (stage, id)
-        };
+        let made = || laid(piece(0.5), held_sheet(), rates);
         let speeds = speeds(made, [3.0, 4.0]);
         println!("{rates:?}: {speeds:?} m/s");
         assert!(speeds.iter().all(|v| v.abs() < CREEP_M_S), "{rates:?}: it creeps at {speeds:?} m/s");
@@ -104,13 +102,7 @@ fn a_tube_on_a_soft_solid_slides_as_coulomb_says() {
     let wanted = |friction: f64| slope().x + friction * slope().z;
     for rates in [(240.0, 240.0), (1000.0, 240.0), (240.0, 1000.0)] {
         for friction in [0.1, 0.2] {
-            let made = || {
-                let mut stage = Stage::new(Faults::default());
-                stage.add(SoftBody::new(block(friction)).unwrap(), rates.0);
-                let free = TubeSpec { damping_per_s: 0.0, ..piece(friction) };
-                let id = stage.add(Tube::new(free).unwrap(), rates.1);
-                (stage, id)
-            };
+            let made = || laid(TubeSpec { damping_per_s: 0.0, ..piece(friction) }, block(friction), rates);
             let (early, late) = (speeds(made, [0.1, 0.2]), speeds(made, [0.3, 0.4]));
             let gained = [0, 1].map(|k| (late[k] - early[k]) / 0.2);
             println!("{rates:?}, {friction}: {gained:?} of {} m/s²", wanted(friction));
