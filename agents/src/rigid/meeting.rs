@@ -373,10 +373,10 @@ impl Meeting {
         pair.touched = true;
         pair.pressed |= along > mass_kg * PRESS_M_S2 * h && h > 0.0;
         pair.rigid = guests[i].is_rigid();
-        pair.spend(work_j);
+        pair.tank.spend(work_j);
         let state = exchange.pair_mut(id);
         state.contacts = state.contacts.max(places);
         state.penetration_m = state.penetration_m.max(depth_m);
-        state.tank_j = Some(pair.tank_j);
+        state.tank_j = Some(pair.tank.left_j());
     }
 }

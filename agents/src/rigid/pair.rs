@@ -9,6 +9,7 @@
 
 use crate::AgentId;
 use crate::coupling::Impulse;
+use crate::coupling::tank::{RESERVE_M_S, Tank};
 use glam::DVec3;
 
 /// All pairs that have touched lately.
@@ -28,18 +29,14 @@ pub(super) struct Pair {
     pub pressed: bool,
     /// Whether the other is a rigid body that could share a world with this one.
     pub rigid: bool,
-    /// What is left in the tank, joules.
-    pub tank_j: f64,
-    /// What the tank held at the start, joules.
-    reserve_j: f64,
+    /// The energy that their coupling may still add.
+    pub tank: Tank,
     /// How the other was expected to move at the end of the step, m/s and rad/s.
     expected: Option<[DVec3; 2]>,
     loose_s: f64,
     idle_s: f64,
 }
 
-/// The speed whose energy a tank holds at the start, m/s: what a push-out of a few parts may spend before it fades.
-pub(super) const RESERVE_M_S: f64 = 0.1;
 /// The share of the reserve that push-out may always spend.
 const PUSH_OUT_LEAST: f64 = 1.0 / 16.0;
 /// Contact that has lasted this long may share one clock, seconds. Ten times as heavy a load on a slow body sinks 5 mm until
@@ -47,9 +44,6 @@ const PUSH_OUT_LEAST: f64 = 1.0 / 16.0;
 const BOND_S: f64 = 0.05;
 /// Bodies that do not press on each other for this long have parted, seconds: a state seen late makes contact stutter.
 const BREAK_S: f64 = 0.05;
-/// An empty tank is full again after this, seconds, and a debt goes down to a third: a watchdog that never forgave would let
-/// bodies sink for good.
-const REFILL_S: f64 = 1.0;
 /// A pair that has not touched for this long is forgotten, seconds.
 const FORGET_S: f64 = 2.0;
 
@@ -57,7 +51,7 @@ impl Pairs {
     /// The memory of the pair with `with`; a new one for a pair whose reduced mass is `mass_kg`.
     pub(super) fn of(&mut self, with: AgentId, mass_kg: f64) -> &mut Pair {
         let at = self.0.iter().position(|pair| pair.with == with).unwrap_or_else(|| {
-            self.0.push(Pair::new(with, 0.5 * mass_kg * RESERVE_M_S * RESERVE_M_S));
+            self.0.push(Pair::new(with, Tank::of(mass_kg)));
             self.0.len() - 1
         });
         &mut self.0[at]
@@ -78,8 +72,7 @@ impl Pairs {
         for pair in &mut self.0 {
             pair.loose_s = if pair.pressed { 0.0 } else { pair.loose_s + dt };
             pair.lasting_s = if pair.loose_s < BREAK_S { pair.lasting_s + dt } else { 0.0 };
-            let missing = pair.reserve_j - pair.tank_j;
-            pair.tank_j += (pair.reserve_j.max(missing) * dt / REFILL_S).min(missing);
+            pair.tank.refill(dt);
             pair.idle_s = if pair.touched { 0.0 } else { pair.idle_s + dt };
         }
         self.0.retain(|pair| pair.idle_s < FORGET_S);
@@ -97,15 +90,14 @@ impl Pairs {
 }
 
 impl Pair {
-    fn new(with: AgentId, reserve_j: f64) -> Self {
+    const fn new(with: AgentId, tank: Tank) -> Self {
         Self {
             with,
             lasting_s: 0.0,
             touched: false,
             pressed: false,
             rigid: false,
-            tank_j: reserve_j,
-            reserve_j,
+            tank,
             expected: None,
             loose_s: BREAK_S,
             idle_s: 0.0,
@@ -127,18 +119,13 @@ impl Pair {
 
     /// What a bounce has to pay back, joules: what has been spent beyond half the reserve.
     pub(super) fn owed_j(&self) -> f64 {
-        (0.5 * self.reserve_j - self.tank_j).max(0.0)
+        (0.5 * self.tank.reserve_j() - self.tank.left_j()).max(0.0)
     }
 
     /// The fastest push-out that the tank can pay, m/s: √(2 E/μ). An empty one still pays for a little, for without any
     /// push-out bodies that lie on each other would sink for good.
     pub(super) fn push_out_m_s(&self) -> f64 {
-        RESERVE_M_S * (self.tank_j / self.reserve_j).clamp(PUSH_OUT_LEAST, 1.0).sqrt()
-    }
-
-    /// Books the energy that a solve added, joules. A full tank takes in no more: what contact took long ago pays for nothing.
-    pub(super) fn spend(&mut self, work_j: f64) {
-        self.tank_j = (self.tank_j - work_j).min(self.reserve_j);
+        RESERVE_M_S * self.tank.share().clamp(PUSH_OUT_LEAST, 1.0).sqrt()
     }
 
     /// How the other should move when the next step begins.
@@ -152,7 +139,7 @@ impl Pair {
     pub(super) fn correct(&mut self, velocities: &[DVec3], on_their_way: Impulse) {
         let Some([velocity, spin]) = self.expected.take() else { return };
         if let [now, now_spin] = *velocities {
-            self.spend(on_their_way.linear.dot(now - velocity) + on_their_way.angular.dot(now_spin - spin));
+            self.tank.spend(on_their_way.linear.dot(now - velocity) + on_their_way.angular.dot(now_spin - spin));
         }
     }
 }
@@ -165,38 +152,27 @@ mod tests {
     fn a_push_out_is_as_fast_as_its_tank_can_pay() {
         let mut pairs = Pairs::default();
         let pair = pairs.of(AgentId(1), 2.0); // 0.01 J
-        pair.spend(-1.0);
+        pair.tank.spend(-1.0);
         for (spent_j, left_j) in [(0.0, 0.01), (0.0051, 0.0049), (0.0040, 0.0009), (1.0, 0.01 / 16.0)] {
-            pair.spend(spent_j);
+            pair.tank.spend(spent_j);
             let energy_j = 0.5 * 2.0 * pair.push_out_m_s().powi(2);
             assert!((energy_j - left_j).abs() < 1e-12, "{energy_j} J of {left_j} J"); // rounding of numbers near 1
         }
-        pair.spend(-2.0);
+        pair.tank.spend(-2.0);
         assert!((pair.push_out_m_s() - RESERVE_M_S).abs() < 1e-12, "what was given back is there again");
-    }
-
-    #[test]
-    fn a_debt_of_any_size_is_forgiven_within_seconds() {
-        let mut pairs = Pairs::default();
-        pairs.of(AgentId(1), 2.0).spend(10.0); // a thousand times the reserve
-        for _ in 0..900 {
-            pairs.of(AgentId(1), 2.0).touched = true;
-            pairs.close(0.01);
-        }
-        assert!((pairs.of(AgentId(1), 2.0).push_out_m_s() - RESERVE_M_S).abs() < 1e-12);
     }
 
     #[test]
     fn a_wrong_guess_counts_only_for_what_was_still_on_its_way() {
         let mut pairs = Pairs::default();
         let pair = pairs.of(AgentId(1), 2.0);
-        let full = pair.tank_j;
+        let full = pair.tank.left_j();
         pair.expect(&[DVec3::X, DVec3::ZERO]);
         pair.correct(&[DVec3::X * 3.0, DVec3::ZERO], Impulse::ZERO);
-        assert_eq!(pair.tank_j, full, "it has bounced off a wall since");
+        assert_eq!(pair.tank.left_j(), full, "it has bounced off a wall since");
         pair.expect(&[DVec3::X, DVec3::ZERO]);
         pair.correct(&[DVec3::X * 1.5, DVec3::ZERO], Impulse { linear: DVec3::X * 0.01, angular: DVec3::ZERO });
-        assert!((pair.tank_j - (full - 0.005)).abs() < 1e-15); // a few roundings of 0.01
+        assert!((pair.tank.left_j() - (full - 0.005)).abs() < 1e-15); // a few roundings of 0.01
     }
 
     #[test]

@@ -8,7 +8,7 @@ use super::couple::FEET_M;
 use super::flight::TOUCH_S;
 use super::meeting::{Found, Me, Meeting, Strike};
 use super::obstacles::{Mine, Obstacles};
-use super::pair::RESERVE_M_S;
+use crate::coupling::tank::RESERVE_M_S;
 use crate::coupling::touch::touches;
 use crate::coupling::{Contact, PUSH_OUT_SHARE, Place, Slots, Touch};
 use glam::DVec3;

@@ -6,7 +6,7 @@
 use super::division::Division;
 use super::spec::Attachment;
 use super::sym3::Sym3;
-use crate::coupling::Link;
+use crate::coupling::{Far, Link, Pulled};
 use crate::{AgentId, Anchor, Pull};
 use glam::{DMat3, DVec3};
 
@@ -120,17 +120,6 @@ pub enum End {
     Linked(Link),
 }
 
-/// The other end of a link at the start of a substep.
-#[derive(Debug, Clone, Copy)]
-pub struct Far {
-    /// Where it is, metres.
-    pub point: DVec3,
-    /// Its velocity without this link, m/s.
-    pub velocity: DVec3,
-    /// Its inverse mass there, 1/kg.
-    pub inverse_mass: DMat3,
-}
-
 impl Tie {
     /// The tie of a pull; `None` where it has no point on this tube or is not finite.
     pub fn new(pull: &Pull, division: &Division) -> Option<Self> {
@@ -174,20 +163,9 @@ impl Tie {
     /// the near end at its start (eq. 35, 36).
     pub fn aim(&mut self, far: &Far, point: DVec3, (start, h): (f64, f64)) {
         let End::Linked(link) = self.end else { return };
-        let way = point - far.point;
-        let distance = way.length();
-        let (k, d) = (link.stiffness_n_m, link.damping_n_s_m);
-        let mut aim = far.point;
-        (self.stiffness, self.damping) = (Sym3::identity(k), Sym3::identity(d));
-        if link.rest_m > 0.0 && distance > 0.0 {
-            let along = way / distance;
-            // a spring in compression has no stiffness across: it would have less than none
-            let across = k * (1.0 - link.rest_m / distance).max(0.0);
-            self.stiffness = Sym3::identity(across) + Sym3::outer(along, k - across);
-            self.damping = Sym3::outer(along, d);
-            aim += along * link.rest_m;
-        }
-        (self.target, self.target_velocity) = (aim - far.velocity * start, far.velocity);
+        let spring = far.spring(&link, point);
+        (self.stiffness, self.damping) = (Sym3::of(&spring.stiffness), Sym3::of(&spring.damping));
+        (self.target, self.target_velocity) = (spring.target - far.velocity * start, far.velocity);
         let resistance = (self.stiffness * (h * h) + self.damping * h).full();
         self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass).inverse();
     }
@@ -204,6 +182,12 @@ impl Tie {
         self.given = self.force(x, v, after) * h + self.taken;
         self.impulse += self.given;
         (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
+    }
+
+    /// What it gave in the last substep; `None` where nobody feels it.
+    pub fn pulled(&self) -> Option<Pulled> {
+        let link = if let End::Linked(link) = self.end { Some(link) } else { None };
+        self.by.map(|by| Pulled { by, link, given: self.given })
     }
 
     /// Notes what it takes where an impulse from another changes the velocities at the ends of its segment by `a` and `b`: the

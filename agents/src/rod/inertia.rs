@@ -81,7 +81,7 @@ impl CurveInertia {
     }
 
     /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
-    pub(super) fn scale(&self, into: &mut Vec<f64>) {
+    pub(crate) fn scale(&self, into: &mut Vec<f64>) {
         let first = into.len();
         into.extend(self.factor.scales());
         for (end, slot) in [(0, first), (1, into.len() - 1)] {

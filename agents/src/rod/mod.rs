@@ -25,7 +25,6 @@ mod holds;
 mod horizon;
 mod inertia;
 mod light;
-mod mate;
 mod meet;
 mod method;
 mod past;
@@ -42,7 +41,6 @@ mod spec;
 mod step;
 mod sym3;
 mod system;
-mod tank;
 #[cfg(test)]
 mod tests;
 mod tube;
@@ -50,13 +48,9 @@ mod turn;
 
 pub use check::TubeError;
 pub use division::{SEGMENTS_MAX, SEGMENTS_MIN};
-pub(crate) use holds::Far;
 pub use inertia::CurveInertia;
-pub(crate) use mate::Mate;
 pub use method::Integrator;
-pub(crate) use publish::smooth;
 pub use spec::{Attachment, Material, Peristalsis, Section, TubeSpec};
-pub(crate) use tank::Tanks;
 pub use tube::{STRETCH_WARN, Tube, pressed_radius_m};
 
 /// The most substeps a scene may ask of one step: past it a real-time step is no longer one.

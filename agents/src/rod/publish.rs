@@ -8,9 +8,6 @@ use super::tube::Tube;
 use crate::{Bounds, Inertia, Snapshot};
 use glam::DVec3;
 
-/// An acceleration farther from free fall than this is a blow and not the way things go on, m/s²: three times gravity.
-const BLOW_M_S2: f64 = 30.0;
-
 /// The box around a tube of this state that is nowhere wider than `radius_m`.
 pub fn bounds(state: &Config, radius_m: f64) -> Bounds {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
@@ -19,11 +16,6 @@ pub fn bounds(state: &Config, radius_m: f64) -> Bounds {
     }
     let speed = state.u.iter().step_by(2).map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
     Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
-}
-
-/// An acceleration as others may expect it to last: no farther from free fall than a blow.
-pub fn smooth(acceleration: DVec3, gravity: DVec3) -> DVec3 {
-    if acceleration.is_finite() { gravity + (acceleration - gravity).clamp_length_max(BLOW_M_S2) } else { gravity }
 }
 
 impl Tube {

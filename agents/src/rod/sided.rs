@@ -5,10 +5,9 @@
 
 use super::company::Company;
 use super::division::Division;
-use super::mate::Mate;
 use crate::coupling::laws::{Drawn, End, Line, push_off_n};
 use crate::coupling::touch::touches;
-use crate::coupling::{Law, Link, PairKind, Placed, Slots, Touch, View};
+use crate::coupling::{Law, Link, Mate, PairKind, Placed, Slots, Touch, View};
 use crate::rod::band::Factor;
 use crate::{AgentId, Anchor, Neighbour, SimTime, Surroundings};
 use glam::{DMat3, DVec3};

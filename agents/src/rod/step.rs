@@ -192,7 +192,7 @@ impl Stepper {
     /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.
     pub fn weigh(&mut self, held: [bool; 2]) {
         let Self { factor, company, .. } = self;
-        company.weigh(factor.slots(), |impulses| respond((factor, held), impulses));
+        company.mates_mut().weigh(factor.slots(), |impulses| respond((factor, held), impulses));
     }
 
     /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had

@@ -11,8 +11,7 @@ use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
-use crate::coupling::{Form, FormKind, Law, Link};
-use crate::rod::smooth;
+use crate::coupling::{Form, FormKind, Law, Link, smooth};
 use crate::{
     Agent, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, Surroundings,
     check_span,
@@ -178,7 +177,8 @@ impl SoftBody {
     /// Ends a step of `dt` seconds: books, grips, what others may expect.
     fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let mass_kg = self.mass_kg();
-        self.company.weigh(&self.system);
+        let Self { company, system, .. } = self;
+        company.mates_mut().weigh(system.vertices(), |impulses| system.respond(impulses));
         self.company.close(around, (dt, mass_kg));
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));

@@ -7,10 +7,8 @@
 use super::holds::Tie;
 use super::system::System;
 use crate::coupling::beside::may_touch;
-use crate::coupling::touch::{TouchRoom, touches};
-use crate::coupling::{Contact, Exchange, Impulse, PairKind, Placed, Site, Touch};
-use crate::rod::{Mate, Tanks};
-use crate::{Body, Bounds, DT_MAX_S, SimSpan, Snapshot, Surroundings};
+use crate::coupling::{Contact, Mate, Mates, PairState, Site};
+use crate::{Body, Bounds, DT_MAX_S, SimSpan, Surroundings};
 use glam::DVec3;
 
 /// Links to one agent are shared in no more rounds than this, and well enough at this error, m/s: a tenth of what counts as rest.
@@ -21,15 +19,10 @@ const SHARED_M_S: f64 = 1e-5;
 /// The agents near one soft body.
 #[derive(Default)]
 pub(super) struct Company {
-    exchange: Exchange,
-    mates: Vec<Mate>,
-    /// How many of `mates` are here in this step; the rest is room.
-    count: usize,
-    touches: Vec<Touch>,
+    mates: Mates,
     impulses: Vec<DVec3>,
     /// What was amiss with each link before and after a round of [`Self::share`], m/s.
     amiss: [Vec<DVec3>; 2],
-    tanks: Tanks,
     /// What others gave since the last step: impulses, and how far they have carried, one a vertex.
     received: Vec<DVec3>,
     carried: Vec<DVec3>,
@@ -43,10 +36,10 @@ impl Company {
         // only another soft body may own a pair with this one
         self.watched = around.neighbours.iter().any(|n| !n.owned && matches!(n.snapshot.body, Body::Soft(_)));
         self.was_given = false;
-        if around.neighbours.is_empty() && self.exchange.is_empty() {
+        if around.neighbours.is_empty() && self.mates.exchange.is_empty() {
             return;
         }
-        let Self { exchange, received, carried, was_given, .. } = self;
+        let Self { mates: Mates { exchange, .. }, received, carried, was_given, .. } = self;
         exchange.open(around);
         let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         exchange.take(around, until, |_, site, sum, moved| {
@@ -76,93 +69,23 @@ impl Company {
 
     /// Gathers those whose couplings with this body it owns, for a step of `dt` seconds from `bounds`.
     pub fn gather(&mut self, around: &Surroundings<'_>, bounds: &Bounds, (dt, friction): (f64, f64)) {
-        self.count = 0;
-        let Self { mates, count, exchange, tanks, .. } = self;
-        for neighbour in around.neighbours.iter().filter(|n| n.owned && n.snapshot.is_finite()) {
-            let linked = around.links.iter().any(|link| link.other == neighbour.id);
-            // who has been given something since is no longer on the way that it published
-            let turned = exchange.pair(neighbour.id).is_some_and(|pair| pair.in_flight_n_s > 0.0);
-            let touched = may_touch(neighbour, around, bounds, if turned { dt + DT_MAX_S } else { dt });
-            if !(linked || touched) {
-                continue;
-            }
-            if mates.len() == *count {
-                mates.push(Mate::default());
-            }
-            if mates[*count].meet(neighbour, around, exchange, (friction, touched)) {
-                mates[*count].ask(tanks);
-                if !linked {
-                    mates[*count].recall(tanks, (around.time, dt));
-                }
-                *count += 1;
-            }
-        }
+        // who has been given something since is no longer on the way that it published
+        let turned = |pair: &PairState| pair.in_flight_n_s > 0.0;
+        self.mates.gather(around, friction, |neighbour, pair| {
+            let span_s = if pair.is_some_and(turned) { dt + DT_MAX_S } else { dt };
+            may_touch(neighbour, around, bounds, span_s)
+        });
+        self.mates.recall(around, dt);
     }
 
-    /// Whether there is nobody.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
+    /// Those whose couplings with this body it owns.
+    pub const fn mates(&self) -> &Mates {
+        &self.mates
     }
 
-    /// Appends the velocities that the others would have without this body, in slots.
-    pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
-        self.mates[..self.count].iter_mut().for_each(|mate| mate.extend(velocities, h));
-    }
-
-    /// Finds the contacts with the others, whose velocities stand behind the body's own.
-    pub fn find(
-        &mut self,
-        here: &Placed<'_>,
-        (h, slack_m, speed): (f64, f64, f64),
-        velocities: &[DVec3],
-        (room, contacts): (&mut TouchRoom, &mut Vec<Contact>),
-    ) {
-        for mate in &mut self.mates[..self.count] {
-            let reach_m = slack_m + (speed + mate.speed(velocities)) * h;
-            let Some(there) = mate.to_touch() else { continue };
-            touches(here, &there, reach_m, room, &mut self.touches);
-            mate.add_contacts(&self.touches, (h, slack_m), velocities, contacts);
-        }
-    }
-
-    /// Takes in what a solve found: the work of the contacts with others on both sides; `velocities` are those after it.
-    pub fn watch<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, velocities: &[DVec3]) {
-        let mates = &mut self.mates[..self.count];
-        mates.iter_mut().for_each(Mate::begin);
-        for (contact, impulse) in contacts {
-            let velocity = contact.slots.velocity(velocities);
-            let mate = mates.iter_mut().find(|mate| mate.is_of(contact));
-            mate.into_iter().for_each(|mate| mate.spend(contact, *impulse, velocity));
-        }
-    }
-
-    /// Begins a solve: whether somebody stands on something fixed, which is taken to carry what presses it.
-    pub fn press(&mut self) -> bool {
-        self.mates[..self.count].iter_mut().map(|mate| mate.other.press()).filter(|stands| *stands).count() > 0
-    }
-
-    /// Whether the impulses that a solve found tip or lift somebody who stands: the first of them.
-    pub fn gives_way<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, slots: usize) -> bool {
-        let Self { mates, count, impulses, .. } = self;
-        impulses.clear();
-        impulses.resize(slots, DVec3::ZERO);
-        contacts.for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
-        mates[..*count].iter_mut().any(|mate| mate.gives_way(impulses))
-    }
-
-    /// Ends a solve.
-    pub fn release(&mut self) {
-        self.mates[..self.count].iter_mut().for_each(|mate| mate.other.release());
-    }
-
-    /// Turns the impulses on the others, one a slot, into the velocities they cause; the body's own slots are left alone.
-    pub fn respond(&self, impulses: &mut [DVec3]) {
-        self.mates[..self.count].iter().for_each(|mate| mate.other.respond(mate.slots_mut(impulses)));
-    }
-
-    /// The size of the inverse mass of each slot of the others, behind those of the body.
-    pub fn scale(&self, mobilities: &mut Vec<f64>) {
-        self.mates[..self.count].iter().for_each(|mate| mate.scale(mobilities));
+    /// The same, to act on.
+    pub const fn mates_mut(&mut self) -> &mut Mates {
+        &mut self.mates
     }
 
     /// Tells links where their far ends are for a substep of `h` seconds.
@@ -170,8 +93,7 @@ impl Company {
         for i in 0..ties.len() {
             let Some(link) = ties[i].link else { continue };
             let shared = ties.iter().filter(|tie| tie.link.is_some_and(|l| l.other == link.other)).count();
-            let mate = self.mates[..self.count].iter_mut().find(|mate| mate.other.id() == Some(link.other));
-            let Some(far) = mate.and_then(|mate| mate.far(link.there, h)) else { continue };
+            let Some(far) = self.mates.far(&link, h) else { continue };
             ties[i].aim(&far, positions[ties[i].vertex], (h, shared));
         }
     }
@@ -207,7 +129,7 @@ impl Company {
 
     /// Finds what is amiss with the expected velocity of each far end, m/s.
     fn find_amiss(&mut self, ties: &[Tie], free: &[DVec3], into: &mut Vec<DVec3>) {
-        let mates = &mut self.mates[..self.count];
+        let mates = self.mates.all_mut();
         mates.iter_mut().for_each(Mate::ease);
         for tie in ties {
             let mate = mates.iter_mut().find(|mate| mate.other.id() == tie.link.map(|link| link.other));
@@ -226,74 +148,28 @@ impl Company {
         mates.iter_mut().for_each(Mate::ease);
     }
 
-    /// Gives what the contacts and ties of a substep gave, `start` seconds into the step, and lets the others go on by `h`.
+    /// Gives what a substep gave, `start` seconds into the step, and lets the others go on by `h`.
     pub fn accept<'a>(
         &mut self,
         contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>,
         ties: &[Tie],
-        (own, start, h): (usize, f64, f64),
+        span: (usize, f64, f64),
     ) {
-        if self.is_empty() && ties.is_empty() {
-            return;
+        if !(self.mates.is_empty() && ties.is_empty()) {
+            self.mates.accept(contacts, ties.iter().filter_map(Tie::pulled), span);
         }
-        let Self { mates, count, impulses, exchange, tanks, .. } = self;
-        let mates = &mut mates[..*count];
-        impulses.clear();
-        impulses.resize(mates.last().map_or(own, Mate::end), DVec3::ZERO);
-        for (contact, impulse) in contacts {
-            contact.slots.scatter(*impulse, impulses);
-            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.note(contact, *impulse));
-        }
-        for tie in ties {
-            let Some(by) = tie.by else { continue };
-            match tie.link {
-                // a tool is led: it only learns of it
-                None => {
-                    exchange.give(by, Site::Whole, start, Impulse { linear: -tie.given, angular: DVec3::ZERO });
-                    let pair = exchange.pair_mut(by);
-                    (pair.kind, pair.contacts) = (PairKind::Grasp, 1);
-                }
-                Some(link) => {
-                    let mate = mates.iter_mut().find(|mate| mate.other.id() == Some(by));
-                    mate.into_iter().for_each(|mate| mate.pull(link.there, -tie.given));
-                }
-            }
-        }
-        for mate in mates {
-            mate.take(impulses, (exchange, tanks), (start, h));
-        }
-    }
-
-    /// Weighs the strongest contact with each: one answer each at most.
-    pub fn weigh(&mut self, system: &System) {
-        let Self { mates, count, tanks, .. } = self;
-        let mates = mates[..*count].iter_mut();
-        mates.for_each(|mate| mate.weigh(tanks, system.vertices(), |impulses| system.respond(impulses)));
     }
 
     /// Ends a step of `dt` seconds of a body of `mass_kg`.
     pub fn close(&mut self, around: &Surroundings<'_>, (dt, mass_kg): (f64, f64)) {
-        let end = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
-        for mate in &mut self.mates[..self.count] {
-            mate.tell(&mut self.exchange, &mut self.tanks, mass_kg);
-            mate.keep(&mut self.tanks, end);
-        }
-        self.tanks.close(dt);
-        if !self.exchange.is_empty() {
-            self.exchange.close(around, dt);
-        }
+        self.mates.tell(mass_kg);
+        self.mates.keep(around, dt);
+        self.mates.close(around, dt);
     }
 
     /// Whether everybody that the body touches rests or never moves: only then may it rest itself.
     pub fn is_calm(&self) -> bool {
-        !self.was_given && self.mates[..self.count].iter().all(Mate::is_calm)
-    }
-
-    /// Writes ledgers and pairs, and who must stay awake.
-    pub fn write(&self, into: &mut Snapshot) {
-        self.exchange.write(into);
-        let woken = self.mates[..self.count].iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id());
-        into.touches.extend(woken);
+        !self.was_given && self.mates.is_calm()
     }
 }
 

@@ -8,7 +8,9 @@ use super::company::Company;
 use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use crate::coupling::touch::{TouchRoom, touches};
-use crate::coupling::{Contact, Form, FormKind, Placed, Problem, Settings, Slots, SolidForm, Solver, Touch, View};
+use crate::coupling::{
+    Contact, Form, FormKind, Placed, Problem, Search, Settings, Slots, SolidForm, Solver, Touch, View,
+};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -85,10 +87,10 @@ impl Contacts {
     ) {
         let own = velocities.len();
         self.list.clear();
-        if (self.walls.is_empty() && company.is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
+        if (self.walls.is_empty() && company.mates().is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
             return;
         }
-        company.extend(velocities, h);
+        company.mates_mut().extend(velocities, h);
         let settings = self.find(positions, velocities, company, h);
         if self.list.is_empty() {
             self.solver.forget();
@@ -96,9 +98,9 @@ impl Contacts {
             return;
         }
         self.list.sort_unstable_by_key(|contact| contact.key);
-        company.scale(&mut self.mobilities);
+        company.mates().scale(&mut self.mobilities);
         self.solve((h, settings), velocities, system, company);
-        company.watch(self.list.iter().zip(self.solver.impulses()), velocities);
+        company.mates_mut().watch(self.list.iter().zip(self.solver.impulses()), velocities);
         velocities.truncate(own);
         self.mobilities.truncate(own);
     }
@@ -114,7 +116,7 @@ impl Contacts {
         let Self { list: contacts, mobilities, solver, free, .. } = self;
         let problem = Problem { contacts, kin: &[], h_s, mobilities, settings };
         let own = system.vertices();
-        let stands = company.press();
+        let stands = company.mates_mut().press();
         if stands {
             free.clear();
             free.extend_from_slice(velocities);
@@ -122,15 +124,15 @@ impl Contacts {
         loop {
             solver.solve(&problem, velocities, &mut |impulses: &mut [DVec3]| {
                 system.respond(&mut impulses[..own]);
-                company.respond(impulses);
+                company.mates().respond(impulses);
             });
             // each time round one more who stands gives way
-            if !stands || !company.gives_way(contacts.iter().zip(solver.impulses()), velocities.len()) {
+            if !stands || !company.mates_mut().gives_way(contacts.iter().zip(solver.impulses()), velocities.len()) {
                 break;
             }
             velocities.copy_from_slice(free);
         }
-        company.release();
+        company.mates_mut().release();
     }
 
     /// Finds what may close within the substep, and says how well it is to be solved.
@@ -172,7 +174,8 @@ impl Contacts {
             }
         }
         let fixed = list.len();
-        company.find(&here, (h, *slack_m, speed), velocities, (room, list));
+        let search = Search { h_s: h, slack_m: *slack_m, speed_m_s: speed };
+        company.mates_mut().find(&here, search, velocities, (room, list));
         if stands && list.len() > fixed { SQUEEZED } else { SETTINGS }
     }
 

@@ -31,7 +31,7 @@ impl SoftBody {
             doubling.finer[0].clone_from(positions);
             doubling.finer[1].clone_from(velocities);
         }
-        if !(self.company.is_empty() && self.given.is_empty()) {
+        if !(self.company.mates().is_empty() && self.given.is_empty()) {
             doubling.watch.give_up();
         }
         if !doubling.watch.is_on() {

@@ -4,8 +4,7 @@
 //! Theory: docs/theory/soft.md, eq. 3, 4; docs/theory/coupling.md, eq. 9.
 
 use super::system::System;
-use crate::coupling::Link;
-use crate::rod::Far;
+use crate::coupling::{Far, Link, Pulled};
 use crate::{AgentId, Anchor, Pull};
 use glam::{DMat3, DVec3};
 
@@ -82,24 +81,17 @@ impl Tie {
     /// links pull at that agent in all.
     pub fn aim(&mut self, far: &Far, point: DVec3, (h, shared): (f64, usize)) {
         let Some(link) = self.link else { return };
-        let way = point - far.point;
-        let distance = way.length();
-        let (k, d) = (link.stiffness_n_m, link.damping_n_s_m);
-        let mut aim = far.point;
-        (self.stiffness, self.damping) = (round(k), round(d));
-        if link.rest_m > 0.0 && distance > 0.0 {
-            let along = way / distance;
-            let outer = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
-            // a spring in compression has no stiffness across: it would have less than none
-            let across = k * (1.0 - link.rest_m / distance).max(0.0);
-            self.stiffness = round(across) + outer * (k - across);
-            self.damping = outer * d;
-            aim += along * link.rest_m;
-        }
-        (self.target, self.target_velocity) = (aim, far.velocity);
+        let spring = far.spring(&link, point);
+        (self.stiffness, self.damping) = (spring.stiffness, spring.damping);
+        (self.target, self.target_velocity) = (spring.target, far.velocity);
         let resistance = self.stiffness * (h * h) + self.damping * h;
         self.yields = far.inverse_mass * shared as f64;
         self.ease = (DMat3::IDENTITY + resistance * self.yields).inverse();
+    }
+
+    /// What it gave in the last substep; `None` where nobody feels it.
+    pub fn pulled(&self) -> Option<Pulled> {
+        self.by.map(|by| Pulled { by, link: self.link, given: self.given })
     }
 
     /// By how much more the far end is spared than was expected, m/s, where the links to its agent make it `move_m_s` and this end

@@ -31,6 +31,6 @@ impl SoftBody {
         } else {
             into.inertia = Inertia::Immovable;
         }
-        self.company.write(into);
+        self.company.mates().write(into);
     }
 }

@@ -50,7 +50,7 @@ impl TubeContacts {
             return 0.0;
         }
         let own = velocities.len();
-        company.extend(velocities, solved.h);
+        company.mates_mut().extend(velocities, solved.h);
         if first {
             let arc_m = &solved.division.arc_m;
             let radii_m = std::mem::take(&mut self.radii_m);
@@ -72,15 +72,15 @@ impl TubeContacts {
             return 0.0;
         }
         self.scale(solved);
-        company.scale(&mut self.mobilities);
+        company.mates().scale(&mut self.mobilities);
         let met = !company.is_empty();
         let mut answer = |impulses: &mut [DVec3]| {
             respond((solved.factor, solved.matter.held), &mut impulses[..own]);
-            company.respond(impulses);
+            company.mates().respond(impulses);
         };
         self.solve((solved.h, SETTINGS), velocities, met, &mut answer);
         if met {
-            company.watch(self.impulses(), velocities);
+            company.mates_mut().watch(self.impulses(), velocities);
         }
         velocities[own..].fill(DVec3::ZERO); // what the others do is not this tube's work
         let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();

@@ -1,10 +1,10 @@
-//! One agent that a tube touches or is linked to during a step.
+//! One agent that a body that bends touches or is linked to during a step.
 //!
-//! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the tube's solve, entries in the ledger.
-//! Never here: the solve itself, the tube's own state. Theory: docs/theory/coupling.md.
+//! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the owner's solve, entries in the ledger.
+//! Never here: the solve itself, the owner's own state. Theory: docs/theory/coupling.md.
 
-use super::holds::Far;
-use super::tank::{Tank, Tanks};
+use super::far::Far;
+use super::tanks::{Account, Tanks};
 use crate::coupling::{Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
 use crate::coupling::{PUSH_OUT_SHARE, inverse_mass};
 use crate::{Anchor, Inertia, Neighbour, SimTime, Surroundings};
@@ -23,7 +23,7 @@ const TOUCH_PARTS_SHIFT: u32 = 58;
 /// is longer: as of a depth.
 const BACK_SHARE: f64 = PUSH_OUT_SHARE;
 
-/// One agent near a tube.
+/// One agent near a body that bends.
 #[derive(Clone, Default)]
 pub struct Mate {
     /// Where it is.
@@ -39,7 +39,7 @@ pub struct Mate {
     strongest: Option<(Contact, f64)>,
     /// What it weighs: the inverse mass of both sides, 1/kg.
     weighed: Option<[f64; 2]>,
-    /// Whether impulses passed in the step, and whether this tube woke it.
+    /// Whether impulses passed in the step, and whether its owner woke it.
     acted: bool,
     /// Linear impulse given in the step, N·s.
     given: DVec3,
@@ -82,7 +82,7 @@ impl Mate {
     }
 
     /// Takes in a neighbour, as it was published if `stale`; whether it is one that can be touched or held. `friction` is the
-    /// tube's.
+    /// owner's.
     pub fn look(
         &mut self,
         neighbour: &Neighbour,
@@ -117,7 +117,7 @@ impl Mate {
         list.first().copied().unwrap_or(DVec3::ZERO)
     }
 
-    /// The reduced mass of the pair with a tube of `mass_kg`.
+    /// The reduced mass of the pair with an owner of `mass_kg`.
     fn reduced_kg(&self, mass_kg: f64) -> f64 {
         match self.other.neighbour().map(|n| &n.snapshot.inertia) {
             Some(Inertia::Rigid { inverse_mass, .. }) => mass_kg / (1.0 + mass_kg * inverse_mass),
@@ -128,9 +128,9 @@ impl Mate {
     /// Lets the tank of the pair say how far push-out has to fade.
     pub fn ask(&mut self, tanks: &mut Tanks) {
         let velocity = self.velocity();
-        if let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) {
-            tank.correct(velocity);
-            self.fade = tank.fade();
+        if let Some(account) = self.other.id().and_then(|id| tanks.get(id)) {
+            account.correct(velocity);
+            self.fade = account.fade();
         }
     }
 
@@ -143,21 +143,21 @@ impl Mate {
         if !self.evenly {
             return;
         }
-        let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) else { return };
-        tank.astray.learn(&self.other, now);
+        let Some(account) = self.other.id().and_then(|id| tanks.get(id)) else { return };
+        account.astray.learn(&self.other, now);
         let span_s = self.other.neighbour().map_or(dt, |n| n.step_s.max(dt));
         self.back_share = BACK_SHARE * dt / span_s;
-        self.back.extend(tank.astray.owed().iter().map(|owed| *owed * (BACK_SHARE / span_s)));
-        self.lasts.extend_from_slice(&tank.last);
+        self.back.extend(account.astray.owed().iter().map(|owed| *owed * (BACK_SHARE / span_s)));
+        self.lasts.extend_from_slice(&account.last);
     }
 
     /// Keeps that for the step that begins at `end`.
     pub fn keep(&mut self, tanks: &mut Tanks, end: SimTime) {
-        let tank = self.other.id().filter(|_| self.acted).and_then(|id| tanks.get(id));
-        if let Some(tank) = tank {
-            std::mem::swap(&mut tank.last, &mut self.lasts);
-            tank.astray.pay(self.back_share);
-            tank.astray.expect(&self.other, end);
+        let account = self.other.id().filter(|_| self.acted).and_then(|id| tanks.get(id));
+        if let Some(account) = account {
+            std::mem::swap(&mut account.last, &mut self.lasts);
+            account.astray.pay(self.back_share);
+            account.astray.expect(&self.other, end);
         }
     }
 
@@ -239,7 +239,7 @@ impl Mate {
         }
     }
 
-    /// The contact of a place: this tube is the first of the two.
+    /// The contact of a place: the owner is the first of the two.
     fn contact(&self, touch: &Touch) -> Contact {
         let slots = self.slots_of(touch);
         let place = touch.key & ((1 << PART_SHIFT) - 1) | (touch.key >> TOUCH_PARTS_SHIFT & 0xf) << PART_SHIFT;
@@ -377,7 +377,7 @@ impl Mate {
     pub fn weigh(&mut self, tanks: &mut Tanks, own: usize, respond: impl Fn(&mut [DVec3])) {
         // who rests is only held for as long as nobody comes: that is not what it weighs
         let Some((contact, _)) = self.strongest.filter(|_| !self.other.is_asleep()) else { return };
-        if !self.other.id().is_some_and(|id| tanks.get(id).is_none_or(Tank::weighs)) {
+        if !self.other.id().is_some_and(|id| tanks.get(id).is_none_or(Account::weighs)) {
             return;
         }
         let mut room = std::mem::take(&mut self.room);
@@ -396,8 +396,8 @@ impl Mate {
         (exchange, tanks): (&mut Exchange, &mut Tanks),
         (start, h): (f64, f64),
     ) {
-        if let Some(tank) = self.other.id().and_then(|id| tanks.get(id)) {
-            tank.spend(self.work_j);
+        if let Some(account) = self.other.id().and_then(|id| tanks.get(id)) {
+            account.tank.spend(self.work_j);
         }
         if self.acted {
             let (first, end) = (self.slots.0, self.end());
@@ -451,10 +451,10 @@ impl Mate {
     /// Writes on the state of the pair.
     pub fn tell(&mut self, exchange: &mut Exchange, tanks: &mut Tanks, mass_kg: f64) {
         if let (true, Some(id)) = (self.acted, self.other.id()) {
-            let tank = tanks.of(id, self.reduced_kg(mass_kg));
-            tank.expect(self.velocity(), self.given);
+            let account = tanks.of(id, self.reduced_kg(mass_kg));
+            account.expect(self.velocity(), self.given);
             let pair = exchange.pair_mut(id);
-            pair.tank_j = Some(tank.left_j);
+            pair.tank_j = Some(account.tank.left_j());
             pair.kind = if self.linked { PairKind::Attachment } else { PairKind::Ledger };
             (pair.contacts, pair.penetration_m) = (self.contacts, self.depth_m);
             pair.inverse_mass_per_kg = self.weighed.or(pair.inverse_mass_per_kg);
