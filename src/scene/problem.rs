@@ -169,6 +169,10 @@ fn floor_boundary(text: &str, at: usize) -> usize {
 /// Serde's words in the words of a scene: the message, and what was expected where it says so.
 fn plain_words(message: &str) -> (String, Option<String>) {
     let first_line = message.lines().next().unwrap_or_default();
+    // every choice in a scene is one of a list of words, and toml asks for one in words of its own
+    if first_line.starts_with("wanted ") {
+        return ("one word is wanted here".to_owned(), Some("expected a word in quotes, as \"auto\"".to_owned()));
+    }
     let (found, expected) = match first_line.split_once(", expected ") {
         Some((found, expected)) => (found, Some(format!("expected {}", plain_type(expected)))),
         None => (first_line, None),

@@ -94,6 +94,9 @@ fn a_wrong_type_says_which_is_right() {
     refused("[0.2, 0.05, 0.0]", "[0.2, 0.05]", "[0.2, 0.05]", &["3 numbers"]);
     refused("n = [1, 5]", "n = [1, 2, 3]", "[1, 2, 3]", &["[least, greatest]"]);
     refused("n = [1, 5]", "n = 1.5", "1.5", &["a whole number"]);
+    for table in ["{ kind = \"threads\", workers = 2 }", "{}", "[1]"] {
+        refused("format = 1", &format!("format = 1\nexecutor = {table}"), table, &["expected a word in quotes"]);
+    }
 }
 
 #[test]
