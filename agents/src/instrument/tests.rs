@@ -1,5 +1,6 @@
 //! What a tool must do: follow its script, follow a hand, catch, hold and let go.
 
+mod bound;
 mod holds;
 mod pushes;
 mod rigid;

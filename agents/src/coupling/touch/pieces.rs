@@ -58,6 +58,8 @@ pub(super) struct Block<'a> {
     pub rotation: DQuat,
     /// A ball around it.
     pub around: Ball,
+    /// Whether it is a part of a tool: thin, and led with force.
+    pub pierces: bool,
 }
 
 impl<'a> Pieces<'a> {
@@ -79,7 +81,7 @@ impl<'a> Pieces<'a> {
                         let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
                         let around = Ball { centre: position, radius_m };
                         let (field, shape) = (known.field(solid), known.shape(form));
-                        Piece::Block(Block { field, shape, origin, rotation, around })
+                        Piece::Block(Block { field, shape, origin, rotation, around, pierces: false })
                     }
                 });
             }
@@ -90,7 +92,8 @@ impl<'a> Pieces<'a> {
                     let rotation = rotation * part.rotation;
                     let around = Ball { centre: origin + rotation * solid.around.centre, ..solid.around };
                     let field = Some(&solid.field);
-                    *piece = Some(Piece::Block(Block { field, shape: &solid.shape, origin, rotation, around }));
+                    let shape = &solid.shape;
+                    *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, pierces: true }));
                 }
             }
             (FormKind::Surface(form), View::Surface(positions)) if !positions.is_empty() => {

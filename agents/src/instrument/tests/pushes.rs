@@ -18,13 +18,13 @@ const JAWS_M: f64 = 0.005;
 const RATES: [(f64, f64); 6] =
     [(240.0, 240.0), (240.0, 120.0), (60.0, 600.0), (600.0, 60.0), (10.0, 1000.0), (1000.0, 10.0)];
 
-fn cube(position: DVec3, mass_kg: f64) -> RigidSpec {
+pub(super) fn cube(position: DVec3, mass_kg: f64) -> RigidSpec {
     let solid = Solid::Box { half_extents_m: HALF };
     RigidSpec { friction: 0.5, gravity: DVec3::Z * -G, sleep: true, ..RigidSpec::free(solid, position, mass_kg) }
 }
 
 /// A tool that pushes with at most `limit_n`.
-fn tool(keyframes: Vec<Keyframe>, limit_n: f64) -> Instrument {
+pub(super) fn tool(keyframes: Vec<Keyframe>, limit_n: f64) -> Instrument {
     Instrument::new(ToolSpec { max_force_n: limit_n, graspable: vec![], ..spec(keyframes) }).unwrap()
 }
 
