@@ -185,6 +185,7 @@ fn a_tool_that_grasps_keeps_every_promise() {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![held],
+        starts_off_m: DVec3::ZERO,
     };
     let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let suite = Suite {
@@ -214,6 +215,7 @@ fn a_tool_led_at_even_speed_keeps_every_promise() {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![],
+        starts_off_m: DVec3::ZERO,
     };
     let make = || Box::new(Instrument::new(spec.clone()).unwrap()) as Box<dyn Agent>;
     let straight = |agent: &dyn Agent, t: f64| {

@@ -36,6 +36,7 @@ fn tool() -> Instrument {
         damping_n_s_m: 0.5,
         max_force_n: 50.0,
         graspable: vec![TUBE],
+        starts_off_m: DVec3::ZERO,
     })
     .unwrap()
 }

@@ -1,15 +1,18 @@
-//! Sets what bends beside what it would start inside.
+//! Sets what bends, and tools, beside what they would start inside.
 //!
-//! In: a scene as it is written. Out: the same scene in which loose agents that bend start clear of all others; who was moved.
+//! In: a scene as it is written. Out: the same scene in which loose agents that bend start clear of all others, and tools of all that
+//! they do not grasp; who was moved.
 //! Never here: running agents, rigid bodies inside each other (they come apart while they run, and gain no speed by it).
 //!
 //! Pushed out while it runs, what bends would be stretched and bent on its way, and spring back: a tube through a block of twice
 //! its width would leave at metres a second. Moved as a whole before anything runs, it holds no energy.
+//! The parts of a tool that is deep in a light box would each push it another way, with all the force of its drive. Drawn back along
+//! its shaft, it comes in as it would have come from outside.
 
 use super::cast::{Scene, Spec};
 use super::figure::{Figure, figure};
 use super::overlap::{Inside, OVERLAP_MIN_M};
-use super::ties::CouplingKind;
+use super::ties::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_agents::AgentId;
 use metachron_agents::coupling::Touch;
@@ -38,13 +41,15 @@ const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG
 
 impl Scene {
     /// Moves every loose agent that bends out of what it is inside, the shortest way that leaves it clear of all; of two that
-    /// bend the later one. A loose rigid body is moved out of what bends and is held. Where there is no such way, nothing is moved.
+    /// bend the later one. A loose rigid body is moved out of what bends and is held, a tool out of all that it does not grasp. Where
+    /// there is no such way, nothing is moved.
     pub(super) fn set_apart(&mut self, inside: &[(AgentId, Inside, f64)]) {
-        let movers: BTreeSet<AgentId> = inside.iter().filter_map(|(a, b, _)| self.mover(*a, *b)).collect();
-        if movers.is_empty() {
+        let pairs: Vec<_> = inside.iter().map(|(a, b, _)| self.movers(*a, *b)).filter(|all| !all.is_empty()).collect();
+        if pairs.is_empty() {
             return;
         }
         let mut figures: Vec<Figure> = self.agents.iter().filter_map(figure).collect();
+        let movers: BTreeSet<AgentId> = pairs.iter().filter_map(|all| self.nearer_out(all, &figures)).collect();
         for mover in movers {
             let Some(at) = figures.iter().position(|figure| figure.id == mover) else { continue };
             let Some(by_m) = self.way_out(&figures[at], &figures) else { continue };
@@ -54,24 +59,54 @@ impl Scene {
                 Spec::Tube(tube) => tube.path_m.iter_mut().for_each(|point| *point += by_m),
                 Spec::Soft(soft) => soft.position += by_m,
                 Spec::Rigid(body) => body.position += by_m,
-                Spec::Instrument(_) | Spec::Synthetic(_) => {}
+                Spec::Instrument(tool) => tool.starts_off_m += by_m,
+                Spec::Synthetic(_) => {}
             }
             self.moved.push(Moved { object: member.name.clone(), by_m });
         }
     }
 
-    /// Who of two is moved, if anybody.
-    fn mover(&self, a: AgentId, b: Inside) -> Option<AgentId> {
+    /// Who of two may be moved.
+    fn movers(&self, a: AgentId, b: Inside) -> Vec<AgentId> {
         let bends = |id: AgentId| matches!(self.agents[id.0 as usize].spec, Spec::Tube(_) | Spec::Soft(_));
-        let led = |id: AgentId| matches!(self.agents[id.0 as usize].spec, Spec::Instrument(_));
+        let loose = |id: &AgentId| bends(*id) && self.is_loose(*id);
         match b {
-            Inside::Fixed(_) => Some(a).filter(|a| bends(*a) && self.is_loose(*a)),
-            Inside::Agent(b) if led(a) || led(b) || !(bends(a) || bends(b)) => None,
+            Inside::Fixed(_) => Some(a).filter(loose).into_iter().collect(),
+            Inside::Agent(b) if self.is_led(a) || self.is_led(b) => {
+                let (tool, other) = if self.is_led(a) { (a, b) } else { (b, a) };
+                let comes_back = self.comes_back(tool, other);
+                [tool, other].into_iter().filter(|id| comes_back && (*id == tool || loose(id))).collect()
+            }
+            Inside::Agent(b) if !(bends(a) || bends(b)) => vec![],
             Inside::Agent(b) => {
-                let loose = |bending: bool| [b, a].into_iter().find(|id| bends(*id) == bending && self.is_loose(*id));
-                loose(true).or_else(|| loose(false))
+                let rigid = || [b, a].into_iter().find(|id| !bends(*id) && self.is_loose(*id));
+                [b, a].into_iter().find(loose).or_else(rigid).into_iter().collect()
             }
         }
+    }
+
+    /// Which of them has the shorter way out of all.
+    fn nearer_out(&self, all: &[AgentId], figures: &[Figure]) -> Option<AgentId> {
+        if let [one] = all {
+            return Some(*one);
+        }
+        let way_m = |id: AgentId| {
+            let figure = figures.iter().find(|figure| figure.id == id)?;
+            Some((self.way_out(figure, figures)?.length(), id))
+        };
+        let ways = all.iter().filter_map(|id| way_m(*id));
+        ways.min_by(|(a, _), (b, _)| a.total_cmp(b)).map(|(_, id)| id)
+    }
+
+    fn is_led(&self, id: AgentId) -> bool {
+        matches!(self.agents[id.0 as usize].spec, Spec::Instrument(_))
+    }
+
+    /// Whether a tool comes to its path from outside of what it starts inside: it does not grasp that, and nothing is linked to it.
+    fn comes_back(&self, tool: AgentId, other: AgentId) -> bool {
+        let Spec::Instrument(spec) = &self.agents[tool.0 as usize].spec else { return false };
+        let linked = |c: &Coupling| matches!(c.kind, CouplingKind::Attach { .. }) && (c.a == tool || c.b == tool);
+        !(spec.graspable.contains(&other) || self.couplings.iter().any(linked))
     }
 
     /// Whether nothing holds an agent where the scene puts it.
@@ -88,9 +123,15 @@ impl Scene {
         !(jointed || attached || held)
     }
 
-    /// The shortest way on which `figure` gets clear of everything that it touches.
+    /// The shortest way on which `figure` gets clear of everything that it touches; back along its shaft, if that leads out, of a tool.
     fn way_out(&self, figure: &Figure, figures: &[Figure]) -> Option<DVec3> {
         let mut around = Around { scene: self, figures, apart: self.pairs_apart(), room: TouchRoom::default() };
+        let back = figure.back();
+        if let Some(way) = back
+            && let Some(far_m) = around.clear(figure, way, f64::INFINITY)
+        {
+            return Some(way * far_m);
+        }
         let mut ways = AXES.to_vec();
         around.deepest(figure, |touch| {
             if ways.len() < WAYS && ways.iter().all(|way| way.dot(touch.normal) < SAME_WAY) {
@@ -147,7 +188,8 @@ impl Around<'_> {
         for other in others.filter(|other| self.scene.touch(figure, other, &self.apart)) {
             look(other, &mut self.room);
         }
-        for obstacle in self.scene.obstacles.iter() {
+        // a tool passes through what is fixed
+        for obstacle in self.scene.obstacles.iter().filter(|_| figure.back().is_none()) {
             if let Some(fixed) = figure.over(obstacle) {
                 look(&fixed, &mut self.room);
             }

@@ -50,6 +50,11 @@ impl Figure {
         Self { id: self.id, form: self.form.clone(), place, low: self.low + by_m, high: self.high + by_m }
     }
 
+    /// Back along the shaft of a tool.
+    pub fn back(&self) -> Option<DVec3> {
+        if let Pose::Tool(_, rotation, _) = &self.place { Some(*rotation * DVec3::NEG_Z) } else { None }
+    }
+
     /// A fixed solid where it stands, if this may be inside it. A plane is a slab below this figure, as high as the plane.
     /// Meshes are left out: what is inside one of them may be in its hollow.
     pub fn over(&self, obstacle: &Obstacle) -> Option<Self> {
@@ -118,7 +123,8 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
         Spec::Instrument(spec) => {
             let (key, shape) = (spec.keyframes.first()?, ToolShape::default());
             let reach = DVec3::splat(shape.shaft_length_m + TOOL_TIP_RADII * shape.shaft_radius_m);
-            (FormKind::Tool(shape), Pose::Tool(key.tip_m, key.rotation, key.jaw), key.tip_m - reach, key.tip_m + reach)
+            let tip = key.tip_m + spec.starts_off_m;
+            (FormKind::Tool(shape), Pose::Tool(tip, key.rotation.normalize(), key.jaw), tip - reach, tip + reach)
         }
         Spec::Synthetic(_) => return None,
     };

@@ -96,3 +96,54 @@ fn who_is_moved_is_told() {
         "{said}"
     );
 }
+
+/// A light box on a floor, and a tool with its tip at `tip_m` in it that points down, after two seconds.
+fn pierced(mass_kg: f64, rates: (f64, f64), (tip_m, force_n): ([f64; 3], f64)) -> Value {
+    let floor = object("floor", "model = \"rigid\"\nshape = \"plane\"\nfixed = true");
+    let light = object("box", &format!("{BOX}\nmass_kg = {mass_kg}\nrate_hz = {}", rates.0));
+    let script = format!("keyframe = [{{ tip_m = {tip_m:?}, rotation_deg = [180, 0, 0], jaw = 0.0 }}]");
+    let drive = format!("model = \"instrument\"\nrate_hz = {}\nmax_force_n = {force_n}\n", rates.1);
+    let tool = object("tool", &format!("{drive}{script}"));
+    let probes = ["box", "tool"].map(|name| format!("[[probe]]\nobject = \"{name}\"\n")).concat();
+    Folder::with(&format!("{floor}{light}{tool}{probes}")).lockstep(&["--seconds", "2"])
+}
+
+#[test]
+fn a_tool_that_starts_deep_in_a_light_box_is_drawn_back_and_throws_nothing() {
+    for (rates, mass_kg, tip_m, force_n) in [
+        ((240.0, 240.0), 0.2, [0.01, 0.0, 0.05], 50.0),
+        ((600.0, 60.0), 0.05, [0.01, 0.0, 0.05], 50.0),
+        ((60.0, 600.0), 0.2, [0.0, 0.02, 0.03], 500.0),
+        ((10.0, 1000.0), 0.05, [0.0, 0.02, 0.08], 5.0),
+    ] {
+        let report = pierced(mass_kg, rates, (tip_m, force_n));
+        let moved = &report["moved"].as_array().unwrap()[..];
+        let [moved] = moved else { panic!("{moved:?}") };
+        // along its shaft, until its jaws, 5 mm beyond the tip, stand on the top
+        let back_m = point(moved, "/by_m")[2];
+        assert!(moved["object"] == "tool" && (back_m - (0.105 - tip_m[2])).abs() < 1e-3, "{rates:?}: {moved}");
+        let [at, tip] = [0, 1].map(|k| point(&report, &format!("/probes/{k}/position_m")));
+        println!("{rates:?} {mass_kg} kg: box at {at:?}, tip at {tip:?}");
+        let off_m = at.iter().zip([0.0, 0.0, 0.05]).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+        assert!(off_m < 1e-3, "{rates:?} {mass_kg} kg: the box is {off_m} m aside");
+        assert!((tip[2] - 0.105).abs() < 1e-3, "{rates:?} {mass_kg} kg: the tip is at {tip:?}");
+    }
+}
+
+#[test]
+fn a_rope_that_starts_on_a_tool_starts_beside_it_and_what_is_grasped_stays() {
+    let rope = "model = \"rope\"\npath_m = [[-0.1, 0, 0.003], [0.1, 0, 0.003]]\nradius_m = 0.005\nsegments = 11\nyoung_pa = 1.0e6\ndensity_kg_m3 = 1000.0\nsleep = false";
+    let tool = |keys: &str| {
+        let script = "keyframe = [{ tip_m = [0, 0.1, 0], rotation_deg = [-90, 0, 0], jaw = 0.0 }]";
+        object("tool", &format!("model = \"instrument\"\n{script}\n{keys}"))
+    };
+    let report = play(&format!("{}{}", object("rope", rope), tool("")));
+    let moved = &report["moved"].as_array().unwrap()[..];
+    let [moved] = moved else { panic!("{moved:?}") };
+    // the shaft is 5 mm across
+    let up_m = point(moved, "/by_m")[2];
+    assert!(moved["object"] == "rope" && (up_m - 0.0045).abs() < 5e-4, "{moved}");
+    assert!(number(agent(&report, "rope"), "/energy_j").abs() < 1e-9);
+    let grasped = play(&format!("{}{}", object("rope", rope), tool("grasps = [\"rope\"]")));
+    assert!(grasped["moved"].as_array().unwrap().is_empty(), "{}", grasped["moved"]);
+}

@@ -22,6 +22,8 @@ pub struct ToolSpec {
     pub max_force_n: f64,
     /// What it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
+    /// From the first keyframe to where its tip starts, metres: it goes to its path from there as after a hand.
+    pub starts_off_m: DVec3,
 }
 
 /// Where a tool is at one time of its script.
@@ -100,6 +102,8 @@ impl ToolSpec {
         let f = self.max_force_n;
         number("the greatest force", f, within(f, 1e-6, 1e9), "between 1e-6 and 1e9 N")?;
         number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
+        let off_m = self.starts_off_m.length();
+        number("the way from the first keyframe", off_m, within(off_m, 0.0, REACH_MAX_M), "finite, within 1e6 m")?;
         let mut before_s = f64::NEG_INFINITY;
         for (index, key) in self.keyframes.iter().enumerate() {
             key.check(index)?;

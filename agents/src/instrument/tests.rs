@@ -31,6 +31,7 @@ fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
         damping_n_s_m: 1.0,
         max_force_n: 50.0,
         graspable: vec![TUBE],
+        starts_off_m: DVec3::ZERO,
     }
 }
 

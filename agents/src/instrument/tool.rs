@@ -68,7 +68,7 @@ const LAIN_M_S: f64 = 2e-3;
 const SAME_TURN: f64 = 1e-14;
 
 impl Instrument {
-    /// Builds the tool of `spec`, in its first keyframe.
+    /// Builds the tool of `spec`, in its first keyframe or as far off as it says.
     ///
     /// # Errors
     /// [`ToolError`] for a script without keyframes, times that do not rise, and any number outside its range.
@@ -76,6 +76,7 @@ impl Instrument {
         spec.check()?;
         let script = Script::new(&spec.keyframes, spec.repeat);
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
+        let tip = tip + spec.starts_off_m;
         let spin = DVec3::ZERO;
         let tool = ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0 };
         let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });

@@ -27,6 +27,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Give
         damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
         max_force_n: c.number_or(place, "max_force_n", (file.max_force_n, FORCE_DEFAULT_N), &allowed(1e-3..=1e6, "N")),
         graspable: graspable(c, place, file, names),
+        starts_off_m: DVec3::ZERO,
     }
 }
 

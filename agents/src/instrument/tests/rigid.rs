@@ -64,8 +64,8 @@ impl Pair {
         let mut stage = Stage::new(faults);
         let body = stage.add(RigidBody::new(on_floor(cube(START))).unwrap(), rates.0);
         let (reach_m, stiffness_n_m) = (REACH_M, STIFFNESS_N_M);
-        let (graspable, max_force_n) = (vec![body], 50.0);
-        let spec = ToolSpec { keyframes, repeat: false, reach_m, stiffness_n_m, damping_n_s_m, max_force_n, graspable };
+        let graspable = vec![body];
+        let spec = ToolSpec { reach_m, stiffness_n_m, damping_n_s_m, graspable, ..spec(keyframes) };
         let tool = stage.add(Instrument::new(spec).unwrap(), rates.1);
         Self { stage, body, tool }
     }

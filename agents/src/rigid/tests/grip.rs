@@ -67,6 +67,7 @@ fn hand(at: DVec3) -> Instrument {
         damping_n_s_m: 0.0,
         max_force_n: 50.0,
         graspable: vec![],
+        starts_off_m: DVec3::ZERO,
     };
     Instrument::new(tool).unwrap()
 }

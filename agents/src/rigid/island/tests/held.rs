@@ -95,6 +95,7 @@ impl Hanging {
             damping_n_s_m: 20.0,
             max_force_n: 50.0,
             graspable: vec![AgentId(0)],
+            starts_off_m: DVec3::ZERO,
         };
         Self { party, tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO }
     }
@@ -165,6 +166,7 @@ fn a_tool_presses_what_shares_a_world_as_hard_as_a_lone_body() {
             damping_n_s_m: 1.0,
             max_force_n: LIMIT_N,
             graspable: vec![],
+            starts_off_m: DVec3::ZERO,
         };
         let (tool, party) = (Instrument::new(spec).unwrap(), Party::new([standing(0.15), standing(0.05)]));
         let mut pressing = Hanging { party, tool, time: SimTime::ZERO };

@@ -60,6 +60,7 @@ fn hand(side: f64, way_m: f64) -> Instrument {
         damping_n_s_m: 0.0,
         max_force_n: 50.0,
         graspable: vec![],
+        starts_off_m: DVec3::ZERO,
     };
     Instrument::new(spec).unwrap()
 }
