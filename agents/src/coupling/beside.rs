@@ -44,6 +44,26 @@ pub fn longest_step(
     if around.neighbours.iter().any(near) { SimSpan::from_nanos(dt.as_nanos() / u64::from(parts)) } else { dt }
 }
 
+/// A part of a step of `dt` that is no longer than `most_s` tells of any neighbour that may be touched in it; a millisecond at least.
+/// Who is held up, or makes up for it, does not count: the two are not at one time.
+pub fn no_longer(
+    dt: SimSpan,
+    around: &Surroundings<'_>,
+    bounds: impl FnOnce() -> Bounds,
+    most_s: impl Fn(&Neighbour) -> Option<f64>,
+) -> SimSpan {
+    let dt_s = dt.as_secs_f64();
+    let apart = |n: &Neighbour| around.time.secs_after(n.snapshot.time).abs() > AHEAD_S + n.step_s;
+    let shorter = |n: &Neighbour| most_s(n).map(|s| s.max(HURRY_S)).filter(|s| *s < dt_s && !apart(n));
+    if around.neighbours.iter().all(|n| shorter(n).is_none()) {
+        return dt;
+    }
+    let bounds = bounds();
+    let near = around.neighbours.iter().filter(|n| may_touch(n, around, &bounds, dt_s));
+    let least_s = near.filter_map(shorter).fold(dt_s, f64::min);
+    SimSpan::from_nanos(dt.as_nanos() / (dt_s / (least_s * SPLIT_SLACK)).ceil() as u64)
+}
+
 /// A part of a step of `dt` in which nobody whose pair the body owns and whom it may touch comes farther than `way_m`; a millisecond
 /// at least.
 pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Bounds, way_m: f64) -> SimSpan {

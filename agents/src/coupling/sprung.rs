@@ -83,6 +83,8 @@ pub(super) struct Lean {
     fresh: Twist,
     /// The acceleration with which the body makes its next step, and how long after the published state that ends, seconds.
     steady: Option<(Twist, f64)>,
+    /// Whether a blow meets it: in no time a drive of limited force gives nothing, and its mass alone answers.
+    struck: bool,
 }
 
 impl Lean {
@@ -101,7 +103,13 @@ impl Lean {
             faster: none,
             fresh: none,
             steady: None,
+            struck: false,
         }
+    }
+
+    /// A blow begins or ends (eq. 9h).
+    pub(super) fn strike(&mut self, struck: bool) {
+        self.struck = struck && self.sprung.limit_n.is_finite();
     }
 
     /// Takes impulses that last for `h` seconds, or for the body's own step where that is longer, from now on.
@@ -130,11 +138,19 @@ impl Lean {
 
     /// The velocities that an impulse causes.
     pub(super) fn respond(&self, impulse: Twist) -> Twist {
-        self.answer.times(impulse)
+        if self.struck {
+            [impulse[0] * self.inertia.0, self.inertia.1 * impulse[1]]
+        } else {
+            self.answer.times(impulse)
+        }
     }
 
     /// The inverse mass (1/kg) and the mean inverse inertia (1/(kg·m²)) with which it answers.
     pub(super) fn mobility(&self) -> [f64; 2] {
+        if self.struck {
+            let turning = self.inertia.1;
+            return [self.inertia.0, (turning.x_axis.x + turning.y_axis.y + turning.z_axis.z) / 3.0];
+        }
         let a = &self.answer.0;
         [(a[0][0] + a[1][1] + a[2][2]) / 3.0, (a[3][3] + a[4][4] + a[5][5]) / 3.0]
     }

@@ -64,6 +64,8 @@ const CATCH_SHARE: f64 = 0.5;
 const ARRIVED: f64 = 1e-7;
 /// A tool on which others sleep keeps still below this, m/s.
 const LAIN_M_S: f64 = 2e-3;
+/// Near others steps are no longer than a rigid body's there, seconds.
+const PART_MAX_S: f64 = 1.0 / 240.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
@@ -266,10 +268,16 @@ impl Agent for Instrument {
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
-    /// What its drive and a body that it pushes together make of each other neither foresees.
+    /// What its drive and a body that it pushes together make of each other neither foresees; and what it hears of once in several
+    /// steps of who pushes it would go on through all of its own.
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
-        beside::longest_step(dt, around, || bounds(&self.tool, self.speed_m_s), |n| !spared(n))
+        let bounds = || bounds(&self.tool, self.speed_m_s);
+        let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
+        // what it comes to catch it will let in
+        let catches = |n: &Neighbour| self.tool.jaw > GRASP_BELOW && self.spec.graspable.contains(&n.id);
+        let pushes = |n: &Neighbour| !(spared(n) || catches(n));
+        beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -277,8 +285,8 @@ impl Agent for Instrument {
     }
 
     /// Tells how long a step is before it has made one: others foresee its drive over that.
-    fn look(&mut self, dt: SimSpan, _around: &Surroundings<'_>) {
-        self.drive.look(dt.as_secs_f64());
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        self.drive.look(self.longest_step(dt, around).as_secs_f64());
     }
 
     /// A tool has no samples to spread: nothing changes.

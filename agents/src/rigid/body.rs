@@ -326,12 +326,10 @@ impl Agent for RigidBody {
         let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
         let squeezes = |n: &Neighbour| bends(n) && (owners > 1 || (!self.stays() && lands()));
         let strikes = |n: &Neighbour| matches!(n.snapshot.body, Body::Rigid(_)) && lands();
-        beside::longest_step(
-            dt,
-            around,
-            || self.bounds(),
-            |n| is_driven(n, around) || (!n.owned && (squeezes(n) || strikes(n))),
-        )
+        let driven = |n: &Neighbour| is_driven(n, around);
+        let wild = |n: &Neighbour| driven(n) || (!n.owned && (squeezes(n) || strikes(n)));
+        let part = beside::longest_step(dt, around, || self.bounds(), wild);
+        beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S))
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -215,6 +215,11 @@ impl Company {
         self.guests[..self.count].iter_mut().for_each(|guest| guest.other.foresee(h));
     }
 
+    /// A blow begins or ends.
+    pub(super) fn strike(&mut self, struck: bool) {
+        self.guests[..self.count].iter_mut().for_each(|guest| guest.other.strike(struck));
+    }
+
     /// There is nobody until the next step.
     pub(super) const fn dismiss(&mut self) {
         self.count = 0;

@@ -102,17 +102,24 @@ impl Meeting {
         fixed: &mut Obstacles,
         strike: Strike,
     ) -> bool {
+        company.strike(true);
         self.lay_out(me, company, (0.0, DVec3::ZERO));
         self.find_blows(me, company, fixed, strike);
-        if self.found.iter().all(|found| found.approach_m_s <= 0.0) {
-            return false;
+        let approached = self.found.iter().any(|found| found.approach_m_s > 0.0);
+        if approached {
+            self.exchange_blow(me, company);
         }
+        company.strike(false);
+        approached
+    }
+
+    /// Solves a blow, and gives everybody what it is.
+    fn exchange_blow(&mut self, me: &mut Me<'_>, company: &mut Company) {
         self.wake(company);
         self.blow.start_afresh();
         self.solve(company, 1.0, true);
         self.strike_in_turn(company);
         self.give(me, company, 0.0);
-        true
     }
 
     /// Solves a blow again that made energy: with those contacts alone that approach, and if need be without rebound.

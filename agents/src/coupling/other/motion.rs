@@ -56,6 +56,13 @@ impl Other {
         }
     }
 
+    /// A blow, which takes no time, begins or ends: a drive of limited force gives nothing in it.
+    pub fn strike(&mut self, struck: bool) {
+        if let Some(lean) = &mut self.lean {
+            lean.strike(struck);
+        }
+    }
+
     /// The mean inverse mass (1/kg) and inverse inertia of a body on springs.
     #[must_use]
     pub fn mobility(&self) -> Option<[f64; 2]> {

@@ -1,10 +1,68 @@
-//! What bounds what a tool does to others: the skin of what it has pierced.
+//! What bounds what a tool does to others: the force of its drive, in its first touch too, and the skin of what it has pierced.
 
-use super::pushes::{cube, tool};
+use super::pushes::{HALF, JAWS_M, TOP_M, body, cube, pose, tool};
 use super::rigid::{G, down, on_floor};
 use super::*;
 use crate::coupling::harness::{Faults, Stage};
+use crate::rigid::RigidBody;
 use crate::soft::{SoftBody, SoftMatter, SoftShape, SoftSpec};
+
+/// What a body gave a tool, as its pair tells.
+struct Given {
+    /// Time and impulse at each state of the body, seconds and N·s.
+    at: Vec<(f64, f64)>,
+    /// The most that the tool told, N.
+    told_n: f64,
+}
+
+impl Given {
+    fn new() -> Self {
+        Self { at: vec![(0.0, 0.0)], told_n: 0.0 }
+    }
+
+    fn look(&mut self, stage: &Stage, body: AgentId, tool: AgentId) {
+        self.told_n = self.told_n.max(pose(stage, tool).force_n);
+        let (seen, last) = (stage.newest(body), self.at[self.at.len() - 1]);
+        let sum = seen.pairs.iter().find(|pair| pair.with == tool).map_or(last.1, |pair| pair.impulse_n_s);
+        if seen.time.as_secs_f64() > last.0 {
+            self.at.push((seen.time.as_secs_f64(), sum));
+        }
+    }
+
+    /// The most that was given a second in any time of `least_s` or the next longer that its states show, N.
+    fn most_n(&self, least_s: f64) -> f64 {
+        let mean_n = |(i, &(from_s, from)): (usize, &(f64, f64))| {
+            let (to_s, to) = self.at[i..].iter().find(|(to_s, _)| to_s - from_s >= least_s)?;
+            Some((to - from) / (to_s - from_s))
+        };
+        self.at.iter().enumerate().filter_map(mean_n).fold(0.0, f64::max)
+    }
+}
+
+#[test]
+fn a_tool_comes_down_on_what_stands_with_no_more_than_its_drive() {
+    const LIMIT_N: f64 = 50.0;
+    let rates = [(240.0, 240.0), (240.0, 120.0), (120.0, 240.0), (60.0, 60.0), (600.0, 60.0), (1000.0, 30.0)];
+    for (rates, mass_kg) in rates.into_iter().chain([(30.0, 1000.0), (10.0, 1000.0)]).flat_map(|r| [(r, 1.0), (r, 0.2)])
+    {
+        let (mut stage, place) = (Stage::new(Faults::default()), DVec3::Z * HALF.z);
+        let cube = stage.add(RigidBody::new(on_floor(cube(place, mass_kg))).unwrap(), rates.0);
+        // at 0.12 m/s, to 20 mm below the top
+        let key = |at_s, above_m: f64| down(at_s, DVec3::Z * (TOP_M + above_m), 0.0);
+        let tool = stage.add(tool(vec![key(0.0, 0.05), key(0.6, -0.02), key(1.2, -0.02)], LIMIT_N), rates.1);
+        let (mut given, mut deep_m) = (Given::new(), 0.0_f64);
+        stage.run(1.5, |stage| {
+            given.look(stage, cube, tool);
+            deep_m = deep_m.max(TOP_M + JAWS_M - pose(stage, tool).tip.z);
+        });
+        let (told_n, blow_n, aside_m) = (given.told_n, given.most_n(4e-3), body(&stage, cube).position.distance(place));
+        println!("{rates:?} {mass_kg} kg: told {told_n} N, {blow_n} N, {deep_m} m deep, {aside_m} m aside");
+        assert!(blow_n > LIMIT_N && blow_n < 1.2 * LIMIT_N, "{rates:?} {mass_kg} kg: {blow_n} N over 4 ms");
+        // beside a body of 1 kHz it tells of the millisecond in which its 0.3 kg are stopped, 37 N, too
+        assert!(told_n < 1.4 * LIMIT_N, "{rates:?} {mass_kg} kg: it tells {told_n} N");
+        assert!(deep_m < 1e-3 && aside_m < 2e-4, "{rates:?} {mass_kg} kg: {deep_m} m deep, {aside_m} m aside");
+    }
+}
 
 #[test]
 fn a_tool_that_has_pierced_a_solid_comes_out_without_it() {
