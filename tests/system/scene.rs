@@ -233,14 +233,14 @@ fn a_tool_and_the_tubes_it_can_hold_see_each_other() {
 }
 
 #[test]
-fn a_drive_without_force_is_refused_with_its_line() {
-    for weak in ["0", "-1", "inf", "nan"] {
+fn a_drive_without_force_or_with_more_than_a_kilonewton_is_refused_with_its_line() {
+    for wrong in ["0", "-1", "inf", "nan", "1001"] {
         let tool = format!(
-            "format = 1\n[[object]]\nname = \"t\"\nmodel = \"instrument\"\nmax_force_n = {weak}\nkeyframe = [{{ tip_m = [0, 0, 0] }}]\n"
+            "format = 1\n[[object]]\nname = \"t\"\nmodel = \"instrument\"\nmax_force_n = {wrong}\nkeyframe = [{{ tip_m = [0, 0, 0] }}]\n"
         );
         let (line, _, text, said) = problem(&tool);
-        assert_eq!((line, text.as_str()), (5, weak));
-        assert!(said.contains("`max_force_n`") && said.contains("N"), "{said}");
+        assert_eq!((line, text.as_str()), (5, wrong));
+        assert!(said.contains("`max_force_n`") && said.contains("1000 N"), "{said}");
     }
 }
 

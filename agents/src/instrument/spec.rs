@@ -18,7 +18,8 @@ pub struct ToolSpec {
     pub stiffness_n_m: f64,
     /// Damping of the hold, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
-    /// The most that its drive pushes with, newtons, > 0: what is stronger holds the tip back from its path.
+    /// The most that its drive pushes with, newtons, 1e-6 … 1000: what is stronger holds the tip back from its path. Past that what is
+    /// light is pressed into what it stands on.
     pub max_force_n: f64,
     /// What it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
@@ -82,6 +83,8 @@ pub enum ToolError {
 
 /// Past this no tool goes, metres.
 pub(super) const REACH_MAX_M: f64 = 1e6;
+/// The strongest drive, newtons: its tip weighs 6 kg.
+const FORCE_MAX_N: f64 = 1e3;
 /// A script is no longer than this, seconds (11 days).
 const SCRIPT_MAX_S: f64 = 1e6;
 
@@ -100,7 +103,7 @@ impl ToolSpec {
         number("the stiffness", k, within(k, f64::MIN_POSITIVE, 1e9), "above zero and at most 1e9 N/m")?;
         let c = self.damping_n_s_m;
         let f = self.max_force_n;
-        number("the greatest force", f, within(f, 1e-6, 1e9), "between 1e-6 and 1e9 N")?;
+        number("the greatest force", f, within(f, 1e-6, FORCE_MAX_N), "between 1e-6 and 1000 N")?;
         number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
         let off_m = self.starts_off_m.length();
         number("the way from the first keyframe", off_m, within(off_m, 0.0, REACH_MAX_M), "finite, within 1e6 m")?;

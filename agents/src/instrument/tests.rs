@@ -296,6 +296,7 @@ fn scripts_that_are_none_are_refused() {
         assert!(matches!(refuse(ToolSpec { reach_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
         assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
         assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber { .. }));
         let damped = Instrument::new(ToolSpec { damping_n_s_m: value, ..good });
         assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
     }

@@ -8,6 +8,7 @@ use crate::scene::format::{InstrumentFile, KeyframeFile};
 use glam::{DQuat, DVec3};
 use metachron_agents::AgentId;
 use metachron_agents::instrument::{Keyframe, ToolSpec};
+use std::ops::RangeInclusive;
 
 /// Most keyframes of a script.
 const KEYFRAMES_MAX: usize = 10_000;
@@ -15,6 +16,11 @@ const KEYFRAMES_MAX: usize = 10_000;
 const REACH_DEFAULT_M: f64 = 0.02;
 /// What a tool's drive pushes with at most where a scene does not say, newtons: what an arm holds against without effort.
 const FORCE_DEFAULT_N: f64 = 50.0;
+/// What it may push with. Its tip weighs 6 g a newton (docs/theory/coupling.md, eq. 9e): past a kilonewton that presses 50 g by
+/// millimetres into the floor under it, past a hundred through it.
+const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
+/// See [`FORCES_N`].
+const FORCES_WHY: &str = "N: a stronger drive would press what is light into what it stands on";
 
 /// Reads an instrument.
 pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Given<'_>, names: &Names) -> ToolSpec {
@@ -25,7 +31,12 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Give
         reach_m: c.number_or(place, "reach_m", (file.reach_m, REACH_DEFAULT_M), &allowed(1e-6..=100.0, "m")),
         stiffness_n_m: c.number_or(place, "stiffness_n_m", (file.stiffness_n_m, 200.0), &allowed(1e-3..=1e7, "N/m")),
         damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
-        max_force_n: c.number_or(place, "max_force_n", (file.max_force_n, FORCE_DEFAULT_N), &allowed(1e-3..=1e6, "N")),
+        max_force_n: c.number_or(
+            place,
+            "max_force_n",
+            (file.max_force_n, FORCE_DEFAULT_N),
+            &allowed(FORCES_N, FORCES_WHY),
+        ),
         graspable: graspable(c, place, file, names),
         starts_off_m: DVec3::ZERO,
     }

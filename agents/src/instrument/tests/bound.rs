@@ -65,6 +65,21 @@ fn a_tool_comes_down_on_what_stands_with_no_more_than_its_drive() {
 }
 
 #[test]
+fn the_strongest_drive_presses_a_light_box_on_the_floor_and_not_into_it() {
+    for rates in [(240.0, 240.0), (60.0, 60.0), (600.0, 60.0), (10.0, 1000.0)] {
+        let (mut stage, place) = (Stage::new(Faults::default()), DVec3::Z * HALF.z);
+        let cube = stage.add(RigidBody::new(on_floor(cube(place, 0.05))).unwrap(), rates.0);
+        let key = |at_s, above_m: f64| down(at_s, DVec3::Z * (TOP_M + above_m), 0.0);
+        let tool = tool(vec![key(0.0, 0.1), key(2.0, -0.02), key(3.0, -0.02), key(4.0, 0.1)], 1e3);
+        stage.add(tool, rates.1);
+        let mut aside_m = 0.0_f64;
+        stage.run(4.5, |stage| aside_m = aside_m.max(body(stage, cube).position.distance(place)));
+        println!("{rates:?}: {aside_m} m aside");
+        assert!(aside_m < 1e-3, "{rates:?}: {aside_m} m aside"); // 1000 N on 0.5 N, by a tip of 6 kg
+    }
+}
+
+#[test]
 fn a_tool_that_has_pierced_a_solid_comes_out_without_it() {
     for (rates, depth_m) in [((240.0, 60.0), 0.02), ((60.0, 240.0), 0.035), ((240.0, 240.0), 0.035)] {
         let block = SoftSpec {
