@@ -109,6 +109,13 @@ impl Mates {
         list[..*count].iter_mut().filter(touched).for_each(|mate| mate.recall(tanks, (around.time, dt)));
     }
 
+    /// Recalls for a step of `dt` seconds how those on whom others press too moved otherwise than expected.
+    pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let Self { list, count, tanks, .. } = self;
+        let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));
+        list[..*count].iter_mut().filter(touched).for_each(|mate| mate.regain(tanks, (around.time, dt)));
+    }
+
     /// Appends the velocities that the others would have without the owner, in slots, on the mean of a substep `h`: what is given at
     /// its start and what falls freely through it then meet exactly at its end.
     pub fn extend(&mut self, velocities: &mut Vec<DVec3>, h: f64) {
@@ -222,7 +229,7 @@ impl Mates {
         list[..*count].iter_mut().for_each(|mate| mate.weigh(tanks, own, &respond));
     }
 
-    /// Keeps what [`Self::recall`] asks for in the step after one of `dt` seconds; comes after [`Self::tell`].
+    /// Keeps what [`Self::recall`] and [`Self::regain`] ask for in the step after one of `dt` seconds; comes after [`Self::tell`].
     pub fn keep(&mut self, around: &Surroundings<'_>, dt: f64) {
         let end = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { list, count, tanks, .. } = self;

@@ -111,6 +111,11 @@ impl Company {
         self.received.fresh()
     }
 
+    /// What others gave that acted through the substep that ended, in slots; empty for nothing.
+    pub fn spent(&self) -> &[DVec3] {
+        self.received.spent()
+    }
+
     /// What others gave since the last step.
     pub fn received(&mut self) -> &mut Received {
         &mut self.received
@@ -122,6 +127,7 @@ impl Company {
         self.knock(around, bounds, dt);
         let friction = self.friction();
         self.mates.gather(around, friction, |neighbour, _| may_touch(neighbour, around, bounds, dt));
+        self.mates.regain(around, dt);
     }
 
     /// There is nobody in this step.
@@ -201,6 +207,7 @@ impl Company {
     /// Ends a step of `dt` seconds.
     pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.mates.tell(self.mass_kg);
+        self.mates.keep(around, dt);
         self.mates.close(around, dt);
     }
 

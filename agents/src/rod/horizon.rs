@@ -5,7 +5,9 @@
 
 use super::band::Factor;
 use super::config::Config;
+use super::contact::respond;
 use super::holds::Tie;
+use super::inertia::momenta;
 use super::method::Integrator;
 use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
@@ -45,6 +47,9 @@ impl Tube {
     /// its next step where they are soft, keep up with it, and no link joins it to them; and where they are slower one step of theirs.
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
+        if self.is_foretold(around, dt) {
+            return;
+        }
         self.ahead_s = 0.0;
         // beside this one it makes no longer steps
         let steps_s = around.neighbours.iter().filter(|n| owns_it(n, around)).map(|n| n.step_s.min(PART_MAX_S));
@@ -70,6 +75,34 @@ impl Tube {
         } else {
             self.accelerations.iter_mut().skip(1).step_by(2).for_each(|turning| *turning = DVec3::ZERO);
         }
+    }
+
+    /// Whether the owners of its contacts expect of the tube the step of [`Self::foretell`] after one of `dt` seconds: tubes with steps
+    /// as long, while it touches nothing else. One whole substep, implicit, tells how the next one goes.
+    pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
+        let (factor, span_s) = self.stepper.last();
+        let whole = span_s == dt && factor.slots() == self.now.u.len() && self.accelerations.len() == self.now.u.len();
+        if !whole || self.spec.integrator != Integrator::ImplicitEuler || self.stepper.contacts.is_touching() {
+            return false;
+        }
+        let alike = |n: &Neighbour| {
+            let lasts = (n.step_s.min(PART_MAX_S) - dt).abs() < (SLOWER - 1.0) * dt;
+            matches!(n.snapshot.body, Body::Curve(_)) && lasts && !is_linked(n, around) && keeps_up(n, around, dt)
+        };
+        let mut owners = around.neighbours.iter().filter(|n| owns_it(n, around)).peekable();
+        owners.peek().is_some() && owners.all(alike)
+    }
+
+    /// Foretells the step after one of `dt` seconds, whose velocities at its start stand where the accelerations go
+    /// (docs/theory/coupling.md, eq. 7i).
+    pub(super) fn foretell(&mut self, dt: f64) {
+        let Self { now, matter, division, accelerations: list, stepper, .. } = self;
+        list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
+        momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
+        list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
+        respond((stepper.factor(), matter.held), list);
+        list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
+        self.ahead_s = dt;
     }
 }
 

@@ -63,15 +63,7 @@ impl CurveInertia {
 
     /// Turns velocities in slots into momenta (docs/theory/rod.md, eq. 11).
     pub(crate) fn momenta(&self, list: &mut [DVec3]) {
-        let mut left = list[0];
-        list[0] = DVec3::ZERO;
-        for (k, (length_m, t)) in self.segments.iter().enumerate() {
-            let (right, spin, m) = (list[2 * k + 2], list[2 * k + 1], self.mu * length_m / 6.0);
-            list[2 * k] += (left * 2.0 + right) * m;
-            list[2 * k + 1] = (spin + *t * t.dot(spin)) * (self.rotary * length_m);
-            list[2 * k + 2] = (left + right * 2.0) * m;
-            left = right;
-        }
+        momenta((self.mu, self.rotary), self.segments.iter().copied(), list);
     }
 
     /// How many slots it knows: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.
@@ -98,5 +90,19 @@ impl CurveInertia {
     pub fn respond(&self, impulses: &mut [DVec3]) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
         respond((&self.factor, self.held), impulses);
+    }
+}
+
+/// Turns velocities in slots into momenta, by mass and rotary inertia per length and the length and direction of each segment
+/// (docs/theory/rod.md, eq. 11).
+pub(super) fn momenta((mu, rotary): (f64, f64), segments: impl Iterator<Item = (f64, DVec3)>, list: &mut [DVec3]) {
+    let mut left = list[0];
+    list[0] = DVec3::ZERO;
+    for (k, (length_m, t)) in segments.enumerate() {
+        let (right, spin, m) = (list[2 * k + 2], list[2 * k + 1], mu * length_m / 6.0);
+        list[2 * k] += (left * 2.0 + right) * m;
+        list[2 * k + 1] = (spin + t * t.dot(spin)) * (rotary * length_m);
+        list[2 * k + 2] = (left + right * 2.0) * m;
+        left = right;
     }
 }

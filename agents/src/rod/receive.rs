@@ -20,6 +20,8 @@ pub struct Received {
     carried: Vec<DVec3>,
     /// The part of dJ that acts through the step that comes; empty for none.
     fresh: Vec<DVec3>,
+    /// What has acted through the substep that ended; empty for none.
+    spent: Vec<DVec3>,
     slots: usize,
     any: bool,
 }
@@ -29,6 +31,7 @@ impl Received {
     pub fn clear(&mut self, slots: usize) {
         (self.slots, self.any) = (slots, false);
         self.fresh.clear();
+        self.spent.clear();
     }
 
     /// Whether nothing came.
@@ -41,8 +44,14 @@ impl Received {
         &self.fresh
     }
 
+    /// What of it acted through the substep that ended, N·s and N·m·s in slots; empty for nothing.
+    pub fn spent(&self) -> &[DVec3] {
+        &self.spent
+    }
+
     /// That substep has been made.
     pub fn spend(&mut self) {
+        std::mem::swap(&mut self.spent, &mut self.fresh);
         self.fresh.clear();
     }
 

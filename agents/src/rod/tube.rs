@@ -250,6 +250,10 @@ impl Tube {
         let Some(before) = before else { return };
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
         self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
+        if self.is_foretold(around, dt) {
+            self.foretell(dt);
+            return;
+        }
         // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
         let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
         for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {

@@ -55,6 +55,8 @@ pub struct Mate {
     /// The velocities of its slots by which friction takes back how far it is astray, and which share of that the step takes.
     back: Vec<DVec3>,
     back_share: f64,
+    /// Whether it is to be known in the next step how far it then is from where it is expected.
+    minds: bool,
     /// Whether what lasts is given to it evenly.
     evenly: bool,
     /// What bends was given a second in the substep before, N and N·m in slots; empty for nothing.
@@ -143,12 +145,31 @@ impl Mate {
         if !self.evenly {
             return;
         }
+        self.look_back(tanks, (now, dt));
+        if let Some(account) = self.other.id().and_then(|id| tanks.get(id)) {
+            self.lasts.extend_from_slice(&account.last);
+        }
+    }
+
+    /// Recalls the first of these of a body that others press on too while nothing fixed holds it up: what they give it is foreseen,
+    /// what the ground gives it is not.
+    pub fn regain(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
+        let stands = self.other.neighbour().is_some_and(|n| n.snapshot.stand.is_some());
+        if self.other.other_givers() > 0 && !stands {
+            self.look_back(tanks, (now, dt));
+        } else if let Some(account) = self.other.id().and_then(|id| tanks.get(id)) {
+            account.astray.forget();
+        }
+    }
+
+    /// Recalls how far the other is from where friction holds it.
+    fn look_back(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
+        self.minds = true;
         let Some(account) = self.other.id().and_then(|id| tanks.get(id)) else { return };
         account.astray.learn(&self.other, now);
         let span_s = self.other.neighbour().map_or(dt, |n| n.step_s.max(dt));
         self.back_share = BACK_SHARE * dt / span_s;
         self.back.extend(account.astray.owed().iter().map(|owed| *owed * (BACK_SHARE / span_s)));
-        self.lasts.extend_from_slice(&account.last);
     }
 
     /// Keeps that for the step that begins at `end`.
@@ -156,8 +177,10 @@ impl Mate {
         let account = self.other.id().filter(|_| self.acted).and_then(|id| tanks.get(id));
         if let Some(account) = account {
             std::mem::swap(&mut account.last, &mut self.lasts);
-            account.astray.pay(self.back_share);
-            account.astray.expect(&self.other, end);
+            if self.minds {
+                account.astray.pay(self.back_share);
+                account.astray.expect(&self.other, end);
+            }
         }
     }
 
@@ -251,6 +274,7 @@ impl Mate {
             friction: self.friction,
             rebound_m_s: 0.0,
             back_m_s: self.back_m_s(touch),
+            share: 1.0 / (1 + self.other.other_givers()) as f64,
             age_s: self.other.answers_within_s(),
         }
     }

@@ -138,6 +138,12 @@ impl Other {
         self.lasting.iter_mut().for_each(|(from_s, _)| *from_s -= h);
     }
 
+    /// How many others go on giving to a rigid body.
+    #[must_use]
+    pub const fn other_givers(&self) -> usize {
+        self.lasting.len()
+    }
+
     /// How what other owners go on giving accelerates a rigid body, m/s² and rad/s².
     pub(super) fn carried_by_others(&self) -> Twist {
         let mut sum = [DVec3::ZERO; 2];

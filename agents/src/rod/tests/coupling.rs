@@ -12,6 +12,7 @@ mod gripper;
 mod meetings;
 mod rates;
 mod received;
+mod slopes;
 mod snap;
 mod squeezed;
 mod tools;

@@ -113,6 +113,18 @@ fn a_slow_tube_lies_on_a_fast_one_as_it_does_at_equal_clocks() {
 }
 
 #[test]
+fn a_tube_lies_across_one_of_its_rate_whether_it_sees_its_newest_state_or_the_one_before() {
+    for (hz, seed) in [240.0, 120.0, 60.0, 20.0].into_iter().flat_map(|hz| [1, 2, 3].map(|seed| (hz, seed))) {
+        let faults = Faults { late: 1, seed, ..Faults::default() };
+        let Lying { depth_m, borne, rise, .. } = cross((hz, hz), hose(1e5, false), faults);
+        println!("{hz}: depth {depth_m:e} borne {borne} rise {rise:e}");
+        assert!(depth_m < 2e-3, "{hz} Hz: {depth_m} m deep");
+        assert!(borne > 0.6 && borne < 1.1, "{hz} Hz: {borne} of its weight");
+        assert!(rise < 0.01, "{hz} Hz: energy rises by {rise} of the start");
+    }
+}
+
+#[test]
 fn a_slow_tube_lies_on_a_fast_one_where_messages_are_late_or_lost() {
     for (rates, seed) in [((1000.0, 10.0), 1), ((240.0, 20.0), 2), ((240.0, 200.0), 3), ((120.0, 100.0), 4)] {
         let faults = Faults { jitter: 0.2, loss: 0.1, seed, ..Faults::default() };
