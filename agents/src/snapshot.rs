@@ -10,7 +10,7 @@ pub use stand::Stand;
 use crate::coupling::{Ledger, PairState, Rebound, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
-use crate::{AgentId, Rare, Resolution, SimTime};
+use crate::{AgentId, Rare, Resolution, SimSpan, SimTime};
 use glam::{DMat3, DQuat, DVec3};
 
 /// The state an agent last published, stamped with its own time.
@@ -18,6 +18,8 @@ use glam::{DMat3, DQuat, DVec3};
 pub struct Snapshot {
     /// The agent's own time, written by the runtime when it publishes.
     pub time: SimTime,
+    /// How far behind the scene its time may lie, written like it: who cannot keep up beside others lives on, later.
+    pub put_off: SimSpan,
     /// How many steps led here.
     pub steps: u64,
     /// The resolution the simulation holds; `None` for a model that has none.
@@ -357,6 +359,12 @@ impl Snapshot {
         self.rebound.set(None);
         self.pairs.clear();
         self.bonds.clear();
+    }
+
+    /// The moment of the scene that it belongs to: its own time, and how far that has been put off.
+    #[must_use]
+    pub fn moment(&self) -> SimTime {
+        self.time + self.put_off
     }
 
     /// Whether every number that others act on is finite.

@@ -276,8 +276,8 @@ impl Track {
     fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
         (self.awake, self.still) = (awake, false);
         match &self.newest {
-            Some(known) if known.time == newest.time && known.steps == newest.steps => {}
-            Some(known) if known.time < newest.time => {
+            Some(known) if known.moment() == newest.moment() && known.steps == newest.steps => {}
+            Some(known) if known.moment() < newest.moment() => {
                 self.before = self.newest.replace(Arc::clone(newest));
             }
             _ => {
@@ -290,17 +290,17 @@ impl Track {
     /// Whether there was a state to pose it by.
     fn pose_at(&mut self, time: SimTime, states: States) -> bool {
         let Some(newest) = &self.newest else { return false };
-        self.age_s = if self.awake { time.secs_after(newest.time).max(0.0) } else { 0.0 };
+        self.age_s = if self.awake { time.secs_after(newest.moment()).max(0.0) } else { 0.0 };
         self.shown = match (states, &self.before) {
             (States::Interpolate, Some(before)) => pose::between(before, newest, time, &mut self.pose),
             (States::Extrapolate, _) if self.awake => pose::beyond(newest, time, &mut self.pose),
             _ => {
                 pose::copy(&newest.body, &mut self.pose);
-                newest.time
+                newest.moment()
             }
         };
         self.bounds = self.find_bounds();
-        self.still = !self.awake && self.shown == newest.time;
+        self.still = !self.awake && self.shown == newest.moment();
         (self.fresh, self.cut_m) = (true, None);
         true
     }

@@ -13,20 +13,20 @@ const BEYOND_MAX_S: f64 = 0.1;
 ///
 /// A state one step old lies between two published ones as long as the agent keeps its rate.
 pub fn between(before: &Snapshot, newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
-    let span = newest.time.secs_after(before.time);
+    let span = newest.moment().secs_after(before.moment());
     let step = span / newest.steps.saturating_sub(before.steps).max(1) as f64;
-    let w = ((time.secs_after(before.time) - step) / span).clamp(0.0, 1.0);
+    let w = ((time.secs_after(before.moment()) - step) / span).clamp(0.0, 1.0);
     if !(w < 1.0 && blend(&before.body, &newest.body, w, into)) {
         copy(&newest.body, into);
-        return newest.time;
+        return newest.moment();
     }
     let late = std::time::Duration::from_secs_f64(span * w);
-    SimTime::from_nanos(before.time.as_nanos() + u64::try_from(late.as_nanos()).unwrap_or(0))
+    SimTime::from_nanos(before.moment().as_nanos() + u64::try_from(late.as_nanos()).unwrap_or(0))
 }
 
 /// Writes the newest state carried on by its velocities to the frame at `time`; its time.
 pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
-    let age_s = time.secs_after(newest.time).clamp(0.0, BEYOND_MAX_S);
+    let age_s = time.secs_after(newest.moment()).clamp(0.0, BEYOND_MAX_S);
     copy(&newest.body, into);
     match into {
         Body::Nothing => {}
@@ -48,7 +48,7 @@ pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
         }
     }
     let ahead = (age_s * 1e9) as u64;
-    SimTime::from_nanos(newest.time.as_nanos() + ahead)
+    SimTime::from_nanos(newest.moment().as_nanos() + ahead)
 }
 
 /// Copies a body into storage that is used again.

@@ -214,7 +214,7 @@ impl Diary {
         gauges.work_s.set(work_s);
         self.pace(gauges, pace);
         // the step just made covers the time up to the agent's own
-        let lived = pace.time().max(entry.now).since(SimTime::ZERO + pace.rested());
+        let lived = pace.scene_time().max(entry.now).since(SimTime::ZERO + pace.rested());
         gauges.mean_hz.set(self.steps as f64 / lived.as_secs_f64());
         self.count_rate(gauges, entry.now);
     }

@@ -111,7 +111,7 @@ impl Eyes {
     /// The state this agent has written last: it tells the crowd where that is.
     pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
-            sight.stand(crowd, state.bounds.as_ref(), state.time);
+            sight.stand(crowd, state.bounds.as_ref(), state.moment());
         }
     }
 

@@ -20,7 +20,7 @@ impl Actor {
             self.dt_range.0.as_nanos(),
             self.diary.steps(),
             self.faults.seed,
-            u64::from(self.unsettled.subsec_nanos()),
+            self.unsettled_ns,
         ]);
         black_box([
             self.links.len(),

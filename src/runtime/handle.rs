@@ -69,7 +69,7 @@ impl AgentHandle {
     /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it still holds.
     #[must_use]
     pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
-        if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.time).as_secs_f64() }
+        if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.moment()).as_secs_f64() }
     }
 
     /// Counts the age of a state that was used, seconds ([`Self::age_s`]); what is no age is not counted.

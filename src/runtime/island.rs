@@ -25,19 +25,21 @@ use std::time::Duration;
 impl Actor {
     /// Brings those it leads to its own time; how many steps that took. A leader that gave up time gave it up for all at that
     /// time.
-    pub fn gather(&mut self, timeline: &Timeline, wall: Duration, start: &Start) -> u32 {
+    pub fn gather(&mut self, timeline: &Timeline, wall: Duration, (start, leapt): (&Start, SimSpan)) -> u32 {
         if self.company.is_empty() {
             return 0;
         }
-        let (time, mut steps) = (self.pace.time(), 0);
+        let (time, put_off, mut steps) = (self.pace.time(), self.pace.put_off(), 0);
         self.company.each(|seat| {
             let caught_up = contained(|| {
                 seat.shared.board.heed(seat.id());
                 seat.take_commands();
-                if seat.pace.time() == time - start.dropped {
-                    seat.pace.drop_span(start.dropped);
+                if seat.pace.time() == time - leapt {
+                    seat.pace.give_up(start.dropped, leapt);
+                    seat.pace.keep_up(put_off);
                     return Ok(0);
                 }
+                seat.pace.keep_up(put_off);
                 seat.catch_up(time, timeline, wall)
             });
             match caught_up {
@@ -51,9 +53,6 @@ impl Actor {
 
     /// Steps alone up to `time`; how many steps that took.
     fn catch_up(&mut self, time: SimTime, timeline: &Timeline, wall: Duration) -> Result<u32, String> {
-        if self.pace.time() < time {
-            self.pace.begin(timeline, wall, true);
-        }
         let mut steps = 0;
         while self.pace.time() < time {
             let span = portion(time.since(self.pace.time()), self.pace.dt());
@@ -97,8 +96,8 @@ impl Actor {
     fn step_as_one(&mut self, dt: SimSpan) -> Result<StepReport, String> {
         let (me, time) = (self.shared.id, self.pace.time());
         self.company.gather_fellows(me, time);
-        let Self { agent, eyes, hands, links, company, peers, writer, .. } = self;
-        eyes.look(peers, writer, (me, time, dt), &company.fellows);
+        let Self { agent, eyes, hands, links, company, peers, writer, pace, .. } = self;
+        eyes.look(peers, writer, (me, pace.scene_time(), dt), &company.fellows);
         let around = Surroundings { me, time, neighbours: eyes.neighbours(), hands, links };
         let mut others = emptied(std::mem::take(&mut company.companions));
         for seat in company.seats.iter_mut().filter(|seat| seat.actor.pace.time() == time) {
@@ -114,7 +113,7 @@ impl Actor {
     /// This agent, as one who leads it wants it.
     fn companion(&mut self, (time, dt): (SimTime, SimSpan), fellows: &Fellows) -> Companion<'_> {
         let id = self.shared.id;
-        self.eyes.look(&self.peers, &self.writer, (id, time, dt), fellows);
+        self.eyes.look(&self.peers, &self.writer, (id, self.pace.scene_time(), dt), fellows);
         let neighbours = self.eyes.neighbours();
         let around = Surroundings { me: id, time, neighbours, hands: &self.hands, links: &self.links };
         Companion { id, agent: &mut *self.agent, around }

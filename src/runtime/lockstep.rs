@@ -210,7 +210,7 @@ impl Lockstep {
 
     fn count_cpu(&mut self, whose: usize, wall: Duration) {
         if let Some(actor) = &mut self.lives[whose].actor {
-            if actor.unsettled.is_zero() {
+            if actor.unsettled_ns == 0 {
                 self.unsettled.push(whose as u32);
             }
             actor.count(wall);

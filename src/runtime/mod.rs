@@ -6,6 +6,7 @@
 //! [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
 //! those that hang together share the turns of one of them (`island`). Never here: a model of physics, a picture, a law of control, a file.
 
+mod abreast;
 mod account;
 mod bell;
 mod clock;

@@ -2,8 +2,9 @@
 //!
 //! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state
 //! that is on time covers the present and pictures need no delay. An agent that is late steps again at once until it has
-//! caught up; one that others touch makes longer steps while it is behind, for its contact to keep its time. Past the lag cap its time jumps to the present without a step: the gap is dropped and counted,
+//! caught up; one that others touch makes longer steps while it is behind, for its contact to keep its time. Past the lag cap its time leaps to the present without a step: the gap is dropped and counted,
 //! so that an agent that cannot keep up runs at the rate it can reach, and never falls further behind.
+//! Beside others no time leaps: it is put off, and what the agents do to each other goes on as it would, slower.
 //! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
 
 mod timeline;
@@ -17,37 +18,61 @@ use std::time::Duration;
 /// Shorter, a hiccup of the machine costs simulated time; longer, an overload shows as old states (MuJoCo resyncs at the same lag).
 pub const LAG_CAP: Duration = Duration::from_millis(100);
 
-/// The same of an agent that is near others, until its steps are as long as they may be: what it gives up, they go through without it.
+/// The same of an agent that is near others: it makes up what holds it up for less than this, and is put off by what it cannot.
 pub const LAG_CAP_NEAR: Duration = Duration::from_millis(500);
 
-/// So often an agent waits for others that are behind it, two milliseconds of wall time at once; each turn that finds nobody behind
-/// gives it one wait more. Who is held up for a moment is waited for, and who never keeps up is not.
-const PATIENCE: u8 = 125;
+/// So often an agent waits for others of whom nothing is heard, two milliseconds of wall time at once: for a second. Who is heard of is
+/// waited for as long as it is behind.
+const PATIENCE: u16 = 500;
 
 /// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
 
 /// Longer than any step.
-const ANY: SimSpan = SimSpan::from_nanos(u64::MAX);
+const ANY: u32 = u32::MAX;
 
 /// The longest step that an agent makes of a shorter one that it wants, because it is behind.
 const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
+
+/// Beside others they are so many times as long as what is wanted at most, two numbers' quotient: a sheet of 240 Hz that makes three of its steps
+/// in one throws off what lies on it.
+const STRETCHED_NEAR: (u64, u64) = (5, 2);
+
+/// And no longer than this (docs/theory/coupling.md, eq. 7g).
+const STRETCHED_NEAR_MAX: SimSpan = SimSpan::from_nanos(16_666_667);
+
+/// Who waits for others for more than such a part of its time is behind for their sake.
+const WAITER: u16 = 4;
+
+/// In what waiting is counted, wall time.
+const TICK: Duration = Duration::from_micros(125);
+
+/// How long it waits at once, milliseconds of wall time.
+const WAIT_MS: u32 = 2;
 
 /// An agent's own time and the length of its next step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Pace {
     time: SimTime,
     dt: SimSpan,
-    /// What the agent makes of it, where that is less; else longer than any step.
-    shorter: SimSpan,
-    /// What it makes of it while it is behind.
-    stretched: SimSpan,
+    /// What the agent makes of it, where that is less, nanoseconds; else longer than any step.
+    shorter: u32,
+    /// What it makes of it while it is behind, nanoseconds.
+    stretched: u32,
     dropped: SimSpan,
+    /// How far it has been put off: it is on time at the timeline's present less this.
+    put_off: SimSpan,
     rested: SimSpan,
     /// No step before this wall time, milliseconds: it waits for others.
     held_until_ms: u32,
+    /// When the step before began, wall time in [`TICK`]s.
+    begun: u32,
+    /// How long it has waited for others since and in the steps before, and of how long, in ticks: the longer ago the less it counts.
+    waits: [u16; 2],
     /// How much of its patience is spent.
-    waited: u8,
+    waited: u16,
+    /// What it heard last of those it waits for.
+    heard: u16,
 }
 
 /// How a turn begins.
@@ -67,11 +92,15 @@ impl Pace {
             time,
             dt,
             shorter: ANY,
-            stretched: SimSpan::ZERO,
+            stretched: 0,
             dropped: SimSpan::ZERO,
+            put_off: SimSpan::ZERO,
             rested: SimSpan::ZERO,
             held_until_ms: 0,
+            begun: 0,
+            waits: [0; 2],
             waited: 0,
+            heard: 0,
         }
     }
 
@@ -81,10 +110,22 @@ impl Pace {
         self.time
     }
 
+    /// The moment of the timeline at which it is on time: its own, and how far it has been put off.
+    #[must_use]
+    pub fn scene_time(&self) -> SimTime {
+        self.time + self.put_off
+    }
+
+    /// How far it has been put off.
+    #[must_use]
+    pub const fn put_off(&self) -> SimSpan {
+        self.put_off
+    }
+
     /// The length of its steps: what is wanted, or the shorter one that it made last.
     #[must_use]
     pub fn dt(&self) -> SimSpan {
-        self.shorter.min(self.dt)
+        if self.shorter == ANY { self.dt } else { self.dt.min(SimSpan::from_nanos(self.shorter.into())) }
     }
 
     /// The length of step that is wanted.
@@ -100,7 +141,7 @@ impl Pace {
 
     /// Where `wanted` was to be stepped by, the agent steps by `made` (above zero), which is not longer.
     pub fn shorten(&mut self, wanted: SimSpan, made: SimSpan) {
-        self.shorter = if made < wanted { made } else { ANY };
+        self.shorter = if made < wanted { u32::try_from(made.as_nanos()).unwrap_or(ANY) } else { ANY };
     }
 
     /// Simulated time given up so far because it could not be made up.
@@ -118,38 +159,51 @@ impl Pace {
     /// The wall time at which the next step is released; `None` while the timeline stands still before it.
     #[must_use]
     pub fn due(&self, timeline: &Timeline) -> Option<Duration> {
-        timeline.wall_of(self.time).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
+        timeline.wall_of(self.scene_time()).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
     }
 
-    /// Waits a moment from wall time `wall` for others that are behind; whether it has the patience.
-    pub fn wait(&mut self, wall: Duration) -> bool {
+    /// Waits a moment from wall time `wall` for others that are behind; whether it has the patience. `heard` is another number as soon as
+    /// there is news of them.
+    pub fn wait(&mut self, wall: Duration, heard: u64) -> bool {
+        // another number in nearly all cases
+        let heard = (heard ^ (heard >> 16) ^ (heard >> 32)) as u16;
+        if heard != self.heard {
+            (self.heard, self.waited) = (heard, 0);
+        }
         let waits = self.waited < PATIENCE;
         if waits {
             self.waited += 1;
-            self.held_until_ms = u32::try_from(wall.as_millis()).map_or(u32::MAX, |now| now.saturating_add(2));
+            self.held_until_ms = u32::try_from(wall.as_millis()).map_or(u32::MAX, |now| now.saturating_add(WAIT_MS));
         }
         waits
     }
 
-    /// Nobody is behind.
-    pub const fn go_on(&mut self) {
-        self.waited = self.waited.saturating_sub(1);
+    /// Whether it is more than two steps behind.
+    #[must_use]
+    pub fn is_late(&self, timeline: &Timeline, wall: Duration) -> bool {
+        let steps = self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS);
+        timeline.sim_at(wall).since(self.scene_time()).as_nanos() > steps
     }
 
-    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap, that of agents that are
-    /// `near` others for one that is.
+    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap. Its time leaps to the present
+    /// then; that of one that is `near` others is put off instead, and goes on from where it is.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration, near: bool) -> Start {
-        // whose steps are as long as they may be cannot make it up
-        let cap = if near && self.stretched < STRETCHED_MAX { LAG_CAP_NEAR } else { LAG_CAP };
+        let cap = if near { LAG_CAP_NEAR } else { LAG_CAP };
         let now = timeline.sim_at(wall);
-        let lag = now.since(self.time);
+        let lag = now.since(self.scene_time());
         let late = timeline.wall_span(lag);
         let steps = SimSpan::from_nanos(self.dt().as_nanos().saturating_mul(LAG_CAP_STEPS));
         let mut dropped = SimSpan::ZERO;
+        self.count_wait(wall);
         if late > cap && late > timeline.wall_span(steps) {
-            dropped = lag;
-            self.dropped += lag;
-            self.time = now;
+            if near {
+                dropped = timeline.sim_span(late - cap);
+                self.put_off += dropped;
+            } else {
+                dropped = lag;
+                self.time += lag;
+            }
+            self.dropped += dropped;
         }
         Start { late, dropped }
     }
@@ -159,18 +213,43 @@ impl Pace {
     ///
     /// What it would give up later, others would have gone through without it; and steps of one length change what it does less
     /// than single long ones.
-    pub fn stretch(&mut self, wanted: SimSpan, timeline: &Timeline, wall: Duration) -> SimSpan {
-        let lag = timeline.sim_at(wall).since(self.time);
-        let now = self.stretched.max(wanted);
+    pub fn stretch(&mut self, wanted: SimSpan, timeline: &Timeline, wall: Duration, near: bool) -> SimSpan {
+        let lag = timeline.sim_at(wall).since(self.scene_time());
+        let now = SimSpan::from_nanos(self.stretched.into()).max(wanted);
         let times = |span: SimSpan, by: u64, of: u64| SimSpan::from_nanos(span.as_nanos().saturating_mul(by) / of);
-        self.stretched = if lag > times(now, LAG_CAP_STEPS, 1) {
-            times(now, 5, 4).min(STRETCHED_MAX)
+        let most = if near {
+            times(wanted, STRETCHED_NEAR.0, STRETCHED_NEAR.1).min(STRETCHED_NEAR_MAX)
+        } else {
+            STRETCHED_MAX
+        };
+        // who waits for others is behind for their sake: longer steps would not help
+        let waits = self.is_waiter(wall);
+        let next = if lag > times(now, LAG_CAP_STEPS, 1) && !waits {
+            times(now, 5, 4).min(most).max(wanted)
         } else if lag <= now {
             times(now, 63, 64)
         } else {
             now
         };
-        self.stretched.max(wanted)
+        self.stretched = u32::try_from(next.as_nanos()).unwrap_or(0);
+        next.max(wanted)
+    }
+
+    /// Counts the wait that ends at wall time `wall`.
+    fn count_wait(&mut self, wall: Duration) {
+        let until_ms = std::mem::take(&mut self.held_until_ms);
+        if until_ms > 0 {
+            let since = Duration::from_millis(u64::from(until_ms.saturating_sub(WAIT_MS)));
+            self.waits[0] = self.waits[0].saturating_add(ticks(wall.saturating_sub(since)) as u16);
+        }
+    }
+
+    /// Whether it has lately spent much of its time waiting; asked once a step.
+    fn is_waiter(&mut self, wall: Duration) -> bool {
+        let (now, [waited, of]) = (ticks(wall), self.waits);
+        let of = of.saturating_add(u16::try_from(now.wrapping_sub(self.begun)).unwrap_or(u16::MAX));
+        (self.begun, self.waits) = (now, [waited, of].map(|ticks| ticks - ticks / 8));
+        waited > of / WAITER
     }
 
     /// The step is done: the agent's time is a step further.
@@ -183,18 +262,37 @@ impl Pace {
         self.time += span;
     }
 
-    /// Gives up `span`, as the one who makes this agent's turns did.
-    pub fn drop_span(&mut self, span: SimSpan) {
-        self.dropped += span;
-        self.time += span;
+    /// Gives up what the one who makes this agent's turns gave up, of which its time leapt by `leapt`.
+    pub fn give_up(&mut self, dropped: SimSpan, leapt: SimSpan) {
+        self.dropped += dropped;
+        self.time += leapt;
+        self.put_off += dropped - leapt;
+    }
+
+    /// Is put off by `put_off` in all, as the one who makes this agent's turns is: what that is more it has given up.
+    pub fn keep_up(&mut self, put_off: SimSpan) {
+        self.dropped = self.dropped + put_off - self.put_off;
+        self.put_off = put_off;
+    }
+
+    /// Calls its own time another from now on, so that it has been put off by `put_off`; by how many seconds it is later for that.
+    pub fn rename(&mut self, put_off: SimSpan) -> f64 {
+        let (moment, before) = (self.scene_time(), self.time);
+        (self.time, self.put_off) = (moment - put_off, put_off);
+        self.time.secs_after(before)
     }
 
     /// The agent wakes at wall time `wall`: the time it slept is behind it.
     pub fn wake(&mut self, timeline: &Timeline, wall: Duration) {
-        let slept = timeline.sim_at(wall).since(self.time);
+        let slept = timeline.sim_at(wall).since(self.scene_time());
         self.rested += slept;
         self.time += slept;
     }
+}
+
+/// Wall time in ticks, from the beginning again after some days.
+const fn ticks(wall: Duration) -> u32 {
+    (wall.as_nanos() / TICK.as_nanos()) as u32
 }
 
 #[cfg(test)]
@@ -214,16 +312,45 @@ mod tests {
     }
 
     #[test]
-    fn an_agent_has_patience_for_so_long_and_gets_it_back_while_nobody_is_behind() {
+    fn who_is_heard_of_is_waited_for_and_who_is_not_for_a_second() {
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
-        while pace.wait(wall) {
+        for heard in 0..1000 {
+            assert!(pace.wait(wall, heard / 100), "at {wall:?}");
             assert_eq!(pace.due(&line), Some(wall + ms(2)));
             wall += ms(2);
         }
-        assert_eq!(wall, ms(250));
-        assert!(wall < LAG_CAP_NEAR, "what it waited it can make up");
-        pace.go_on();
-        assert!(pace.wait(wall) && !pace.wait(wall + ms(2)));
+        let since = wall - ms(200);
+        while pace.wait(wall, 9) {
+            wall += ms(2);
+        }
+        assert_eq!(wall - since, ms(1000));
+        assert!(!pace.wait(wall, 9) && pace.wait(wall, 10), "there is news");
+    }
+
+    #[test]
+    fn who_is_near_others_is_put_off_and_lives_through_all_of_its_time() {
+        // a step of 4 ms that takes 10 ms: what others see of it is never missing any time, and it is never late by more than the cap
+        let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
+        for step in 0..1000 {
+            assert_eq!(pace.time(), SimTime::ZERO + span_ms(4 * step));
+            pace.begin(&line, wall, true);
+            pace.advance();
+            wall += ms(10);
+            assert!(line.sim_at(wall).since(pace.scene_time()) <= SimSpan::from_nanos(520_000_000));
+        }
+        assert_eq!(pace.dropped(), pace.put_off());
+        assert!(pace.put_off() > span_ms(5400), "of 10 s it lived through 4");
+    }
+
+    #[test]
+    fn another_name_for_its_time_changes_nothing_of_when_it_is_due() {
+        let (line, mut pace) = (Timeline::new(), pace(4));
+        pace.begin(&line, ms(3500), true);
+        let (due, dropped) = (pace.due(&line), pace.dropped());
+        assert_eq!(pace.rename(SimSpan::ZERO), 3.0);
+        assert_eq!((pace.time(), pace.put_off()), (SimTime::ZERO + span_ms(3000), SimSpan::ZERO));
+        assert_eq!(pace.rename(span_ms(1000)), -1.0);
+        assert_eq!((pace.time(), pace.due(&line), pace.dropped()), (SimTime::ZERO + span_ms(2000), due, dropped));
     }
 
     #[test]
@@ -234,7 +361,7 @@ mod tests {
         while wall < ms(3000) {
             wall = wall.max(pace.due(&line).unwrap());
             assert_eq!(pace.begin(&line, wall, false).dropped, SimSpan::ZERO, "at {wall:?}");
-            let step = pace.stretch(span_ms(4), &line, wall);
+            let step = pace.stretch(span_ms(4), &line, wall, false);
             steps.push((wall, step));
             pace.advance_by(step);
             wall += if wall < ms(1000) { ms(6) } else { ms(1) };

@@ -38,7 +38,7 @@ impl Reader {
     #[must_use]
     pub fn new(agents: &[AgentHandle]) -> Self {
         let newest: Vec<_> = agents.iter().map(AgentHandle::latest).collect();
-        let looks = newest.iter().map(|state| Look { counted: 0, time: state.time, rests: false }).collect();
+        let looks = newest.iter().map(|state| Look { counted: 0, time: state.moment(), rests: false }).collect();
         Self { newest, looks, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
     }
 
@@ -64,7 +64,7 @@ impl Reader {
                 let state = agent.state();
                 self.newest[at] = agent.latest();
                 let look = &mut self.looks[at];
-                (look.time, look.rests) = (self.newest[at].time, state == AgentState::Resting);
+                (look.time, look.rests) = (self.newest[at].moment(), state == AgentState::Resting);
                 visit(agent, &self.newest[at], state == AgentState::Running);
             });
         }

@@ -12,7 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 impl Actor {
     /// Accounts for a step that has been made and shows it; whether its state can be seen.
     pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
-        let missed = now > self.pace.time();
+        let missed = now > self.pace.scene_time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
         // first the account: who sees a state finds it accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
@@ -35,12 +35,12 @@ impl Actor {
 
     /// Writes the state at `time`, to be published later; `at_rest` where the agent means to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
-        let agent = &self.agent;
+        let (agent, put_off) = (&self.agent, self.pace.put_off());
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
             agent.write_snapshot(into);
-            (into.time, into.at_rest) = (time, at_rest);
+            (into.time, into.put_off, into.at_rest) = (time, put_off, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;

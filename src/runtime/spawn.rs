@@ -20,7 +20,6 @@ use super::watch::{Trace, Watch};
 use metachron_agents::coupling::{Form, FormKind, Law, Link};
 use metachron_agents::{Agent, AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
 use std::sync::{Arc, Mutex};
-use std::time::Duration;
 
 /// An agent on its way into a run.
 pub struct AgentSpawn {
@@ -293,9 +292,11 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
         diary: Diary::new(),
         rhythm: Rhythm::default(),
         open: None,
+        woken: false,
+        beside: false,
         withheld: false,
         announced: Vec::new(),
-        unsettled: Duration::ZERO,
+        unsettled_ns: 0,
         served: SimTime::ZERO,
         owed: SimSpan::ZERO,
     }

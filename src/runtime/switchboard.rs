@@ -60,6 +60,8 @@ pub(super) struct Switchboard {
     /// Somebody was summoned: the lockstep loop looks for them.
     rung: AtomicBool,
     stop: AtomicBool,
+    /// Somebody who is near others is far behind.
+    far_behind: AtomicBool,
     /// Calls the workers, where agents have no threads of their own.
     bell: OnceLock<Bell>,
     /// Whose state has changed, for the reader of the run.
@@ -73,6 +75,7 @@ impl Switchboard {
             signals,
             rung: AtomicBool::new(false),
             stop: AtomicBool::new(false),
+            far_behind: AtomicBool::new(false),
             bell: OnceLock::new(),
             news: News::new(agents),
         }
@@ -225,6 +228,16 @@ impl Switchboard {
             bell.rouse_all();
         }
         self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
+    }
+
+    /// Somebody who is near others is far behind.
+    pub fn note_far_behind(&self) {
+        self.far_behind.store(true, Release);
+    }
+
+    /// Whether anybody has been so far.
+    pub fn was_anybody_far_behind(&self) -> bool {
+        self.far_behind.load(Acquire)
     }
 
     /// Asks every thread to end.

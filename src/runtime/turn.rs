@@ -9,19 +9,17 @@
 //! leads ([`super::island`]).
 
 use super::account::{Diary, SMOOTHING};
-use super::eyes::{Eyes, Peers, newest};
+use super::eyes::{Eyes, Peers};
 use super::faults::Faults;
 use super::fellows::Fellows;
 use super::governor::{Demand, Governor, TurnMeasure};
 use super::handle::Shared;
 use super::island::Company;
-use super::pace::{Pace, Start, Timeline};
+use super::pace::{LAG_CAP, Pace, Start, Timeline};
 use super::slot::SlotWriter;
 use metachron_agents::coupling::Link;
-use metachron_agents::coupling::beside::leaves_behind;
 use metachron_agents::{
-    Agent, AgentId, Body, Inertia, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport,
-    Surroundings,
+    Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
 };
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
@@ -47,12 +45,16 @@ pub(super) struct Actor {
     pub diary: Diary,
     pub rhythm: Rhythm,
     pub open: Option<Open>,
+    /// It rested until now: who is near it then has not been asked the time yet.
+    pub woken: bool,
+    /// Somebody who does not step with it was beside it when that was asked last.
+    pub beside: bool,
     /// The state that was written last is kept from being seen.
     pub withheld: bool,
     /// Up to which revision each ledger was announced to the one it is for.
     pub announced: Vec<(AgentId, u64)>,
-    /// Wall time of turns whose CPU time is not known yet.
-    pub unsettled: Duration,
+    /// Wall time of turns whose CPU time is not known yet, nanoseconds.
+    pub unsettled_ns: u64,
     /// Up to which time it has had its share of a pool's workers.
     pub served: SimTime,
     /// How far it was served worse with the worker it was taken from: it makes that up.
@@ -152,7 +154,7 @@ impl Actor {
             return;
         }
         let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
-        self.eyes.look(&self.peers, &self.writer, (me, time, dt), &Fellows::default());
+        self.eyes.look(&self.peers, &self.writer, (me, self.pace.scene_time(), dt), &Fellows::default());
         let neighbours = self.eyes.neighbours();
         let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
         let agent = &mut self.agent;
@@ -217,13 +219,14 @@ impl Actor {
     /// Accounts for the time of a turn on the wall: those it leads share it.
     pub fn count(&mut self, wall: Duration) {
         let share = if self.company.is_empty() { wall } else { wall / (1 + self.company.len() as u32) };
-        self.unsettled += share;
-        self.company.each(|seat| seat.unsettled += share);
+        let share_ns = share.as_nanos() as u64;
+        self.unsettled_ns += share_ns;
+        self.company.each(|seat| seat.unsettled_ns += share_ns);
     }
 
     /// Accounts for the CPU time of the turns since the last call: `share` of what they took on the wall.
     pub fn settle(&mut self, share: f64) {
-        let nanos = (std::mem::take(&mut self.unsettled).as_secs_f64() * share * 1e9) as u64;
+        let nanos = (std::mem::take(&mut self.unsettled_ns) as f64 * share) as u64;
         let cpu = &self.shared.gauges.cpu_nanos;
         // nobody else writes: to exchange the word would cost more
         cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
@@ -257,17 +260,23 @@ impl Actor {
     /// `None` where it waits instead, or hands its turns over before it steps.
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Option<(Open, Effort)>, String> {
         self.take_commands();
-        let start = self.pace.begin(timeline, wall, !self.eyes.neighbours().is_empty());
+        let near = self.find_company(self.pace.is_late(timeline, wall));
+        let before = self.pace.time();
+        let start = self.pace.begin(timeline, wall, near);
+        let leapt = self.pace.time().since(before);
+        if near && start.late > LAG_CAP {
+            self.shared.board.note_far_behind();
+        }
         if self.waits(wall) || self.is_called() {
             return Ok(None);
         }
         if self.governor.is_some() {
             self.rhythm.beat(timeline, wall);
         }
-        let alone = self.gather(timeline, wall, &start);
+        let alone = self.gather(timeline, wall, (&start, leapt));
         let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
         let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
-        let wanted = if is_met { self.pace.stretch(wanted, timeline, wall) } else { wanted };
+        let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
         let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
         let (Made { report, dt }, led) =
             if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };
@@ -283,19 +292,6 @@ impl Actor {
         Ok(Some((open, Effort { work: report.work, steps: 1 + led + alone })))
     }
 
-    /// Whether it waits for those who own contact with it and are behind; one that nobody leads or follows.
-    fn waits(&mut self, wall: Duration) -> bool {
-        // what it saw last was behind by more than it is now: who was not is not
-        let behind = self.company.is_empty() && self.leaves_behind() && {
-            self.eyes.look_again();
-            self.leaves_behind()
-        };
-        if !behind {
-            self.pace.go_on();
-        }
-        behind && self.pace.wait(wall)
-    }
-
     /// Whether somebody has found since its last step that it should lead this agent: a slow one that stepped once more alone would
     /// be where nobody expects it.
     fn is_called(&mut self) -> bool {
@@ -306,20 +302,15 @@ impl Actor {
         self.seek_leader().is_some()
     }
 
-    fn leaves_behind(&self) -> bool {
-        let Self { eyes, hands, links, pace, writer, .. } = self;
-        let around =
-            Surroundings { me: self.shared.id, time: pace.time(), neighbours: eyes.neighbours(), hands, links };
-        let is_led = |state: &Snapshot| matches!(state.body, Body::Tool(_));
-        let is_pushed = |state: &Snapshot| !is_led(state) && !matches!(state.inertia, Inertia::Immovable);
-        let bounds = || newest(writer, |state| state.bounds.filter(|_| is_pushed(state)));
-        leaves_behind(pace.dt(), &around, bounds)
-    }
-
     /// Steps by itself, by `wanted` or what the agent makes of that.
     pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
         let time = self.pace.time();
-        self.eyes.look(&self.peers, &self.writer, (self.shared.id, time, wanted), &Fellows::default());
+        self.eyes.look(
+            &self.peers,
+            &self.writer,
+            (self.shared.id, self.pace.scene_time(), wanted),
+            &Fellows::default(),
+        );
         let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
         let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
         let dt = self.agent.longest_step(wanted, &around).min(wanted);
@@ -401,6 +392,7 @@ impl Actor {
     fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
         self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
+        self.woken = true;
         self.rhythm = Rhythm::default();
         self.diary.restart(timeline.sim_at(wall));
         self.diary.pace(&self.shared.gauges, &self.pace);

@@ -40,12 +40,12 @@ impl Trace {
 
     /// Writes the state down if its time has come.
     pub fn look(&mut self, state: &Snapshot) {
-        if state.time < self.next || self.samples.len() >= SAMPLES_MAX || self.watch.every == SimSpan::ZERO {
+        if state.moment() < self.next || self.samples.len() >= SAMPLES_MAX || self.watch.every == SimSpan::ZERO {
             return;
         }
         let Some((position, _)) = state.body.probe(self.watch.at) else { return };
-        self.samples.push((state.time, position));
-        self.next = self.multiple_after(state.time);
+        self.samples.push((state.moment(), position));
+        self.next = self.multiple_after(state.moment());
     }
 
     /// Writes the state down at every multiple of the period up to `until`: it holds that long.

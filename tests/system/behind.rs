@@ -1,6 +1,8 @@
-//! Agents that touch others and cannot keep up: steps that take longer than they last grow, and hold what they held.
+//! Agents that touch others and cannot keep up: steps that take longer than they last grow, and hold what they held; past that all that
+//! touch live on slower.
 
-use crate::play::{agent, lockstep, number, point};
+use crate::play::{Folder, agent, lockstep, number, point};
+use serde_json::Value;
 
 /// Where the first probe of a built-in scene ends where each step of `model` takes so many milliseconds; nobody drops any time.
 fn slowed(scene: &str, seconds: &str, (model, step_ms): (&str, u32), watched: &str) -> [f64; 3] {
@@ -10,9 +12,24 @@ fn slowed(scene: &str, seconds: &str, (model, step_ms): (&str, u32), watched: &s
         assert!(!agent["parked"].as_bool().unwrap(), "{scene}: {agent}");
         assert!(number(agent, "/dropped_ms") < 20.0, "{scene}: {agent}");
     }
+    at(&report, watched)
+}
+
+/// Where the first probe of an object ends.
+fn at(report: &Value, watched: &str) -> [f64; 3] {
     let probes = report["probes"].as_array().unwrap();
     let probe = probes.iter().position(|probe| probe["object"] == watched).expect("it is watched");
-    point(&report, &format!("/probes/{probe}/position_m"))
+    point(report, &format!("/probes/{probe}/position_m"))
+}
+
+/// The report of a built-in scene where each step of `model` takes so many microseconds, whatever it has to do; nobody flies apart.
+fn put_off(scene: &str, seconds: &str, (model, step_us): (&str, u32)) -> Value {
+    let slow = [format!("machine.step.{model}.base_us={step_us}"), format!("machine.step.{model}.unit_us=0")];
+    let report = lockstep(scene, &["--seconds", seconds, "--set", &slow[0], "--set", &slow[1]]);
+    for agent in report["agents"].as_array().unwrap() {
+        assert!(!agent["parked"].as_bool().unwrap(), "{scene}: {agent}");
+    }
+    report
 }
 
 #[test]
@@ -66,4 +83,110 @@ fn a_gut_hangs_on_a_sheet_that_cannot_keep_its_rate() {
     }
     let report = lockstep("mesentery", &["--seconds", "0.5", "--set", "machine.step.sheet.base_us=10000"]);
     assert!(number(agent(&report, "mesentery"), "/rate_hz") < 101.0, "a step takes 10 ms");
+}
+
+#[test]
+fn a_gut_and_its_sheet_live_on_slower_together_where_the_sheet_needs_more_than_longer_steps_give() {
+    for step_ms in [20, 30, 40] {
+        let report = put_off("mesentery", "4", ("sheet", 1000 * step_ms));
+        let gut = at(&report, "gut");
+        assert!(gut[2] > 0.05 && gut[2] < 0.2, "{step_ms} ms: {gut:?}");
+        // steps of 1/60 s at most: of 4 s they live through 4 s · 16.7 ms / step, but for half a second that may still be made up
+        let given_up_s = 4.0 - 4.0 * 16.7 / f64::from(step_ms);
+        for name in ["gut", "mesentery"] {
+            let dropped_s = 1e-3 * number(agent(&report, name), "/dropped_ms");
+            assert!(dropped_s > given_up_s - 0.6 && dropped_s < given_up_s + 0.6, "{step_ms} ms: {name} {dropped_s} s");
+        }
+    }
+}
+
+#[test]
+fn fingers_that_step_at_a_fifth_of_their_rate_hold_what_they_lift_later() {
+    // lifted at 3.2 s of the hands' script
+    let tube = at(&put_off("gripper", "9", ("rigid", 10_000)), "tube");
+    assert!((tube[2] - 0.136).abs() < 2e-3, "{tube:?}");
+}
+
+#[test]
+fn a_tube_that_hardly_misses_its_rate_stays_in_faster_fingers() {
+    // a step of 4.17 ms
+    for step_us in [4300, 5000, 10_000] {
+        let tube = at(&put_off("gripper", "4", ("tube", step_us)), "tube");
+        assert!((tube[2] - 0.136).abs() < 2e-3, "{step_us} us: {tube:?}");
+    }
+}
+
+#[test]
+fn a_hose_stays_on_a_rope_where_a_step_of_either_takes_longer_than_any_may_last() {
+    let hose = at(&put_off("crossing", "4", ("tube", 20_000)), "hose");
+    assert!((hose[2] - 0.169).abs() < 5e-3, "{hose:?}");
+}
+
+/// A sheet of 240 Hz held all around, on a slope of 12°, and a tube that lies down the slope on it.
+const SLOPE: &str = r#"
+[[object]]
+name = "sheet"
+model = "sheet"
+size_m = [0.4, 0.4]
+segments = [8, 8]
+thickness_m = 0.004
+young_pa = 2.0e6
+density_kg_m3 = 1050.0
+damping_per_s = 3.0
+friction = 0.8
+position_m = [0.0, 0.0, 0.2]
+rotation_deg = [0.0, 12.0, 0.0]
+hold = ["left", "right", "near", "far"]
+rate_hz = 240.0
+[[object]]
+name = "tube"
+model = "tube"
+path_m = [[-0.117, 0.0, 0.2404], [0.117, 0.0, 0.1906]]
+radius_m = 0.012
+wall_m = 0.002
+young_pa = 2.0e5
+density_kg_m3 = 1050.0
+damping_per_s = 2.0
+friction = 0.8
+rate_hz = 240.0
+eps_m = 0.02
+[[probe]]
+object = "tube"
+at = 0.5
+"#;
+
+#[test]
+fn a_tube_lies_on_a_sloping_sheet_whatever_the_sheet_takes_for_a_step() {
+    for step_ms in [13, 16, 20] {
+        let slow = format!("machine.step.sheet.base_us={}", 1000 * step_ms);
+        let tube = at(&Folder::with(SLOPE).lockstep(&["--seconds", "3", "--set", &slow]), "tube");
+        // it creeps down
+        let off_m = tube[2] - (0.199 - 0.2126 * tube[0]);
+        assert!(tube[0].abs() < 0.08 && off_m.abs() < 0.01, "{step_ms} ms: {tube:?}, {off_m} m off");
+    }
+}
+
+/// A ball of 20 mm that falls on it from a metre above.
+const BALL: &str = r#"
+[[object]]
+name = "ball"
+model = "rigid"
+shape = "ball"
+radius_m = 0.02
+mass_kg = 0.05
+position_m = [0.1, 0.1, 1.2]
+rate_hz = 240.0
+[[probe]]
+object = "ball"
+"#;
+
+#[test]
+fn who_comes_to_agents_that_live_slower_takes_their_time_for_its_own() {
+    let folder = Folder::with(&format!("{SLOPE}{BALL}"));
+    // of the 0.45 s of its fall those below lived through 0.12; it would stand still until they have caught up, at 1.7 s
+    let play = |seconds: &str| folder.lockstep(&["--seconds", seconds, "--set", "machine.step.sheet.base_us=40000"]);
+    let ball = at(&play("1.1"), "ball");
+    assert!(ball[2] < 0.25, "{ball:?}");
+    let later = at(&play("3"), "ball");
+    assert!(later[2] > 0.1, "{later:?}");
 }

@@ -5,7 +5,7 @@
 
 use super::Law;
 use crate::instrument::GRASP_BELOW;
-use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings};
+use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings, ToolState};
 
 /// Beside others a body that bends makes no longer substeps than this, seconds: in a longer one it falls so far from where it
 /// began that its places of contact are no longer there (measured: 20 mm deep at 0.1 s, 0.01 mm at 1/60 s).
@@ -14,9 +14,13 @@ pub const PART_MAX_S: f64 = 1.0 / 60.0;
 const SPLIT_SLACK: f64 = 1.01;
 /// No step is made shorter than this because of somebody fast, seconds.
 const HURRY_S: f64 = 1e-3;
-/// Who owns contact may be this far behind, seconds: as long as a system lets a thread wait now and then, and as short as a fall
-/// from rest makes 2 mm in.
+/// Whom it pushes an owner may leave behind so far besides one of their steps, seconds: as long as a system lets a thread wait now and
+/// then, and as short as a fall from rest makes 2 mm in.
 const AHEAD_S: f64 = 0.02;
+/// Who is pushed may leave who pushes it behind by so much of one of its steps: fingers that answer to forces older than that drop a tube.
+const PUSHED_STEPS: f64 = 0.5;
+/// And by this at least, seconds: clocks are looked at again no sooner.
+const PUSHED_LEAST_S: f64 = 2e-3;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
 const SURPRISE_M_S2: f64 = 30.0;
 
@@ -79,15 +83,43 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
     SimSpan::from_nanos(dt.as_nanos() / parts as u64)
 }
 
-/// Whether somebody who owns contact with the body, and whom it may touch in a step of `dt`, stands so far behind its time that it
-/// would go through them before they know: by 20 ms and one of their steps. `bounds` are those of the body, if anything can push it.
-pub fn leaves_behind(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Option<Bounds>) -> bool {
-    let behind = |n: &Neighbour| around.time.secs_after(n.snapshot.time) > AHEAD_S + n.step_s;
-    let mut owners = around.neighbours.iter().filter(|n| !n.owned && !n.snapshot.at_rest && behind(n)).peekable();
-    if owners.peek().is_none() {
+/// Whether a neighbour with steps of `step_s` seconds stands so far behind the body's time that the body has to wait for it, where they
+/// are linked, hold each other or may touch in a step of `dt`: by half of such a step where it owns the pair, by one and 20 ms where the
+/// body does. `bounds` are those of the body, if anything of it can be touched.
+pub fn leaves_behind(
+    neighbour: &Neighbour,
+    (dt, step_s): (SimSpan, f64),
+    around: &Surroundings<'_>,
+    bounds: impl FnOnce() -> Option<Bounds>,
+) -> bool {
+    let behind_s = around.time.secs_after(neighbour.snapshot.time);
+    let allowed_s = if neighbour.owned { AHEAD_S + step_s } else { (PUSHED_STEPS * step_s).max(PUSHED_LEAST_S) };
+    if behind_s <= allowed_s || neighbour.snapshot.at_rest {
         return false;
     }
-    bounds().is_some_and(|bounds| owners.any(|n| may_touch(n, around, &bounds, dt.as_secs_f64())))
+    is_beside(neighbour, (dt, step_s), around, bounds)
+}
+
+/// Whether a neighbour with steps of `step_s` seconds has to live at one pace with a body that makes steps of `dt`: they are linked, hold
+/// each other, or may touch before one of them knows of the other. `bounds` are those of the body, if anything of it can be touched.
+pub fn is_beside(
+    neighbour: &Neighbour,
+    (dt, step_s): (SimSpan, f64),
+    around: &Surroundings<'_>,
+    bounds: impl FnOnce() -> Option<Bounds>,
+) -> bool {
+    // who is farther behind is not waited for until it is as near as this
+    let ahead_s = dt.as_secs_f64() + AHEAD_S + step_s;
+    around.links.iter().any(|link| link.other == neighbour.id)
+        || holds(neighbour, around.me)
+        || bounds().is_some_and(|bounds| is_near(neighbour, &bounds, (dt.as_secs_f64(), ahead_s)))
+}
+
+/// Whether one of the two is a tool that holds the other.
+fn holds(neighbour: &Neighbour, me: AgentId) -> bool {
+    let held = |tool: &ToolState| tool.grasp.is_some_and(|grasp| grasp.target == me);
+    matches!(&neighbour.snapshot.body, Body::Tool(tool) if held(tool))
+        || neighbour.snapshot.grips.iter().any(|grip| grip.by == Some(me))
 }
 
 /// Whether a link by the ledger joins a neighbour to this body.
@@ -118,11 +150,16 @@ pub fn has_a_say(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
 /// Whether a neighbour may come near enough to a body within `bounds` to touch it in the next `dt` seconds.
 #[must_use]
 pub fn may_touch(neighbour: &Neighbour, around: &Surroundings<'_>, bounds: &Bounds, dt: f64) -> bool {
+    let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
+    neighbour.law == Law::Ledger && !is_let_in(neighbour, around.me) && is_near(neighbour, bounds, (dt, ahead))
+}
+
+/// The same where its state is as old as to be `ahead` at the end, seconds; whatever the law, and between open jaws.
+fn is_near(neighbour: &Neighbour, bounds: &Bounds, (dt, ahead): (f64, f64)) -> bool {
     let (Some(_), Some(there)) = (&neighbour.form, &neighbour.snapshot.bounds) else { return false };
-    if neighbour.law != Law::Ledger || !neighbour.snapshot.is_finite() || is_let_in(neighbour, around.me) {
+    if !neighbour.snapshot.is_finite() {
         return false;
     }
-    let ahead = around.time.secs_after(neighbour.snapshot.time).abs() + dt;
     let way = bounds.speed_m_s * dt + (there.speed_m_s + SURPRISE_M_S2 * ahead) * ahead;
     let apart = (there.low - bounds.high).max(bounds.low - there.high).max_element();
     apart <= way

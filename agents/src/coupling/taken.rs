@@ -44,7 +44,7 @@ impl Taken {
         if let Some(ahead) = self.copy.ahead.take() {
             (sum, carried) = (-ahead.sum, -ahead.carried(now));
         }
-        if self.read.is_none_or(|read| read < owner.snapshot.time) {
+        if self.read.is_none_or(|read| read != owner.snapshot.time) {
             let gained = self.learn(ledger, owner, now);
             (sum, carried) = (sum + gained[0], carried + gained[1]);
         }

@@ -33,6 +33,8 @@ struct Knot {
 pub(super) struct Script {
     knots: Vec<Knot>,
     repeat: bool,
+    /// At which time the script's own begins, seconds.
+    begin_s: f64,
 }
 
 impl Script {
@@ -52,11 +54,17 @@ impl Script {
         }
         set_slopes(&mut knots, repeat);
         let repeat = repeat && knots.len() > 1;
-        Self { knots, repeat }
+        Self { knots, repeat, begin_s: 0.0 }
+    }
+
+    /// Its time begins later by so many seconds, earlier where that is below zero.
+    pub(super) fn begin_later(&mut self, by_s: f64) {
+        self.begin_s += by_s;
     }
 
     /// Where the script leads at `time_s`: it waits in its first keyframe before it and in its last after it.
     pub(super) fn at(&self, time_s: f64) -> Pose {
+        let time_s = time_s - self.begin_s;
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
         let t = if self.repeat && time_s > first.at_s {
             first.at_s + (time_s - first.at_s) % (last.at_s - first.at_s)
@@ -73,7 +81,7 @@ impl Script {
 
     /// Whether nothing moves any more from `time_s` on.
     pub(super) fn is_over(&self, time_s: f64) -> bool {
-        !self.repeat && time_s >= self.knots[self.knots.len() - 1].at_s
+        !self.repeat && time_s - self.begin_s >= self.knots[self.knots.len() - 1].at_s
     }
 }
 

@@ -280,6 +280,10 @@ impl Agent for Instrument {
         beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
     }
 
+    fn rename_time(&mut self, by_s: f64) {
+        self.script.begin_later(by_s);
+    }
+
     fn resolution(&self) -> Option<Resolution> {
         None
     }

@@ -332,6 +332,10 @@ impl Agent for RigidBody {
         beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S))
     }
 
+    fn rename_time(&mut self, _by_s: f64) {
+        self.borne.forget();
+    }
+
     fn resolution(&self) -> Option<Resolution> {
         None
     }

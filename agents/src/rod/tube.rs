@@ -52,6 +52,8 @@ pub struct Tube {
     pub(super) ahead_s: f64,
     pub(super) resolution: Resolution,
     time: SimTime,
+    /// From which of its times on its wave counts, seconds.
+    wave_from_s: f64,
     pub(super) dt_s: f64,
     pub(super) steps: u64,
 }
@@ -100,6 +102,7 @@ impl Tube {
             accelerations: vec![],
             ahead_s: 0.0,
             time: SimTime::ZERO,
+            wave_from_s: 0.0,
             dt_s: 0.0,
             steps: 0,
         };
@@ -196,7 +199,7 @@ impl Tube {
     pub(super) fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
         let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
         let Some(wave) = self.spec.peristalsis else { return radius };
-        let phase = (arc_m - wave.speed_m_s * time.as_secs_f64()) / wave.wavelength_m;
+        let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.wave_from_s)) / wave.wavelength_m;
         let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
         radius * (1.0 - wave.amplitude * lift)
     }
@@ -349,6 +352,10 @@ impl Agent for Tube {
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         beside::longest_step(dt, around, || bounds(&self.now, self.widest_m()), |n| has_a_say(n, around))
+    }
+
+    fn rename_time(&mut self, by_s: f64) {
+        self.wave_from_s += by_s;
     }
 
     fn resolution(&self) -> Option<Resolution> {

@@ -94,12 +94,27 @@ impl Company {
         self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor));
     }
 
+    /// Those it leads.
+    pub fn all(&self) -> impl Iterator<Item = &Actor> {
+        self.seats.iter().map(|seat| &*seat.actor)
+    }
+
+    /// Who stepped as one when that was last found out; `None` where nobody is led.
+    pub fn fellows(&self) -> Option<&Fellows> {
+        (!self.is_empty()).then_some(&self.fellows)
+    }
+
+    /// Visits those it leads, each with all that step as one.
+    pub fn each_beside(&mut self, mut visit: impl FnMut(&mut Actor, &Fellows)) {
+        self.seats.iter_mut().for_each(|seat| visit(&mut seat.actor, &self.fellows));
+    }
+
     /// Those at `time`.
     pub(super) fn at(&self, time: SimTime) -> impl Iterator<Item = &Seat> {
         self.seats.iter().filter(move |seat| seat.actor.pace.time() == time)
     }
 
-    pub(super) fn gather_fellows(&mut self, leader: AgentId, time: SimTime) {
+    pub fn gather_fellows(&mut self, leader: AgentId, time: SimTime) {
         let Self { seats, fellows, .. } = self;
         fellows.gather(leader, seats.iter().filter(|s| s.actor.pace.time() == time).map(|s| s.actor.id()));
     }
