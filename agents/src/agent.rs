@@ -39,7 +39,7 @@ pub trait Agent: Send {
     }
 
     /// Calls its own time another from now on, later by `by_s` seconds than it was called; earlier where that is below zero.
-    /// Nothing else changes, and nobody is near it: what it does at which time goes on from where it is.
+    /// Nothing else changes, and nothing is on its way to it or from it: what it does at which time goes on from where it is.
     fn rename_time(&mut self, _by_s: f64) {}
 
     /// The resolution the simulation holds; `None` for a model that has none.

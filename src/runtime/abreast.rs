@@ -8,7 +8,7 @@ use super::eyes::newest;
 use super::fellows::Fellows;
 use super::turn::Actor;
 use metachron_agents::coupling::beside::{is_beside, leaves_behind};
-use metachron_agents::{AgentId, Bounds, Neighbour, SimSpan, Surroundings};
+use metachron_agents::{AgentId, Bounds, Neighbour, SimSpan, SimTime, Surroundings};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
@@ -59,26 +59,54 @@ impl Actor {
         around.neighbours.iter().filter(move |n| which(n, steps(n), &around, &bounds))
     }
 
-    /// Whether anybody is beside it who does not step with it; not asked where nobody is late. Who comes beside others takes their time
-    /// for its own, and who has nobody beside it any more that of the scene.
-    pub fn find_company(&mut self, late: bool) -> bool {
-        let somebody_is = self.shared.board.was_anybody_far_behind();
+    /// Whether it lives at one pace with others: somebody is beside it who does not step with it, or has not taken yet what it gave.
+    /// Not asked where nobody is late.
+    pub fn keeps_company(&mut self, now: SimTime, late: bool) -> bool {
+        let somebody_is = self.pace.put_off() > SimSpan::ZERO || self.shared.board.is_anybody_far_behind(now);
+        let was_beside = self.beside.take();
         if !(late || somebody_is) {
             return false;
         }
-        let newcomer = std::mem::take(&mut self.woken) | !self.beside;
-        if somebody_is && newcomer {
+        if somebody_is && was_beside != Some(true) {
             self.look_around();
         }
-        self.beside = self.is_beside_others();
-        if somebody_is && (newcomer || !self.beside) {
-            let put_off = if self.beside { self.put_off_beside() } else { SimSpan::ZERO };
-            if put_off != self.pace.put_off() {
-                self.rename_time(put_off);
-                self.company.each(|seat| seat.rename_time(put_off));
-            }
+        let is_beside = self.is_beside_others();
+        self.beside = Some(is_beside);
+        if !self.is_settled() {
+            return true;
         }
-        self.beside
+        if somebody_is {
+            self.agree_on_time(was_beside, is_beside);
+        }
+        is_beside
+    }
+
+    /// Who comes beside others takes their time for its own, and who has nobody beside it any more that of the scene. Who was beside them
+    /// before it was asked keeps its own: it has a share in what they do.
+    fn agree_on_time(&mut self, was_beside: Option<bool>, is_beside: bool) {
+        let put_off = match (was_beside, is_beside) {
+            (_, false) => SimSpan::ZERO,
+            (Some(false), true) => self.put_off_beside(),
+            _ => return,
+        };
+        if put_off != self.pace.put_off() {
+            self.rename_time(put_off);
+            self.company.each(|seat| seat.rename_time(put_off));
+        }
+    }
+
+    /// Whether nothing is on its way between it, with those it leads, and anybody.
+    fn is_settled(&self) -> bool {
+        let settled = |actor: &Self| actor.eyes.is_settled(actor.id(), &actor.writer, |id| actor.runs(id));
+        settled(self) && self.company.all().all(settled)
+    }
+
+    /// Whether another agent is at its time, as far as steps and hiccups allow: only then the two may step as one.
+    pub fn is_at_the_time_of(&self, id: AgentId) -> bool {
+        let Some(peer) = self.peers.get(id) else { return false };
+        let theirs = peer.shared.slot.latest();
+        let allowed_s = FAR_BEHIND_S + self.pace.dt().as_secs_f64() + self.step_of(id);
+        theirs.at_rest || self.pace.time().secs_after(theirs.time).abs() <= allowed_s
     }
 
     /// By how much it would have to be put off to be at the time of the one farthest behind of those beside it; as it is where

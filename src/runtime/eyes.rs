@@ -115,6 +115,12 @@ impl Eyes {
         }
     }
 
+    /// Whether all that `me`, whose states `writer` writes, and those of whom it sees that they `live` have booked for each other has been
+    /// taken.
+    pub fn is_settled(&self, me: AgentId, writer: &SlotWriter<Snapshot>, live: impl Fn(AgentId) -> bool) -> bool {
+        newest(writer, |mine| self.neighbours.iter().filter(|n| live(n.id)).all(|n| is_settled(me, mine, n)))
+    }
+
     /// Looks at those it saw last, and at nobody else.
     pub fn look_again(&mut self) {
         for (neighbour, look) in self.neighbours.iter_mut().zip(&self.looks) {

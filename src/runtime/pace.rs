@@ -240,7 +240,8 @@ impl Pace {
         let until_ms = std::mem::take(&mut self.held_until_ms);
         if until_ms > 0 {
             let since = Duration::from_millis(u64::from(until_ms.saturating_sub(WAIT_MS)));
-            self.waits[0] = self.waits[0].saturating_add(ticks(wall.saturating_sub(since)) as u16);
+            let waited = u16::try_from(ticks(wall.saturating_sub(since))).unwrap_or(u16::MAX);
+            self.waits[0] = self.waits[0].saturating_add(waited);
         }
     }
 

@@ -23,6 +23,10 @@ use std::sync::OnceLock;
 /// so that a touched agent does not doze off between two touches.
 const TOUCH_HOLD: SimSpan = SimSpan::from_nanos(100_000_000);
 
+/// How long after somebody was far behind everybody asks for it, simulated time; and how often that is noted.
+const FAR_BEHIND_HOLD: SimSpan = SimSpan::from_nanos(2_000_000_000);
+const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
+
 /// The flags of one agent.
 #[derive(Debug)]
 struct Signal {
@@ -60,8 +64,8 @@ pub(super) struct Switchboard {
     /// Somebody was summoned: the lockstep loop looks for them.
     rung: AtomicBool,
     stop: AtomicBool,
-    /// Somebody who is near others is far behind.
-    far_behind: AtomicBool,
+    /// Simulated nanoseconds when somebody who is near others was far behind last, plus one; zero for never.
+    far_behind: AtomicU64,
     /// Calls the workers, where agents have no threads of their own.
     bell: OnceLock<Bell>,
     /// Whose state has changed, for the reader of the run.
@@ -75,7 +79,7 @@ impl Switchboard {
             signals,
             rung: AtomicBool::new(false),
             stop: AtomicBool::new(false),
-            far_behind: AtomicBool::new(false),
+            far_behind: AtomicU64::new(0),
             bell: OnceLock::new(),
             news: News::new(agents),
         }
@@ -230,14 +234,19 @@ impl Switchboard {
         self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
     }
 
-    /// Somebody who is near others is far behind.
-    pub fn note_far_behind(&self) {
-        self.far_behind.store(true, Release);
+    /// Somebody who is near others is far behind, or was and is not at the scene's time yet, at `now`.
+    pub fn note_far_behind(&self, now: SimTime) {
+        let noted = self.far_behind.load(Relaxed);
+        // everybody reads it: it is written now and then
+        if noted == 0 || now > SimTime::from_nanos(noted - 1) + FAR_BEHIND_NOTED {
+            self.far_behind.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
+        }
     }
 
-    /// Whether anybody has been so far.
-    pub fn was_anybody_far_behind(&self) -> bool {
-        self.far_behind.load(Acquire)
+    /// Whether anybody has been so lately.
+    pub fn is_anybody_far_behind(&self, now: SimTime) -> bool {
+        let noted = self.far_behind.load(Acquire);
+        noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
     }
 
     /// Asks every thread to end.
@@ -315,6 +324,17 @@ mod tests {
         assert!(board.take_wake(ME));
         board.follow(AgentId(1), None);
         assert_eq!(board.leader(AgentId(2)), AgentId(1));
+    }
+
+    #[test]
+    fn who_was_far_behind_is_forgotten_after_a_while() {
+        let (board, at) = (Switchboard::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
+        assert!(!board.is_anybody_far_behind(SimTime::ZERO));
+        board.note_far_behind(SimTime::ZERO);
+        assert!(board.is_anybody_far_behind(at(1999)) && !board.is_anybody_far_behind(at(2000)));
+        board.note_far_behind(at(1500));
+        board.note_far_behind(at(1550));
+        assert!(board.is_anybody_far_behind(at(3499)) && !board.is_anybody_far_behind(at(3500)));
     }
 
     #[test]

@@ -45,10 +45,8 @@ pub(super) struct Actor {
     pub diary: Diary,
     pub rhythm: Rhythm,
     pub open: Option<Open>,
-    /// It rested until now: who is near it then has not been asked the time yet.
-    pub woken: bool,
-    /// Somebody who does not step with it was beside it when that was asked last.
-    pub beside: bool,
+    /// Whether somebody who does not step with it was beside it in its turn before, if that was asked.
+    pub beside: Option<bool>,
     /// The state that was written last is kept from being seen.
     pub withheld: bool,
     /// Up to which revision each ledger was announced to the one it is for.
@@ -174,11 +172,10 @@ impl Actor {
         self.shared.board.heed(self.id());
         self.take_in();
         match contained(|| self.attempt(timeline, wall)) {
-            Ok(Some((open, effort))) => {
-                self.open = Some(open);
+            Ok((open, effort)) => {
+                self.open = open;
                 Some(effort)
             }
-            Ok(None) => Some(Effort { work: 0.0, steps: 0 }),
             Err(reason) => {
                 self.park(reason);
                 self.disband(timeline, wall);
@@ -257,23 +254,25 @@ impl Actor {
         self.shut_door();
     }
 
-    /// `None` where it waits instead, or hands its turns over before it steps.
-    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<Option<(Open, Effort)>, String> {
+    /// No open turn where it waits instead, or hands its turns over before it steps.
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<Open>, Effort), String> {
         self.take_commands();
-        let near = self.find_company(self.pace.is_late(timeline, wall));
+        let now = timeline.sim_at(wall);
+        let near = self.keeps_company(now, self.pace.is_late(timeline, wall));
         let before = self.pace.time();
         let start = self.pace.begin(timeline, wall, near);
         let leapt = self.pace.time().since(before);
-        if near && start.late > LAG_CAP {
-            self.shared.board.note_far_behind();
+        if near && start.late > LAG_CAP || self.pace.put_off() > SimSpan::ZERO {
+            self.shared.board.note_far_behind(now);
         }
+        // even where it waits: those whom it waits for may wait for one that it leads
+        let alone = self.gather(timeline, wall, (&start, leapt));
         if self.waits(wall) || self.is_called() {
-            return Ok(None);
+            return Ok((None, Effort { work: 0.0, steps: alone }));
         }
         if self.governor.is_some() {
             self.rhythm.beat(timeline, wall);
         }
-        let alone = self.gather(timeline, wall, (&start, leapt));
         let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
         let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
         let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
@@ -289,7 +288,7 @@ impl Actor {
         self.write_snapshot(self.pace.time() + dt, rests)?;
         open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
         self.pace.advance_by(dt);
-        Ok(Some((open, Effort { work: report.work, steps: 1 + led + alone })))
+        Ok((Some(open), Effort { work: report.work, steps: 1 + led + alone }))
     }
 
     /// Whether somebody has found since its last step that it should lead this agent: a slow one that stepped once more alone would
@@ -392,7 +391,8 @@ impl Actor {
     fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
         self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
-        self.woken = true;
+        // as one who comes from elsewhere: while it slept the others' time went on
+        self.beside = Some(false);
         self.rhythm = Rhythm::default();
         self.diary.restart(timeline.sim_at(wall));
         self.diary.pace(&self.shared.gauges, &self.pace);

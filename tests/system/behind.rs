@@ -204,3 +204,146 @@ fn who_comes_to_agents_that_live_slower_takes_their_time_for_its_own() {
     let later = at(&play("3"), "ball");
     assert!(later[2] > 0.1, "{later:?}");
 }
+
+/// A level sheet of 240 Hz held all around, and a box of 8 Hz that is put down on it.
+const LYING: &str = r#"
+[[object]]
+name = "sheet"
+model = "sheet"
+size_m = [0.4, 0.4]
+segments = [8, 8]
+thickness_m = 0.004
+young_pa = 2.0e6
+density_kg_m3 = 1050.0
+damping_per_s = 3.0
+friction = 0.8
+position_m = [0.0, 0.0, 0.2]
+hold = ["left", "right", "near", "far"]
+rate_hz = 240.0
+[[object]]
+name = "box"
+model = "rigid"
+shape = "box"
+half_extents_m = [0.03, 0.03, 0.03]
+mass_kg = 0.1
+position_m = [0.0, 0.0, 0.235]
+friction = 0.8
+rate_hz = 8.0
+[[probe]]
+object = "box"
+"#;
+
+#[test]
+fn a_slow_box_that_lies_on_a_sheet_lies_there_after_one_step_of_the_sheet_was_held_up() {
+    let held_up = [
+        "--set",
+        "machine.step.sheet.base_us=1500",
+        "--set",
+        "machine.step.sheet.unit_us=0",
+        "--set",
+        "machine.step.rigid.base_us=100",
+        "--set",
+        "machine.step_load=[{at_s=2.0,factor=100},{at_s=2.002,factor=1}]",
+    ];
+    let folder = Folder::with(LYING);
+    let [before, after] = ["2", "4"].map(|s| at(&folder.lockstep(&[&["--seconds", s], &held_up[..]].concat()), "box"));
+    assert!((before[2] - after[2]).abs() < 2e-3, "{before:?} {after:?}");
+}
+
+/// A ball that rolls down a sheet and off it, against a box on a stand with a tool above it.
+const MEETING: &str = r#"
+[[object]]
+name = "slider"
+model = "rigid"
+shape = "ball"
+radius_m = 0.02
+mass_kg = 0.1
+position_m = [-0.12, 0.0, 0.249]
+friction = 0.5
+rate_hz = 240.0
+sleep = false
+[[object]]
+name = "stand"
+model = "rigid"
+shape = "box"
+fixed = true
+half_extents_m = [0.05, 0.1, 0.1]
+position_m = [0.35, 0.0, 0.02]
+[[object]]
+name = "sheet"
+model = "sheet"
+size_m = [0.4, 0.4]
+segments = [8, 8]
+thickness_m = 0.004
+young_pa = 2.0e9
+density_kg_m3 = 1050.0
+damping_per_s = 3.0
+friction = 0.5
+position_m = [0.0, 0.0, 0.2]
+rotation_deg = [0.0, 12.0, 0.0]
+hold = ["left", "right", "near", "far"]
+rate_hz = 240.0
+[[object]]
+name = "waiting"
+model = "rigid"
+shape = "box"
+half_extents_m = [0.03, 0.08, 0.06]
+mass_kg = 0.3
+position_m = [0.33, 0.0, 0.18]
+friction = 0.5
+rate_hz = 240.0
+sleep = false
+[[object]]
+name = "tool"
+model = "instrument"
+rate_hz = 240.0
+keyframe = [
+    { at_s = 0.0, tip_m = [0.33, 0.0, 0.265], rotation_deg = [180, 0, 0], jaw = 0.0 },
+    { at_s = 50.0, tip_m = [0.33, 0.0, 0.2651], rotation_deg = [180, 0, 0], jaw = 0.0 },
+]
+[[probe]]
+object = "waiting"
+"#;
+
+#[test]
+fn agents_of_two_times_that_meet_strike_each_other_as_at_one() {
+    // half a second apart, the box would have been where its new speed carries it in that time: 11 cm farther
+    let slow = ["--set", "machine.step.sheet.base_us=20000", "--set", "machine.step.sheet.unit_us=0"];
+    let folder = Folder::with(MEETING);
+    let [slowed, kept] = [("3", &slow[..]), ("1.5", &[])].map(|(s, set)| {
+        at(&folder.lockstep(&[&["--seconds", s, "--set", "machine.step.rigid.base_us=20"], set].concat()), "waiting")
+    });
+    assert!(kept[0] > 0.331 && (kept[2] - 0.18).abs() < 1e-3, "it is struck: {kept:?}");
+    assert!((slowed[0] - kept[0]).abs() < 0.015 && (slowed[2] - kept[2]).abs() < 1e-3, "{slowed:?}, not {kept:?}");
+}
+
+#[test]
+fn boxes_that_fall_on_each_other_at_two_clocks_never_wait_in_a_circle() {
+    for seed in 0..4_u32 {
+        let boxes: String = (0..8).map(|k| tumbling(k, seed)).collect();
+        let plane = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\n";
+        let report = Folder::with(&format!("{plane}{boxes}")).lockstep(&["--seconds", "0.8"]);
+        for agent in report["agents"].as_array().unwrap() {
+            assert!(number(agent, "/dropped_ms") == 0.0, "seed {seed}: {agent}");
+        }
+    }
+}
+
+/// One of eight boxes above each other in fours, tilted and of 60 or 240 Hz, as `seed` says.
+fn tumbling(k: u32, seed: u32) -> String {
+    let mut word = 747_796_405_u32.wrapping_mul(8 * seed + k + 1);
+    let mut next = || {
+        word ^= word << 13;
+        word ^= word >> 17;
+        word ^= word << 5;
+        f64::from(word) / f64::from(u32::MAX)
+    };
+    let half_m: [f64; 3] = std::array::from_fn(|_| 0.03 + 0.05 * next());
+    let tilt_deg: [f64; 3] = std::array::from_fn(|_| 60.0 * next() - 30.0);
+    let at_m = [0.2 * f64::from(k % 2) - 0.1, 0.2 * f64::from(k / 2 % 2) - 0.1, 0.16 + 0.22 * f64::from(k / 4)];
+    let rate_hz = if next() < 0.5 { 60.0 } else { 240.0 };
+    format!(
+        "[[object]]\nname = \"b{k}\"\nmodel = \"rigid\"\nshape = \"box\"\nmass_kg = 1.0\nhalf_extents_m = {half_m:?}\n\
+         position_m = {at_m:?}\nrotation_deg = {tilt_deg:?}\nrate_hz = {rate_hz:?}\n"
+    )
+}

@@ -3,9 +3,10 @@
 //! In: a step that is wanted, and who is near. Out: that step, or an equal part of it; who may be touched in it; whether somebody
 //! has to be waited for. Never here: the step itself. Theory: docs/theory/coupling.md, eq. 7g.
 
-use super::Law;
+use super::{Impulse, Law};
 use crate::instrument::GRASP_BELOW;
 use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings, ToolState};
+use glam::DVec3;
 
 /// Beside others a body that bends makes no longer substeps than this, seconds: in a longer one it falls so far from where it
 /// began that its places of contact are no longer there (measured: 20 mm deep at 0.1 s, 0.01 mm at 1/60 s).
@@ -22,6 +23,10 @@ const PUSHED_STEPS: f64 = 0.5;
 /// And by this at least, seconds: clocks are looked at again no sooner. What pulls at a link is waited for after one of its steps and this:
 /// a gut of 240 Hz flew off its sheet that let it fall 28 ms behind.
 const PUSHED_LEAST_S: f64 = 2e-3;
+/// Whose time goes back by more than this calls it another now; less is a message that came late, seconds.
+pub(super) const MEETS_S: f64 = 0.1;
+/// An owner who has not been heard of for so many steps, its own or a body's, gives nothing any more.
+pub(super) const SILENT_STEPS: f64 = 3.0;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
 const SURPRISE_M_S2: f64 = 30.0;
 
@@ -128,6 +133,18 @@ fn holds(neighbour: &Neighbour, me: AgentId) -> bool {
     let held = |tool: &ToolState| tool.grasp.is_some_and(|grasp| grasp.target == me);
     matches!(&neighbour.snapshot.body, Body::Tool(tool) if held(tool))
         || neighbour.snapshot.grips.iter().any(|grip| grip.by == Some(me))
+}
+
+/// How far what an owner gave has carried a body with steps of `step_s` seconds: as if it came as late as it may between two that live at
+/// one pace, where it is older. Who met at times of their own, one waiting for the other, was not moved by it while it waited.
+#[must_use]
+pub fn carried(owner: &Neighbour, step_s: f64, sum: Impulse, carried: Impulse) -> Impulse {
+    let late_s = AHEAD_S + SILENT_STEPS * owner.step_s.max(step_s);
+    let bounded = |sum: DVec3, way: DVec3| {
+        let most = late_s * sum.length();
+        if way.length_squared() > most * most { way.clamp_length_max(most) } else { way }
+    };
+    Impulse { linear: bounded(sum.linear, carried.linear), angular: bounded(sum.angular, carried.angular) }
 }
 
 /// Whether a link by the ledger joins a neighbour to this body.

@@ -4,6 +4,7 @@
 //! what is still on its way, and the part of a snapshot that others read. Never here: contacts, laws, how a body answers.
 //! Theory: docs/theory/coupling.md, eq. 1–4.
 
+use super::beside::carried;
 use super::laws::Wave;
 use super::taken::Taken;
 use super::{Impulse, Ledger, Site};
@@ -166,9 +167,12 @@ impl Exchange {
             if known.is_some_and(|known| !ledger.is_beyond(known)) || !ledger.is_finite() {
                 continue;
             }
+            let step_s = until.secs_after(around.time);
             let mut reading = self.reading.take().unwrap_or_else(|| Ledger::new(neighbour.id));
             reading.read(ledger, until);
-            reading.since(known, around.time, |site, sum, carried| apply(neighbour.id, site, sum, carried));
+            reading.since(known, around.time, |site, sum, way| {
+                apply(neighbour.id, site, sum, carried(neighbour, step_s, sum, way))
+            });
             self.taken_mut(neighbour.id).copy_from(&reading, neighbour);
             self.reading = Some(reading);
         }

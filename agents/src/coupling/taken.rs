@@ -3,6 +3,7 @@
 //! In: that owner's ledger, whenever it is read. Out: a copy of it, and the force that it amounts to, which goes on between
 //! readings. Never here: how a body answers. Theory: docs/theory/coupling.md, eq. 2 and 4c.
 
+use super::beside::{SILENT_STEPS, carried};
 use super::{Ahead, Impulse, Ledger, Site};
 use crate::{AgentId, Neighbour, SimTime};
 
@@ -17,9 +18,6 @@ pub(super) struct Taken {
     rate: Impulse,
     span_s: f64,
 }
-
-/// An owner who has not been heard of for so many steps, its own or this body's, gives nothing any more.
-const SILENT_STEPS: f64 = 3.0;
 
 impl Taken {
     /// Nothing yet.
@@ -45,7 +43,7 @@ impl Taken {
             (sum, carried) = (-ahead.sum, -ahead.carried(now));
         }
         if self.read.is_none_or(|read| read != owner.snapshot.time) {
-            let gained = self.learn(ledger, owner, now);
+            let gained = self.learn(ledger, owner, (now, dt_s));
             (sum, carried) = (sum + gained[0], carried + gained[1]);
         }
         let Some(read) = self.read else { return [sum, carried, Impulse::ZERO] };
@@ -60,22 +58,22 @@ impl Taken {
         [sum + meanwhile, carried + meanwhile * (0.5 * gap_s), self.rate * dt_s]
     }
 
-    /// Reads a ledger: what is new in it by the time `now`, and the force that it amounts to.
-    fn learn(&mut self, ledger: Option<&Ledger>, owner: &Neighbour, now: SimTime) -> [Impulse; 2] {
+    /// Reads a ledger before a step of `dt_s` seconds: what is new in it by the time `now`, and the force that it amounts to.
+    fn learn(&mut self, ledger: Option<&Ledger>, owner: &Neighbour, (now, dt_s): (SimTime, f64)) -> [Impulse; 2] {
         let mut gained = [Impulse::ZERO; 2];
         let began = ledger.and_then(|ledger| ledger.pages.first()).map(|page| page.origin);
         let from = self.read.or(began).unwrap_or(owner.snapshot.time);
+        let span_s = owner.snapshot.time.secs_after(from);
         if let Some(ledger) = ledger.filter(|ledger| ledger.is_beyond(&self.copy) || self.read.is_none()) {
-            ledger.beyond(Some(&self.copy), now, |site, sum, carried| {
+            ledger.beyond(Some(&self.copy), now, |site, sum, way| {
                 if site == Site::Whole {
-                    gained = [gained[0] + sum, gained[1] + carried];
+                    gained = [gained[0] + sum, gained[1] + carried(owner, dt_s.max(span_s), sum, way)];
                 }
             });
             self.copy_from(ledger, owner);
             self.copy.coming.clear(); // what acts late is part of the force
         }
         self.read = Some(owner.snapshot.time);
-        let span_s = owner.snapshot.time.secs_after(from);
         if span_s > 0.0 {
             (self.rate, self.span_s) = (gained[0] * span_s.recip(), span_s);
         }

@@ -133,6 +133,8 @@ impl Company {
 
     /// Takes in `actor` and all it leads.
     fn admit(&mut self, mut actor: Box<Actor>) {
+        // where it will be when it makes its own turns again nobody knows
+        actor.beside = None;
         self.seats.append(&mut actor.company.seats);
         self.seats.push(Seat { actor, apart: 0 });
         self.seats.sort_unstable_by_key(|seat| seat.actor.id());
@@ -210,12 +212,13 @@ impl Actor {
         shared.board.summon(id);
     }
 
-    /// Whom it should hand its turns to: the leader with the lowest number of those that it, or one it leads, is bonded with.
+    /// Whom it should hand its turns to: the leader with the lowest number of those that it, or one it leads, is bonded with. Who is at
+    /// another time would make up for that alone, and is not led before they have come together.
     pub fn seek_leader(&self) -> Option<AgentId> {
         self.shared.seating.as_ref()?;
         let led = self.company.seats.iter().map(|seat| &*seat.actor);
         let leaders = std::iter::once(self).chain(led).filter_map(Actor::bonded_leader);
-        leaders.min().filter(|leader| *leader < self.id())
+        leaders.min().filter(|leader| *leader < self.id() && self.is_at_the_time_of(*leader))
     }
 
     /// The leader with the lowest number of those this agent is bonded with, whichever side says so.

@@ -7,6 +7,7 @@
 //! has f = Z v + c. Z = k T, so the line has the mass k T² of its own. What was sent is published as its integral over time:
 //! readings that are lost or made twice take and repeat nothing, and means over a step only dissipate.
 
+use crate::coupling::beside::MEETS_S;
 use crate::{SimSpan, SimTime};
 use glam::{DMat3, DVec3};
 use std::collections::VecDeque;
@@ -87,8 +88,13 @@ impl Line {
     pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
         let wave = wave.unwrap_or_default();
         let sane = wave.sent.is_finite() && wave.start.is_finite();
-        if self.heard.back().is_some_and(|&(last, _)| last >= at) || !sane {
+        let back_s = self.heard.back().map_or(-1.0, |&(last, _)| last.secs_after(at));
+        if (0.0..=MEETS_S).contains(&back_s) || !sane {
             return;
+        }
+        if back_s > MEETS_S {
+            // no old message: the other end calls its time another now
+            self.heard.clear();
         }
         if self.delay_s == 0.0 {
             let theirs = self.heard.back().map(|&(last, _)| at.secs_after(last));
