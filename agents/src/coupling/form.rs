@@ -4,6 +4,7 @@
 //! Never here: how the nearest points are found ([`super::touch`]).
 
 use super::Slots;
+use super::touch::Fans;
 use crate::shape::{ShapeError, Solid, ToolShape};
 use glam::{DQuat, DVec3};
 use rapier3d::parry::shape::SharedShape;
@@ -59,6 +60,8 @@ pub struct SurfaceForm {
     pub edge_m: f64,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
+    /// What lies around each vertex and edge.
+    pub fans: Arc<Fans>,
 }
 
 /// A solid as others touch it.

@@ -113,6 +113,8 @@ const FLAT: f64 = 0.9999;
 const SPAN_TRIES: usize = 16;
 /// How near the floor under the tangents the lowest point must come, as a share of the span.
 const LOWEST_SHARE: f64 = 1e-6;
+/// A cylinder that leans less than this stands on its rim: no point of that is the nearest.
+const UPRIGHT: f64 = 1e-3;
 /// How close to an end of a span its lowest point belongs to that end's own ball, as a share of the span.
 const SPAN_END_SHARE: f64 = 0.02;
 
@@ -197,11 +199,31 @@ impl Field {
     /// The place where the inside of a span comes nearer than its ends, and its share of the span; `None` where the ends say
     /// it all, or the span stays farther than `reach_m` beyond its own radius.
     pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
-        let (share, touch) = match &self.kind {
-            Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m)?,
-            _ => self.lowest(ends, reach_m).map(|lowest| (lowest.share, lowest.touch))?,
-        };
-        (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(&share).then_some((share, touch))
+        self.lowest_of_span(ends, reach_m).filter(|(share, _)| (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(share))
+    }
+
+    /// The same, however near to an end of the span it is.
+    pub fn lowest_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+        match &self.kind {
+            Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m),
+            _ => self.lowest(ends, reach_m).map(|lowest| (lowest.share, lowest.touch)),
+        }
+    }
+
+    /// The corners that a flat face may come nearest to whose normal towards the solid is `way`: all of a box; of each rim of a
+    /// cylinder the nearest point and three at right angles. `None` for what has none or is a mesh.
+    pub fn corners(&self, way: DVec3) -> Option<[DVec3; 8]> {
+        let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        match &self.kind {
+            Kind::Box(half) => Some(std::array::from_fn(|i| *half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)))),
+            Kind::Cylinder(radius_m, half_m) => {
+                let across = way.truncate();
+                let near = if across.length() > UPRIGHT { -across.normalize() } else { glam::DVec2::X } * *radius_m;
+                let quarters = [near, near.perp(), -near, -near.perp()];
+                Some(std::array::from_fn(|i| quarters[i & 3].extend(*half_m * sign(i, 2))))
+            }
+            _ => None,
+        }
     }
 
     /// A lower bound of the gap to a whole span, with the normal of the place that comes nearest; `None` beyond `reach_m`.

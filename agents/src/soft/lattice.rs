@@ -10,6 +10,7 @@ use super::spec::{SoftMatter, SoftShape, SoftSpec};
 use super::strut::Strut;
 use super::system::System;
 use crate::coupling::SurfaceForm;
+use crate::coupling::touch::Fans;
 use glam::{DQuat, DVec2, DVec3};
 
 /// A divided soft body.
@@ -268,6 +269,7 @@ impl Lattice {
             triangles: self.triangles.clone().into(),
             radius_m: self.radius_m,
             closed: !self.bricks.is_empty(),
+            fans: Fans::of(&self.edges, &self.triangles).into(),
         }
     }
 

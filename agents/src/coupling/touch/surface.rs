@@ -3,29 +3,26 @@
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
 //! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
 //!
-//! Beside a block vertices speak for a surface; an edge or a triangle adds its own place only where it is nearer than its corners by
-//! more than [`BETTER_SHARE`] of its size. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is told in the surface itself, so that both sides are pushed at one point.
+//! A place is told by the vertex, edge or triangle in whose region the other lies ([`super::fans`]): what lies ahead on a flat skin is
+//! no wall. On what is round each node over a triangle and each edge that it crosses is a place. A place of the other side is told in
+//! the surface itself, so that both sides are pushed at one point.
+
+mod block;
 
 use super::Touch;
-use super::pieces::{Block, Piece, Strand, Surface};
+use super::fans::{LEAN_SHARE, Ridge};
+use super::pieces::{Piece, Strand, Surface};
 use crate::coupling::Place;
-use crate::shape::field::{self, Ball, Field};
+use crate::shape::field::Ball;
 use crate::shape::{near_segments, near_triangle};
 use glam::DVec3;
 
-/// An edge or a triangle counts where it is nearer than its corners by this share of its length.
-const BETTER_SHARE: f64 = 0.02;
-/// Shares of an edge nearer to its ends than this belong to its vertices.
+/// Shares of an edge nearer to its ends than this belong to its vertices, where skins meet.
 const END_SHARE: f64 = 0.02;
-/// Projections to and fro between a triangle and a block: both are convex, so the two points approach each other.
-const PROJECTIONS: usize = 8;
 /// Axes nearer than this cross: no way leads from one to the other, metres.
 const CROSSING_M: f64 = 1e-9;
 /// Two soft skins that have passed each other by more than this share of an edge are left alone: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
-/// What touches a skin from outside pushes it inwards. A tool that would push it aside or outwards is through it, and touches it no more
-/// until it is out again: the cosine of its normal with the skin's. At the edge of a box it is 0.7, at a corner 0.6.
-const PIERCED: f64 = -0.5;
 /// What a place is of, in its key: a vertex of the surface, an edge, a triangle, a vertex of another surface.
 const KINDS: [u64; 4] = [0, 1 << 40, 2 << 40, 3 << 40];
 /// Where the number of the part stands in its key.
@@ -98,7 +95,7 @@ impl Surface<'_> {
     fn inside(&self, triangle: [u32; 3], [a, b, c]: [DVec3; 3], point: DVec3) -> Option<(Spot, DVec3)> {
         let near = near_triangle(point, [a, b, c]);
         let shares = shares(near, [a, b, c])?;
-        let deep = shares.into_iter().all(|share| share > END_SHARE);
+        let deep = shares.into_iter().all(|share| share > LEAN_SHARE);
         deep.then_some((Spot { vertices: triangle, shares }, near))
     }
 }
@@ -172,21 +169,22 @@ impl Meeting<'_> {
             let (span, share) = nearest_span(strand, at);
             let core = on_span(strand, span, share).centre;
             // what is behind the skin of a closed body is its triangles' to push out
-            if self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0) {
+            let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
+            if outside && Ridge::Vertex(vertex).is_nearest(self.surface, core - at) {
                 into.extend(self.tell(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), strand, (span, share)));
             }
         }
         for (number, edge, ends) in self.surface.edges_in(self.region) {
             for span in 0..strand.spans() {
                 let (share, at) = near_segments(strand.ends(span).map(|ball| ball.centre), ends);
-                if !(END_SHARE..=1.0 - END_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
+                if !(LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&at) || (share == 1.0 && span + 1 < strand.spans()) {
                     continue;
                 }
                 let (point, ball) = (ends[0].lerp(ends[1], at), on_span(strand, span, share));
                 let outside = edge.iter().all(|vertex| {
                     self.normals.get(*vertex as usize).is_none_or(|normal| normal.dot(ball.centre - point) >= 0.0)
                 });
-                if outside {
+                if outside && Ridge::Edge(number, ends).is_nearest(self.surface, ball.centre - point) {
                     let key = KINDS[1] | number << PART_SHIFT | span as u64;
                     into.extend(self.tell(key, (Spot::edge(edge, at), point), strand, (span, share)));
                 }
@@ -239,84 +237,6 @@ impl Meeting<'_> {
     fn out_of(&self, spot: Spot) -> Option<DVec3> {
         let [a, b, c] = self.surface.corners(spot.vertices);
         (b - a).cross(c - a).try_normalize()
-    }
-
-    fn block(&self, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) {
-        let radius_m = self.surface.form.radius_m;
-        let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
-        let nearest = |at: DVec3| {
-            let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
-            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
-            near.or_else(|| {
-                field
-                    .touches(inward(at).centre, 2.0 * block.around.radius_m)
-                    .iter()
-                    .next()
-                    .filter(|t| t.distance_m < 0.0)
-            })
-        };
-        for (vertex, at) in self.surface.vertices_in(self.region) {
-            if let Some(touch) = nearest(at) {
-                self.tell_block(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), (block, touch), into);
-            }
-        }
-        if !field.feels_spans() {
-            return;
-        }
-        let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
-        for (number, edge, ends) in self.surface.edges_in(self.region) {
-            let Some((share, touch)) = field.touches_span(ends.map(inward), self.reach_m) else { continue };
-            let better_m = BETTER_SHARE * ends[0].distance(ends[1]);
-            if ends.into_iter().all(|end| touch.distance_m + better_m < apart(end)) {
-                let key = KINDS[1] | number << PART_SHIFT;
-                let point = ends[0].lerp(ends[1], share);
-                self.tell_block(key, (Spot::edge(edge, share), point), (block, touch), into);
-            }
-        }
-        for (number, triangle, corners) in self.surface.triangles_in(self.region) {
-            let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
-            let size = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
-            let look_m = radius_m + self.reach_m + 2.0 * size;
-            let mut found = None;
-            for _ in 0..PROJECTIONS {
-                found = field.touches(inward(point).centre, look_m).iter().next();
-                let Some(touch) = found else { break };
-                let foot = point - block.rotation * touch.normal * touch.distance_m;
-                point = near_triangle(foot, corners);
-            }
-            let Some(touch) = found else { continue };
-            let Some((spot, point)) = self.surface.inside(triangle, corners, point) else { continue };
-            if corners.into_iter().all(|corner| touch.distance_m + BETTER_SHARE * size < apart(corner)) {
-                self.tell_block(KINDS[2] | number << PART_SHIFT, (spot, point), (block, touch), into);
-            }
-        }
-    }
-
-    fn tell_block(
-        &self,
-        key: u64,
-        (spot, point): (Spot, DVec3),
-        (block, touch): (&Block<'_>, field::Touch),
-        into: &mut Vec<Touch>,
-    ) {
-        let gap_m = touch.distance_m - self.surface.form.radius_m;
-        let normal = block.rotation * touch.normal;
-        if gap_m <= self.reach_m && !(block.pierces && self.is_pierced(spot, normal)) {
-            into.push(Touch {
-                key,
-                normal,
-                gap_m,
-                on_a: spot.place(),
-                on_b: Place::Point(point - normal * (0.5 * gap_m)),
-            });
-        }
-    }
-
-    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
-    fn is_pierced(&self, spot: Spot, normal: DVec3) -> bool {
-        let inside = spot.shares[2] > 0.0;
-        let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
-        self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
     }
 
     fn surface(&self, there: &Surface<'_>, normals: &[DVec3], into: &mut Vec<Touch>) {
