@@ -165,6 +165,8 @@ pub struct ToolState {
     pub lets_in: Option<AgentId>,
     /// Magnitude of the force that what is held exerts on the tool, newtons.
     pub force_n: f64,
+    /// Whether nothing leads it on: its script has come to its end, and no hand has it.
+    pub is_left: bool,
 }
 
 /// A tool's hold on a material point of another agent.

@@ -93,6 +93,7 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
                 grasp: b.grasp,
                 lets_in: b.lets_in,
                 force_n: a.force_n + (b.force_n - a.force_n) * w,
+                is_left: b.is_left,
             });
         }
         (Body::Soft(a), Body::Soft(b)) if a.positions.len() == b.positions.len() => {

@@ -384,6 +384,7 @@ mod tests {
             grasp: None,
             lets_in: None,
             force_n: 0.0,
+            is_left: false,
         };
         for (kind, body, want) in [
             (PairKind::Ledger, Body::Nothing, (0, 1, [3.0, 2.0])),

@@ -410,3 +410,54 @@ fn a_tool_at_the_very_middle_of_a_box_lets_it_lie() {
     let at = point(&report, "/probes/0/position_m");
     assert!((at[2] - 0.1).abs() < 1e-3 && at[0].hypot(at[1]) < 1e-3, "{at:?}");
 }
+
+/// A tool that is led to 20 mm below the top of a box of `mass_kg` on the floor and held there for ever, by a drive of 20 N.
+fn pressed(mass_kg: f64, rates_hz: [f64; 2]) -> Folder {
+    let [box_hz, tool_hz] = rates_hz;
+    Folder::with(&format!(
+        r#"
+[[object]]
+name = "floor"
+model = "rigid"
+shape = "plane"
+friction = 0.5
+[[object]]
+name = "box"
+model = "rigid"
+shape = "box"
+half_extents_m = [0.05, 0.05, 0.05]
+position_m = [0, 0, 0.05]
+mass_kg = {mass_kg:?}
+rate_hz = {box_hz:?}
+[[object]]
+name = "tool"
+model = "instrument"
+rate_hz = {tool_hz:?}
+max_force_n = 20.0
+grasps = []
+keyframe = [
+    {{ at_s = 0.0, tip_m = [0.0, 0.0, 0.3], rotation_deg = [180.0, 0.0, 0.0], jaw = 0.0 }},
+    {{ at_s = 2.0, tip_m = [0.0, 0.0, 0.08] }},
+    {{ at_s = 30.0, tip_m = [0.0, 0.0, 0.08] }},
+]
+[[probe]]
+object = "tool"
+"#
+    ))
+}
+
+#[test]
+fn nobody_falls_asleep_under_a_tool_that_presses() {
+    for (mass_kg, rates_hz) in [(1.0, [240.0, 240.0]), (0.5, [60.0, 60.0]), (0.5, [120.0, 120.0]), (0.5, [60.0, 120.0])]
+    {
+        let folder = pressed(mass_kg, rates_hz);
+        // it dipped 7 mm in and hopped 13 mm up about once a second
+        for seconds in ["3.2", "4.1", "4.6", "5.3"] {
+            let report = folder.lockstep(&["--seconds", seconds]);
+            let tip_m = point(&report, "/probes/0/position_m")[2];
+            let rested_ms = number(agent(&report, "box"), "/rested_ms");
+            assert!(rested_ms < 2000.0, "{rates_hz:?}: {rested_ms} ms, and not only before the tool came");
+            assert!((tip_m - 0.105).abs() < 1e-3, "{rates_hz:?}: {tip_m} m at {seconds} s");
+        }
+    }
+}

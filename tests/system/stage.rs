@@ -44,7 +44,17 @@ pub fn still_life() -> (Stage, Camera) {
     let tool = |tip: DVec3, from: DVec3, jaw, grasp| {
         let rotation = DQuat::from_rotation_arc(DVec3::Z, (tip - from).normalize());
         let still = DVec3::ZERO;
-        Body::Tool(ToolState { tip, rotation, velocity: still, spin: still, jaw, grasp, lets_in: None, force_n: 0.6 })
+        Body::Tool(ToolState {
+            tip,
+            rotation,
+            velocity: still,
+            spin: still,
+            jaw,
+            grasp,
+            lets_in: None,
+            force_n: 0.6,
+            is_left: false,
+        })
     };
     let bodies = [
         Body::Curve(held),

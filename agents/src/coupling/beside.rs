@@ -165,6 +165,12 @@ pub fn is_driven(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
     matches!(neighbour.snapshot.body, Body::Tool(_)) && !is_linked(neighbour, around)
 }
 
+/// Whether a neighbour is a tool that a script or a hand leads on, though it may stand still: who sleeps under it gives it nothing.
+#[must_use]
+pub fn is_led_on(neighbour: &Neighbour) -> bool {
+    matches!(&neighbour.snapshot.body, Body::Tool(tool) if !tool.is_left)
+}
+
 /// Whether a neighbour bends, is driven, or moves as somebody else near here pushes it.
 #[must_use]
 pub fn has_a_say(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {

@@ -80,7 +80,8 @@ impl Instrument {
         let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
         let tip = tip + spec.starts_off_m;
         let spin = DVec3::ZERO;
-        let tool = ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0 };
+        let tool =
+            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
         let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
         let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
@@ -176,11 +177,11 @@ impl Instrument {
     }
 
     /// Whether the tool has come to the end of its script and waits there, empty.
-    fn rests(&mut self, end: &Pose, time_s: f64) -> bool {
+    fn rests(&mut self, end: &Pose) -> bool {
         let there = (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED;
         // who sleeps on it gives no more: it keeps still as well, or it would rise into them
         let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
-        let rests = there && still && self.script.is_over(time_s) && !self.jaws.holds() && self.tool.jaw == end.jaw;
+        let rests = there && still && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
             self.led = (end.tip, DVec3::ZERO);
             self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
@@ -257,14 +258,15 @@ impl Agent for Instrument {
         let led = self.drive_on(led, around, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), ..led };
+        let is_left = hand.is_none() && self.script.is_over(end_s);
+        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
         self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
         self.tool.lets_in = self.let_in(around, dt_s);
         self.wake_others(around, dt_s);
         self.tool.force_n = self.felt.force_n();
         self.steps += 1;
-        self.at_rest = hand.is_none() && self.rests(&end, end_s);
+        self.at_rest = is_left && self.rests(&end);
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 

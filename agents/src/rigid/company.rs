@@ -8,6 +8,7 @@ use super::clearance::{Ahead, Approach, Fall, Mover, first_root};
 use super::meeting::WAKE_M_S;
 use super::motion::Motion;
 use super::pair::Pairs;
+use crate::coupling::beside::is_led_on;
 use crate::coupling::touch::{TouchRoom, gap};
 use crate::coupling::{Exchange, Form, FormKind, Impulse, Law, Other, Placed, View};
 use crate::shape::Solid;
@@ -225,10 +226,11 @@ impl Company {
         self.count = 0;
     }
 
-    /// Whether everybody that is touched moves slower than `calm_m_s`.
+    /// Whether everybody that is touched moves slower than `calm_m_s`, and nobody is a tool that is led on: it would come into who sleeps.
     pub(super) fn is_calm(&self, calm_m_s: f64) -> bool {
         let touched = |guest: &&Guest| guest.id().is_some_and(|id| self.pairs.touched().any(|with| with == id));
-        self.guests().iter().filter(touched).all(|guest| guest.speed_m_s() < calm_m_s)
+        let calm = |guest: &Guest| guest.speed_m_s() < calm_m_s && !guest.other.neighbour().is_some_and(is_led_on);
+        self.guests().iter().filter(touched).all(calm)
     }
 
     /// Everybody that is met.
@@ -362,8 +364,10 @@ impl Guest {
                 }
             }
             FormKind::Chain { .. } => (self.chain, self.restitution) = (true, 0.0),
+            // its drive brings what bounces back at once, and again: pressed, a tip would never come to rest
+            FormKind::Tool(_) => self.restitution = 0.0,
             // a soft body owns its pairs
-            FormKind::Tool(_) | FormKind::Surface(_) => {}
+            FormKind::Surface(_) => {}
         }
     }
 

@@ -87,6 +87,7 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
         grasp: Some(Grasp { target: AgentId(0), anchor, clasp: None, stiffness_n_m: 100.0, damping_n_s_m: 0.5 }),
         lets_in: None,
         force_n: 0.0,
+        is_left: false,
     };
     let tool = Arc::new(Snapshot { body: Body::Tool(pose), ..Snapshot::default() });
     Some(vec![Neighbour { owned: true, ..Neighbour::seen(AgentId(1), tool) }])
