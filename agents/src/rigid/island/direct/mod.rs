@@ -16,6 +16,7 @@ mod newton;
 mod order;
 mod reach;
 mod row;
+mod sweep;
 
 use super::Held;
 use super::member::{Ground, Member};

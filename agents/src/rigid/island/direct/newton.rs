@@ -6,20 +6,13 @@
 //! λ = P(λ₀ − (J v + b) / R): the gradient of a convex function of v, so that Newton's method with a line search along the
 //! convex function's own slope always converges, and its matrix M + Jᵀ R⁻¹ J over the active rows is positive. R is a
 //! millionth of the row's own inverse mass; what yields under R is taken back by λ₀ ← λ, a few times. Friction's
-//! disc takes its radius μ λₙ from the pass before: where the passes meet, the law is Coulomb's own, without dilation.
+//! disc takes its radius μ λₙ from the pass before: where the passes meet, the law is Coulomb's own, without dilation. What takes
+//! too many factors is left to [`super::sweep`].
 
 use super::matrix::Matrix;
-use super::row::{Law, Mass, Row, Twist};
+use super::row::{Law, MOBILITY_MIN, Mass, Row, Twist};
+use super::sweep;
 use glam::DVec3;
-
-/// How a solve went.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub(super) struct Outcome {
-    /// Matrices factored.
-    pub factors: u32,
-    /// The velocity by which the worst row still misses its law, m/s.
-    pub miss_m_s: f64,
-}
 
 /// Room to work in; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
@@ -30,6 +23,8 @@ pub(super) struct Newton {
     /// λ₀ of each row; for a normal's friction the radius is in `radius`.
     start: Vec<f64>,
     radius: Vec<f64>,
+    /// λ as it was given.
+    warm: Vec<f64>,
     velocity: Vec<f64>,
     along: Vec<f64>,
     free: Vec<Twist>,
@@ -43,32 +38,35 @@ const GIVE: f64 = 1e-6;
 const MISS_M_S: f64 = 1e-9;
 /// A gradient that would change no velocity by more than this share of the fastest is none.
 const STEEP: f64 = 1e-9;
+/// A pass that ends early, or where roundings let it go no farther, is flown where no body would move by more than this share under
+/// what is left: velocities and impulses then belong together to six digits.
+const NEAR: f64 = 1e-6;
 /// Friction's disc may be wrong by this much more than a row, as a velocity.
 const DISC: f64 = 1e-3;
 /// The most passes of λ₀ ← λ.
 const PASSES_MAX: u32 = 40;
 /// The most factorisations in all.
 const FACTORS_MAX: u32 = 80;
-/// The least inverse mass of a row: a row between nothing.
-const MOBILITY_MIN: f64 = 1e-12;
 
 impl Newton {
-    /// Solves for the velocities; `rows` get their impulses.
-    pub(super) fn solve(&mut self, rows: &mut [Row], masses: &[Mass], velocities: &mut [Twist]) -> Outcome {
-        let mut outcome = Outcome::default();
+    /// Solves for the velocities; `rows` get their impulses. A pass that is cut short has velocities that its impulses do not
+    /// give: it is never flown, [`sweep`] has the last word then.
+    pub(super) fn solve(&mut self, rows: &mut [Row], masses: &[Mass], velocities: &mut [Twist]) {
         if rows.is_empty() {
-            return outcome;
+            return;
         }
         self.prepare(rows, masses, velocities);
+        let mut factors = FACTORS_MAX;
         for _ in 0..PASSES_MAX {
             self.begin_pass(rows);
-            self.minimise(rows, (masses, velocities), &mut outcome);
-            outcome.miss_m_s = self.missed(rows);
-            if outcome.miss_m_s <= MISS_M_S || outcome.factors >= FACTORS_MAX {
-                break;
+            if !self.minimise(rows, (masses, velocities), &mut factors) {
+                rows.iter_mut().zip(&self.warm).for_each(|(row, warm)| row.lambda = *warm);
+                return sweep::solve(rows, masses, &self.free, velocities);
+            }
+            if self.missed(rows) <= MISS_M_S || factors == 0 {
+                return;
             }
         }
-        outcome
     }
 
     /// Learns whom the next solves' rows join.
@@ -91,6 +89,8 @@ impl Newton {
         }));
         self.radius.clear();
         self.radius.resize(rows.len(), 0.0);
+        self.warm.clear();
+        self.warm.extend(rows.iter().map(|row| row.lambda));
         for room in [&mut self.velocity, &mut self.along, &mut self.start] {
             room.clear();
             room.resize(rows.len(), 0.0);
@@ -107,16 +107,19 @@ impl Newton {
         }
     }
 
-    /// One pass: Newton's method on the convex function.
-    fn minimise(&mut self, rows: &mut [Row], state: (&[Mass], &mut [Twist]), outcome: &mut Outcome) {
+    /// One pass: Newton's method on the convex function; `false` where that ended before its velocities are what its impulses give.
+    fn minimise(&mut self, rows: &mut [Row], state: (&[Mass], &mut [Twist]), factors: &mut u32) -> bool {
         let (masses, velocities) = state;
         self.velocity.iter_mut().zip(rows.iter()).for_each(|(u, row)| *u = row.velocity(velocities));
         self.project(rows, 0.0);
-        while outcome.factors < FACTORS_MAX && self.steep(rows, masses, velocities) {
-            outcome.factors += 1;
+        while self.steep(rows, masses, velocities, STEEP) {
+            if *factors == 0 {
+                return !self.steep(rows, masses, velocities, NEAR);
+            }
+            *factors -= 1;
             let slope = self.descend(rows, masses);
             if slope.is_nan() || slope >= 0.0 {
-                return;
+                return !self.steep(rows, masses, velocities, NEAR);
             }
             let share = self.search(rows, (masses, velocities), slope);
             for (twist, step) in velocities.iter_mut().zip(self.gradient.chunks_exact(6)) {
@@ -127,10 +130,11 @@ impl Newton {
             self.velocity.iter_mut().zip(rows.iter()).for_each(|(u, row)| *u = row.velocity(velocities));
             self.project(rows, 0.0);
         }
+        true
     }
 
-    /// Writes the gradient; whether any body would still move under it.
-    fn steep(&mut self, rows: &[Row], masses: &[Mass], velocities: &[Twist]) -> bool {
+    /// Writes the gradient; whether any body would still move under it, by more than this share of the fastest.
+    fn steep(&mut self, rows: &[Row], masses: &[Mass], velocities: &[Twist], limit: f64) -> bool {
         self.gradient.clear();
         let mut fastest = 1.0_f64;
         for ((mass, now), free) in masses.iter().zip(velocities).zip(&self.free) {
@@ -145,7 +149,7 @@ impl Newton {
         masses.iter().zip(self.gradient.chunks_exact(6)).any(|(mass, g)| {
             let linear = DVec3::from_slice(&g[..3]) / mass.mass_kg;
             let angular = mass.inverse * DVec3::from_slice(&g[3..]);
-            linear.abs().max_element().max(angular.abs().max_element()) > STEEP * fastest
+            linear.abs().max_element().max(angular.abs().max_element()) > limit * fastest
         })
     }
 

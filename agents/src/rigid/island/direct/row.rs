@@ -7,6 +7,9 @@ use glam::{DMat3, DVec3};
 /// Where a row has no second body.
 pub(super) const NOBODY: u32 = u32::MAX;
 
+/// The least inverse mass of a row: a row between nothing.
+pub(super) const MOBILITY_MIN: f64 = 1e-12;
+
 /// One scalar constraint: u = lin·(v_a − v_b) + turn_a·ω_a − turn_b·ω_b.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Row {
@@ -86,6 +89,17 @@ impl Row {
             self.lin.length_squared() / mass.mass_kg + turn.dot(mass.inverse * turn)
         };
         of(self.a, self.turn_a) + if self.b == NOBODY { 0.0 } else { of(self.b, self.turn_b) }
+    }
+
+    /// Changes velocities by an impulse.
+    pub(super) fn push(&self, impulse: f64, masses: &[Mass], velocities: &mut [Twist]) {
+        for (body, impulse, turn) in [(self.a, impulse, self.turn_a), (self.b, -impulse, self.turn_b)] {
+            if body != NOBODY {
+                let (mass, [v, w]) = (&masses[body as usize], &mut velocities[body as usize]);
+                *v += self.lin * (impulse / mass.mass_kg);
+                *w += mass.inverse * (turn * impulse);
+            }
+        }
     }
 
     /// Adds Jᵀ impulse.

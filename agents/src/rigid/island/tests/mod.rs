@@ -9,6 +9,7 @@ use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
 mod chains;
+mod heaps;
 mod held;
 mod joints;
 mod membership;
