@@ -227,12 +227,14 @@ pub(super) fn curve_of_rope(soft: &SoftState, radius_m: f64, curve: &mut CurveSt
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::Arc;
 
     fn square() -> (SurfaceForm, SoftState) {
         let form = SurfaceForm {
             vertices: [0, 1, 2, 3].into(),
             edges: [[0, 1], [1, 2], [2, 3], [0, 3], [0, 2]].into(),
             triangles: [[0, 1, 2], [0, 2, 3]].into(),
+            fans: Arc::default(),
             radius_m: 0.01,
             edge_m: 1.0,
             closed: false,
@@ -268,6 +270,7 @@ mod tests {
             vertices: (0..8).collect(),
             edges: [].into(),
             triangles: triangles.into(),
+            fans: Arc::default(),
             radius_m: 0.0,
             edge_m: 1.0,
             closed: true,

@@ -91,7 +91,7 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
 
 /// Whether a neighbour with steps of `step_s` seconds stands so far behind the body's time that the body has to wait for it, where they
 /// are linked, hold each other or may touch in a step of `dt`: by half of such a step where it owns the pair, by one and 20 ms where the
-/// body does, and on a link, where there is no moment at which nothing acts, by one and 2 ms. `bounds` are those of the body, if anything
+/// body does, but by one and 2 ms on a link, where there is no moment at which nothing acts, and where the other bends. `bounds` are those of the body, if anything
 /// of it can be touched.
 pub fn leaves_behind(
     neighbour: &Neighbour,
@@ -102,7 +102,7 @@ pub fn leaves_behind(
     let behind_s = around.time.secs_after(neighbour.snapshot.time);
     let allowed_s = if !neighbour.owned {
         (PUSHED_STEPS * step_s).max(PUSHED_LEAST_S)
-    } else if is_linked(neighbour, around) {
+    } else if is_linked(neighbour, around) || bends(neighbour) {
         PUSHED_LEAST_S + step_s
     } else {
         AHEAD_S + step_s
