@@ -36,6 +36,8 @@ pub(crate) struct Stage {
 struct Actor {
     agent: Box<dyn Agent>,
     rate_hz: f64,
+    /// How far it is ahead of those who are not.
+    lead_s: f64,
     time: SimTime,
     published: Vec<Arc<Snapshot>>,
     /// When the step to the newest of these began.
@@ -82,7 +84,16 @@ impl Stage {
         agent.write_snapshot(&mut snapshot);
         let published = vec![Arc::new(snapshot)];
         let (hands, links) = (vec![], vec![]);
-        self.actors.push(Actor { agent, rate_hz, time: SimTime::ZERO, published, begun: None, hands, links });
+        self.actors.push(Actor {
+            agent,
+            rate_hz,
+            lead_s: 0.0,
+            time: SimTime::ZERO,
+            published,
+            begun: None,
+            hands,
+            links,
+        });
         AgentId(self.actors.len() as u32 - 1)
     }
 
@@ -117,6 +128,16 @@ impl Stage {
         change(Arc::make_mut(last));
     }
 
+    /// From now on `id` is `lead_s` seconds ahead of those of whom nothing is said.
+    pub(crate) fn lead(&mut self, id: AgentId, lead_s: f64) {
+        self.actors[id.0 as usize].lead_s = lead_s;
+    }
+
+    /// The agent itself.
+    pub(crate) fn agent_mut(&mut self, id: AgentId) -> &mut dyn Agent {
+        &mut *self.actors[id.0 as usize].agent
+    }
+
     /// Changes what goes wrong from now on.
     pub(crate) fn set_faults(&mut self, faults: Faults) {
         self.faults = faults;
@@ -126,7 +147,8 @@ impl Stage {
     pub(crate) fn run(&mut self, seconds: f64, mut look: impl FnMut(&Self)) {
         self.look();
         loop {
-            let next = (0..self.actors.len()).min_by_key(|&i| self.actors[i].time).expect("an agent");
+            let late_s = |i: &usize| self.actors[*i].time.as_secs_f64() - self.actors[*i].lead_s;
+            let next = (0..self.actors.len()).min_by(|i, j| late_s(i).total_cmp(&late_s(j))).expect("an agent");
             if self.actors[next].time.as_secs_f64() >= seconds {
                 return;
             }

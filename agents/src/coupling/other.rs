@@ -89,8 +89,7 @@ impl Other {
             }
             self.age_s = around.time.secs_after(neighbour.snapshot.time);
             self.foresee(self.age_s);
-            // what bends accelerates as told for about a step, and forwards: back by more of them its nodes would fly apart
-            self.go_on(if self.is_many() { self.age_s.max(-2.0 * self.reckoned_s()) } else { self.age_s });
+            self.catch_up();
             self.deliver(neighbour, around, exchange, from);
         }
         known

@@ -71,7 +71,12 @@ impl Company {
         received.clear(2 * division.segments() + 1);
         if !around.neighbours.is_empty() || !exchange.is_empty() {
             exchange.open(around);
-            exchange.take(around, until, |_, site, sum, carried| received.add(division, site, sum, carried));
+            let dt = until.secs_after(around.time);
+            exchange.take(around, until, |id, site, sum, carried| {
+                received.add(division, site, sum, carried);
+                let giver = around.neighbours.iter().find(|n| n.id == id);
+                giver.into_iter().for_each(|giver| received.note(giver, around.time, dt));
+            });
         }
     }
 

@@ -9,7 +9,14 @@ use super::division::Division;
 use super::holds::Tie;
 use super::turn::{exp, unit};
 use crate::coupling::{Impulse, Site, Slots};
+use crate::{Neighbour, SimTime};
 use glam::DVec3;
+
+/// From who is ahead of a tube, or behind it, by more steps than this comes what no linear way tells: how far it has carried the tube since,
+/// or is to take it back.
+const TIMELY_STEPS: f64 = 2.0;
+/// How often that way is halved before none of it is gone.
+const WAY_HALVINGS: u32 = 6;
 
 /// Impulses received, gathered in slots.
 #[derive(Debug, Clone, Default)]
@@ -24,12 +31,16 @@ pub struct Received {
     spent: Vec<DVec3>,
     slots: usize,
     any: bool,
+    /// Whether any came from one whose time is another.
+    untimely: bool,
+    /// Room for a state that is only tried.
+    trial: Config,
 }
 
 impl Received {
     /// Empties the slots of a tube of so many.
     pub fn clear(&mut self, slots: usize) {
-        (self.slots, self.any) = (slots, false);
+        (self.slots, self.any, self.untimely) = (slots, false, false);
         self.fresh.clear();
         self.spent.clear();
     }
@@ -67,6 +78,13 @@ impl Received {
         }));
     }
 
+    /// Notes who gave something to a tube that is about to make a step of `dt` seconds from `now`.
+    pub fn note(&mut self, giver: &Neighbour, now: SimTime, dt: f64) {
+        let ahead_s = giver.snapshot.time.secs_after(now);
+        // what it gave last acted at the start of its step
+        self.untimely |= ahead_s - giver.step_s > TIMELY_STEPS * dt || -ahead_s > TIMELY_STEPS * dt.max(giver.step_s);
+    }
+
     /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division does not lose any of it.
     pub fn add(&mut self, division: &Division, site: Site, sum: Impulse, carried: Impulse) {
         let Site::Arc(arc_m) = site else { return };
@@ -97,7 +115,8 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
     ///
-    /// No node is carried farther than `way_m`. `ties` are those that the factor holds: each notes what it takes.
+    /// No node is carried farther than `way_m`, and what is untimely none so far that it strains the tube. `ties` are those
+    /// that the factor holds: each notes what it takes.
     pub fn apply(
         &mut self,
         state: &mut Config,
@@ -115,13 +134,37 @@ impl Received {
         }
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };
+        let share = if self.untimely { self.unstrained(state, (matter, division), share) } else { share };
+        let Self { sum, carried, .. } = self;
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
         ties.iter_mut().for_each(|tie| tie.take(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
-        state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
-        let turns = carried.iter().skip(1).step_by(2);
-        state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
+        carry(state, carried, share);
         state.strain(matter, division);
     }
+
+    /// The share of what carries `state`, at most `share`, halved until the tube is strained no more by it; none where a few times do
+    /// not suffice (eq. 37b).
+    fn unstrained(&mut self, state: &Config, (matter, division): (&Matter, &Division), mut share: f64) -> f64 {
+        let Self { carried, trial, .. } = self;
+        for _ in 0..WAY_HALVINGS {
+            trial.resize(state.q.len());
+            trial.copy_from(state);
+            carry(trial, carried, share);
+            trial.strain(matter, division);
+            if trial.elastic_j <= state.elastic_j {
+                return share;
+            }
+            share *= 0.5;
+        }
+        0.0
+    }
+}
+
+/// Moves and turns a state by a share of what each slot is carried.
+fn carry(state: &mut Config, carried: &[DVec3], share: f64) {
+    state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
+    let turns = carried.iter().skip(1).step_by(2);
+    state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
 }
 
 /// Takes held ends out of an array of slots.

@@ -90,6 +90,27 @@ impl Other {
         }
     }
 
+    /// Brings it to the time of who looks, `age_s` after its own. What bends accelerates as it told for about a step, and backwards no
+    /// farther: back by more of them its nodes would fly apart. Forwards its points go on from there as the whole of it does (docs/theory/coupling.md, eq. 6d).
+    pub(super) fn catch_up(&mut self) {
+        if !self.is_many() {
+            self.go_on(self.age_s);
+            return;
+        }
+        let told_s = 2.0 * self.reckoned_s();
+        let rest_s = (self.age_s - told_s).max(0.0);
+        self.go_on(self.age_s.clamp(-told_s, told_s));
+        if rest_s > 0.0 {
+            let (a, stride) = (self.acceleration(), self.stride());
+            for (x, v) in self.positions.iter_mut().zip(self.velocities.iter_mut().step_by(stride)) {
+                *x += *v * rest_s + a * (0.5 * rest_s * rest_s);
+                *v += a * rest_s;
+            }
+            let spins = self.velocities.iter().skip(1).step_by(2);
+            self.frames.iter_mut().zip(spins).for_each(|(q, spin)| *q = turned(*q, *spin * rest_s));
+        }
+    }
+
     /// Lets `h` seconds pass: x + v h + a h²/2, v + a h.
     pub fn go_on(&mut self, h: f64) {
         if let Some(lean) = &mut self.lean {

@@ -2,6 +2,7 @@
 //!
 //! The other bodies are stand-ins without models of their own: a free, led or driven solid that takes what it is given.
 
+mod ahead;
 mod bodies;
 mod bridge;
 mod capstan;
