@@ -8,7 +8,7 @@
 
 use super::row::{Law, MOBILITY_MIN, Mass, Row, Twist};
 
-/// So often each row is asked: the worst of 316 heaps then misses a law by 3 cm/s, most by 1 mm/s; thrice as often, 8 mm/s.
+/// So often each row is asked: of 228 solves of heaps half then miss a gap's law by less than 0.6 mm/s, nine tenths by 11 mm/s.
 const SWEEPS: u32 = 100;
 /// Roundings of D, as a share of the energy of what impulses change.
 const ROUNDING: f64 = 1e-12;
