@@ -165,7 +165,7 @@ pub struct ToolState {
     pub lets_in: Option<AgentId>,
     /// Magnitude of the force that what is held exerts on the tool, newtons.
     pub force_n: f64,
-    /// Whether nothing leads it on: its script has come to its end, and no hand has it.
+    /// Whether nothing leads it on: it has come to the end of its script, which nothing holds it back from, and no hand has it.
     pub is_left: bool,
 }
 

@@ -176,12 +176,16 @@ impl Instrument {
         }
     }
 
+    /// Whether the led point has come to where the script ends: what stands in the way of a drive that gives all it can holds it back.
+    fn has_led_to(&self, end: &Pose) -> bool {
+        (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED
+    }
+
     /// Whether the tool has come to the end of its script and waits there, empty.
     fn rests(&mut self, end: &Pose) -> bool {
-        let there = (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED;
         // who sleeps on it gives no more: it keeps still as well, or it would rise into them
         let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
-        let rests = there && still && !self.jaws.holds() && self.tool.jaw == end.jaw;
+        let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
             self.led = (end.tip, DVec3::ZERO);
             self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
@@ -258,7 +262,7 @@ impl Agent for Instrument {
         let led = self.drive_on(led, around, dt_s);
         self.lag_m = led.tip.distance(wanted);
         self.speed_m_s = speed(&self.tool, &led, dt_s);
-        let is_left = hand.is_none() && self.script.is_over(end_s);
+        let is_left = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
         self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
         self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
         self.tool.grasp = self.jaws.grasp(&self.spec);
