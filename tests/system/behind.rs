@@ -136,22 +136,30 @@ fn a_hose_stays_on_a_rope_where_a_step_of_either_takes_longer_than_any_may_last(
     assert!((hose[2] - 0.169).abs() < 5e-3, "{hose:?}");
 }
 
-/// A sheet of 240 Hz held all around, on a slope of 12°, and a tube that lies down the slope on it.
-const SLOPE: &str = r#"
+/// A sheet of 240 Hz held all around, tilted about y.
+fn sheet(young_pa: f64, friction: f64, tilt_deg: f64) -> String {
+    format!(
+        r#"
 [[object]]
 name = "sheet"
 model = "sheet"
 size_m = [0.4, 0.4]
 segments = [8, 8]
 thickness_m = 0.004
-young_pa = 2.0e6
+young_pa = {young_pa:?}
 density_kg_m3 = 1050.0
 damping_per_s = 3.0
-friction = 0.8
+friction = {friction:?}
 position_m = [0.0, 0.0, 0.2]
-rotation_deg = [0.0, 12.0, 0.0]
+rotation_deg = [0.0, {tilt_deg:?}, 0.0]
 hold = ["left", "right", "near", "far"]
 rate_hz = 240.0
+"#
+    )
+}
+
+/// A tube that lies down the slope of [`slope`].
+const TUBE: &str = r#"
 [[object]]
 name = "tube"
 model = "tube"
@@ -169,11 +177,16 @@ object = "tube"
 at = 0.5
 "#;
 
+/// A slope of 12°, and a tube that lies down it.
+fn slope() -> String {
+    format!("{}{TUBE}", sheet(2.0e6, 0.8, 12.0))
+}
+
 #[test]
 fn a_tube_lies_on_a_sloping_sheet_whatever_the_sheet_takes_for_a_step() {
     for step_ms in [13, 16, 20] {
         let slow = format!("machine.step.sheet.base_us={}", 1000 * step_ms);
-        let tube = at(&Folder::with(SLOPE).lockstep(&["--seconds", "3", "--set", &slow]), "tube");
+        let tube = at(&Folder::with(&slope()).lockstep(&["--seconds", "3", "--set", &slow]), "tube");
         // it creeps down
         let off_m = tube[2] - (0.199 - 0.2126 * tube[0]);
         assert!(tube[0].abs() < 0.08 && off_m.abs() < 0.01, "{step_ms} ms: {tube:?}, {off_m} m off");
@@ -196,7 +209,7 @@ object = "ball"
 
 #[test]
 fn who_comes_to_agents_that_live_slower_takes_their_time_for_its_own() {
-    let folder = Folder::with(&format!("{SLOPE}{BALL}"));
+    let folder = Folder::with(&format!("{}{BALL}", slope()));
     // of the 0.45 s of its fall those below lived through 0.12; it would stand still until they have caught up, at 1.7 s
     let play = |seconds: &str| folder.lockstep(&["--seconds", seconds, "--set", "machine.step.sheet.base_us=40000"]);
     let ball = at(&play("1.1"), "ball");
@@ -205,21 +218,8 @@ fn who_comes_to_agents_that_live_slower_takes_their_time_for_its_own() {
     assert!(later[2] > 0.1, "{later:?}");
 }
 
-/// A level sheet of 240 Hz held all around, and a box of 8 Hz that is put down on it.
+/// A box of 8 Hz that is put down on a level sheet.
 const LYING: &str = r#"
-[[object]]
-name = "sheet"
-model = "sheet"
-size_m = [0.4, 0.4]
-segments = [8, 8]
-thickness_m = 0.004
-young_pa = 2.0e6
-density_kg_m3 = 1050.0
-damping_per_s = 3.0
-friction = 0.8
-position_m = [0.0, 0.0, 0.2]
-hold = ["left", "right", "near", "far"]
-rate_hz = 240.0
 [[object]]
 name = "box"
 model = "rigid"
@@ -245,13 +245,13 @@ fn a_slow_box_that_lies_on_a_sheet_lies_there_after_one_step_of_the_sheet_was_he
         "--set",
         "machine.step_load=[{at_s=2.0,factor=100},{at_s=2.002,factor=1}]",
     ];
-    let folder = Folder::with(LYING);
+    let folder = Folder::with(&format!("{}{LYING}", sheet(2.0e6, 0.8, 0.0)));
     let [before, after] = ["2", "4"].map(|s| at(&folder.lockstep(&[&["--seconds", s], &held_up[..]].concat()), "box"));
     assert!((before[2] - after[2]).abs() < 2e-3, "{before:?} {after:?}");
 }
 
-/// A ball that rolls down a sheet and off it, against a box on a stand with a tool above it.
-const MEETING: &str = r#"
+/// A ball that rolls down a sheet and off it, against what stands on a stand.
+const ROLLING: &str = r#"
 [[object]]
 name = "slider"
 model = "rigid"
@@ -269,20 +269,10 @@ shape = "box"
 fixed = true
 half_extents_m = [0.05, 0.1, 0.1]
 position_m = [0.35, 0.0, 0.02]
-[[object]]
-name = "sheet"
-model = "sheet"
-size_m = [0.4, 0.4]
-segments = [8, 8]
-thickness_m = 0.004
-young_pa = 2.0e9
-density_kg_m3 = 1050.0
-damping_per_s = 3.0
-friction = 0.5
-position_m = [0.0, 0.0, 0.2]
-rotation_deg = [0.0, 12.0, 0.0]
-hold = ["left", "right", "near", "far"]
-rate_hz = 240.0
+"#;
+
+/// What stands there: a box on the stand, and a tool above it.
+const WAITING: &str = r#"
 [[object]]
 name = "waiting"
 model = "rigid"
@@ -309,7 +299,7 @@ object = "waiting"
 fn agents_of_two_times_that_meet_strike_each_other_as_at_one() {
     // half a second apart, the box would have been where its new speed carries it in that time: 11 cm farther
     let slow = ["--set", "machine.step.sheet.base_us=20000", "--set", "machine.step.sheet.unit_us=0"];
-    let folder = Folder::with(MEETING);
+    let folder = Folder::with(&format!("{ROLLING}{}{WAITING}", sheet(2.0e9, 0.5, 12.0)));
     let [slowed, kept] = [("3", &slow[..]), ("1.5", &[])].map(|(s, set)| {
         at(&folder.lockstep(&[&["--seconds", s, "--set", "machine.step.rigid.base_us=20"], set].concat()), "waiting")
     });
