@@ -20,8 +20,8 @@ const HURRY_S: f64 = 1e-3;
 const AHEAD_S: f64 = 0.02;
 /// Who is pushed may leave who pushes it behind by so much of one of its steps: fingers that answer to forces older than that drop a tube.
 const PUSHED_STEPS: f64 = 0.5;
-/// And by this at least, seconds: clocks are looked at again no sooner. What pulls at a link is waited for after one of its steps and this:
-/// a gut of 240 Hz flew off its sheet that let it fall 28 ms behind.
+/// And by this at least, seconds: clocks are looked at again no sooner. What pulls at a link, or bends, is waited for after one of its
+/// steps and this: a gut of 240 Hz flew off its sheet that let it fall 28 ms behind.
 const PUSHED_LEAST_S: f64 = 2e-3;
 /// Whose time goes back by more than this calls it another now; less is a message that came late, seconds.
 pub(super) const MEETS_S: f64 = 0.1;
@@ -91,8 +91,8 @@ pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -
 
 /// Whether a neighbour with steps of `step_s` seconds stands so far behind the body's time that the body has to wait for it, where they
 /// are linked, hold each other or may touch in a step of `dt`: by half of such a step where it owns the pair, by one and 20 ms where the
-/// body does, but by one and 2 ms on a link, where there is no moment at which nothing acts, and where the other bends. `bounds` are those of the body, if anything
-/// of it can be touched.
+/// body does, but by one and 2 ms on a link, where there is no moment at which nothing acts, and where the other bends. `bounds` are
+/// those of the body, if anything of it can be touched.
 pub fn leaves_behind(
     neighbour: &Neighbour,
     (dt, step_s): (SimSpan, f64),

@@ -91,7 +91,8 @@ impl Other {
     }
 
     /// Brings it to the time of who looks, `age_s` after its own. What bends accelerates as it told for about a step, and backwards no
-    /// farther: back by more of them its nodes would fly apart. Forwards its points go on from there as the whole of it does (docs/theory/coupling.md, eq. 6d).
+    /// farther: back by more of them its nodes would fly apart. Forwards its points go on from there as the whole of it does
+    /// (docs/theory/coupling.md, eq. 6d).
     pub(super) fn catch_up(&mut self) {
         if !self.is_many() {
             self.go_on(self.age_s);
