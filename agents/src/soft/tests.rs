@@ -6,6 +6,7 @@ mod falls;
 mod links;
 mod meetings;
 mod promises;
+mod skins;
 mod slides;
 mod slopes;
 mod statics;

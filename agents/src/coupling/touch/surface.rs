@@ -8,6 +8,7 @@
 //! the surface itself, so that both sides are pushed at one point.
 
 mod block;
+mod skins;
 
 use super::Touch;
 use super::fans::{LEAN_SHARE, Ridge};
@@ -16,9 +17,8 @@ use crate::coupling::Place;
 use crate::shape::field::Ball;
 use crate::shape::{near_segments, near_triangle};
 use glam::DVec3;
+use skins::Skins;
 
-/// Shares of an edge nearer to its ends than this belong to its vertices, where skins meet.
-const END_SHARE: f64 = 0.02;
 /// Axes nearer than this cross: no way leads from one to the other, metres.
 const CROSSING_M: f64 = 1e-9;
 /// Two soft skins that have passed each other by more than this share of an edge are left alone: they came from elsewhere.
@@ -125,7 +125,11 @@ impl SurfaceRoom {
             }
             Piece::Surface(there) => {
                 learn_normals(there, &mut self.others);
-                meeting.surface(there, &self.others, into);
+                let (low, high) = surface.bounds;
+                let within_m = within_m + there.form.radius_m;
+                let region = (low - within_m, high + within_m);
+                let back = Meeting { surface: there, reach_m, region, normals: &self.others };
+                Skins::new(&meeting, &back).touches(into);
             }
         }
     }
@@ -237,74 +241,6 @@ impl Meeting<'_> {
     fn out_of(&self, spot: Spot) -> Option<DVec3> {
         let [a, b, c] = self.surface.corners(spot.vertices);
         (b - a).cross(c - a).try_normalize()
-    }
-
-    fn surface(&self, there: &Surface<'_>, normals: &[DVec3], into: &mut Vec<Touch>) {
-        let thick_m = self.surface.form.radius_m + there.form.radius_m;
-        let deep_m = DEEP_SHARE * self.surface.form.edge_m.min(there.form.edge_m);
-        let mut tell = |key: u64, (a, at): (Spot, DVec3), (b, near): (Spot, DVec3)| {
-            // the way into the surface, out of the other: a closed body tells on which side the two are
-            let inward = a.out(self.normals).map(|out| -out).or(b.out(normals));
-            if let Some((normal, gap_m)) =
-                apart(at - near, inward, (thick_m, deep_m)).filter(|(_, gap)| *gap <= self.reach_m)
-            {
-                into.push(Touch { key, normal, gap_m, on_a: a.place(), on_b: b.place() });
-            }
-        };
-        for (vertex, at) in self.surface.vertices_in(self.region) {
-            if let Some(near) = self.nearest_on(there, at) {
-                tell(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), near);
-            }
-        }
-        let within_m = self.reach_m + thick_m;
-        let back = (self.surface.bounds.0 - within_m, self.surface.bounds.1 + within_m);
-        for (vertex, at) in there.vertices_in(back) {
-            if let Some(near) = self.nearest_on(self.surface, at) {
-                tell(KINDS[3] | u64::from(vertex), near, (Spot::vertex(vertex), at));
-            }
-        }
-        for (number, edge, ends) in self.surface.edges_in(self.region) {
-            let around = (ends[0].min(ends[1]) - within_m, ends[0].max(ends[1]) + within_m);
-            for (other, edge_b, ends_b) in there.edges_in(around) {
-                let (s, t) = near_segments(ends, ends_b);
-                let inner = END_SHARE..=1.0 - END_SHARE;
-                if inner.contains(&s) && inner.contains(&t) {
-                    let key = KINDS[1] | number << PART_SHIFT | other;
-                    let a = (Spot::edge(edge, s), ends[0].lerp(ends[1], s));
-                    tell(key, a, (Spot::edge(edge_b, t), ends_b[0].lerp(ends_b[1], t)));
-                }
-            }
-        }
-    }
-
-    /// The spot of a triangle of `surface` that is nearest to a point, within reach; of a rope, which has none, that of an edge.
-    fn nearest_on(&self, surface: &Surface<'_>, at: DVec3) -> Option<(Spot, DVec3)> {
-        let within_m = self.reach_m + surface.form.radius_m + self.surface.form.radius_m;
-        let within = (at - within_m, at + within_m);
-        let spots = surface.triangles_in(within).filter_map(|(_, triangle, corners)| {
-            let near = near_triangle(at, corners);
-            Some((Spot { vertices: triangle, shares: shares(near, corners)? }, near))
-        });
-        let is_rope = surface.form.triangles.is_empty();
-        let lines = surface.edges_in(within).filter(|_| is_rope).map(|(_, edge, ends)| {
-            let along = ends[1] - ends[0];
-            let share = ((at - ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
-            (Spot::edge(edge, share), ends[0].lerp(ends[1], share))
-        });
-        spots.chain(lines).min_by(|a, b| a.1.distance_squared(at).total_cmp(&b.1.distance_squared(at)))
-    }
-}
-
-/// The normal along `way`, which leads from one surface to another, and the gap; `inward` is roughly that normal where it is
-/// known: against it the two have passed each other. `None` where they cross, or are too deep in each other to tell.
-fn apart(way: DVec3, inward: Option<DVec3>, (thick_m, deep_m): (f64, f64)) -> Option<(DVec3, f64)> {
-    let length = way.length();
-    if length <= CROSSING_M {
-        return inward.and_then(DVec3::try_normalize).map(|normal| (normal, -thick_m));
-    }
-    match inward {
-        Some(inward) if inward.dot(way) < 0.0 => (length <= deep_m).then(|| (way / -length, -length - thick_m)),
-        _ => Some((way / length, length - thick_m)),
     }
 }
 
