@@ -241,7 +241,7 @@ fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {
         impulse_oracle_n_s: pair.impulse_oracle_n_s,
     };
     let couplings = oracle.pairs.iter().map(error).collect();
-    OracleReport { dt_ms: oracle.dt_s * 1e3, states: oracle.states, couplings }
+    OracleReport { dt_ms: oracle.dt_s * 1e3, sim_s: oracle.sim_s, states: oracle.states, couplings }
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {

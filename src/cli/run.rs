@@ -262,6 +262,14 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     if played.unpriced && !args.quiet {
         message("note: what drawing costs here could not be measured in three seconds: the usual prices were taken");
     }
+    if args.oracle && played.interrupted && !args.quiet {
+        message(&match &played.report.oracle {
+            Some(oracle) => {
+                format!("interrupted: the first {:.2} s are compared, which both runs have played", oracle.sim_s)
+            }
+            None => "interrupted: the scene was not played a second time, so nothing is compared".to_owned(),
+        });
+    }
     if let Some(path) = &played.picture {
         message(&format!("picture: {}", path.display()));
     }

@@ -14,7 +14,7 @@ use super::trace::{Trace, Traced, mass_kg, momentum, points};
 use crate::scene::Scene;
 use crate::scene::format::{ExecutorKind, MODELS};
 use crate::scene::ties::Faults;
-use metachron_agents::{AgentId, SimSpan, Snapshot};
+use metachron_agents::{AgentId, SimSpan, SimTime, Snapshot};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
@@ -30,6 +30,8 @@ const STEP_MAX_S: f64 = 2e-3;
 pub struct Oracle {
     /// Step of the common clock, seconds.
     pub dt_s: f64,
+    /// Simulated seconds that both runs have played: all of the run, unless the comparison was ended before its end.
+    pub sim_s: f64,
     /// States compared.
     pub states: u64,
     /// Every pair that was coupled in either run.
@@ -89,10 +91,11 @@ fn consult(
     let dt_s = common.agents.first().map_or(STEP_MAX_S, |member| member.pace.dt.as_secs_f64());
     let mut session = Session::open(common)?;
     let empty = Trace::default();
-    let mut states: Vec<&Traced> = outcome.trace.as_ref().unwrap_or(&empty).states.iter().collect();
+    let trace = outcome.trace.as_ref().unwrap_or(&empty);
+    let mut states: Vec<&Traced> = trace.states.iter().collect();
     states.sort_by_key(|state| (state.time, state.agent));
     distances.resize(scene.agents.len(), Distance::default());
-    let mut interrupted = false;
+    let mut cut = None;
     let mut looked = Duration::ZERO;
     for (at, state) in states.iter().enumerate() {
         session.wait_until(Duration::from_nanos(state.time.as_nanos()));
@@ -102,15 +105,18 @@ fn consult(
             session.look();
             looked = session.now() + session.period();
             if !go_on(at as f64 / states.len() as f64) {
-                interrupted = true;
+                cut = Some(state.time);
                 break;
             }
         }
     }
     session.look();
-    let pairs = pairs(&outcome.couplings, session.couplings(), distances);
+    // who has not played as long has not exchanged as much
+    let run = cut.map(|time| trace.couplings_by(time, &outcome.couplings));
+    let pairs = pairs(run.as_ref().unwrap_or(&outcome.couplings), session.couplings(), distances);
+    let sim_s = cut.map_or(outcome.sim_s, SimTime::as_secs_f64);
     let states = distances.iter().map(|d| d.points).sum();
-    Ok(Oracle { dt_s, states, pairs, interrupted })
+    Ok(Oracle { dt_s, sim_s, states, pairs, interrupted: cut.is_some() })
 }
 
 /// The same scene with one clock for all, and nothing in the way of it.
@@ -223,17 +229,58 @@ mod tests {
         assert_eq!((sum(0, 1), sum(1, 2)), (Some(5.0), None));
     }
 
+    /// Two pairs of balls, one of which meets after 0.1 s and the other after 0.6 s.
+    fn two_blows() -> Scene {
+        let ball = |name: &str, [x, y]: [f64; 2], v: f64| {
+            format!(
+                "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nmass_kg = 1.0\nrestitution = 1.0\n\
+                 position_m = [{x}, {y}, 0]\nvelocity_m_s = [{v}, 0, 0]\n"
+            )
+        };
+        let early = ball("a", [0.0, 0.0], 1.0) + &ball("b", [0.3, 0.0], 0.0);
+        let late = ball("c", [0.0, 5.0], 1.0) + &ball("d", [0.8, 5.0], 0.0);
+        let text = format!("format = 1\nexecutor = \"lockstep\"\n[world]\ngravity_m_s2 = [0, 0, 0]\n{early}{late}");
+        Source::memory("blows", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
+    }
+
     #[test]
-    fn states_of_free_fall_are_compared_at_their_own_times() {
-        let scene = falling();
+    fn a_comparison_that_is_cut_short_is_of_what_both_runs_have_played() {
+        let scene = two_blows();
+        let outcome = played(&scene, 60);
+        let until = |share: f64| {
+            consult_oracle(&scene, &outcome, &mut |done| done < share)
+                .map(|o| (o.sim_s, o.interrupted, o.pairs))
+                .unwrap()
+        };
+        let (sim_s, interrupted, pairs) = until(0.4);
+        assert!(interrupted && (0.3..0.5).contains(&sim_s), "{sim_s} s");
+        let [pair] = &pairs[..] else { panic!("only one pair has met: {pairs:?}") };
+        // equal masses that bounce without loss change their 1 m/s
+        let exchanged = [pair.impulse_n_s, pair.impulse_oracle_n_s].map(Option::unwrap);
+        assert!(
+            (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 1e-6),
+            "{pair:?}"
+        );
+        let (sim_s, interrupted, pairs) = until(2.0);
+        assert!(!interrupted && (sim_s, pairs.len()) == (outcome.sim_s, 2), "{sim_s} s, {pairs:?}");
+    }
+
+    /// `frames` frames of `scene`, with a trace.
+    fn played(scene: &Scene, frames: u32) -> Outcome {
         let mut session = Session::open(scene.clone()).unwrap();
         session.keep_trace();
         session.begin();
-        for frame in 0..30 {
+        for frame in 0..frames {
             session.wait_until(session.period() * frame);
             session.look();
         }
-        let outcome = session.end(None, false);
+        session.end(None, false)
+    }
+
+    #[test]
+    fn states_of_free_fall_are_compared_at_their_own_times() {
+        let scene = falling();
+        let outcome = played(&scene, 30);
         let mut told = 0;
         let mut distances = Vec::new();
         let oracle = consult(&scene, &outcome, &mut distances, &mut |_| {

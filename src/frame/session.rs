@@ -443,6 +443,7 @@ impl Session {
         self.couplings.note(self.reader.newest(), leader);
         if let Some(trace) = &mut self.trace {
             trace.note(&self.scene, self.reader.newest());
+            trace.note_couplings(now, self.couplings.all());
         }
     }
 }

@@ -2,9 +2,11 @@
 //!
 //! In: the newest states. Out: a [`Trace`]. Never here: the comparison.
 
+use super::couplings::Coupling;
 use crate::scene::{Scene, Spec};
 use glam::DVec3;
 use metachron_agents::{AgentId, Body, CurveState, SimTime, Snapshot};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Material points of a tube that are written down, evenly from start to end.
@@ -15,6 +17,10 @@ const TUBE_POINTS: u32 = 9;
 pub struct Trace {
     pub(super) states: Vec<Traced>,
     last: Vec<Option<SimTime>>,
+    /// Impulses that pairs had exchanged in all, by the coupling's number and the time of the run, each time that one had grown.
+    exchanged: Vec<(SimTime, usize, f64)>,
+    /// The newest of them, coupling by coupling.
+    newest: Vec<f64>,
 }
 
 /// One state of one agent.
@@ -40,6 +46,25 @@ impl Trace {
             let momentum = momentum(&member.spec, &snapshot.body);
             self.states.push(Traced { agent: member.id, time: snapshot.time, points_m, momentum });
         }
+    }
+
+    /// Writes down what couplings, always in the same order, have exchanged by `now`.
+    pub(super) fn note_couplings(&mut self, now: SimTime, all: &[Coupling]) {
+        for (at, coupling) in all.iter().enumerate() {
+            if self.newest.get(at) != Some(&coupling.impulse_n_s) {
+                self.newest.resize(self.newest.len().max(at + 1), 0.0);
+                self.newest[at] = coupling.impulse_n_s;
+                self.exchanged.push((now, at, coupling.impulse_n_s));
+            }
+        }
+    }
+
+    /// Those of `all` that were there by `time`, with the impulses that they had exchanged by then.
+    pub(super) fn couplings_by(&self, time: SimTime, all: &[Coupling]) -> Vec<Coupling> {
+        let mut by_then = BTreeMap::new();
+        by_then.extend(self.exchanged.iter().take_while(|one| one.0 <= time).map(|&(_, at, impulse)| (at, impulse)));
+        let one = |(at, impulse_n_s): (usize, f64)| Some(Coupling { impulse_n_s, ..all.get(at)?.clone() });
+        by_then.into_iter().filter_map(one).collect()
     }
 }
 

@@ -197,6 +197,8 @@ impl MovedReport {
 pub struct OracleReport {
     /// Step of the common clock, milliseconds.
     pub dt_ms: f64,
+    /// Simulated seconds that both have played: all of the run, unless Ctrl-C ended the second one.
+    pub sim_s: f64,
     /// Points compared.
     pub states: u64,
     /// Every pair that was coupled in either run.
@@ -339,6 +341,7 @@ mod tests {
         "/overlaps/0/depth_m",
         "/moved/0/by_m",
         "/oracle/dt_ms",
+        "/oracle/sim_s",
         "/oracle/couplings/0/position_rms_m",
         "/agents/0/led_by",
         "/budget/spent_share",

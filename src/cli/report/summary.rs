@@ -134,7 +134,8 @@ fn coupling_table(out: &mut String, couplings: &[CouplingReport]) {
 }
 
 fn oracle_table(out: &mut String, oracle: &OracleReport) {
-    let _ = writeln!(out, "\nagainst one common clock of {:.4} ms, {} points compared", oracle.dt_ms, oracle.states);
+    let OracleReport { dt_ms, sim_s, states, .. } = oracle;
+    let _ = writeln!(out, "\nagainst one common clock of {dt_ms:.4} ms over {sim_s:.2} s, {states} points compared");
     let _ = writeln!(
         out,
         "{:<41} {:>11} {:>11} {:>13} {:>12} {:>12}",
