@@ -93,19 +93,19 @@ fn consult(
     let empty = Trace::default();
     let trace = outcome.trace.as_ref().unwrap_or(&empty);
     let mut states: Vec<&Traced> = trace.states.iter().collect();
-    states.sort_by_key(|state| (state.time, state.agent));
+    states.sort_by_key(|state| (state.moment, state.agent));
     distances.resize(scene.agents.len(), Distance::default());
     let mut cut = None;
     let mut looked = Duration::ZERO;
     for (at, state) in states.iter().enumerate() {
-        session.wait_until(Duration::from_nanos(state.time.as_nanos()));
+        session.wait_until(Duration::from_nanos(state.moment.as_nanos()));
         compare(&session, state, distances);
         // couplings are published for a second after they end: looking every frame misses none
         if session.now() >= looked {
             session.look();
             looked = session.now() + session.period();
             if !go_on(at as f64 / states.len() as f64) {
-                cut = Some(state.time);
+                cut = Some(state.moment);
                 break;
             }
         }
@@ -147,7 +147,7 @@ fn compare(session: &Session, state: &Traced, distances: &mut [Distance]) {
     let (Some(agent), Some(distance)) = (session.agents().get(at), distances.get_mut(at)) else { return };
     let snapshot: &Snapshot = &agent.latest();
     // the newest state is at most one tick away from that time
-    let ahead_s = state.time.secs_after(snapshot.time);
+    let ahead_s = state.moment.secs_after(snapshot.moment());
     for ((there, velocity), here) in points(&snapshot.body).zip(&state.points_m) {
         let apart = here.distance(there + velocity * ahead_s);
         distance.points += 1;

@@ -27,24 +27,27 @@ pub struct Trace {
 #[derive(Debug, Clone)]
 pub(super) struct Traced {
     pub(super) agent: AgentId,
-    pub(super) time: SimTime,
+    /// The moment of the scene that it belongs to, which is the agent's own time unless it has been put off.
+    pub(super) moment: SimTime,
     pub(super) points_m: Vec<DVec3>,
     /// Linear momentum, N·s.
     pub(super) momentum: DVec3,
 }
 
 impl Trace {
-    /// Writes down every state that is newer than the last one of its agent.
+    /// Writes down every state that is of a later moment of the scene than the last one of its agent; the agent's own time may go back,
+    /// when it takes another one for its own.
     pub(super) fn note(&mut self, scene: &Scene, newest: &[Arc<Snapshot>]) {
         self.last.resize(newest.len(), None);
         for ((member, snapshot), last) in scene.agents.iter().zip(newest).zip(&mut self.last) {
-            if matches!(snapshot.body, Body::Nothing) || last.is_some_and(|last| last >= snapshot.time) {
+            let moment = snapshot.moment();
+            if matches!(snapshot.body, Body::Nothing) || last.is_some_and(|last| last >= moment) {
                 continue;
             }
-            *last = Some(snapshot.time);
+            *last = Some(moment);
             let points_m = points(&snapshot.body).map(|(at, _)| at).collect();
             let momentum = momentum(&member.spec, &snapshot.body);
-            self.states.push(Traced { agent: member.id, time: snapshot.time, points_m, momentum });
+            self.states.push(Traced { agent: member.id, moment, points_m, momentum });
         }
     }
 
@@ -103,6 +106,28 @@ fn flow(curve: &CurveState) -> DVec3 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scene::{Source, load};
+    use metachron_agents::{RigidState, SimSpan};
+
+    #[test]
+    fn who_takes_another_time_for_its_own_is_traced_on_by_the_scenes() {
+        let text = "format = 1\nobject = [{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 }]\n";
+        let scene = Source::memory("ball", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
+        let at = |ms: u64| SimTime::ZERO + SimSpan::from_nanos(ms * 1_000_000);
+        let state = |(own, put_off): (u64, u64)| Snapshot {
+            time: at(own),
+            put_off: at(put_off).since(SimTime::ZERO),
+            body: Body::Rigid(RigidState::default()),
+            ..Snapshot::default()
+        };
+        let mut trace = Trace::default();
+        // on time; put off by 0.3 s, told twice; the next step; on time again
+        for one in [(1000, 0), (710, 300), (710, 300), (720, 300), (1030, 0)] {
+            trace.note(&scene, &[Arc::new(state(one))]);
+        }
+        let moments: Vec<_> = trace.states.iter().map(|state| state.moment).collect();
+        assert_eq!(moments, [1000, 1010, 1020, 1030].map(at));
+    }
 
     #[test]
     fn the_flow_of_a_turning_line_is_its_middles() {
