@@ -2,7 +2,6 @@
 
 use crate::play::{metachron, program};
 use serde_json::Value;
-use std::io::Read;
 use std::path::Path;
 use std::process::{Output, Stdio};
 use tempfile::TempDir;
@@ -182,12 +181,12 @@ fn a_folder_that_cannot_be_made_is_bad_input() {
     assert!(said(&done).contains("cannot be written") && said(&done).contains("below"), "{}", said(&done));
 }
 
-/// A child that is interrupted once its file has two rows more than `kept`; its exit code and what it said.
+/// A child that is interrupted once its file has two rows more than `kept`; its exit code, what it printed, and what it said.
 #[cfg(unix)]
-fn interrupted(out: &Path, experiment: &str, kept: usize) -> (Option<i32>, String) {
+fn interrupted(out: &Path, experiment: &str, kept: usize) -> (Option<i32>, String, String) {
     let mut child = program()
         .args(["chart", "stability", "--out", out.to_str().unwrap(), "--only", experiment])
-        .stdout(Stdio::null())
+        .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
@@ -198,19 +197,19 @@ fn interrupted(out: &Path, experiment: &str, kept: usize) -> (Option<i32>, Strin
     }
     let interrupt = format!("kill -INT {}", child.id());
     assert!(std::process::Command::new("sh").args(["-c", &interrupt]).status().unwrap().success());
-    let code = child.wait().unwrap().code();
-    let mut words = String::new();
-    child.stderr.take().unwrap().read_to_string(&mut words).unwrap();
-    (code, words)
+    let done = child.wait_with_output().unwrap();
+    let [printed, words] = [done.stdout, done.stderr].map(|text| String::from_utf8(text).unwrap());
+    (done.status.code(), printed, words)
 }
 
 #[cfg(unix)]
 #[test]
 fn an_interrupted_sweep_keeps_its_rows_and_the_next_run_takes_them_up() {
     let out = folder();
-    let (code, words) = interrupted(out.path(), "tube-map", 0);
+    let (code, printed, words) = interrupted(out.path(), "tube-map", 0);
     assert_eq!(code, Some(130), "{words}");
     assert!(words.contains("takes them up"), "{words}");
+    assert!(printed.contains("holds so far"), "{printed}");
     let (path, mark) = (out.path().join("stability-tube-map.csv"), out.path().join("stability-tube-map.unfinished"));
     let kept = rows(&path);
     assert!(kept.len() >= 2 && mark.exists());
@@ -231,7 +230,7 @@ fn an_interrupted_sweep_keeps_its_rows_and_the_next_run_takes_them_up() {
 /// Interrupts a second run, which must begin with the rows of the first.
 #[cfg(unix)]
 fn interrupted_again(out: &Path, kept: usize) {
-    let (code, words) = interrupted(out, "tube-map", kept);
+    let (code, _, words) = interrupted(out, "tube-map", kept);
     assert_eq!(code, Some(130), "{words}");
     assert!(rows(&out.join("stability-tube-map.csv")).len() >= kept + 2);
 }

@@ -59,14 +59,20 @@ pub(in crate::cli) struct Finding {
     pub(super) measured: f64,
     /// The limit.
     pub(super) limit: f64,
-    /// Whether the claim holds.
-    pub(super) holds: bool,
+    /// Whether the claim holds; `None` where the rows that would tell were not measured.
+    pub(super) holds: Option<bool>,
 }
 
 impl Finding {
     /// Holds where `measured` is at most `limit`; a number that is none holds nothing.
     pub(super) fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
-        Self { claim: claim.into(), measured, limit, holds: measured <= limit }
+        Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
+    }
+
+    /// The same of `rows` rows that are not all: what needs others is not measured, and neither kept nor broken.
+    pub(super) fn unfinished(self, rows: usize) -> Self {
+        let measured = rows > 0 && !self.measured.is_nan();
+        Self { holds: self.holds.filter(|_| measured), ..self }
     }
 }
 
@@ -83,7 +89,14 @@ mod tests {
     #[test]
     fn a_number_that_is_none_keeps_no_claim() {
         assert!(worst([1.0, f64::NAN, 2.0]).is_nan() && worst([]).is_nan());
-        assert!(!Finding::at_most("bounded", worst([1.0, f64::NAN]), 2.0).holds);
-        assert!(Finding::at_most("bounded", worst([1.0, 2.0]), 2.0).holds);
+        let bounded = |numbers: [f64; 2]| Finding::at_most("bounded", worst(numbers), 2.0).holds;
+        assert_eq!((bounded([1.0, f64::NAN]), bounded([1.0, 2.0])), (Some(false), Some(true)));
+    }
+
+    #[test]
+    fn a_claim_whose_rows_are_missing_neither_holds_nor_fails() {
+        let after = |rows: usize, measured: f64| Finding::at_most("bounded", measured, 2.0).unfinished(rows).holds;
+        assert_eq!((after(0, 0.0), after(3, f64::NAN)), (None, None));
+        assert_eq!((after(3, 1.0), after(3, 3.0)), (Some(true), Some(false)));
     }
 }

@@ -227,6 +227,8 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
         files.extend(drawn::<E>(setting.folder, &stem, &swept.rows)?);
         files.extend(pictured::<E>(setting.folder, &stem, &swept.rows)?);
     }
+    let findings = E::findings(&swept.rows);
+    let judged = |one: Finding| if swept.complete { one } else { one.unfinished(swept.rows.len()) };
     Ok(Done {
         name: E::NAME,
         title: E::TITLE,
@@ -234,7 +236,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
         rows: swept.rows.len(),
         files,
         table: E::table(&swept.rows),
-        findings: E::findings(&swept.rows),
+        findings: findings.into_iter().map(judged).collect(),
     })
 }
 
@@ -268,8 +270,13 @@ fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow
 /// An experiment's table, findings and files as text.
 fn told(done: &Done) -> String {
     let mut findings = Table::new(&["", "claim", "measured", "limit"]);
+    let (so_far, state) = if done.complete { ("", "") } else { (" so far", " (unfinished)") };
     for Finding { claim, measured, limit, holds } in &done.findings {
-        let word = if *holds { "holds" } else { "FAILS" };
+        let word = match holds {
+            Some(true) => format!("holds{so_far}"),
+            Some(false) => format!("FAILS{so_far}"),
+            None => "not measured".to_owned(),
+        };
         findings.rows.push(vec![
             word.into(),
             claim.clone().into(),
@@ -278,7 +285,6 @@ fn told(done: &Done) -> String {
         ]);
     }
     let files: Vec<_> = done.files.iter().map(|f| f.display().to_string()).collect();
-    let state = if done.complete { "" } else { " (unfinished)" };
     let Done { name, title, table, .. } = done;
     format!("{name}: {title}{state}\n\n{}\n{}\nfiles: {}\n\n", table.text(), findings.text(), files.join(", "))
 }

@@ -89,7 +89,7 @@ pub(super) fn number(rows: &[Row], setting: &str, policy: &str, of: fn(&Row) -> 
 
 /// A claim that something is at least `limit`.
 pub(super) fn at_least(claim: impl Into<String>, measured: f64, limit: f64) -> Finding {
-    Finding { claim: claim.into(), measured, limit, holds: measured >= limit }
+    Finding { claim: claim.into(), measured, limit, holds: Some(measured >= limit) }
 }
 
 /// The time of every frame under some policies, beside the target.
