@@ -1,4 +1,4 @@
-//! The window on a real display: it plays a scene, loses its device, comes back, and says so where there is no display.
+//! The window on a real display: it plays a scene, loses its device, comes back, and says so where there is no display or it is gone.
 //!
 //! A window must be opened on the main thread, which the test harness keeps for itself: so this is a program of its own.
 //! It starts an Xvfb of its own; each claim runs in a process with a home of its own. Without Xvfb or an adapter the
@@ -9,11 +9,11 @@ use metachron::compositor::viewer::{
     Action, Bounds, FrameTimes, Show, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions, run_window,
 };
 use metachron::compositor::{Camera, Gpu, Hit, Picture, Ray};
-use metachron::frame::{Session, WindowPlan, play_in_window};
+use metachron::frame::{Session, WindowFailure, WindowPlan, play_in_window};
 use metachron::runtime::AgentState;
 use metachron::scene::{self, Source};
 use metachron_agents::AgentId;
-use std::io::{BufRead, BufReader};
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
 use std::time::{Duration, Instant};
@@ -21,11 +21,15 @@ use std::time::{Duration, Instant};
 /// A claim and the function that checks it in its own process. The last is checked without a display.
 type Claim = (&'static str, fn());
 
-const CLAIMS: [Claim; 3] = [
+const CLAIMS: [Claim; 4] = [
+    (DISPLAY_GONE, a_display_that_goes_away_ends_the_run_with_its_outcome),
     ("the_tube_plays_in_a_window_and_the_window_ends_with_its_run", the_tube_plays_in_a_window),
     ("a_lost_device_is_replaced_and_the_show_goes_on", a_lost_device_is_replaced_and_the_show_goes_on),
     ("without_a_display_the_error_says_so", without_a_display_the_error_says_so),
 ];
+
+/// The claim whose process has a display of its own, which is taken away from it.
+const DISPLAY_GONE: &str = "a_display_that_goes_away_ends_the_run_with_its_outcome";
 
 /// Pictures before the device is destroyed.
 const LOST_AFTER: u64 = 6;
@@ -126,6 +130,43 @@ fn the_tube_plays_in_a_window() {
     assert!(outcome.agents.iter().all(|agent| !matches!(agent.stats.state, AgentState::Parked(_))));
 }
 
+fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
+    let source = Source::open("pendulum").unwrap();
+    let session = Session::open(scene::load(&source, &[]).unwrap()).unwrap();
+    let screenshots = std::env::temp_dir();
+    let plan =
+        WindowPlan { source, overrides: Vec::new(), size: None, screenshots, seconds: None, frames: Some(10_000) };
+    let mut told = false;
+    let played = play_in_window(session, plan, &mut |frame, _| {
+        if frame.frame >= FRAMES && !told {
+            // the display is gone when a line comes back
+            println!("{READY}");
+            std::io::stdin().read_line(&mut String::new()).unwrap();
+            told = true;
+        }
+        true
+    });
+    let Err(WindowFailure::Gone(outcome, error)) = played else { panic!("the window is still there") };
+    assert!(outcome.interrupted && outcome.finished > FRAMES && outcome.agents[0].stats.steps > 0);
+    assert!(error.to_string().contains("no longer answers"), "{error}");
+}
+
+/// What the process says whose display is to be taken away.
+const READY: &str = "take the display away";
+
+/// Runs [`DISPLAY_GONE`] in a process of its own on `display`, which ends when that asks for it.
+fn holds_without(display: Display, home: &Path) -> bool {
+    let mut child = claim(DISPLAY_GONE, Some(&display.name), home);
+    let mut child = child.stdin(Stdio::piped()).stdout(Stdio::piped()).spawn().unwrap();
+    let said = BufReader::new(child.stdout.take().unwrap());
+    let asked = said.lines().map_while(Result::ok).any(|line| line == READY);
+    drop(display);
+    if let Some(mut stdin) = child.stdin.take().filter(|_| asked) {
+        stdin.write_all(b"\n").unwrap();
+    }
+    told(DISPLAY_GONE, child.wait().unwrap().success())
+}
+
 /// A display of our own, gone when this is dropped.
 struct Display {
     server: Child,
@@ -153,8 +194,8 @@ impl Drop for Display {
     }
 }
 
-/// Runs a claim in a process of its own; gives whether it holds.
-fn holds(name: &str, display: Option<&str>, home: &Path) -> bool {
+/// The process that checks a claim.
+fn claim(name: &str, display: Option<&str>, home: &Path) -> Command {
     let mut child = Command::new(std::env::current_exe().unwrap());
     child.args(["--claim", name]).env("HOME", home).env("XDG_DATA_HOME", home).env("XDG_RUNTIME_DIR", home);
     for variable in ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"] {
@@ -163,7 +204,15 @@ fn holds(name: &str, display: Option<&str>, home: &Path) -> bool {
     if let Some(display) = display {
         child.env("DISPLAY", display);
     }
-    let holds = child.status().unwrap().success();
+    child
+}
+
+/// Runs a claim in a process of its own; gives whether it holds.
+fn holds(name: &str, display: Option<&str>, home: &Path) -> bool {
+    told(name, claim(name, display, home).status().unwrap().success())
+}
+
+fn told(name: &str, holds: bool) -> bool {
     println!("test {name} ... {}", if holds { "ok" } else { "FAILED" });
     holds
 }
@@ -202,6 +251,9 @@ fn main() -> ExitCode {
         let required = std::env::var_os("METACHRON_REQUIRE_ADAPTER").is_some_and(|value| value == "1");
         return verdict(refused && !required);
     };
-    let held = with.iter().filter(|name| holds(name, Some(&display.name), home.path())).count();
-    verdict(refused && held == with.len())
+    let held = with.iter().filter(|name| match **name {
+        DISPLAY_GONE => Display::start().is_some_and(|own| holds_without(own, home.path())),
+        name => holds(name, Some(&display.name), home.path()),
+    });
+    verdict(refused && held.count() == with.len())
 }

@@ -46,6 +46,9 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
         Ok(outcome) => Ok(played(&request.scene, outcome, None)),
         Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
+        Err(WindowFailure::Gone(outcome, why)) => {
+            Ok(Played { window_gone: Some(why.to_string()), ..played(&request.scene, *outcome, None) })
+        }
         Err(WindowFailure::Session(error)) => Err(error.into()),
     }
 }
@@ -162,7 +165,7 @@ fn played(scene: &Scene, outcome: Outcome, picture: Option<PathBuf>) -> Played {
         probes: outcome.probes.iter().map(probe).collect(),
     };
     let (unpriced, interrupted) = (outcome.unpriced, outcome.interrupted);
-    Played { report, frames: outcome.frames, no_window: None, picture, unpriced, interrupted }
+    Played { report, frames: outcome.frames, no_window: None, window_gone: None, picture, unpriced, interrupted }
 }
 
 fn agent(scene: &Scene, agent: &AgentOutcome) -> AgentReport {

@@ -70,6 +70,8 @@ pub struct Played {
     pub frames: Vec<FrameRecord>,
     /// Why there was no window though one was wanted.
     pub no_window: Option<String>,
+    /// Why the window that was open is gone; the run ended there.
+    pub window_gone: Option<String>,
     /// The picture that was written.
     pub picture: Option<PathBuf>,
     /// Whether levels were chosen by the usual prices of drawing, because there was no time to measure the adapter's.
@@ -117,7 +119,10 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     })?;
     drop(bar);
     write_all(args, &played)?;
-    judge(args, &played)
+    match &played.window_gone {
+        Some(why) => Err(anyhow::anyhow!("{why}")),
+        None => judge(args, &played),
+    }
 }
 
 /// The request that the arguments make. Precedence: flags, `--set`, environment, scene, defaults.

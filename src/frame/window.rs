@@ -40,6 +40,8 @@ pub struct WindowPlan {
 pub enum WindowFailure {
     /// There is no display or no adapter for one.
     NoWindow(Box<Session>, WindowError),
+    /// The window was open, and its display is gone: what the run came to until then.
+    Gone(Box<Outcome>, WindowError),
     /// A scene could not be started again.
     Session(SessionError),
 }
@@ -51,12 +53,15 @@ pub enum WindowFailure {
 /// hidden are no part of it, and of a run without an end at least the newest [`FRAMES_KEPT`] are.
 ///
 /// # Errors
-/// [`WindowFailure::NoWindow`] gives the session back, its time standing still.
+/// [`WindowFailure::NoWindow`] gives the session back, its time standing still, [`WindowFailure::Gone`] the outcome.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut show = WindowShow::new(session, plan, go_on);
     match run_window(&mut show, &options) {
         Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
+        Err(error @ WindowError::Gone(_)) => {
+            Err(WindowFailure::Gone(Box::new(show.session.end(show.adapter, true)), error))
+        }
         Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
     }
 }

@@ -14,6 +14,8 @@ use std::cell::{Cell, OnceCell};
 use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
 use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 /// How a window starts.
@@ -49,6 +51,9 @@ pub enum WindowError {
     /// The device was lost as often as this within a second of being made.
     #[error("the graphics device was lost {0} times within a second of being made")]
     DeviceUnstable(u32),
+    /// The window was open, and the display it was on is gone.
+    #[error("the window is gone: {0}")]
+    Gone(String),
     /// The window could not be made for another reason.
     #[error("the window could not be opened: {0}")]
     Failed(String),
@@ -76,8 +81,8 @@ const LATE: Duration = Duration::from_millis(1);
 /// To be called on the main thread. A lost device is replaced; the show is not told and need not care.
 ///
 /// # Errors
-/// [`WindowError::NoDisplay`] where a run should go on without a window, the others where graphics fail.
-/// The show is left as it is.
+/// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as nobody sees it any
+/// more; the others where graphics fail. The show is left as it is.
 pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
     find_display()?;
     let mut viewer = Viewer::default();
@@ -140,34 +145,61 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
     };
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
-    // egui panics where a device is lost between its own calls; nothing of the show or the viewer is under change there
-    match panic::catch_unwind(AssertUnwindSafe(run)) {
-        Ok(ended) => ended.map_err(named_error)?,
-        Err(_) if lost() => return Ok(Fate::DeviceLost),
-        Err(bug) => panic::resume_unwind(bug),
+    let opened = || device.get().is_some();
+    // egui panics where a device is lost between its own calls, and winit where the display is; nothing of the show or the viewer is
+    // under change there
+    match hearing_winit(|| panic::catch_unwind(AssertUnwindSafe(run))) {
+        (_, true) => return Err(no_answer(opened())),
+        (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
+        (Err(_), _) if lost() => return Ok(Fate::DeviceLost),
+        (Err(bug), _) => panic::resume_unwind(bug),
     }
     Ok(fate.get())
 }
 
+/// Gives what `run` gives, and whether winit has panicked meanwhile, as it does where the display does not answer: that is not printed.
+fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
+    let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
+    let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
+    panic::set_hook(Box::new(move |panic| match panic.location() {
+        Some(place) if place.file().contains("winit") => hears.store(true, Ordering::Relaxed),
+        _ => others(panic),
+    }));
+    let given = run();
+    drop(panic::take_hook());
+    if let Ok(before) = Arc::try_unwrap(before) {
+        panic::set_hook(before);
+    }
+    (given, heard.load(Ordering::Relaxed))
+}
+
 const LAYOUT: &str = "metachron layout";
 
-fn named_error(error: eframe::Error) -> WindowError {
+fn named_error(error: eframe::Error, opened: bool) -> WindowError {
     match error {
-        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => {
-            WindowError::NoDisplay(unanswered(|key| std::env::var(key).ok()))
-        }
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => no_answer(opened),
         eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
         other => WindowError::Failed(other.to_string()),
     }
 }
 
-/// Which display was asked for and does not answer: winit's own words name a line of its source.
-fn unanswered(read: impl Fn(&str) -> Option<String>) -> String {
+/// The display does not answer, or no longer where the window has been `opened`.
+fn no_answer(opened: bool) -> WindowError {
+    let read = |key: &str| std::env::var(key).ok();
+    if opened {
+        return WindowError::Gone(unanswered(read, "no longer answers"));
+    }
+    let why = unanswered(read, "does not answer");
+    WindowError::NoDisplay(format!("{why}; name one that does, or run with --headless"))
+}
+
+/// Which display was asked for, and that it `fails`: winit's own words name a line of its source.
+fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
     let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
     let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
         return "the system gives no window".to_owned();
     };
-    format!("`{value}`, which {key} names, does not answer; name one that does, or run with --headless")
+    format!("`{value}`, which {key} names, {fails}")
 }
 
 fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
@@ -180,7 +212,7 @@ fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
         .with_icon(super::icons::window_icon());
     let mut wgpu_options = egui_wgpu::WgpuConfiguration::default();
     if let egui_wgpu::WgpuSetup::CreateNew(setup) = &mut wgpu_options.wgpu_setup {
-        setup.device_descriptor = std::sync::Arc::new(super::super::offscreen::device_descriptor);
+        setup.device_descriptor = Arc::new(super::super::offscreen::device_descriptor);
     }
     let renderer = eframe::Renderer::Wgpu;
     // a size that is given wins over the one that the window was closed with, which is restored before this is asked
@@ -388,9 +420,9 @@ mod tests {
 
     #[test]
     fn a_display_that_does_not_answer_is_named() {
-        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()));
-        assert!(told.starts_with("`:77`, which DISPLAY names,") && told.contains("--headless"), "{told}");
-        assert_eq!(unanswered(|_| None), "the system gives no window");
+        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
+        assert_eq!(told, "`:77`, which DISPLAY names, does not answer");
+        assert_eq!(unanswered(|_| None, "does not answer"), "the system gives no window");
     }
 
     #[test]
