@@ -1,7 +1,7 @@
 //! What does a turn cost in a pool whose agents are always due, as they grow in number? Wall time, all workers busy.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use metachron::runtime::{AgentSpawn, Pool, Priority, Run, SystemClock};
+use metachron::runtime::{AgentSpawn, Drive, Pool, Priority, Run, SystemClock};
 use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
 use metachron_agents::{N_MAX, Resolution, ResolutionRange};
 use std::sync::Arc;
@@ -39,7 +39,8 @@ fn make_turns(c: &mut Criterion) {
     let mut group = c.benchmark_group("runtime/pool_turn");
     for agents in [100_usize, 1000, 10_000] {
         let spawns = (0..agents).map(agent).collect();
-        let run = Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).expect("the pool starts");
+        let mut run = Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).expect("the pool starts");
+        run.drive(Drive::Run);
         group.throughput(Throughput::Elements(1));
         group.bench_function(BenchmarkId::from_parameter(agents), |b| b.iter_custom(|turns| time(&run, turns)));
         Box::new(run).shutdown();

@@ -125,6 +125,7 @@ fn the_tube_plays_in_a_window() {
     assert_eq!((outcome.finished, outcome.frames.len() as u64), (FRAMES, FRAMES));
     assert!(outcome.adapter.is_some() && outcome.frames.iter().all(|f| f.triangles > 0 && f.frame_ms > 0.0));
     // the second picture lets time begin
+    assert_eq!(outcome.frames[0].sim_s, 0.0);
     assert!(outcome.frames.windows(2).skip(1).all(|f| f[1].sim_s > f[0].sim_s));
     assert!(outcome.agents[0].stats.steps > 0);
     assert!(outcome.agents.iter().all(|agent| !matches!(agent.stats.state, AgentState::Parked(_))));

@@ -32,8 +32,6 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 /// What the models, the executor or the adapter refuse.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
-    // nothing happens before somebody can see it: opening an adapter takes seconds where a processor draws
-    session.hold();
     if !request.quiet {
         session.tell_by(super::output::message);
     }

@@ -52,6 +52,7 @@ pub fn experiment(
     mut plan: Experiment,
     go_on: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Experimented, SessionError> {
+    session.begin();
     let period = session.period();
     let mut design = Design::begin(session.control(), plan.frames);
     let (mut due, mut interrupted) = (Duration::ZERO, false);

@@ -40,6 +40,7 @@ pub fn push(
 ) -> Result<Vec<Vec<After>>, SessionError> {
     session.control().set_policy(Policy::Feedback);
     session.control().set_law(pushes.law);
+    session.begin();
     let (wanted, times) = (std::mem::take(&mut pushes.polygons), pushes.times.max(1));
     let mut medians = Vec::with_capacity(wanted.len());
     for (at, polygons) in wanted.iter().enumerate() {

@@ -110,7 +110,7 @@ const LAG_NEWS: f64 = 0.2;
 const GLIDE_FRAMES: u8 = 6;
 
 impl Session {
-    /// Starts the agents of `scene`.
+    /// Makes the agents of `scene`; real time waits for [`Session::begin`].
     ///
     /// # Errors
     /// [`SessionError::Build`] and [`SessionError::Run`]; nothing runs then.
@@ -317,14 +317,14 @@ impl Session {
         self.run.wait_until(until);
     }
 
-    /// Lets real time wait for [`Session::begin`]. Virtual time passes only where somebody waits for it.
+    /// Lets real time wait for [`Session::begin`] again. Virtual time passes only where somebody waits for it.
     pub fn hold(&mut self) {
         if !self.is_virtual() {
             self.run.drive(Drive::Pause);
         }
     }
 
-    /// Lets real time pass that [`Session::hold`] keeps waiting.
+    /// Lets real time pass.
     pub fn begin(&mut self) {
         if !self.is_virtual() {
             self.begun = self.now();

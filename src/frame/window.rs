@@ -142,7 +142,9 @@ impl<'a> WindowShow<'a> {
         self.stop_tuning();
         session.keep_frames(kept(&self.plan));
         session.drive(Drive::Speed(self.speed));
-        if !self.running {
+        if self.running {
+            session.begin();
+        } else {
             session.drive(Drive::Pause);
         }
         let prices = *self.session.control().prices();

@@ -37,8 +37,8 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Starts a worker for each core the system gives; simulated time begins when all are there. Where the system refuses
-    /// `priority` ([`Priority::ask`]) workers have the ordinary one.
+    /// Starts a worker for each core the system gives; simulated time stands still until somebody lets it run ([`Drive::Run`]).
+    /// Where the system refuses `priority` ([`Priority::ask`]) workers have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for agents that cannot run as asked, and where the system gives no thread.
@@ -66,9 +66,7 @@ impl Pool {
             hall.board.stop();
             no_thread(source)
         })?;
-        let mut run = Self { hall, notes, watch: Some(watch) };
-        run.drive(Drive::Run);
-        Ok(run)
+        Ok(Self { hall, notes, watch: Some(watch) })
     }
 
     fn end(&mut self) {

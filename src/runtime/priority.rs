@@ -56,7 +56,7 @@ impl Priority {
 
 #[cfg(test)]
 mod tests {
-    use super::super::testing::{Dummy, eventually, system};
+    use super::super::testing::{Dummy, eventually, running, system};
     use super::super::{Pool, Run, Threads};
     use super::*;
 
@@ -84,9 +84,9 @@ mod tests {
         for (prefix, pooled) in [("agent:real", false), ("pool:", true)] {
             let spawn = || crate::runtime::AgentSpawn { name: "real".to_owned(), ..Dummy::new(1.0).at(100.0) };
             let run: Box<dyn Run> = if pooled {
-                Box::new(Pool::start(vec![spawn()], system(), Priority::Realtime).unwrap())
+                running(Pool::start(vec![spawn()], system(), Priority::Realtime).unwrap())
             } else {
-                Box::new(Threads::start(vec![spawn()], system(), Priority::Realtime).unwrap())
+                running(Threads::start(vec![spawn()], system(), Priority::Realtime).unwrap())
             };
             eventually("it steps", || run.agents()[0].steps() >= 3);
             // other tests have pools of ordinary priority meanwhile

@@ -2,7 +2,7 @@
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
-use super::{Clock, Priority, Run, SystemClock, Threads};
+use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
 use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site, SolidForm};
 use metachron_agents::shape::Solid;
@@ -20,14 +20,20 @@ pub(super) type Start = fn(Vec<AgentSpawn>, Arc<dyn Clock>) -> Box<dyn Run>;
 
 /// Every executor that keeps real time; pools with fewer and with more workers than a small machine has cores.
 const LIVE: [(&str, Start); 4] = [
-    ("threads", |spawns, clock| Box::new(Threads::start(spawns, clock, Priority::Normal).unwrap())),
+    ("threads", |spawns, clock| running(Threads::start(spawns, clock, Priority::Normal).unwrap())),
     ("pool of one", |spawns, clock| pool(spawns, clock, 1)),
     ("pool of two", |spawns, clock| pool(spawns, clock, 2)),
     ("pool of five", |spawns, clock| pool(spawns, clock, 5)),
 ];
 
 fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<dyn Run> {
-    Box::new(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
+}
+
+/// Lets the time of a run begin.
+pub(super) fn running<R: Run + 'static>(mut run: R) -> Box<R> {
+    run.drive(Drive::Run);
+    Box::new(run)
 }
 
 /// Holds a claim against every executor that keeps real time.

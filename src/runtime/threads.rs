@@ -44,8 +44,8 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Gives every agent its thread; simulated time begins when all are there. Where the system refuses `priority`
-    /// ([`Priority::ask`]) they have the ordinary one.
+    /// Gives every agent its thread; simulated time stands still until somebody lets it run ([`Drive::Run`]). Where the system
+    /// refuses `priority` ([`Priority::ask`]) they have the ordinary one.
     ///
     /// # Errors
     /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as asked, and where the system gives no thread.
@@ -65,7 +65,6 @@ impl Threads {
             run.board.lives_on(id, thread.thread().clone());
             run.threads.push(Some(thread));
         }
-        run.drive(Drive::Run);
         Ok(run)
     }
 

@@ -15,7 +15,9 @@ fn agent(cost_us: f64, rate_hz: f64) -> AgentSpawn {
 }
 
 fn pool(spawns: Vec<AgentSpawn>) -> Box<Pool> {
-    Box::new(Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap())
+    let mut pool = Pool::start(spawns, Arc::new(SystemClock::new()), Priority::Normal).unwrap();
+    pool.drive(Drive::Run);
+    Box::new(pool)
 }
 
 /// Goes on until everybody has made so many steps, a frame at a time; a minute only ends a test that hangs.

@@ -6,7 +6,7 @@
 use super::bare;
 use super::cast::{Model, agent, spawn};
 use super::machine::{others_cpu, own_cpu, resident_bytes, switches};
-use crate::runtime::{AgentStats, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads};
+use crate::runtime::{AgentStats, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock, Threads};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
@@ -128,6 +128,7 @@ pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row
         Executor::Pool => Box::new(Pool::start(spawns, clock, case.priority)?),
         Executor::Lockstep => Box::new(Lockstep::start(spawns, Machine::default())?),
     };
+    run.drive(Drive::Run);
     let start_ms = millis(started.elapsed());
     let watched = watch(&mut *run, case.executor == Executor::Lockstep, span);
     let after = resident_bytes();

@@ -73,6 +73,7 @@ pub(super) fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome
 mod tests {
     use super::*;
     use crate::scene::{self, Source};
+    use metachron_agents::SimTime;
 
     #[test]
     fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {
@@ -80,9 +81,9 @@ mod tests {
         let scene = scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
         let opened = std::time::Instant::now();
         let mut session = Session::open(scene).unwrap();
-        session.hold();
         let held = session.now() + Duration::from_millis(30);
         session.wait_until(held);
+        assert_eq!((session.sim_now(), session.agents()[0].steps()), (SimTime::ZERO, 0));
         session.begin();
         let outcome = session.end(None, false);
         let (start_up_s, wall_s) = (outcome.start_up_s, outcome.wall_s);

@@ -1,13 +1,13 @@
 //! What only a pool does; `live_tests.rs` holds what every executor does.
 
-use super::super::testing::{Dummy, Fault, Log, eventually, system};
+use super::super::testing::{Dummy, Fault, Log, eventually, running, system};
 use super::super::{AgentHandle, AgentState, Command};
 use super::*;
 use metachron_agents::{AgentId, SimTime};
 use std::collections::BTreeSet;
 
 fn pool(spawns: Vec<AgentSpawn>, workers: usize, patience: Duration) -> Box<Pool> {
-    Box::new(Pool::with_workers(spawns, system(), workers, (patience, Priority::Normal)).unwrap())
+    running(Pool::with_workers(spawns, system(), workers, (patience, Priority::Normal)).unwrap())
 }
 
 const LONG: Duration = Duration::from_secs(60);
