@@ -7,11 +7,39 @@ use super::document::Document;
 use super::format::{OneOrRange, Point};
 use super::problem::{Problem, did_you_mean};
 use glam::DVec3;
+use serde::de::DeserializeOwned;
 use std::fmt::Display;
-use std::ops::RangeInclusive;
+use std::ops::{Range, RangeInclusive};
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, ValueDeserializer};
 
 /// More names than this are counted, not listed.
 const LISTED_MAX: usize = 20;
+
+/// Keys of one table that are told to be wrong at most: each is found by reading the table once more.
+const TOLD_OF_A_TABLE: usize = 20;
+
+/// Takes the innermost key out of `table` under which `at` stands, and gives its name; `None` where there is none.
+fn take_out(table: &mut DeTable<'_>, at: &Range<usize>) -> Option<String> {
+    for (_, value) in table.iter_mut() {
+        let inner = match value.get_mut() {
+            DeValue::Table(inner) => take_out(inner, at),
+            DeValue::Array(items) => items.iter_mut().find_map(|item| match item.get_mut() {
+                DeValue::Table(inner) => take_out(inner, at),
+                _ => None,
+            }),
+            _ => None,
+        };
+        if inner.is_some() {
+            return inner;
+        }
+    }
+    let within = |span: Range<usize>| span.start <= at.start && at.end <= span.end;
+    let mut found = table.iter().filter(|(key, value)| within(key.span()) || within(value.span()));
+    let name = found.next()?.0.get_ref().to_string();
+    table.remove(name.as_str());
+    Some(name)
+}
 
 /// Collects problems of one scene.
 pub(super) struct Checker<'d, 't> {
@@ -105,6 +133,32 @@ impl<'d, 't> Checker<'d, 't> {
 
     pub(super) fn push(&mut self, problem: Problem) {
         self.problems.push(problem);
+    }
+
+    /// Reads a `table` that stands at `span`; `also` are keys that it has besides. Every key of it that is wrong is told, the first
+    /// twenty: each is taken out, so that the next is found.
+    pub(super) fn read<T: DeserializeOwned>(
+        &mut self,
+        mut table: DeTable<'_>,
+        span: Range<usize>,
+        also: &[&str],
+    ) -> Option<T> {
+        let mut taken: Vec<String> = Vec::new();
+        for _ in 0..TOLD_OF_A_TABLE {
+            let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table.clone())));
+            let error = match T::deserialize(value) {
+                Ok(read) => return taken.is_empty().then_some(read),
+                Err(error) => error,
+            };
+            let missing = error.message().strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
+            // what is told to be wrong, or is that key misspelt, is not missing besides
+            let told = |key: &str| taken.iter().any(|one| one == key || did_you_mean(one, [key]).is_some());
+            if !missing.is_some_and(told) {
+                self.push(Problem::from_toml(&error, span.clone(), also));
+            }
+            taken.push(take_out(&mut table, &error.span()?)?);
+        }
+        None
     }
 
     /// Tells that `key` is wrong: what it is, and what was expected.

@@ -9,6 +9,7 @@ pub mod builtin;
 mod cast;
 mod check;
 mod document;
+mod excerpt;
 mod figure;
 pub mod format;
 mod overlap;
@@ -34,10 +35,7 @@ use format::{ExecutorKind, SceneFile, WorldFile};
 use glam::DVec3;
 use metachron_agents::rigid::Joint;
 use problem::Problem;
-use serde::Deserialize;
 use std::sync::Arc;
-use toml::Spanned;
-use toml::de::{DeValue, ValueDeserializer};
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
@@ -87,14 +85,7 @@ fn read_stage(c: &mut Checker<'_, '_>) -> Option<SceneFile> {
     let document = c.document();
     let others = document.root().iter().filter(|(key, _)| key.get_ref() != "object");
     let table = others.map(|(key, value)| (key.clone(), value.clone())).collect();
-    let value = ValueDeserializer::from(Spanned::new(document.first_line(), DeValue::Table(table)));
-    match SceneFile::deserialize(value) {
-        Ok(file) => Some(file),
-        Err(error) => {
-            c.push(Problem::from_toml(&error, document.first_line(), &[]));
-            None
-        }
-    }
+    c.read(table, document.first_line(), &[])
 }
 
 fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {

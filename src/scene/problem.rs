@@ -3,9 +3,9 @@
 //! In: places in the text and what was found there. Out: [`SceneError`], for people (miette) and for programs.
 //! Never here: the rules themselves.
 
-use miette::{Diagnostic, NamedSource, SourceSpan};
+use super::excerpt::{Excerpt, readable};
+use miette::{Diagnostic, SourceSpan};
 use std::ops::Range;
-use std::sync::Arc;
 use thiserror::Error;
 
 /// More problems than this are counted, not told.
@@ -52,7 +52,7 @@ pub struct SceneProblem {
     /// The offending text, cut after 80 characters.
     pub text: String,
     #[source_code]
-    source_code: Option<NamedSource<Arc<str>>>,
+    source_code: Option<Excerpt>,
     #[label("{expected}")]
     span: Option<SourceSpan>,
 }
@@ -79,8 +79,7 @@ impl SceneError {
         problems.sort_by_key(|p| (p.span.start, p.span.end));
         let hidden = problems.len().saturating_sub(SHOWN_MAX);
         problems.truncate(SHOWN_MAX);
-        let source: Arc<str> = text.into();
-        let problems = problems.into_iter().map(|p| p.shown(name, &source)).collect();
+        let problems = problems.into_iter().map(|p| p.shown(name, text)).collect();
         Self { name: name.to_owned(), problems, hidden }
     }
 }
@@ -137,28 +136,21 @@ impl Problem {
         problem.helped(Some(format!("keys of this table: {}", known.join(", "))))
     }
 
-    fn shown(self, name: &str, source: &Arc<str>) -> SceneProblem {
+    fn shown(self, name: &str, source: &str) -> SceneProblem {
         let start = floor_boundary(source, self.span.start);
         let end = floor_boundary(source, self.span.end.max(start));
-        let before = &source[..start];
-        let line_start = before.rfind('\n').map_or(0, |at| at + 1);
-        let text = &source[start..end];
+        let excerpt = Excerpt::of(name, source, &(start..end));
         SceneProblem {
-            message: self.message,
-            expected: self.expected,
-            help: self.help,
-            line: before.matches('\n').count() + 1,
-            column: source[line_start..start].chars().count() + 1,
-            text: text.chars().take(QUOTE_MAX).collect(),
-            source_code: Some(NamedSource::new(name, Arc::clone(source))),
-            span: Some(SourceSpan::from(start..first_line_of(text, start))),
+            message: readable(&self.message),
+            expected: readable(&self.expected),
+            help: self.help.as_deref().map(readable),
+            line: excerpt.line,
+            column: excerpt.column,
+            text: source[start..end].chars().take(QUOTE_MAX).collect(),
+            span: Some(SourceSpan::from(excerpt.span.clone())),
+            source_code: Some(excerpt),
         }
     }
-}
-
-/// Underlining ends with the line: a table or a long list is shown by its first line.
-fn first_line_of(text: &str, start: usize) -> usize {
-    start + text.find(['\n', '\r']).unwrap_or(text.len())
 }
 
 fn floor_boundary(text: &str, at: usize) -> usize {

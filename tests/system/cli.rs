@@ -128,6 +128,24 @@ fn check_shows_file_line_column_text_and_what_was_expected() {
 }
 
 #[test]
+fn a_scene_of_one_long_line_is_shown_around_what_is_wrong_and_huge_numbers_are_short() {
+    let ball = |name: u32, radius: &str| {
+        format!(
+            "{{ name = \"b{name}\", model = \"rigid\", shape = \"ball\", radius_m = {radius}, position_m = [{name}, 0, 0] }}"
+        )
+    };
+    let balls: Vec<_> = (0..2500).map(|k| ball(k, "0.1")).chain([ball(2500, "1e308")]).collect();
+    let (_folder, path) =
+        written(&format!("format = 1\nobject = [{}]\nx = \"{}\"\n", balls.join(", "), "a".repeat(200_000)));
+    let check = metachron(&["check", &path]);
+    let said = err(&check);
+    assert_eq!(code(&check), 2, "{said}");
+    assert!(said.contains("is 1e308") && said.contains("radius_m = 1e308, position_m"), "{said}");
+    let widest = said.lines().map(|line| line.chars().count()).max();
+    assert!(widest < Some(160), "a line of {widest:?}");
+}
+
+#[test]
 fn check_as_json_says_the_same_to_programs() {
     let (_folder, path) = written(BAD);
     let check = metachron(&["check", "--json", "tube", &path]);

@@ -264,6 +264,16 @@ fn all_problems_are_told_at_once_in_the_order_of_the_text() {
 }
 
 #[test]
+fn all_keys_of_a_table_that_have_the_wrong_type_are_told_at_once() {
+    let bad = "format = 1\n[target]\nframe_hz = \"x\"\npolicy = \"best\"\n[camera]\neye_m = 3\n[[probe]]\nobject = 1\n\
+               [[object]]\nname = 4\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = \"a\"\nrate_hz = true\nmas_kg = 1\n";
+    let error = read(bad).unwrap_err();
+    let lines: Vec<_> = error.problems.iter().map(|p| p.line).collect();
+    // a key that is told to be wrong is not told to be missing as well
+    assert_eq!(lines, [3, 4, 6, 8, 10, 13, 14, 15], "{:#?}", error.problems);
+}
+
+#[test]
 fn deep_nesting_and_many_problems_stay_readable() {
     for open in ["[", "{a="] {
         let said = problem(&format!("format = 1\nx = {}\n", open.repeat(100_000))).3;

@@ -25,7 +25,7 @@ use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::Arc;
 use toml::Spanned;
-use toml::de::{DeTable, DeValue, ValueDeserializer};
+use toml::de::{DeTable, DeValue};
 
 /// Most agents of a scene: each that can be touched remembers something of every other one.
 pub(in crate::scene) const AGENTS_MAX: usize = 10_000;
@@ -263,10 +263,7 @@ fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) 
 }
 
 fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: Range<usize>) -> Option<T> {
-    let value = ValueDeserializer::from(Spanned::new(span.clone(), DeValue::Table(table)));
-    T::deserialize(value)
-        .map_err(|error| c.push(Problem::from_toml(&error, span, &[&COMMON_KEYS[..], &["model"]].concat())))
-        .ok()
+    c.read(table, span, &[&COMMON_KEYS[..], &["model"]].concat())
 }
 
 /// Gives every object its name and every agent its number, in the order of the file.
