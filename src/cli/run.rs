@@ -206,7 +206,20 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
             return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
         }
     }
-    check_apart(args)
+    check_apart(args)?;
+    check_ending(args)
+}
+
+/// What is written is PNG, and a name that says otherwise would be believed.
+fn check_ending(args: &RunArgs) -> anyhow::Result<()> {
+    let Some((path, ending)) = args.png.as_deref().and_then(|path| Some((path, path.extension()?))) else {
+        return Ok(());
+    };
+    if ending.eq_ignore_ascii_case("png") {
+        return Ok(());
+    }
+    let why = format!("--png {} would be a PNG picture in a .{} file", path.display(), ending.display());
+    Err(BadInput(format!("{why}; name one that ends in .png")).into())
 }
 
 /// No output may overwrite another one, or what is read.

@@ -189,8 +189,9 @@ fn wrong_usage_ends_with_two_and_says_what_is_right() {
         (&["run", "--headless", "--json", "--report", "-"], "choose one"),
         (&["run", "--headless", "--png", "-"], "--png -"),
         (&["run", "--headless", "--frames-csv", "-"], "name a file"),
-        (&["run", "--headless", "--report", "a.x", "--png", "./a.x"], "--png ./a.x would overwrite --report"),
-        (&["run", "--headless", "--png", "a.x", "--frames-csv", "a.x"], "would overwrite --png"),
+        (&["run", "--headless", "--report", "a.png", "--png", "./a.png"], "--png ./a.png would overwrite --report"),
+        (&["run", "--headless", "--png", "a.png", "--frames-csv", "a.png"], "would overwrite --png"),
+        (&["run", "--headless", "--png", "a.jpg"], "ends in .png"),
         (&["bench", "agents", "--agents", "0", "--out", "target"], "no case"),
         (&["check"], "SCENE"),
     ] {
