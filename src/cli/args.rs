@@ -233,7 +233,7 @@ pub struct RunArgs {
     /// Print the report as JSON on standard output, instead of the summary
     #[arg(long)]
     pub json: bool,
-    /// No progress and no summary
+    /// Errors alone: no progress, no summary, no word of what was written
     #[arg(short, long)]
     pub quiet: bool,
 }

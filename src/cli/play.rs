@@ -18,7 +18,7 @@ use crate::scene::Scene;
 use crate::scene::format::ExecutorKind;
 use metachron_agents::AgentId;
 use metachron_budget::Bound;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Told of every frame; answers whether to go on.
 type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
@@ -78,7 +78,7 @@ fn without_window(session: Session, why: &WindowError, request: &Request, go_on:
 fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let [width, height] = request.size.unwrap_or(PICTURE_SIZE);
     let size = Size { width, height };
-    let drawing = drawing(&session, request.png.as_deref(), png.is_some(), size)?;
+    let drawing = drawing(&session, request, png.is_some(), size)?;
     let picture = png.clone().filter(|_| !matches!(drawing, Drawing::Nothing));
     let end = match request.headless_end() {
         RunLength::Frames(frames) => End::Frames(frames),
@@ -101,19 +101,21 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
 
 /// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter. Without one there is
 /// no run where the user has asked for a picture by name.
-fn drawing(session: &Session, asked: Option<&Path>, picture: bool, size: Size) -> anyhow::Result<Drawing> {
+fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> anyhow::Result<Drawing> {
     if session.is_virtual() && !picture {
         return Ok(Drawing::Nothing);
     }
     let gpu = match Gpu::headless() {
         Ok(gpu) => gpu,
-        Err(error @ GpuError::NoAdapter { .. }) if asked.is_none() => {
-            super::output::message(&format!("nothing is drawn: {error}"));
+        Err(error @ GpuError::NoAdapter { .. }) if request.png.is_none() => {
+            if !request.quiet {
+                super::output::message(&format!("nothing is drawn: {error}"));
+            }
             return Ok(Drawing::Nothing);
         }
         Err(error) => {
             let error = anyhow::Error::from(error);
-            return Err(match asked {
+            return Err(match &request.png {
                 Some(path) => error.context(format!("the picture {} cannot be drawn", path.display())),
                 None => error,
             });

@@ -266,7 +266,9 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
         Some(path) => {
             std::fs::write(path, &report)
                 .with_context(|| format!("the report {} cannot be written", path.display()))?;
-            message(&format!("report: {}", path.display()));
+            if !args.quiet {
+                message(&format!("report: {}", path.display()));
+            }
         }
         None => {}
     }
@@ -274,13 +276,26 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
         write_frames(path, &played.frames)
             .with_context(|| format!("the frames {} cannot be written", path.display()))?;
     }
-    if let Some(why) = played.no_window.as_ref().filter(|_| !args.quiet) {
+    if !args.quiet {
+        tell_notes(args, played);
+    }
+    if args.json {
+        data(&report)?;
+    } else if !args.quiet && args.report.as_deref() != Some(Path::new("-")) {
+        data(&played.report.summary_text())?;
+    }
+    Ok(())
+}
+
+/// What people may want to know beside the report.
+fn tell_notes(args: &RunArgs, played: &Played) {
+    if let Some(why) = &played.no_window {
         message(&format!("ran without a window: {why}"));
     }
-    if played.unpriced && !args.quiet {
+    if played.unpriced {
         message("note: what drawing costs here could not be measured in three seconds: the usual prices were taken");
     }
-    if args.oracle && played.interrupted && !args.quiet {
+    if args.oracle && played.interrupted {
         message(&match &played.report.oracle {
             Some(oracle) => {
                 format!("interrupted: the first {:.2} s are compared, which both runs have played", oracle.sim_s)
@@ -291,12 +306,6 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     if let Some(path) = &played.picture {
         message(&format!("picture: {}", path.display()));
     }
-    if args.json {
-        data(&report)?;
-    } else if !args.quiet && args.report.as_deref() != Some(Path::new("-")) {
-        data(&played.report.summary_text())?;
-    }
-    Ok(())
 }
 
 fn write_frames(path: &Path, frames: &[FrameRecord]) -> anyhow::Result<()> {

@@ -42,7 +42,7 @@ fn what_is_data_is_json_and_nothing_else_is_on_standard_output() {
     }
     let path = scene.file("report.json");
     let quiet = run(&scene, &["-q", "--report", &path]);
-    assert!(quiet.stdout.is_empty());
+    assert!(quiet.stdout.is_empty() && quiet.stderr.is_empty(), "{}", String::from_utf8_lossy(&quiet.stderr));
     let both: Value = serde_json::from_slice(&run(&scene, &["--json", "--report", &path]).stdout).unwrap();
     let file: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
     assert!(both == file);
