@@ -6,6 +6,7 @@ mod cli;
 mod coupling;
 mod fit;
 mod groups;
+mod guide;
 mod idle;
 mod painting;
 mod picture;
