@@ -15,6 +15,9 @@ const WIDE: f32 = 800.0;
 /// In one of fewer than this the scene's name, the speed and the tools give way too: all have keys.
 const NARROW: f32 = 560.0;
 
+/// In one of fewer than this the clock gives way to the frame rate.
+const SLIM: f32 = 360.0;
+
 /// What the factor means.
 const REAL_TIME: &str = "Simulated time that was stepped for each second, by the agent that keeps up least: \
                          what it cannot make up is dropped. The wanted speed is on the left";
@@ -25,6 +28,7 @@ pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command
     let palette = palette(ui);
     ui.horizontal_centered(|ui| {
         let (wide, narrow) = (ui.available_width() > WIDE, ui.available_width() < NARROW);
+        let slim = ui.available_width() < SLIM;
         if wide {
             ui.label(RichText::new("metachron").strong().size(14.0));
         }
@@ -38,7 +42,9 @@ pub fn show(ui: &mut Ui, status: &Status, summary: &FrameSummary) -> Vec<Command
             speed(ui, status, &mut commands);
             ui.add_space(10.0);
         }
-        clock(ui, status, wide, &palette);
+        if !slim {
+            clock(ui, status, wide, &palette);
+        }
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             if !narrow {
                 tools(ui, &mut commands);

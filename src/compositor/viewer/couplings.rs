@@ -7,6 +7,14 @@ use super::text;
 use super::theme::palette;
 use egui::{Grid, RichText, Ui};
 
+/// The columns, and what stands in them.
+const COLUMNS: [(&str, &str); 4] = [
+    ("Pair", "Who owns the contact, and the other"),
+    ("Law", "How the two act on each other"),
+    ("Force", "With which they press, hold or pull now"),
+    ("Tank", "Energy that the coupling may still give before it fades"),
+];
+
 /// More rows than this are counted, not listed.
 const ROWS_MAX: usize = 8;
 
@@ -15,7 +23,11 @@ pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
     let palette = palette(ui);
     let mut order: Vec<&CouplingRow> = couplings.iter().collect();
     order.sort_by(|a, b| b.force_n.total_cmp(&a.force_n));
-    Grid::new("couplings").num_columns(4).spacing([10.0, 2.0]).show(ui, |ui| {
+    Grid::new("couplings").num_columns(COLUMNS.len()).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (name, meaning) in COLUMNS {
+            ui.label(RichText::new(name).size(11.5).color(palette.weak)).on_hover_text(meaning);
+        }
+        ui.end_row();
         for row in order.iter().take(ROWS_MAX) {
             ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
             ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
@@ -59,6 +71,28 @@ fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
+
+    #[test]
+    fn every_column_has_a_heading_above_it() {
+        let row = CouplingRow {
+            a: "hose".to_owned(),
+            b: "floor".to_owned(),
+            kind: "ledger",
+            contacts: 1,
+            force_n: 1.25,
+            penetration_m: 0.0,
+            inverse_mass_per_kg: None,
+            tank_j: Some(2.0),
+        };
+        let harness = Harness::new_ui(|ui| show(ui, std::slice::from_ref(&row)));
+        let cells = ["hose – floor", "ledger", "1.25 N", "2.00 J"];
+        for ((heading, _), cell) in COLUMNS.iter().zip(cells) {
+            let (above, below) = (harness.get_by_label(heading).rect(), harness.get_by_label(cell).rect());
+            assert!(above.bottom() <= below.top() && above.left() == below.left(), "{heading}: {above:?} {below:?}");
+        }
+    }
 
     #[test]
     fn what_a_contact_weighs_is_told_of_both_sides_and_of_both_together() {
