@@ -13,8 +13,8 @@ use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::{Form, FormKind, Law, Link, smooth};
 use crate::{
-    Agent, Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, Surroundings,
-    check_span,
+    Agent, Body, Bounds, Grip, Inertia, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
+    Surroundings, check_span,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -205,7 +205,12 @@ impl Agent for SoftBody {
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
         // what comes farther in a step than an edge is long would turn cells inside out before it is felt
-        beside::unhurried(dt, around, || self.bounds(), self.contacts.edge_m())
+        let dt = beside::unhurried(dt, around, || self.bounds(), self.contacts.edge_m());
+        let step_s = |n: &Neighbour| match &n.snapshot.inertia {
+            Inertia::Soft(soft) if n.owned => Some(soft.span_s),
+            _ => None,
+        };
+        beside::in_step(dt, around, || self.bounds(), step_s)
     }
 
     fn resolution(&self) -> Option<Resolution> {

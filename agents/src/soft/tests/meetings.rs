@@ -296,8 +296,9 @@ fn a_soft_block_lies_on_a_soft_block_at_any_rates() {
 }
 
 /// Places between mesh lines that cross told depths of half an edge, aside: blocks of this stiffness came 19 mm deep, and through.
+/// Where the owner looks between two ends of the other's steps it takes its way there for a parabola: 3 mm deep on a slab, 23 on a sheet.
 #[test]
-fn a_soft_block_lies_wherever_it_is_put_on_a_slab() {
+fn a_soft_block_lies_wherever_it_is_put_on_a_slab_or_a_sheet() {
     let matter = SoftMatter { density_kg_m3: 1050.0, damping_per_s: 3.0, ..MATTER };
     let block = |size_m, segments, position, held| SoftSpec {
         matter,
@@ -307,28 +308,36 @@ fn a_soft_block_lies_wherever_it_is_put_on_a_slab() {
         obstacles: [floor()].into(),
         ..spec(SoftShape::Box { size_m, segments })
     };
+    let sheet = SoftSpec {
+        matter: SoftMatter { young_pa: 2e6, ..matter },
+        gravity: G,
+        position: DVec3::new(-0.2, -0.2, 0.1),
+        held: vec![Side::Left, Side::Right, Side::Near, Side::Far],
+        ..spec(SoftShape::Sheet { size_m: [0.4, 0.4], thickness_m: 0.004, segments: [7, 9] })
+    };
+    let slab = block(DVec3::new(0.2, 0.2, 0.1), [4, 4, 2], DVec3::new(-0.1, -0.1, 0.0), vec![Side::Bottom]);
     // rates that are nearly equal see each other at every phase in turn
-    for rates in [(60.0, 60.0), (60.0, 61.0), (61.0, 60.0), (120.0, 240.0), (100.0, 120.0), (120.0, 100.0)] {
-        let low = block(DVec3::new(0.2, 0.2, 0.1), [4, 4, 2], DVec3::new(-0.1, -0.1, 0.0), vec![Side::Bottom]);
-        let high = block(DVec3::splat(0.1), [3; 3], DVec3::new(-0.04, -0.05, 0.102), vec![]);
+    let rates = [(60.0, 60.0), (60.0, 61.0), (61.0, 60.0), (120.0, 240.0), (100.0, 120.0), (120.0, 100.0)];
+    for (low, rates) in [slab, sheet].iter().flat_map(|low| rates.map(|rates| (low, rates))) {
+        let high = block(DVec3::splat(0.1), [3; 3], DVec3::new(-0.04, -0.05, 0.103), vec![]);
         let mut stage = Stage::new(Faults::default());
-        let low = stage.add(SoftBody::new(low).unwrap(), rates.0);
+        let low = stage.add(SoftBody::new(low.clone()).unwrap(), rates.0);
         let high = stage.add(SoftBody::new(high).unwrap(), rates.1);
         let owner = if rates.1 > rates.0 { high } else { low };
         stage.run(2.0, |_| {});
-        let (mut force_n, mut seen, mut steps, mut deep_m) = (0.0, 0, 0_u64, 0.0_f64);
+        let (mut given, mut seen, mut from, mut deep_m) = (0.0, 0, None, 0.0_f64);
         stage.run(4.0, |stage| {
             let newest = stage.newest(owner);
             if newest.steps > seen {
-                (seen, steps) = (newest.steps, steps + 1);
-                force_n += newest.pairs[0].force_n;
-                deep_m = deep_m.max(newest.pairs[0].penetration_m);
+                let dt_s = newest.time.secs_after(*from.get_or_insert(newest.time));
+                (seen, given) = (newest.steps, given + newest.pairs[0].force_n * dt_s);
+                (from, deep_m) = (Some(newest.time), deep_m.max(newest.pairs[0].penetration_m));
             }
         });
-        let weight = force_n / (steps as f64 * 1.05 * 9.81);
+        let weight = given / (2.0 * 1.05 * 9.81);
         println!("{rates:?}: {weight} of the weight, {deep_m:.1e} m deep");
         assert!((weight - 1.0).abs() < 0.02, "{rates:?}: carries {weight} of the weight");
-        assert!(deep_m < 3.5e-3, "{rates:?}: {deep_m} m deep");
+        assert!(deep_m < 1e-3, "{rates:?}: {deep_m} m deep");
     }
 }
 
