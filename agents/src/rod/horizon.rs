@@ -9,11 +9,12 @@ use super::contact::respond;
 use super::holds::Tie;
 use super::inertia::momenta;
 use super::method::Integrator;
+use super::publish::bounds;
 use super::step::{Setting, Stepper};
 use super::system::{Iterate, Scene, assemble};
 use super::tube::Tube;
 use crate::coupling::Law;
-use crate::coupling::beside::{PART_MAX_S, bends, is_linked};
+use crate::coupling::beside::{PART_MAX_S, bends, is_linked, may_touch};
 use crate::{Body, Neighbour, Surroundings};
 use glam::DVec3;
 
@@ -52,12 +53,12 @@ impl Tube {
         }
         self.ahead_s = 0.0;
         // beside this one it makes no longer steps
-        let steps_s = around.neighbours.iter().filter(|n| owns_it(n, around)).map(|n| n.step_s.min(PART_MAX_S));
+        let steps_s = self.owners(around, dt).map(|n| n.step_s.min(PART_MAX_S));
         // to a faster one among them the tube must not look too heavy
         let span_s = steps_s.fold(f64::INFINITY, f64::min);
         let slower = span_s > SLOWER * dt;
-        let mut owners = around.neighbours.iter().filter(|n| owns_it(n, around));
-        let soft = owners
+        let soft = self
+            .owners(around, dt)
             .all(|n| matches!(n.snapshot.body, Body::Soft(_)) && !is_linked(n, around) && keeps_up(n, around, dt));
         let alone = soft && self.spec.integrator == Integrator::ImplicitEuler && !self.stepper.contacts.is_touching();
         if !(span_s.is_finite() && (slower || alone)) {
@@ -89,8 +90,20 @@ impl Tube {
             let lasts = (n.step_s.min(PART_MAX_S) - dt).abs() < (SLOWER - 1.0) * dt;
             matches!(n.snapshot.body, Body::Curve(_)) && lasts && !is_linked(n, around) && keeps_up(n, around, dt)
         };
-        let mut owners = around.neighbours.iter().filter(|n| owns_it(n, around)).peekable();
+        let mut owners = self.owners(around, dt).peekable();
         owners.peek().is_some() && owners.all(alike)
+    }
+
+    /// Who has a say in the step after one of `dt` seconds: of those that own contact with the tube who presses on it, or who may touch it
+    /// in a step of theirs while nobody does; and who is linked to it.
+    fn owners<'a>(&self, around: &'a Surroundings<'_>, dt: f64) -> impl Iterator<Item = &'a Neighbour> {
+        let bounds = bounds(&self.now, self.widest_m());
+        let presses = |n: &Neighbour| n.snapshot.pairs.iter().any(|pair| pair.with == around.me && pair.contacts > 0);
+        let pressed = around.neighbours.iter().any(|n| owns_it(n, around) && presses(n));
+        let acts = move |n: &Neighbour| {
+            if pressed { presses(n) } else { may_touch(n, around, &bounds, dt.max(n.step_s)) }
+        };
+        around.neighbours.iter().filter(move |n| owns_it(n, around) && (is_linked(n, around) || acts(n)))
     }
 
     /// Foretells the step after one of `dt` seconds, whose velocities at its start stand where the accelerations go
