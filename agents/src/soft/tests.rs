@@ -4,6 +4,7 @@ mod bullets;
 mod error;
 mod falls;
 mod links;
+mod lying;
 mod meetings;
 mod promises;
 mod skins;

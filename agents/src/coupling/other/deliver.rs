@@ -60,30 +60,41 @@ impl Other {
     /// What a body that bends has not taken yet, `sums` as velocities, has moved it by `carried` in the eyes of who gave it: what of
     /// that its elastic forces take back in its next step (docs/theory/soft.md, eq. 16d, 16e).
     fn take_back(&mut self, sums: &[DVec3], carried: &mut Vec<DVec3>) {
-        let Self { neighbour, taken_back, velocities, age_s, held, .. } = self;
-        let Some(inertia) = neighbour.as_ref().map(|n| &n.snapshot.inertia).filter(|_| !*held) else { return };
-        let (step_s, span_s) = match inertia {
-            Inertia::Soft(soft) if soft.slots() == sums.len() => (soft.span_s, soft.span_s),
-            Inertia::Curve(curve) if curve.slots() == sums.len() => (curve.ahead_s, curve.span_s),
-            _ => return,
-        };
-        if step_s <= 0.0 {
-            return;
-        }
+        let Some(step_s) = self.foretold_s() else { return };
+        let mut taken_back = std::mem::take(&mut self.taken_back);
         // how far it will have been carried when it takes them, and which share of them then has acted through a whole step
-        carried.iter_mut().zip(sums).for_each(|(moved, v)| *moved = (*moved - *v * *age_s) / step_s);
+        carried.iter_mut().zip(sums).for_each(|(moved, v)| *moved = (*moved - *v * self.age_s) / step_s);
         taken_back.extend(
             sums.iter()
                 .zip(&*carried)
                 .map(|(v, moved)| *v * (moved.dot(*v) / v.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0)),
         );
-        match inertia {
-            Inertia::Soft(soft) => soft.take_back(taken_back, carried),
-            Inertia::Curve(curve) => curve.take_back(taken_back, carried),
+        self.find_change(&mut taken_back, carried);
+        let so_far_s = (self.reckoned_s() + self.age_s).min(step_s);
+        self.velocities.iter_mut().zip(&taken_back).for_each(|(v, a)| *v += *a * so_far_s);
+        self.taken_back = taken_back;
+    }
+
+    /// The length of the step that what bends foretells, seconds; `None` where it tells of none.
+    pub(super) fn foretold_s(&self) -> Option<f64> {
+        let slots = self.velocities.len();
+        let inertia = self.neighbour.as_ref().map(|n| &n.snapshot.inertia).filter(|_| !self.held);
+        let step_s = match inertia {
+            Some(Inertia::Soft(soft)) if soft.slots() == slots => soft.span_s,
+            Some(Inertia::Curve(curve)) if curve.slots() == slots => curve.ahead_s,
+            _ => return None,
+        };
+        (step_s > 0.0).then_some(step_s)
+    }
+
+    /// What is on its way, `changed` as velocities that have `carried` it so far, both one a slot as shares of the step that it foretells,
+    /// changes of how it accelerates in that step, m/s², which goes to `changed`.
+    pub(super) fn find_change(&self, changed: &mut [DVec3], carried: &mut Vec<DVec3>) {
+        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Soft(soft)) => soft.take_back(changed, carried),
+            Some(Inertia::Curve(curve)) => curve.take_back(changed, carried),
             _ => {}
         }
-        let so_far_s = (0.5 * span_s + *age_s).min(step_s);
-        velocities.iter_mut().zip(taken_back).for_each(|(v, a)| *v += *a * so_far_s);
     }
 
     /// Adds what other owners have given a rigid body by the time `at`, and notes what they will give (eq. 6b); nothing of who

@@ -1,7 +1,7 @@
 //! Another agent at a point where a spring holds it: how that point is expected to move, and how it is given what the spring gives.
 //!
 //! In: a point, and the step of whoever holds it. Out: its mean velocity in that step; into how many parts an impulse falls.
-//! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a; soft.md, eq. 16f.
+//! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a; soft.md, eq. 16f, 16h.
 
 use super::Other;
 use crate::coupling::Place;
@@ -29,8 +29,8 @@ impl Other {
 
     /// By how much the mean velocity of each slot of what bends in the next `h` seconds is above the one that is reckoned now, where
     /// `lasts` goes on being given to it evenly, N and N·m in slots, empty for nothing; `None` where all is given at once
-    /// (docs/theory/soft.md, eq. 16f).
-    pub fn gains(&self, h: f64, lasts: Option<&Vec<DVec3>>, [into, room]: [&mut Vec<DVec3>; 2]) {
+    /// (docs/theory/soft.md, eq. 16f, 16h).
+    pub fn gains(&mut self, h: f64, lasts: Option<&Vec<DVec3>>, [into, room]: [&mut Vec<DVec3>; 2]) {
         into.clear();
         into.extend((0..self.velocities().len()).map(|slot| self.acceleration_of(slot) * h));
         let parts = f64::from(self.parts(h));
@@ -38,7 +38,10 @@ impl Other {
             (Some(Inertia::Curve(curve)), Some(lasts)) if parts > 1.0 && curve.slots() == into.len() && !self.held => {
                 (curve, lasts)
             }
-            _ => return into.iter_mut().for_each(|gain| *gain *= 0.5),
+            _ => {
+                into.iter_mut().for_each(|gain| *gain *= 0.5);
+                return self.spring_back(h, lasts, [into, room]);
+            }
         };
         // in steps of its own what is free of both only comes so far
         room.clear();
@@ -50,6 +53,34 @@ impl Other {
         curve.respond(room);
         let (late, reckoned) = (0.5 * (parts - 1.0) / parts, self.reckoned_s() / h);
         into.iter_mut().zip(&*room).for_each(|(gain, free)| *gain -= *gain * reckoned + *free * late);
+    }
+
+    /// Whether it bends and foretells its next step.
+    #[must_use]
+    pub fn is_foretold(&self) -> bool {
+        self.foretold_s().is_some()
+    }
+
+    /// Adds what its elastic forces take back in the next `h` seconds of what `lasts` gives in them, where it is ahead and takes that late
+    /// (eq. 16h).
+    fn spring_back(&mut self, h: f64, lasts: Option<&Vec<DVec3>>, [into, room]: [&mut Vec<DVec3>; 2]) {
+        let Some((step_s, lasts)) = self.foretold_s().zip(lasts).filter(|(_, lasts)| lasts.len() == into.len()) else {
+            return;
+        };
+        let late = (-self.age_s / step_s).clamp(0.0, 1.0);
+        let share = (h / step_s - late).clamp(0.0, 1.0);
+        if late * share == 0.0 {
+            return;
+        }
+        room.clear();
+        room.extend(lasts.iter().map(|lasts| *lasts * step_s));
+        self.respond(room);
+        room.iter_mut().for_each(|moved| *moved *= late);
+        let mut carried = std::mem::take(&mut self.carried);
+        carried.clone_from(room);
+        self.find_change(room, &mut carried);
+        self.carried = carried;
+        into.iter_mut().zip(&*room).for_each(|(gain, a)| *gain += *a * (step_s * share));
     }
 
     /// Lets `h` seconds pass in which what bends moves by its velocities and these `gains`.

@@ -124,6 +124,20 @@ fn a_tube_lies_across_one_of_its_rate_whether_it_sees_its_newest_state_or_the_on
     }
 }
 
+/// What one of them took late was expected to yield as what it had at once: 1.4 mm deep once a second, 0.5 and 1 mm where steps vary.
+#[test]
+fn a_tube_lies_across_one_whose_clock_stands_apart_by_part_of_a_step() {
+    let drifting = [1e5, 1e6].map(|young_pa| ((240.0, 241.0), young_pa, 0.0, 1e-4));
+    let trembling = [((240.0, 240.0), 1e5, 0.01, 2e-4), ((120.0, 120.0), 1e5, 0.01, 6e-4)];
+    for (rates, young_pa, jitter, most_m) in drifting.into_iter().chain(trembling) {
+        let faults = Faults { jitter, seed: 2, ..Faults::default() };
+        let Lying { depth_m, rise, .. } = cross(rates, hose(young_pa, false), faults);
+        println!("{rates:?}, {young_pa:e} Pa: depth {depth_m:e} rise {rise:e}");
+        assert!(depth_m < most_m, "{rates:?}, {young_pa} Pa: {depth_m} m deep");
+        assert!(rise < 0.01, "{rates:?}, {young_pa} Pa: energy rises by {rise} of the start");
+    }
+}
+
 #[test]
 fn a_slow_tube_lies_on_a_fast_one_where_messages_are_late_or_lost() {
     for (rates, seed) in [((1000.0, 10.0), 1), ((240.0, 20.0), 2), ((240.0, 200.0), 3), ((120.0, 100.0), 4)] {
