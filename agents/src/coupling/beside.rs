@@ -27,10 +27,6 @@ const PUSHED_LEAST_S: f64 = 2e-3;
 pub(super) const MEETS_S: f64 = 0.1;
 /// An owner who has not been heard of for so many steps, its own or a body's, gives nothing any more.
 pub(super) const SILENT_STEPS: f64 = 3.0;
-/// The end of another's step that is nearer than this share of the own one is left to the next.
-const SOON_SHARE: f64 = 0.25;
-/// Clocks count whole nanoseconds: steps that differ by less than this share are equal.
-const SAME_SHARE: f64 = 1e-6;
 /// A body may come faster by this than it was seen, m/s²: three times gravity.
 const SURPRISE_M_S2: f64 = 30.0;
 
@@ -78,46 +74,24 @@ pub fn no_longer(
     SimSpan::from_nanos(dt.as_nanos() / (dt_s / (least_s * SPLIT_SLACK)).ceil() as u64)
 }
 
-/// A part of a step of `dt` in which nobody whose pair the body owns and whom it may touch comes farther than `way_m`; a millisecond
-/// at least.
-pub fn unhurried(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> Bounds, way_m: f64) -> SimSpan {
-    let dt_s = dt.as_secs_f64();
-    let fast = |n: &&Neighbour| n.owned && n.snapshot.bounds.is_some_and(|b| b.speed_m_s * dt_s > way_m);
-    if !around.neighbours.iter().any(|n| fast(&n)) {
-        return dt;
-    }
-    let bounds = bounds();
-    let near = around.neighbours.iter().filter(fast).filter(|n| may_touch(n, around, &bounds, dt_s));
-    let speed_m_s = near.filter_map(|n| n.snapshot.bounds).map(|b| b.speed_m_s).fold(0.0, f64::max);
-    let parts = (dt_s * speed_m_s / way_m).ceil().min((dt_s / HURRY_S).floor()).max(1.0);
-    SimSpan::from_nanos(dt.as_nanos() / parts as u64)
-}
-
-/// A part of a step of `dt` that ends where one of a neighbour's does, if that may be touched; `step_s` tells how long its steps are, in
-/// seconds. Others between whose ends an owner looked err by how they bend there (docs/theory/coupling.md, eq. 7k).
-pub fn in_step(
+/// A part of a step of `dt` in which nobody that the body may touch comes farther towards it than `way_m` tells of that one; a millisecond
+/// at least. `way_m` is `None` of whoever does not matter.
+pub fn unhurried(
     dt: SimSpan,
     around: &Surroundings<'_>,
     bounds: impl FnOnce() -> Bounds,
-    step_s: impl Fn(&Neighbour) -> Option<f64>,
+    way_m: impl Fn(&Neighbour) -> Option<f64>,
 ) -> SimSpan {
-    let dt_s = dt.as_secs_f64();
-    let known = |n: &&Neighbour| step_s(n).is_some_and(|h| h > 0.0) && !n.snapshot.at_rest;
-    if !around.neighbours.iter().any(|n| known(&n)) {
+    if around.neighbours.iter().all(|n| way_m(n).is_none()) {
         return dt;
     }
-    let bounds = bounds();
-    let near = around.neighbours.iter().filter(known).filter(|n| may_touch(n, around, &bounds, dt_s));
-    let part = |n: &Neighbour| {
-        let step_s = step_s(n)?;
-        let left_s = step_s - around.time.secs_after(n.snapshot.time).rem_euclid(step_s);
-        let skipped = ((SOON_SHARE * dt_s - left_s) / step_s).ceil().max(0.0);
-        let more = ((dt_s - left_s) / step_s + SAME_SHARE).floor().max(skipped);
-        let end_s = left_s + more * step_s;
-        Some(end_s / (end_s / dt_s - SAME_SHARE).ceil().max(1.0))
+    let (dt_s, bounds) = (dt.as_secs_f64(), bounds());
+    let parts = |n: &Neighbour| {
+        let speed_m_s = bounds.speed_m_s + n.snapshot.bounds?.speed_m_s;
+        Some(speed_m_s * dt_s / way_m(n)?).filter(|parts| *parts > 1.0 && may_touch(n, around, &bounds, dt_s))
     };
-    let part_s = near.filter_map(part).fold(dt_s, f64::min);
-    SimSpan::from_secs_f64(part_s).unwrap_or(dt).min(dt)
+    let parts = around.neighbours.iter().filter_map(parts).fold(1.0, f64::max);
+    SimSpan::from_nanos(dt.as_nanos() / parts.ceil().min((dt_s / HURRY_S).floor()).max(1.0) as u64)
 }
 
 /// Whether a neighbour with steps of `step_s` seconds stands so far behind the body's time that the body has to wait for it, where they
@@ -231,51 +205,4 @@ fn is_near(neighbour: &Neighbour, bounds: &Bounds, (dt, ahead): (f64, f64)) -> b
 fn is_let_in(neighbour: &Neighbour, me: AgentId) -> bool {
     let Body::Tool(tool) = &neighbour.snapshot.body else { return false };
     tool.grasp.map_or(tool.jaw > GRASP_BELOW, |grasp| grasp.target == me)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::{SimTime, Snapshot};
-    use proptest::prelude::*;
-    use std::sync::Arc;
-
-    const BOX: Bounds = Bounds { low: DVec3::ZERO, high: DVec3::ONE, speed_m_s: 0.0 };
-
-    /// One step of `dt_s` of a body at `now_s` beside another that was seen at `seen_s` and makes steps of `step_s`.
-    fn beside_one(dt_s: f64, now_s: f64, (seen_s, step_s): (f64, f64)) -> f64 {
-        let at = |s: f64| SimTime::ZERO + SimSpan::from_secs_f64(s).unwrap();
-        let form = super::super::Form {
-            kind: super::super::FormKind::Chain { held_ends: 0 },
-            friction: 0.0,
-            restitution: 0.0,
-        };
-        let snapshot = Snapshot { time: at(seen_s), bounds: Some(BOX), ..Snapshot::default() };
-        let there = Neighbour { form: Some(Arc::new(form)), ..Neighbour::seen(AgentId(1), Arc::new(snapshot)) };
-        let around = Surroundings { neighbours: &[there], ..Surroundings::alone(AgentId(0), at(now_s)) };
-        in_step(SimSpan::from_secs_f64(dt_s).unwrap(), &around, || BOX, |_| Some(step_s)).as_secs_f64()
-    }
-
-    proptest! {
-        #[test]
-        fn equal_parts_of_steps_lead_to_where_a_step_of_the_other_ends(
-            dt_s in 1e-3_f64..0.1,
-            seen_s in 1.0_f64..1.2,
-            now_s in 1.0_f64..1.2,
-            step_s in 1e-3_f64..0.1,
-        ) {
-            let part_s = beside_one(dt_s, now_s, (seen_s, step_s));
-            prop_assert!(part_s > 0.125 * dt_s && part_s <= dt_s, "{part_s}");
-            let off = |n: u32| ((now_s + f64::from(n) * part_s - seen_s) / step_s + 0.5).rem_euclid(1.0) - 0.5;
-            let parts = (dt_s.max(step_s) * 1.25 / part_s).ceil() as u32;
-            prop_assert!((1..=parts).any(|n| off(n).abs() * step_s < 1e-8 * f64::from(n)), "{part_s}");
-        }
-    }
-
-    #[test]
-    fn whose_steps_end_together_makes_whole_ones() {
-        for (dt_s, now_s, other) in [(0.01, 1.0, (1.0, 0.01)), (0.01, 1.0, (1.01, 0.01)), (0.01, 1.0, (1.0, 0.002))] {
-            assert!((beside_one(dt_s, now_s, other) - dt_s).abs() < 2e-9, "{dt_s} beside {other:?}");
-        }
-    }
 }

@@ -9,11 +9,12 @@ use super::doubling::Doubling;
 use super::holds::Tie;
 use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
+use super::step::HASTE_MAX;
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::{Form, FormKind, Law, Link, smooth};
 use crate::{
-    Agent, Body, Bounds, Grip, Inertia, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
+    Agent, Body, Bounds, Grip, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
     Surroundings, check_span,
 };
 use glam::DVec3;
@@ -204,13 +205,7 @@ impl Agent for SoftBody {
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
-        // what comes farther in a step than an edge is long would turn cells inside out before it is felt
-        let dt = beside::unhurried(dt, around, || self.bounds(), self.contacts.edge_m());
-        let step_s = |n: &Neighbour| match &n.snapshot.inertia {
-            Inertia::Soft(soft) if n.owned => Some(soft.span_s),
-            _ => None,
-        };
-        beside::in_step(dt, around, || self.bounds(), step_s)
+        beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
     }
 
     fn resolution(&self) -> Option<Resolution> {
@@ -242,6 +237,16 @@ impl Agent for SoftBody {
 }
 
 impl SoftBody {
+    /// How far a neighbour may come towards it in a step, metres: farther than an edge is long it would turn cells inside out before it is
+    /// felt. Another soft body is to be foreseen, as long as neither has to divide its step ([`HASTE_MAX`]).
+    fn unhurried_m(&self, neighbour: &Neighbour) -> Option<f64> {
+        let edge_m = self.contacts.edge_m();
+        match neighbour.form.as_deref().map(|form| &form.kind) {
+            Some(FormKind::Surface(there)) => Some(HASTE_MAX * edge_m.min(there.edge_m)),
+            _ => Some(edge_m).filter(|_| neighbour.owned),
+        }
+    }
+
     /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
     pub(super) fn work(&self) -> f64 {
         1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64

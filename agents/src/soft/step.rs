@@ -7,7 +7,7 @@ use crate::{StepError, Surroundings};
 use glam::{DMat3, DVec3};
 
 /// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
-const HASTE_MAX: f64 = 0.3;
+pub(super) const HASTE_MAX: f64 = 0.3;
 /// Past this no coordinate or speed is taken, metres or m/s: its square would soon be no number.
 const REACH_MAX: f64 = 1e9;
 /// A step is divided into no more substeps than this.
@@ -28,6 +28,7 @@ impl SoftBody {
             self.touch(h);
             if self.lattice.haste(&self.free, h) > HASTE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
+                self.given.iter_mut().for_each(|given| *given *= 0.5); // it acts evenly through the step
                 continue;
             }
             if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
@@ -35,9 +36,6 @@ impl SoftBody {
             }
             self.act(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
-            if left > 0 {
-                self.given.clear();
-            }
         }
         self.span_s = dt / f64::from(parts);
         self.judge(dt, done);

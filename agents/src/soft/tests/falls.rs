@@ -121,3 +121,37 @@ fn a_sheet_that_is_held_around_a_post_hangs_as_if_it_were_bored() {
         assert!(total_j(&through) < 1e-2, "0 J -> {} J", total_j(&through));
     }
 }
+
+/// What was on its way to the ball was given at once to the first of the parts of its step: it went through, or flew with 59 mJ more.
+#[test]
+fn a_soft_ball_that_falls_on_a_soft_slab_comes_to_lie_on_it() {
+    let matter = SoftMatter { density_kg_m3: 1050.0, damping_per_s: 3.0, ..MATTER };
+    let made = |shape, young_pa, position, speed_m_s: f64| SoftSpec {
+        matter: SoftMatter { young_pa, ..matter },
+        gravity: G,
+        position,
+        velocity: DVec3::NEG_Z * speed_m_s,
+        obstacles: [floor()].into(),
+        ..spec(shape)
+    };
+    let rates = [(60.0, 60.0), (120.0, 60.0), (240.0, 60.0), (1000.0, 60.0), (60.0, 120.0), (60.0, 1000.0)];
+    for (rates, speed_m_s) in rates.into_iter().flat_map(|rates| [0.7, 3.0].map(|v| (rates, v))) {
+        let slab = SoftShape::Box { size_m: DVec3::new(0.3, 0.3, 0.1), segments: [3, 4, 2] };
+        let slab = made(slab, 1e5, DVec3::new(-0.15, -0.15, 0.0), 0.0);
+        let ball = SoftShape::Ball { radius_m: 0.05, segments: 4 };
+        let ball = made(ball, 5e4, DVec3::new(-0.041, 0.0416, 0.175), speed_m_s);
+        let mut stage = Stage::new(Faults::default());
+        let slab = stage.add(SoftBody::new(slab).unwrap(), rates.0);
+        let ball = stage.add(SoftBody::new(ball).unwrap(), rates.1);
+        let energy_j = |stage: &Stage| stage.newest(slab).energy_j + stage.newest(ball).energy_j;
+        let (start_j, mut most_j) = (energy_j(&stage), f64::NEG_INFINITY);
+        stage.run(1.2, |stage| most_j = most_j.max(energy_j(stage) - start_j));
+        let owner = if rates.1 > rates.0 { ball } else { slab };
+        let deep_m = stage.newest(owner).pairs[0].penetration_m;
+        let low_m = stage.newest(ball).bounds.unwrap().low.z;
+        println!("{rates:?}, {speed_m_s} m/s: {deep_m:.1e} m deep, bottom at {low_m}, {most_j} J");
+        assert!(most_j < 1e-3 * start_j, "{rates:?}, {speed_m_s} m/s: it gained {most_j} of {start_j} J");
+        // it presses the slab in by 1 to 5 mm
+        assert!(deep_m < 1e-3 && low_m > 0.092, "{rates:?}, {speed_m_s} m/s: {deep_m} m deep, at {low_m}");
+    }
+}

@@ -296,7 +296,7 @@ fn a_soft_block_lies_on_a_soft_block_at_any_rates() {
 }
 
 /// Places between mesh lines that cross told depths of half an edge, aside: blocks of this stiffness came 19 mm deep, and through.
-/// Where the owner looks between two ends of the other's steps it takes its way there for a parabola: 3 mm deep on a slab, 23 on a sheet.
+/// Without soft.md's eq. 16h 3 mm deep on a slab and 23 on a sheet.
 #[test]
 fn a_soft_block_lies_wherever_it_is_put_on_a_slab_or_a_sheet() {
     let matter = SoftMatter { density_kg_m3: 1050.0, damping_per_s: 3.0, ..MATTER };

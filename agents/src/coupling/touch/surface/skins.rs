@@ -8,6 +8,7 @@ use super::super::fans::{LEAN_SHARE, Ridge};
 use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
 use crate::shape::{near_segments, near_triangle};
 use glam::DVec3;
+use std::ops::RangeInclusive;
 
 /// A way whose cosine with the normal of a triangle is above this comes from its face.
 const FACE: f64 = 0.999;
@@ -120,12 +121,12 @@ impl<'a> Skins<'a> {
             return Some(Met { spot, normal: face.or(out.map(|out| -out))?, distance_m: 0.0 });
         }
         let normal = (at - foot) / distance_m;
-        let out_here = Ridge::Vertex(vertex).out(a.surface, -normal)?;
         if out.is_some_and(|out| out.dot(normal) > 0.0) {
             // it turns away: an open skin has gone into it, or it is on the far side
-            let passed = !b.surface.form.closed && distance_m <= self.deep_m && a.holds(foot, distance_m);
+            let passed = !b.surface.form.closed && distance_m <= self.deep_m && a.holds(foot, 0.0..=distance_m);
             return passed.then_some(Met { spot, normal: -normal, distance_m: -distance_m });
         }
+        let out_here = Ridge::Vertex(vertex).out(a.surface, -normal)?;
         if let Some(face) = face.filter(|face| face.dot(normal).abs() > FACE) {
             let normal = face * face.dot(normal).signum();
             return Some(Met { spot, normal, distance_m: normal.dot(at - foot) });
@@ -158,8 +159,8 @@ impl<'a> Skins<'a> {
             && fronts.all(|front| !front)
             && first.is_nearest(here.surface, way)
             && second.is_nearest(there.surface, -way)
-            && here.holds(b, distance_m)
-            && there.holds(a, distance_m);
+            && here.holds(b, HALF * distance_m..=distance_m)
+            && there.holds(a, HALF * distance_m..=distance_m);
         passed.then_some((-normal, -distance_m))
     }
 }
@@ -199,9 +200,9 @@ impl Meeting<'_> {
         near.spot.out(self.normals).is_some_and(|out| out.dot(point - near.at) < 0.0)
     }
 
-    /// Whether a point is inside the skin, and comes out of it in no less than half of `way_m` and no more; any is in an open one.
-    fn holds(&self, point: DVec3, way_m: f64) -> bool {
-        let deep = |near: Near| near.at.distance(point) >= HALF * way_m && self.is_behind(near, point);
-        !self.surface.form.closed || self.nearest(point, way_m + CROSSING_M, None).is_some_and(deep)
+    /// Whether a point is inside the skin, and so far from it, metres; any is in an open one.
+    fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
+        let deep = |near: Near| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
+        !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
     }
 }
