@@ -17,8 +17,11 @@ const FEW: usize = 4;
 const CROSSING_SHARE: f64 = 1e-3;
 /// The place of a crossing in keys, after those of nodes.
 const CROSSING: u64 = 4;
-/// Rounds of the search for the nearest places of spans that taper.
-const TAPER_ROUNDS: usize = 8;
+/// Rounds of the search for the nearest places of spans that taper, at most: of spans that are nearly parallel each brings them only a
+/// little nearer.
+const TAPER_ROUNDS: usize = 200;
+/// It ends where a round moves them by less than this share.
+const TAPER_SHARE: f64 = 1e-9;
 /// The search for a gap looks first this many times the radii around, and then this many times farther each time.
 const WIDENING: f64 = 4.0;
 
@@ -209,8 +212,12 @@ fn bound(a: [Ball; 2], b: [Ball; 2]) -> field::Touch {
     let (mut s, mut t) = near_segments(a.map(|e| e.centre), b.map(|e| e.centre));
     if a[0].radius_m != a[1].radius_m || b[0].radius_m != b[1].radius_m {
         for _ in 0..TAPER_ROUNDS {
+            let before = (s, t);
             s = nearest_share(b[0].toward(b[1], t).centre, a);
             t = nearest_share(a[0].toward(a[1], s).centre, b);
+            if (s - before.0).abs().max((t - before.1).abs()) < TAPER_SHARE {
+                break;
+            }
         }
     }
     let (near, _) = facing(a, b, [s, t]);
