@@ -156,6 +156,7 @@ impl<'d, 't> Checker<'d, 't> {
             if !missing.is_some_and(told) {
                 self.push(Problem::from_toml(&error, span.clone(), also));
             }
+            taken.extend(missing.map(str::to_owned));
             taken.push(take_out(&mut table, &error.span()?)?);
         }
         None

@@ -1,6 +1,6 @@
 //! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
 
-use crate::play::{agent, lockstep, number, point};
+use crate::play::{Folder, agent, lockstep, number, point};
 use metachron::scene::{Scene, SceneError, Source, Spec, load};
 use metachron_agents::soft::{Side, SoftShape};
 
@@ -93,4 +93,27 @@ fn the_rope_hangs_in_a_catenary_and_the_rod_keeps_some_of_its_bend() {
     assert!((rope[2] - (0.2 - 0.09885)).abs() < 1.5e-3, "{rope:?}");
     // the rod was made as a V, 11 cm deep, and would be one again
     assert!(rod[2] > 0.088 && rod[2] < rope[2] - 3e-3, "{rod:?}");
+}
+
+/// What sleeps and owns the pair did not see it come: it fell through to the floor.
+#[test]
+fn a_soft_body_that_sleeps_wakes_for_what_bends_and_falls_on_it() {
+    let soft = "young_pa = 1e5\ndensity_kg_m3 = 1050.0\ndamping_per_s = 3.0\nrate_hz = 240.0\n";
+    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\n";
+    let slab = format!(
+        "[[object]]\nname = \"slab\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.2, 0.2, 0.04]\nsegments = [5, 5, 1]\nposition_m = [0, 0, 0.02]\n{soft}"
+    );
+    let falls = [
+        "model = \"solid\"\nshape = \"box\"\nsize_m = [0.08, 0.08, 0.08]\nsegments = [3, 3, 3]\nposition_m = [0, 0, 2.08]\n",
+        "model = \"sheet\"\nsize_m = [0.12, 0.1]\nsegments = [4, 4]\nthickness_m = 0.004\nposition_m = [0, 0, 2.042]\n",
+        "model = \"rope\"\npath_m = [[-0.06, 0, 2.046], [0.06, 0, 2.046]]\nradius_m = 0.006\nsegments = 6\n",
+    ];
+    for faller in falls {
+        let probe = "[[probe]]\nobject = \"faller\"\nevery_ms = 10.0\n";
+        let text = format!("{floor}{slab}[[object]]\nname = \"faller\"\n{faller}{soft}{probe}");
+        let report = Folder::with(&text).lockstep(&["--seconds", "1.5"]);
+        let at = point(&report, "/probes/0/position_m");
+        // two metres take 0.64 s, and it sleeps after half a second
+        assert!(at[2] > 0.03, "{faller}: it is at {at:?}, the top at 0.04");
+    }
 }

@@ -1,7 +1,7 @@
 //! Whom a mover wakes: who owns the contact with it, sleeps, and so does not see it come.
 //!
 //! In: a mover after its step, what is around. Out: the sleepers it may touch next, for [`crate::Snapshot::touches`].
-//! Never here: forces; rigid bodies, who look along their own flight (`rigid/company.rs`).
+//! Never here: forces; rigid bodies, who look along their own flight (`rigid/company.rs`), and tubes (`rod/company.rs`).
 
 use super::touch::{TouchRoom, gap};
 use super::{Law, Other, Placed, WAKE_M_S};

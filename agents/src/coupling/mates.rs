@@ -109,7 +109,8 @@ impl Mates {
         list[..*count].iter_mut().filter(touched).for_each(|mate| mate.recall(tanks, (around.time, dt)));
     }
 
-    /// Recalls for a step of `dt` seconds how those on whom others press too moved otherwise than expected.
+    /// Recalls for a step of `dt` seconds what those that are only touched were given, and how those on whom others press too moved otherwise
+    /// than expected.
     pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
         let Self { list, count, tanks, .. } = self;
         let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));

@@ -12,7 +12,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::step::HASTE_MAX;
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
-use crate::coupling::{Form, FormKind, Law, Link, smooth};
+use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View, smooth};
 use crate::{
     Agent, Body, Bounds, Grip, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
     Surroundings, check_span,
@@ -33,6 +33,8 @@ pub struct SoftBody {
     pub(super) given: Vec<DVec3>,
     pub(super) ties: Vec<Tie>,
     pub(super) company: Company,
+    /// Who sleeps in its way.
+    pub(super) knock: Knock,
     pub(super) contacts: Contacts,
     pub(super) grips: Vec<Grip>,
     pub(super) touching: bool,
@@ -83,6 +85,7 @@ impl SoftBody {
             given: vec![],
             ties: vec![],
             company: Company::default(),
+            knock: Knock::default(),
             grips: vec![],
             touching: false,
             acceleration: spec.gravity,
@@ -175,6 +178,15 @@ impl SoftBody {
         }
     }
 
+    /// Finds who sleeps in its way.
+    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        let bounds = self.bounds();
+        if self.knock.begin(&bounds, around) {
+            let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
+            self.knock.find(&placed, &bounds, (around, dt_s));
+        }
+    }
+
     /// Ends a step of `dt` seconds: books, grips, what others may expect.
     fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let mass_kg = self.mass_kg();
@@ -187,6 +199,7 @@ impl SoftBody {
         self.foretell();
         self.steps += 1;
         self.at_rest = self.watch_rest(dt);
+        self.wake_others(around, dt);
     }
 }
 

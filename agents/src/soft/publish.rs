@@ -32,5 +32,6 @@ impl SoftBody {
             into.inertia = Inertia::Immovable;
         }
         self.company.mates().write(into);
+        into.touches.extend(self.knock.on());
     }
 }

@@ -162,7 +162,9 @@ fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
     let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
     let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
     panic::set_hook(Box::new(move |panic| match panic.location() {
-        Some(place) if place.file().contains("winit") => hears.store(true, Ordering::Relaxed),
+        Some(place) if place.file().split(['/', '\\']).any(|part| part.starts_with("winit-")) => {
+            hears.store(true, Ordering::Relaxed)
+        }
         _ => others(panic),
     }));
     let given = run();

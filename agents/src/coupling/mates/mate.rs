@@ -7,8 +7,9 @@ mod memory;
 
 use super::far::Far;
 use super::tanks::{Account, Tanks};
-use crate::coupling::inverse_mass;
-use crate::coupling::{Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S};
+use crate::coupling::{
+    Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S, inverse_mass,
+};
 use crate::{Anchor, Inertia, Neighbour, Surroundings};
 use glam::DVec3;
 

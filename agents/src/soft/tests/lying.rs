@@ -112,7 +112,7 @@ fn check(what: &str, lying: &Lying, (sway_m, depth_m): (f64, f64)) {
     assert!((lying.carried - 1.0).abs() < 0.02, "{what}: it is carried with {} of its weight", lying.carried);
     assert!(lying.sway_m < sway_m, "{what}: it sways by {} m", lying.sway_m);
     assert!(lying.depth_m < depth_m, "{what}: {} m deep", lying.depth_m);
-    assert!(lying.tank_j > -0.03, "{what}: {} J", lying.tank_j);
+    assert!(lying.tank_j.is_finite() && lying.tank_j > -0.03, "{what}: {} J", lying.tank_j);
 }
 
 /// A tube expected blows as soon as a second one stood anywhere, and the block was thrown off at 60 to 100 Hz.
@@ -150,7 +150,7 @@ fn a_soft_block_lies_on_a_held_sheet_at_unequal_rates() {
     let fine = lies(laid(On::Sheet, (240.0, 240.0), Faults::default()));
     for rates in UNEQUAL {
         let lying = lies(laid(On::Sheet, rates, Faults::default()));
-        check(&format!("{rates:?}"), &lying, (4e-3, 2e-3));
+        check(&format!("{rates:?}"), &lying, (4e-3, 5e-4));
         // as of tubes: it gives way by up to 3 mm for one load of a sixtieth of a second
         let off_m = lying.height_m - fine.height_m;
         assert!(off_m.abs() < 3e-3, "{rates:?}: {off_m} m higher than at 240 Hz");

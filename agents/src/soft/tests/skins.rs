@@ -77,7 +77,8 @@ proptest! {
     fn a_sheet_over_or_under_a_slab_is_on_that_side_of_it(
         (x, y) in (-0.08_f64..0.08, -0.08_f64..0.08),
         turn in prop_oneof![Just(0.0), -1.6_f64..1.6],
-        gap_m in -3e-4_f64..3e-4,
+        // past the sheet's middle from half a millimetre on
+        gap_m in -6e-4_f64..3e-4,
         high_m in prop_oneof![Just(0.1), Just(0.004)],
         over in any::<bool>(),
     ) {
@@ -88,5 +89,26 @@ proptest! {
         let up = if over { 1.0 } else { -1.0 };
         let slab = slab(DVec3::new(0.1, 0.1, high_m), [3, 3, 1], (DVec3::new(x, y, up * away_m), turn));
         agree(&met(&slab, &sheet), DVec3::Z * up, gap_m)?;
+    }
+
+    /// A vertex beside a rope that had come in was once pushed along the skin, half an edge deep.
+    #[test]
+    fn a_rope_over_or_in_a_slab_is_pushed_out_of_its_top(
+        (x, y) in (-0.03_f64..0.03, -0.03_f64..0.03),
+        turn in prop_oneof![Just(0.0), -1.6_f64..1.6],
+        under_m in -1.9e-3_f64..2e-3,
+    ) {
+        let radius_m = 2e-3;
+        let gap_m = -radius_m - under_m;
+        let path_m = vec![DVec3::X * -0.06, DVec3::X * 0.06];
+        let rope = skin(SoftShape::Rope { path_m, radius_m, segments: 7 }, (DVec3::new(x, y, radius_m + gap_m), turn));
+        let low = slab(DVec3::new(0.2, 0.2, 0.1), [6, 6, 3], (DVec3::NEG_Z * 0.05, 0.0));
+        let list = met(&rope, &low);
+        prop_assert!(list.len() >= 3, "{list:?}");
+        // what leans out of the skin by 60 degrees at most is twice as far from the axis as that is deep
+        let deepest_m = if under_m > 0.0 { -radius_m - 2.0 * under_m } else { gap_m };
+        for touch in &list {
+            prop_assert!(touch.gap_m > deepest_m - LEFT_M, "{touch:?}, {under_m} m under");
+        }
     }
 }

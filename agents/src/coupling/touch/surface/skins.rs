@@ -100,7 +100,8 @@ impl<'a> Skins<'a> {
 
     /// Nothing farther from a place is looked at, metres.
     fn within_m(&self) -> f64 {
-        self.here.reach_m.max(self.deep_m) + self.thick_m
+        let closed = self.here.surface.form.closed || self.there.surface.form.closed;
+        self.here.reach_m.max(if closed { self.deep_m } else { 0.0 }) + self.thick_m
     }
 
     /// Where a vertex of the skin `a` touches the skin `b`.
@@ -118,16 +119,25 @@ impl<'a> Skins<'a> {
         let distance_m = at.distance(foot);
         if distance_m <= CROSSING_M {
             let Near { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
-            return Some(Met { spot, normal: face.or(out.map(|out| -out))?, distance_m: 0.0 });
+            let away = out.map(|out| -out);
+            // of an open skin either side may be meant
+            let normal = face.map(|face| if away.is_some_and(|away| face.dot(away) < 0.0) { -face } else { face });
+            return Some(Met { spot, normal: normal.or(away)?, distance_m: 0.0 });
         }
         let normal = (at - foot) / distance_m;
+        let is_face = face.is_some_and(|face| face.dot(normal).abs() > FACE);
         if out.is_some_and(|out| out.dot(normal) > 0.0) {
             // it turns away: an open skin has gone into it, or it is on the far side
-            let passed = !b.surface.form.closed && distance_m <= self.deep_m && a.holds(foot, 0.0..=distance_m);
+            let least_m = if is_face { 0.0 } else { HALF * distance_m };
+            let passed = !b.surface.form.closed
+                && distance_m <= self.deep_m
+                && Ridge::Vertex(vertex).out(a.surface, normal).is_some()
+                && a.holds(foot, least_m..=distance_m)
+                && a.nearest(foot, distance_m, Some(normal)).is_none();
             return passed.then_some(Met { spot, normal: -normal, distance_m: -distance_m });
         }
         let out_here = Ridge::Vertex(vertex).out(a.surface, -normal)?;
-        if let Some(face) = face.filter(|face| face.dot(normal).abs() > FACE) {
+        if let Some(face) = face.filter(|_| is_face) {
             let normal = face * face.dot(normal).signum();
             return Some(Met { spot, normal, distance_m: normal.dot(at - foot) });
         }
