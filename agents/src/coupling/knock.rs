@@ -20,8 +20,12 @@ pub(crate) struct Knock {
 const STEPS: f64 = 2.0;
 
 impl Knock {
-    /// Finds who sleeps within two steps of `dt_s` seconds of one who is at `placed`, inside `bounds`.
+    /// Finds anew who sleeps within two steps of `dt_s` seconds of one who is at `placed`, inside `bounds`; who is slow wakes nobody.
     pub(crate) fn find(&mut self, placed: &Placed<'_>, bounds: &Bounds, (around, dt_s): (&Surroundings<'_>, f64)) {
+        self.on.clear();
+        if bounds.speed_m_s <= WAKE_M_S {
+            return;
+        }
         let reach_m = STEPS * dt_s * bounds.speed_m_s;
         for neighbour in around.neighbours.iter().filter(|n| sleeps(n)) {
             let is_apart = neighbour
@@ -38,13 +42,7 @@ impl Knock {
         }
     }
 
-    /// Begins anew; whether one with these `bounds` is fast enough to wake anybody of those `around`.
-    pub(crate) fn begin(&mut self, bounds: &Bounds, around: &Surroundings<'_>) -> bool {
-        self.on.clear();
-        bounds.speed_m_s > WAKE_M_S && around.neighbours.iter().any(sleeps)
-    }
-
-    /// Those found since the last [`Self::begin`].
+    /// Those found last.
     pub(crate) fn on(&self) -> &[AgentId] {
         &self.on
     }

@@ -104,17 +104,20 @@ impl Mates {
     /// Recalls for a step of `dt` seconds how those that are only touched moved otherwise than expected, and what they were given
     /// (docs/theory/soft.md, eq. 16f, 16g).
     pub fn recall(&mut self, around: &Surroundings<'_>, dt: f64) {
-        let Self { list, count, tanks, .. } = self;
-        let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));
-        list[..*count].iter_mut().filter(touched).for_each(|mate| mate.recall(tanks, (around.time, dt)));
+        self.for_touched(around, |mate, tanks| mate.recall(tanks, (around.time, dt)));
     }
 
     /// Recalls for a step of `dt` seconds what those that are only touched were given, and how those on whom others press too moved otherwise
     /// than expected.
     pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
+        self.for_touched(around, |mate, tanks| mate.regain(tanks, (around.time, dt)));
+    }
+
+    /// Does `act` with each to whom no link leads.
+    fn for_touched(&mut self, around: &Surroundings<'_>, mut act: impl FnMut(&mut Mate, &mut Tanks)) {
         let Self { list, count, tanks, .. } = self;
         let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));
-        list[..*count].iter_mut().filter(touched).for_each(|mate| mate.regain(tanks, (around.time, dt)));
+        list[..*count].iter_mut().filter(touched).for_each(|mate| act(mate, tanks));
     }
 
     /// Appends the velocities that the others would have without the owner, in slots, on the mean of a substep `h`: what is given at

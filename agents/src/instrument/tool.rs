@@ -170,10 +170,8 @@ impl Instrument {
     fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
-        if self.knock.begin(&bounds, around) {
-            let placed = Placed { form: &self.form, view: View::Tool { tip, rotation, jaw } };
-            self.knock.find(&placed, &bounds, (around, dt_s));
-        }
+        let placed = Placed { form: &self.form, view: View::Tool { tip, rotation, jaw } };
+        self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
     /// Whether the led point has come to where the script ends: what stands in the way of a drive that gives all it can holds it back.

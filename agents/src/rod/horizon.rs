@@ -17,6 +17,7 @@ use crate::coupling::Law;
 use crate::coupling::beside::{PART_MAX_S, bends, is_linked, may_touch};
 use crate::{Body, Neighbour, Surroundings};
 use glam::DVec3;
+use std::cell::LazyCell;
 
 /// An owner that is behind by more of the longer of both steps does not keep up.
 const BEHIND_STEPS: f64 = 2.0;
@@ -96,8 +97,9 @@ impl Tube {
 
     /// Who has a say in the step after one of `dt` seconds: of those that own contact with the tube who presses on it, or who may touch it
     /// in a step of theirs while nobody does; and who is linked to it.
-    fn owners<'a>(&self, around: &'a Surroundings<'_>, dt: f64) -> impl Iterator<Item = &'a Neighbour> {
-        let bounds = bounds(&self.now, self.widest_m());
+    fn owners<'a>(&'a self, around: &'a Surroundings<'_>, dt: f64) -> impl Iterator<Item = &'a Neighbour> {
+        // most of the time nobody asks
+        let bounds = LazyCell::new(|| bounds(&self.now, self.widest_m()));
         let presses = |n: &Neighbour| n.snapshot.pairs.iter().any(|pair| pair.with == around.me && pair.contacts > 0);
         let pressed = around.neighbours.iter().any(|n| owns_it(n, around) && presses(n));
         let acts = move |n: &Neighbour| {

@@ -181,10 +181,8 @@ impl SoftBody {
     /// Finds who sleeps in its way.
     fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let bounds = self.bounds();
-        if self.knock.begin(&bounds, around) {
-            let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
-            self.knock.find(&placed, &bounds, (around, dt_s));
-        }
+        let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
+        self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
     /// Ends a step of `dt` seconds: books, grips, what others may expect.
