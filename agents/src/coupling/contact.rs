@@ -69,6 +69,13 @@ impl Slots {
         }
     }
 
+    /// The same of the slots that `into` knows.
+    pub fn scatter_known(&self, impulse: DVec3, into: &mut [DVec3]) {
+        for &(slot, w) in self.linear() {
+            into.get_mut(slot as usize).into_iter().for_each(|sum| *sum += impulse * w);
+        }
+    }
+
     /// A scale for the contact's inverse mass, from the scale of each slot: Σ w² m⁻¹ + Σ r² I⁻¹ (eq. 9).
     #[must_use]
     pub fn mobility(&self, mobilities: &[f64]) -> f64 {

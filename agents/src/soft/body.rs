@@ -6,13 +6,14 @@
 use super::company::Company;
 use super::contact::Contacts;
 use super::doubling::Doubling;
+use super::foretold::Foretold;
 use super::holds::Tie;
 use super::lattice::Lattice;
 use super::spec::{SoftError, SoftSpec};
 use super::step::HASTE_MAX;
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
-use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View, smooth};
+use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View};
 use crate::{
     Agent, Body, Bounds, Grip, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
     Surroundings, check_span,
@@ -37,13 +38,10 @@ pub struct SoftBody {
     pub(super) knock: Knock,
     pub(super) contacts: Contacts,
     pub(super) grips: Vec<Grip>,
-    pub(super) touching: bool,
     /// Of the centre of mass in the last step, without what others gave, m/s².
     pub(super) acceleration: DVec3,
-    /// How each vertex will accelerate without what others give, m/s²; empty where nobody wants to know.
-    pub(super) accelerations: Vec<DVec3>,
-    /// The length of the last substep, seconds.
-    pub(super) span_s: f64,
+    /// What it tells others of its next step.
+    pub(super) foretold: Foretold,
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
     before: Vec<DVec3>,
@@ -87,10 +85,8 @@ impl SoftBody {
             company: Company::default(),
             knock: Knock::default(),
             grips: vec![],
-            touching: false,
             acceleration: spec.gravity,
-            accelerations: vec![],
-            span_s: 0.0,
+            foretold: Foretold::default(),
             at_rest: false,
             doubling: Doubling::default(),
             quiet_s: 0.0,
@@ -159,25 +155,6 @@ impl SoftBody {
         at_rest
     }
 
-    /// Works out how it will accelerate in a substep like the last one without what others gave, where somebody wants to know
-    /// (docs/theory/soft.md, eq. 16a). What contact of its own did may have been a blow.
-    fn foretell(&mut self) {
-        let Self { accelerations, system, lattice, velocities, free: before, given, .. } = self;
-        accelerations.clear();
-        if !self.company.is_watched() {
-            return;
-        }
-        let damped = 2.0 + self.span_s * self.spec.matter.damping_per_s;
-        let moves = velocities.iter().zip(&*before).zip(&lattice.mass_kg);
-        accelerations.extend(moves.map(|((now, before), mass)| (*now * damped - *before) * *mass));
-        accelerations.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum -= *given);
-        system.respond(accelerations);
-        for (a, now) in accelerations.iter_mut().zip(&*velocities) {
-            let gained = (*a - *now) / self.span_s;
-            *a = if self.touching { smooth(gained, self.spec.gravity) } else { gained };
-        }
-    }
-
     /// Finds who sleeps in its way.
     fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let bounds = self.bounds();
@@ -185,8 +162,8 @@ impl SoftBody {
         self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
-    /// Ends a step of `dt` seconds: books, grips, what others may expect.
-    fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+    /// Ends a step of `dt` seconds: books, grips, what others may expect; how many substeps more that took.
+    fn settle(&mut self, around: &Surroundings<'_>, dt: f64) -> u32 {
         let mass_kg = self.mass_kg();
         let Self { company, system, .. } = self;
         company.mates_mut().weigh(system.vertices(), |impulses| system.respond(impulses));
@@ -194,10 +171,11 @@ impl SoftBody {
         self.grips.clear();
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
         self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
-        self.foretell();
+        let told = self.foretell(dt);
         self.steps += 1;
         self.at_rest = self.watch_rest(dt);
         self.wake_others(around, dt);
+        told
     }
 }
 
@@ -210,8 +188,8 @@ impl Agent for SoftBody {
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         let (substeps, doubled) = self.advance(around, dt_s)?;
-        self.settle(around, dt_s);
-        Ok(StepReport { work: self.work() * f64::from(substeps + doubled), substeps, at_rest: self.at_rest })
+        let told = self.settle(around, dt_s);
+        Ok(StepReport { work: self.work() * f64::from(substeps + doubled + told), substeps, at_rest: self.at_rest })
     }
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {

@@ -190,9 +190,4 @@ impl Contacts {
         let solved = if self.list.is_empty() { &[] } else { self.solver.impulses() };
         self.list.iter().zip(solved)
     }
-
-    /// Whether anything is touched.
-    pub fn is_idle(&self) -> bool {
-        self.list.is_empty()
-    }
 }

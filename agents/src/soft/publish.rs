@@ -24,8 +24,8 @@ impl SoftBody {
         if self.company.is_watched() && self.steps > 0 {
             let inertia = into.inertia.soft_mut();
             inertia.copy_from(self.system.answer(), &self.contacts.mobilities);
-            inertia.accelerations.clone_from(&self.accelerations);
-            inertia.span_s = self.span_s;
+            inertia.accelerations.clone_from(&self.foretold.accelerations);
+            inertia.span_s = self.foretold.span_s;
             inertia.mass_kg.clone_from(&self.lattice.mass_kg);
             inertia.damping_per_s = self.spec.matter.damping_per_s;
         } else {

@@ -37,14 +37,28 @@ impl SoftBody {
             self.act(f64::from(parts - left) * h, h);
             (left, done) = (left - 1, done + 1);
         }
-        self.span_s = dt / f64::from(parts);
         self.judge(dt, done);
         Ok((done, doubled))
     }
 
     /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
     pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
-        let Self { system, lattice, positions, velocities, free, given, spec, ties, company, contacts, .. } = self;
+        if !self.assemble(h) {
+            return Err("its stiffness has no inverse");
+        }
+        let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
+        free.clear();
+        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
+        free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
+        free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
+        system.respond(free);
+        company.share(ties, free, system);
+        Ok(())
+    }
+
+    /// Finds the forces on where it is, and how it answers impulses in a substep of `h` seconds; whether it does.
+    pub(super) fn assemble(&mut self, h: f64) -> bool {
+        let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
         lattice.add(positions, system);
@@ -56,16 +70,7 @@ impl SoftBody {
         ties.iter_mut().for_each(|tie| tie.add(positions[tie.vertex], h, system));
         contacts.mobilities.clear();
         contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
-        if !system.factor() {
-            return Err("its stiffness has no inverse");
-        }
-        free.clear();
-        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
-        free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
-        free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
-        system.respond(free);
-        company.share(ties, free, system);
-        Ok(())
+        system.factor()
     }
 
     /// Lets contact act on the foreseen velocities.
@@ -76,24 +81,24 @@ impl SoftBody {
 
     /// Moves along the foreseen velocities, and gives the others their part.
     fn act(&mut self, start: f64, h: f64) {
-        let Self { positions, velocities, free, ties, company, contacts, .. } = self;
+        let Self { positions, velocities, free, ties, company, contacts, foretold, .. } = self;
         std::mem::swap(velocities, free);
         positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
         ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
         company.accept(contacts.impulses(), ties, (positions.len(), start, h));
-        self.touching = !contacts.is_idle();
+        foretold.note(contacts, positions.len(), h);
     }
 
     /// Takes in what others gave since the last step, and looks who is near.
     fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
-        let Self { system, positions, velocities, given, company, .. } = self;
+        let Self { system, positions, velocities, given, company, foretold, .. } = self;
         given.clear();
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
             given.extend_from_slice(sums);
             for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
-                let past = moment.dot(*sum) / (dt * sum.length_squared()).max(f64::MIN_POSITIVE);
+                let past = moment.dot(*sum) / (foretold.span_s * sum.length_squared()).max(f64::MIN_POSITIVE);
                 *sum *= past.clamp(0.0, 1.0);
                 *given -= *sum;
             }

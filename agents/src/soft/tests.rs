@@ -3,6 +3,7 @@
 mod bullets;
 mod error;
 mod falls;
+mod foretold;
 mod links;
 mod lying;
 mod meetings;

@@ -1,0 +1,76 @@
+//! What a soft body foretells of its next step: how it answers impulses in it, and how each vertex will accelerate.
+//!
+//! In: the substep that ended last, what touched the body in it and before. Out: A and a of a whole step for snapshots, and for
+//! what it is given until it steps again. Never here: how long that step will be. Theory: docs/theory/soft.md, eq. 16a, 16i, 16j.
+
+use super::body::SoftBody;
+use super::contact::Contacts;
+use glam::DVec3;
+
+/// A substep that is shorter than its step by less than this is all of it.
+const WHOLE: f64 = 1.0 + 1e-9;
+
+/// The step that a soft body foretells.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Foretold {
+    /// Its length, seconds: that of the last one.
+    pub span_s: f64,
+    /// How each vertex will accelerate in it without what others give, m/s²; empty where nobody wants to know.
+    pub accelerations: Vec<DVec3>,
+    /// The length of the last substep, seconds.
+    last_s: f64,
+    /// How contacts pressed each vertex in the last substep, and in the one before, N.
+    presses: [Vec<DVec3>; 2],
+}
+
+impl Foretold {
+    /// Notes a substep of `h` seconds of a body of so many `vertices`.
+    pub fn note(&mut self, contacts: &Contacts, vertices: usize, h: f64) {
+        self.last_s = h;
+        self.presses.swap(0, 1);
+        let now = &mut self.presses[0];
+        now.clear();
+        now.resize(vertices, DVec3::ZERO);
+        contacts.impulses().for_each(|(contact, impulse)| contact.slots.scatter_known(*impulse / h, now));
+    }
+
+    /// The part of what presses that was no part of it in the substep before, on each vertex, N: a blow, which does not go on (eq. 16j).
+    fn blows(&self) -> impl Iterator<Item = DVec3> {
+        let [now, before] = &self.presses;
+        let size: f64 = before.iter().map(|f| f.length_squared()).sum();
+        let along: f64 = now.iter().zip(before).map(|(now, before)| now.dot(*before)).sum();
+        let share = if size > 0.0 { (along / size).clamp(0.0, 1.0) } else { 0.0 };
+        let lasts = before.iter().copied().chain(std::iter::repeat(DVec3::ZERO));
+        now.iter().zip(lasts).map(move |(now, before)| *now - before * share)
+    }
+}
+
+impl SoftBody {
+    /// Works out what it foretells of a step of `dt` seconds, as long as the last one, where somebody wants to know (eq. 16a, 16i); how
+    /// many substeps more that took.
+    pub(super) fn foretell(&mut self, dt: f64) -> u32 {
+        self.foretold.accelerations.clear();
+        self.foretold.span_s = self.foretold.last_s;
+        if !self.company.is_watched() {
+            return 0;
+        }
+        let divided = dt > self.foretold.last_s * WHOLE;
+        if divided && self.assemble(dt) {
+            self.foretold.span_s = dt;
+        }
+        let Self { foretold, system, lattice, velocities, free: before, given, .. } = self;
+        let mut momenta = std::mem::take(&mut foretold.accelerations);
+        let (last_s, span_s) = (foretold.last_s, foretold.span_s);
+        let damped = 1.0 + last_s * self.spec.matter.damping_per_s;
+        let moves = velocities.iter().zip(&*before).zip(&lattice.mass_kg);
+        momenta.extend(moves.map(|((now, before), mass)| (*now * damped - *before) * *mass));
+        momenta.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum -= *given);
+        momenta.iter_mut().zip(foretold.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
+        let still = velocities.iter().zip(&lattice.mass_kg).map(|(now, mass)| *now * *mass);
+        momenta.iter_mut().zip(still).for_each(|(momentum, still)| *momentum = still + *momentum * (span_s / last_s));
+        system.respond(&mut momenta);
+        momenta.iter_mut().zip(&*velocities).for_each(|(a, now)| *a = (*a - *now) / span_s);
+        foretold.accelerations = momenta;
+        u32::from(divided)
+    }
+}
