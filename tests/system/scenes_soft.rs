@@ -117,3 +117,24 @@ fn a_soft_body_that_sleeps_wakes_for_what_bends_and_falls_on_it() {
         assert!(at[2] > 0.03, "{faller}: it is at {at:?}, the top at 0.04");
     }
 }
+
+/// Its steps of a millisecond take longer than that, and who pushed it was 18 ms ahead: it flew off.
+#[test]
+fn a_soft_ball_that_falls_a_metre_on_a_soft_block_of_its_rate_lies_on_it() {
+    let soft = "young_pa = 1e5\ndensity_kg_m3 = 1050.0\ndamping_per_s = 3.0\n";
+    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\nfriction = 0.5\n";
+    let block = "[[object]]\nname = \"block\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.2, 0.2, 0.1]\nsegments = [4, 4, 2]\nposition_m = [0, 0, 0.0505]\n";
+    let ball = "[[object]]\nname = \"ball\"\nmodel = \"solid\"\nshape = \"ball\"\nradius_m = 0.035\nsegments = [4, 4, 4]\nposition_m = [0, 0, 1.14]\n";
+    for rate_hz in [60.0, 240.0] {
+        let text = format!("{floor}{block}{soft}rate_hz = {rate_hz:?}\n{ball}{soft}rate_hz = {rate_hz:?}\n");
+        let report = Folder::with(&text).lockstep(&["--seconds", "3"]);
+        let pair = &report["couplings"][0];
+        // four cells across hold 0.9349 of a sphere
+        let weight_n = 0.9349 * 1050.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.035_f64.powi(3) * 9.81;
+        let force_n = number(pair, "/force_n");
+        assert!((force_n / weight_n - 1.0).abs() < 0.01, "{rate_hz} Hz: {force_n} N of {weight_n}");
+        assert!(number(pair, "/penetration_m") < 1e-3, "{rate_hz} Hz: {pair}");
+        // a blow at 4.4 m/s between matter of 1e5 Pa
+        assert!(number(pair, "/penetration_max_m") < 3e-3, "{rate_hz} Hz: {pair}");
+    }
+}

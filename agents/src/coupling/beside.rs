@@ -5,7 +5,7 @@
 
 use super::{Impulse, Law};
 use crate::instrument::GRASP_BELOW;
-use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings, ToolState};
+use crate::{AgentId, Body, Bounds, Inertia, Neighbour, SimSpan, Surroundings, ToolState};
 use glam::DVec3;
 
 /// Beside others a body that bends makes no longer substeps than this, seconds: in a longer one it falls so far from where it
@@ -108,7 +108,7 @@ pub fn leaves_behind(
     let allowed_s = if !neighbour.owned {
         (PUSHED_STEPS * step_s).max(PUSHED_LEAST_S)
     } else if is_linked(neighbour, around) || bends(neighbour) {
-        PUSHED_LEAST_S + step_s
+        told_s(neighbour).map_or(PUSHED_LEAST_S + step_s, |told_s| told_s.min(step_s))
     } else {
         AHEAD_S + step_s
     };
@@ -116,6 +116,14 @@ pub fn leaves_behind(
         return false;
     }
     is_beside(neighbour, (dt, step_s), around, bounds)
+}
+
+/// How long the step is that a soft body foretells, seconds: past it nobody knows how it bends.
+fn told_s(neighbour: &Neighbour) -> Option<f64> {
+    match &neighbour.snapshot.inertia {
+        Inertia::Soft(soft) => Some(soft.span_s).filter(|told_s| *told_s > 0.0),
+        _ => None,
+    }
 }
 
 /// Whether a neighbour with steps of `step_s` seconds has to live at one pace with a body that makes steps of `dt`: they are linked, hold

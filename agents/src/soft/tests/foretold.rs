@@ -2,9 +2,11 @@
 
 use super::meetings::floor;
 use super::*;
+use crate::coupling::beside::leaves_behind;
 use crate::coupling::harness::{Faults, Stage};
+use crate::coupling::{Law, Link};
 use crate::soft::SoftInertia;
-use crate::{Inertia, Neighbour};
+use crate::{Anchor, Inertia, Neighbour};
 use std::sync::Arc;
 
 const BALL: SoftShape = SoftShape::Ball { radius_m: 0.035, segments: 4 };
@@ -50,6 +52,24 @@ fn a_step_that_was_divided_foretells_a_whole_one() {
         for (told, made) in answers[0].iter().zip(&answers[1]) {
             assert!(told.distance(*made) < 1e-6 * answers[1][vertex].length(), "{told} for {made}"); // h in nanoseconds
         }
+    }
+}
+
+/// A body may owe its owner a step as long as those that it makes, not as those that it would make alone: 18 ms of forecasts for 1 ms.
+#[test]
+fn who_pushes_a_soft_body_is_no_farther_ahead_of_it_than_it_foretells() {
+    let other = AgentId(1);
+    let here = Anchor::Vertex(0);
+    let link =
+        [Link { other, here, there: here, stiffness_n_m: 1.0, damping_n_s_m: 0.0, rest_m: 0.0, law: Law::Ledger }];
+    for (told_s, ahead_s, waits) in
+        [(1e-3, 0.9e-3, false), (1e-3, 1.1e-3, true), (0.01, 0.009, false), (0.01, 0.011, true), (0.0, 0.018, false)]
+    {
+        let time = SimTime::ZERO + dt(ahead_s);
+        let around = Surroundings { links: &link, ..Surroundings::alone(AgentId(0), time) };
+        let neighbour = another(true, told_s);
+        let found = leaves_behind(&neighbour, (dt(1.0 / 60.0), neighbour.step_s), &around, || None);
+        assert_eq!(found, waits, "{ahead_s} s ahead of steps of {told_s} s");
     }
 }
 
