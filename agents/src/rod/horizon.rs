@@ -61,7 +61,8 @@ impl Tube {
         let soft = self
             .owners(around, dt)
             .all(|n| matches!(n.snapshot.body, Body::Soft(_)) && !is_linked(n, around) && keeps_up(n, around, dt));
-        let alone = soft && self.spec.integrator == Integrator::ImplicitEuler && !self.stepper.contacts.is_touching();
+        let alone =
+            soft && self.spec.integrator == Integrator::ImplicitEuler && !self.stepper.contacts.touches_what_moves();
         if !(span_s.is_finite() && (slower || alone)) {
             return;
         }
@@ -84,7 +85,7 @@ impl Tube {
     pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
         let (factor, span_s) = self.stepper.last();
         let whole = span_s == dt && factor.slots() == self.now.u.len() && self.accelerations.len() == self.now.u.len();
-        if !whole || self.spec.integrator != Integrator::ImplicitEuler || self.stepper.contacts.is_touching() {
+        if !whole || self.spec.integrator != Integrator::ImplicitEuler || self.stepper.contacts.touches_what_moves() {
             return false;
         }
         let alike = |n: &Neighbour| {
@@ -115,7 +116,7 @@ impl Tube {
         list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
         momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
         list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
-        respond((stepper.factor(), matter.held), list);
+        respond((stepper.last().0, matter.held), list);
         list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
         self.ahead_s = dt;
     }
@@ -136,14 +137,15 @@ impl Stepper {
             return None;
         }
         let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
-        let Self { rows, rhs, factor, horizon, .. } = self;
+        let Self { rows, rhs, factor, horizon, footing, .. } = self;
         assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
         if span_s.is_some() {
+            footing.bear(rows, matter.held);
             horizon.factor.factor(rows).ok()?;
             horizon.factor.solve(rhs);
             horizon.span_s = h;
         } else {
-            factor.solve(rhs);
+            footing.factor().unwrap_or(factor).solve(rhs);
         }
         gained.clear();
         gained.extend(rhs.iter().zip(&now.u).map(|(then, now)| (*then - *now) / h));

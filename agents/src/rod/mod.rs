@@ -21,6 +21,7 @@ mod contact;
 mod division;
 mod doubling;
 mod extent;
+mod footing;
 mod holds;
 mod horizon;
 mod inertia;

@@ -50,6 +50,11 @@ impl Received {
         !self.any
     }
 
+    /// What came, N·s at nodes and N·m·s at segments.
+    pub fn sum(&self) -> &[DVec3] {
+        &self.sum
+    }
+
     /// What of it acts through the substep that comes, N·s and N·m·s in slots; empty for nothing.
     pub fn fresh(&self) -> &[DVec3] {
         &self.fresh

@@ -9,6 +9,7 @@ use super::company::Company;
 use super::config::{Config, Matter};
 use super::contact::{Solved, TubeContacts, respond};
 use super::division::Division;
+use super::footing::Footing;
 use super::holds::{NodeSpring, Tie};
 use super::horizon::Horizon;
 use super::method::Integrator;
@@ -73,6 +74,8 @@ pub struct Stepper {
     pub company: Company,
     /// What slower owners have to expect.
     pub(super) horizon: Horizon,
+    /// What it lies on, where others have to know.
+    pub(super) footing: Footing,
     /// Work that contact does in the substep tried, J.
     pushed_j: f64,
     /// The length of the substep that ended last, seconds.
@@ -143,8 +146,9 @@ impl Stepper {
             return Ok(());
         }
         self.prepare(now, setting)?;
-        let Self { company, factor, .. } = self;
-        company.received().apply(now, (factor, ties), (setting.matter, setting.division), way_m);
+        let Self { company, factor, footing, .. } = self;
+        let answer = footing.under(company.received().sum(), setting.matter.held).unwrap_or(factor);
+        company.received().apply(now, (answer, ties), (setting.matter, setting.division), way_m);
         Ok(())
     }
 
@@ -175,6 +179,7 @@ impl Stepper {
     pub fn forget(&mut self) {
         self.factor.forget();
         self.horizon.forget();
+        self.footing.forget();
         self.contacts.forget();
         self.past.forget();
     }
@@ -184,9 +189,15 @@ impl Stepper {
         &self.factor
     }
 
-    /// The same, and how long that substep was, seconds; zero before the first.
+    /// The same with what the tube lies on, and how long that substep was, seconds; zero before the first.
     pub fn last(&self) -> (&Factor, f64) {
-        (&self.factor, self.span_s)
+        (self.footing.factor().unwrap_or(&self.factor), self.span_s)
+    }
+
+    /// Finds what the tube lies on after its last substep, where others want to know (`watched`).
+    pub fn stand(&mut self, held: [bool; 2], watched: bool) {
+        let Self { footing, rows, contacts, .. } = self;
+        if watched { footing.stand(rows, contacts, held) } else { footing.forget() }
     }
 
     /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.

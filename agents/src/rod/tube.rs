@@ -334,6 +334,7 @@ impl Agent for Tube {
         let taken = self.step_by(dt_s, Stepper::step);
         let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
         self.stepper.weigh(self.matter.held);
+        self.stepper.stand(self.matter.held, watched);
         self.double((dt_s, substeps));
         self.write_grips(dt_s);
         self.stepper.company.close(around, dt_s);

@@ -222,8 +222,8 @@ impl Meeting<'_> {
         let length = way.length();
         let (mut normal, mut distance) = if length > CROSSING_M { (way / length, length) } else { (across(), 0.0) };
         if out.is_some_and(|out| out.dot(normal) > 0.0) {
-            // the core is behind the skin: it has to come out where it went in
-            if length > 2.0 * ball.radius_m {
+            // the core is behind the skin: it has to come out where it went in, and under a thin plate it never did
+            if length > 2.0 * ball.radius_m || self.is_before(ball.centre, length) {
                 return None;
             }
             (normal, distance) = (-normal, -distance);
@@ -235,6 +235,14 @@ impl Meeting<'_> {
             _ => Place::Point(point - normal * half),
         };
         (gap_m <= self.reach_m).then(|| Touch { key, normal, gap_m, on_a: spot.place(), on_b })
+    }
+
+    /// Whether a point is in front of a triangle that is nearer than `within_m`.
+    fn is_before(&self, point: DVec3, within_m: f64) -> bool {
+        self.surface.triangles_in((point - within_m, point + within_m)).any(|(_, _, [a, b, c])| {
+            let way = point - near_triangle(point, [a, b, c]);
+            way.length() < within_m * (1.0 - LEAN_SHARE) && (b - a).cross(c - a).dot(way) > 0.0
+        })
     }
 
     /// The normal of the triangle of a spot; `None` for a vertex or an edge.

@@ -21,6 +21,11 @@ use walls::{WallTouch, Walls};
 /// Contacts are taken up this share of the radius before they touch: impulses of other contacts may close the rest.
 const SLACK_RADII: f64 = 0.05;
 
+/// Where the number of a fixed solid begins in the key of its contacts; those of a tube with itself are lower, with others higher.
+const WALL_SHIFT: u32 = 41;
+/// One past the highest number of a fixed solid.
+const WALLS_END: u64 = 1 << (63 - WALL_SHIFT);
+
 /// What a step of the second and of the first segment is in the key of a pair's place.
 const KEY_STEPS: [u64; 2] = [PLACES as u64, 1 << 20];
 /// The names that a foot had before it passed to the next segment, within one tube and between a tube and another.
@@ -129,6 +134,17 @@ impl TubeContacts {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
+    /// Where fixed solids pressed in the last solve: what each place joins, its normal, and what it gave along it, N·s.
+    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3, f64)> {
+        let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
+        fixed.map(|(c, impulse)| (c.slots, c.normal, impulse.dot(c.normal))).filter(|(.., given)| *given > 0.0)
+    }
+
+    /// Whether the last search found any contact with what moves, itself included.
+    pub fn touches_what_moves(&self) -> bool {
+        !self.contacts.iter().all(is_fixed)
+    }
+
     /// Whether the last search found any contact.
     pub fn is_touching(&self) -> bool {
         !self.contacts.is_empty()
@@ -206,6 +222,11 @@ impl Skin<'_> {
     }
 }
 
+/// Whether a contact is one with a fixed solid.
+fn is_fixed(contact: &Contact) -> bool {
+    (1..WALLS_END).contains(&(contact.key >> WALL_SHIFT))
+}
+
 /// Self-contact: facing points of two segments, and arms to the middle of the gap (eq. 20).
 fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
     let mut slots = Slots::default();
@@ -251,7 +272,8 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
         }
     }
     let inside = u64::from(touch.share.is_some());
-    let key = (u64::from(touch.wall) + 1) << 41 | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
+    let key =
+        (u64::from(touch.wall) + 1) << WALL_SHIFT | inside << 40 | u64::from(touch.index) << 4 | u64::from(touch.place);
     Contact {
         key,
         slots,
