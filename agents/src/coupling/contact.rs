@@ -39,7 +39,8 @@ impl Slots {
         self.counts[1] += 1;
     }
 
-    fn linear(&self) -> &[(u32, f64)] {
+    /// The linear velocities it gathers, and their weights.
+    pub(crate) fn linear(&self) -> &[(u32, f64)] {
         &self.linear[..usize::from(self.counts[0])]
     }
 
@@ -57,6 +58,15 @@ impl Slots {
     /// The part of the relative velocity that nodes give: spins move a round skin across its normal only.
     pub(crate) fn velocity_of_nodes(&self, velocities: &[DVec3]) -> DVec3 {
         self.linear().iter().map(|&(slot, w)| velocities[slot as usize] * w).sum()
+    }
+
+    /// The part of it that the slots from `first` on give.
+    pub(crate) fn velocity_from(&self, first: usize, velocities: &[DVec3]) -> DVec3 {
+        let is_in = |slot: u32| slot as usize >= first;
+        let linear =
+            self.linear().iter().filter(|(slot, _)| is_in(*slot)).map(|&(slot, w)| velocities[slot as usize] * w);
+        let angular = self.angular().iter().filter(|(slot, _)| is_in(*slot));
+        linear.sum::<DVec3>() + angular.map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum::<DVec3>()
     }
 
     /// Adds the impulses and angular impulses Jᵀ λ (eq. 2).

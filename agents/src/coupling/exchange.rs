@@ -153,20 +153,24 @@ impl Exchange {
     /// Takes what owners have given since the last reading and what acts before `until`: `apply` gets who, where, dJ, and
     /// t dJ − dS at the step's start.
     ///
-    /// A reading that is not newer than the last one, or that is not finite, gives nothing.
+    /// A reading that is not newer than the last one, or that is not finite, gives nothing. Returns how many seconds ago the first of it
+    /// was given at most: what an owner had given by the state that was read last is no news.
     pub fn take(
         &mut self,
         around: &Surroundings<'_>,
         until: SimTime,
         mut apply: impl FnMut(AgentId, Site, Impulse, Impulse),
-    ) {
+    ) -> f64 {
+        let mut unread_s = 0.0_f64;
         for neighbour in around.neighbours {
             let Some(ledger) = neighbour.snapshot.given.iter().find(|l| l.with == around.me) else { continue };
             let at = self.taken.iter().position(|t| t.copy.with == neighbour.id);
+            let read = at.and_then(|at| self.taken[at].read(neighbour));
             let known = at.map(|at| &self.taken[at].copy);
             if known.is_some_and(|known| !ledger.is_beyond(known)) || !ledger.is_finite() {
                 continue;
             }
+            unread_s = unread_s.max(read.map_or(f64::INFINITY, |read| around.time.secs_after(read)));
             let step_s = until.secs_after(around.time);
             let mut reading = self.reading.take().unwrap_or_else(|| Ledger::new(neighbour.id));
             reading.read(ledger, until);
@@ -176,6 +180,7 @@ impl Exchange {
             self.taken_mut(neighbour.id).copy_from(&reading, neighbour);
             self.reading = Some(reading);
         }
+        unread_s
     }
 
     /// Takes what owners give to a body as a whole as forces that go on: what each gave in its last step goes on evenly, until

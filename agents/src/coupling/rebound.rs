@@ -10,7 +10,9 @@ use glam::DVec3;
 /// What fixed solids gave in one step, as if at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Rebound {
-    /// The end of the step.
+    /// When the step began.
+    pub start: SimTime,
+    /// When it ended.
     pub end: SimTime,
     /// Their impulse.
     pub given: Impulse,
@@ -36,7 +38,9 @@ impl Rebound {
     /// The share of it that `late` would have spared, which is on its way to the body and has carried it so far by `at`.
     #[must_use]
     pub fn spared_by(&self, [late, carried]: [Impulse; 2], at: SimTime) -> f64 {
-        let is_earlier = self.age_s(at) < since_s(late, carried);
+        // what the body had read when it began is in its state
+        let since_s = since_s(late, carried).min(at.secs_after(self.start));
+        let is_earlier = self.age_s(at) < since_s;
         if is_earlier { spared(late, (self.given, self.met_n_s)) } else { 0.0 }
     }
 
@@ -79,7 +83,8 @@ mod tests {
     }
 
     /// 3 N·s, 20 ms before the end of a step at 0.1 s; half of it stopped the body.
-    const BLOW: fn() -> Rebound = || Rebound { end: at(0.1), given: up(3.0), carried: DVec3::Z * 0.06, met_n_s: 1.5 };
+    const BLOW: fn() -> Rebound =
+        || Rebound { start: at(0.05), end: at(0.1), given: up(3.0), carried: DVec3::Z * 0.06, met_n_s: 1.5 };
 
     fn carried(way: f64) -> Impulse {
         Impulse { linear: DVec3::Z * way, angular: DVec3::ZERO }
@@ -99,6 +104,9 @@ mod tests {
         for late in [[up(1.0), carried(0.002)], [up(-1.0), carried(-0.03)], [Impulse::ZERO; 2]] {
             assert_eq!(BLOW().spared_by(late, at(0.09)), 0.0, "{late:?}");
         }
+        // whatever it has carried, none of it is older than the step in which it was not known
+        let late = Rebound { start: at(0.085), ..BLOW() };
+        assert_eq!(late.spared_by([up(1.0), carried(0.03)], at(0.09)), 0.0);
     }
 
     #[test]

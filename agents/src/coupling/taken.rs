@@ -31,6 +31,11 @@ impl Taken {
         (self.copy.with, self.read) = (owner.id, Some(owner.snapshot.time));
     }
 
+    /// Looks at the owner: its own time in the reading before.
+    pub(super) fn read(&mut self, owner: &Neighbour) -> Option<SimTime> {
+        self.read.replace(owner.snapshot.time)
+    }
+
     /// What a step of `dt_s` seconds from `now` takes: dJ, t dJ − dS, and the impulse that acts evenly over the step.
     pub(super) fn follow(
         &mut self,

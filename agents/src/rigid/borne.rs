@@ -36,10 +36,14 @@ impl Borne {
     }
 
     /// Takes out what fixed solids gave in place of `late`, an impulse that comes at `now` and has been carrying the body by
-    /// `carried` kg·m since it was given: as much of what they gave since then as points its way, and how far that has carried
-    /// the body by now.
-    pub(super) fn in_place_of(&mut self, late: Impulse, carried: Impulse, now: SimTime) -> [Impulse; 2] {
-        let since_s = since_s(late, carried);
+    /// `carried` kg·m since it was given, `unread_s` seconds ago at most: as much of what they gave since then as points its way, and how
+    /// far that has carried the body by now.
+    pub(super) fn in_place_of(
+        &mut self,
+        [late, carried]: [Impulse; 2],
+        (now, unread_s): (SimTime, f64),
+    ) -> [Impulse; 2] {
+        let since_s = since_s(late, carried).min(unread_s);
         let recent = |step: &Rebound| step.age_s(now) < since_s;
         let (mut all, mut way, mut met_n_s) = (Impulse::ZERO, DVec3::ZERO, 0.0);
         for step in self.steps.iter().filter(|step| recent(step)) {
@@ -81,7 +85,8 @@ impl RigidBody {
             angular: if alone { self.motion.angular - self.begun_at.1 } else { DVec3::ZERO },
         };
         let given = if is_blow { given * blow } else { Impulse::ZERO };
-        let mut rebound = Rebound { end: start + dt, given, carried: way * (blow * self.spread.mass_kg), met_n_s: 0.0 };
+        let mut rebound =
+            Rebound { start, end: start + dt, given, carried: way * (blow * self.spread.mass_kg), met_n_s: 0.0 };
         let came = self.begun + self.gravity * -rebound.age_s(start);
         let size = given.linear.length();
         rebound.met_n_s = (-came.dot(given.linear.normalize_or_zero()) * self.spread.mass_kg).clamp(0.5 * size, size);
@@ -100,7 +105,7 @@ mod tests {
     /// 3 N·s that stopped it 2 ms before the end of a step at 0.1 s.
     fn landed() -> Borne {
         let mut borne = Borne::default();
-        borne.note(Rebound { end: at(0.10), given: up(3.0), carried: DVec3::Z * 0.006, met_n_s: 3.0 });
+        borne.note(Rebound { start: at(0.08), end: at(0.10), given: up(3.0), carried: DVec3::Z * 0.006, met_n_s: 3.0 });
         borne
     }
 
@@ -112,21 +117,23 @@ mod tests {
     fn fixed_solids_give_back_what_a_late_impulse_would_have_spared_them_and_no_more() {
         let mut borne = landed();
         // it acted 10 ms ago in the mean, the fixed solid 2 ms before the end of its step
-        let [given, way] = borne.in_place_of(up(2.0), up(0.02), at(0.10));
+        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY));
         assert!((given.linear.z - 2.0).abs() < 1e-12 && (given.angular.x - 2.0).abs() < 1e-12, "{given:?}");
         assert!((way.linear.z - 0.004).abs() < 1e-12, "{way:?}");
         // what is left has carried it for 5 ms more
-        let [given, way] = borne.in_place_of(up(2.0), up(0.02), at(0.105));
+        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.105), f64::INFINITY));
         assert!((given.linear.z - 1.0).abs() < 1e-12 && (way.linear.z - 0.007).abs() < 1e-12, "{given:?} {way:?}");
-        assert_eq!(borne.in_place_of(up(2.0), up(0.02), at(0.10)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
     }
 
     #[test]
     fn what_presses_the_other_way_or_acted_later_spares_nothing() {
         let mut borne = landed();
-        assert_eq!(borne.in_place_of(up(-2.0), up(-0.02), at(0.10)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of(up(2.0), up(0.02), at(0.13)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of(up(2.0), up(0.0), at(0.10)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of(Impulse::ZERO, Impulse::ZERO, at(0.10)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(-2.0), up(-0.02)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.13), f64::INFINITY)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.0)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([Impulse::ZERO, Impulse::ZERO], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
+        // the giver's state before it was read a millisecond ago: it was given after the blow
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), 1e-3)), [Impulse::ZERO; 2]);
     }
 }

@@ -57,7 +57,7 @@ impl RigidBody {
         let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
         let mut taken = None;
-        company.exchange.take(around, until, |_, _, sum, way| {
+        let unread_s = company.exchange.take(around, until, |_, _, sum, way| {
             motion.velocity += sum.linear / spread.mass_kg;
             motion.angular += sum.angular;
             let (given, carried) = taken.unwrap_or((Impulse::ZERO, Impulse::ZERO));
@@ -65,7 +65,7 @@ impl RigidBody {
         });
         if let Some((given, carried)) = taken {
             let since_s = carried.linear.length() / given.linear.length();
-            let [left, carried] = self.spare(given, carried, around.time);
+            let [left, carried] = self.spare([given, carried], (around.time, unread_s));
             // what the ground bears carries nothing, and what is still to act lifts nothing off it
             let carried = match self.stand {
                 Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
@@ -87,9 +87,10 @@ impl RigidBody {
         Impulse { linear: way * mass, ..carried }
     }
 
-    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both.
-    fn spare(&mut self, given: Impulse, carried: Impulse, now: SimTime) -> [Impulse; 2] {
-        let [back, way] = self.borne.in_place_of(given, carried, now);
+    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both. They were given
+    /// at most so many seconds before now.
+    fn spare(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
+        let [back, way] = self.borne.in_place_of([given, carried], since);
         self.motion.velocity -= back.linear / self.spread.mass_kg;
         self.motion.angular -= back.angular;
         [given - back, carried - way]

@@ -12,6 +12,7 @@ mod skins;
 mod slides;
 mod slopes;
 mod statics;
+mod thin;
 
 use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
 use crate::{Agent, AgentId, Body, SimSpan, SimTime, Snapshot, SoftState, Surroundings};

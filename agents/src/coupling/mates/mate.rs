@@ -197,7 +197,9 @@ impl Mate {
         for touch in touches {
             let mut contact = self.contact(touch);
             let closing = contact.slots.velocity(velocities).dot(contact.normal);
-            if touch.gap_m + closing * h > slack_m {
+            // something fixed may stop the owner on a way on which it would be out of reach
+            let towards = contact.slots.velocity_from(self.slots.0, velocities).dot(contact.normal);
+            if touch.gap_m + closing.min(towards) * h > slack_m {
                 continue;
             }
             let parting = -contact.bias_m_s(h);

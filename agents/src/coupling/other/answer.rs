@@ -52,7 +52,7 @@ impl Other {
 
     /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a).
     fn stands(&self, linear: DVec3, angular: DVec3) -> Option<DVec3> {
-        let stand = self.neighbour.as_ref()?.snapshot.stand?;
+        let stand = self.grounded()?;
         let pressed = self.pressed.unwrap_or_else(|| stand.bears(self.pose.centre, Impulse { linear, angular }));
         pressed.then_some(stand.normal)
     }

@@ -44,6 +44,7 @@ impl Other {
         }
         let Flight { mut sums, mut carried, .. } = flight;
         if !sums.is_empty() {
+            self.carry_off(carried[0]);
             self.respond(&mut sums);
             self.respond(&mut carried);
             [sums[0], carried[0]] = self.rise([sums[0], carried[0]]);

@@ -4,9 +4,12 @@
 //! towards the ground, which the body does not feel ([`Other::respond`]). Theory: docs/theory/coupling.md, eq. 7f.
 
 use super::Other;
-use crate::Stand;
 use crate::coupling::Impulse;
+use crate::{Inertia, Stand};
 use glam::DVec3;
+
+/// Who is expected higher than this above what it stands on is off it, metres.
+const LIFTED_M: f64 = 1e-4;
 
 /// How a body that was lifted off the ground moves along its normal.
 #[derive(Debug, Clone, Copy)]
@@ -48,6 +51,17 @@ impl Other {
         }
     }
 
+    /// What is on its way has carried it so far, kg·m: it is in the air where that leads off the ground, however it then moves.
+    pub(super) fn carry_off(&mut self, carried: DVec3) {
+        let Some(Inertia::Rigid { inverse_mass, .. }) = self.neighbour.as_ref().map(|n| &n.snapshot.inertia) else {
+            return;
+        };
+        let height_m = self.footing().map_or(0.0, |stand| carried.dot(stand.normal) * *inverse_mass);
+        if height_m > LIFTED_M {
+            self.height_m = Some(height_m);
+        }
+    }
+
     /// What is left of a change of velocity and of the way that it has carried the body where both lift it off the ground.
     pub(super) fn rise(&mut self, all: [DVec3; 2]) -> [DVec3; 2] {
         let Some(stand) = self.footing() else { return all };
@@ -69,7 +83,7 @@ impl Other {
     /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a); whether it stands at all. While a solve looks
     /// for impulses its answer to them must be linear: one that changed with the line on which they act would have no end.
     pub fn press(&mut self) -> bool {
-        self.pressed = self.footing().map(|_| true);
+        self.pressed = self.grounded().map(|_| true);
         self.pressed.is_some()
     }
 
@@ -88,6 +102,11 @@ impl Other {
     /// Ends a solve: each impulse tells by itself again how it meets the ground.
     pub const fn release(&mut self) {
         self.pressed = None;
+    }
+
+    /// How it stands, where it has not been lifted off that.
+    pub(super) fn grounded(&self) -> Option<Stand> {
+        self.footing().filter(|_| self.height_m.is_none_or(|height_m| height_m < LIFTED_M))
     }
 
     /// How it stands, where impulses may move it.

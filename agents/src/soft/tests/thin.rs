@@ -1,0 +1,88 @@
+//! What falls on something thin that lies on the floor, at rates at which it is on the floor before it hears of the thin thing.
+
+use super::meetings::floor;
+use super::*;
+use crate::coupling::harness::{Faults, Stage};
+use crate::rigid::{RigidBody, RigidSpec};
+use crate::rod::{Material, Section, Tube, TubeSpec};
+use crate::shape::Solid;
+
+/// A cloth of 4 mm on the floor.
+fn cloth() -> SoftSpec {
+    SoftSpec {
+        matter: SoftMatter { young_pa: 1e6, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 3.0 },
+        position: DVec3::new(-0.15, -0.1, 0.003),
+        gravity: G,
+        friction: 0.5,
+        obstacles: [floor()].into(),
+        ..spec(SoftShape::Sheet { size_m: [0.3, 0.2], thickness_m: 0.004, segments: [8, 6] })
+    }
+}
+
+/// The deepest overlap and the force of the pairs that `owner` keeps.
+fn pressed(stage: &Stage, owner: AgentId) -> (f64, f64) {
+    let pairs = &stage.newest(owner).pairs;
+    (pairs.iter().map(|p| p.penetration_m).fold(0.0, f64::max), pairs.iter().map(|p| p.force_n).sum())
+}
+
+/// It was seen to stand on the floor where what lifts it off had carried it, and each later push was taken for one before its fall.
+#[test]
+fn a_box_that_falls_on_a_cloth_on_the_floor_lies_on_the_cloth() {
+    for rates in [(60.0, 60.0), (60.0, 240.0), (240.0, 60.0), (240.0, 240.0), (100.0, 120.0)] {
+        let solid = Solid::Box { half_extents_m: DVec3::splat(0.03) };
+        let low = RigidSpec {
+            gravity: G,
+            friction: 0.5,
+            obstacles: [floor()].into(),
+            ..RigidSpec::free(solid, DVec3::Z * 0.06, 0.3)
+        };
+        let mut stage = Stage::new(Faults::default());
+        stage.at_once = true;
+        let cloth = stage.add(SoftBody::new(cloth()).unwrap(), rates.0);
+        let brick = stage.add(RigidBody::new(low).unwrap(), rates.1);
+        stage.run(1.0, |_| {});
+        let mut depth_m = 0.0_f64;
+        stage.run(2.0, |stage| depth_m = depth_m.max(pressed(stage, cloth).0));
+        let z = stage.settled(brick, 2.0).state.position.z;
+        println!("{rates:?}: {z} {depth_m}");
+        assert!((z - 0.034).abs() < 2e-4, "{rates:?}: the box is at {z}");
+        assert!(depth_m < 2e-4, "{rates:?}: {depth_m} m deep");
+    }
+}
+
+/// The block expected the tube to give way into the floor, and the tube was carried there by what it was given late.
+#[test]
+fn a_soft_block_that_falls_on_a_tube_on_the_floor_does_not_swallow_it() {
+    let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+    for rates in [(60.0, 60.0), (240.0, 240.0), (60.0, 240.0)] {
+        let path_m = vec![DVec3::new(0.0, -0.12, 0.0101), DVec3::new(0.0, 0.12, 0.0101)];
+        let tube = TubeSpec {
+            friction: 0.5,
+            damping_per_s: 3.0,
+            gravity: G,
+            obstacles: [floor()].into(),
+            ..TubeSpec::free(path_m, Section::hollow(0.01, 0.0025, material), 12)
+        };
+        let block = SoftSpec {
+            matter: SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1050.0, damping_per_s: 3.0 },
+            position: DVec3::new(-0.05, -0.05, 0.04),
+            gravity: G,
+            friction: 0.5,
+            obstacles: [floor()].into(),
+            ..spec(SoftShape::Box { size_m: DVec3::new(0.1, 0.1, 0.06), segments: [4, 4, 2] })
+        };
+        let mut stage = Stage::new(Faults::default());
+        stage.at_once = true;
+        let tube = stage.add(Tube::new(tube).unwrap(), rates.0);
+        let block = stage.add(SoftBody::new(block).unwrap(), rates.1);
+        let (mut depth_m, mut lowest_m) = (0.0_f64, f64::INFINITY);
+        stage.run(1.5, |stage| {
+            depth_m = depth_m.max(pressed(stage, block).0);
+            lowest_m = stage.newest(tube).bounds.map_or(lowest_m, |bounds| lowest_m.min(bounds.low.z));
+        });
+        println!("{rates:?}: {depth_m} lowest {lowest_m}");
+        // a fifth of the radius where it lands; 25 to 30 mm before
+        assert!(depth_m < 2e-3, "{rates:?}: {depth_m} m deep");
+        assert!(lowest_m > -1e-3, "{rates:?}: the tube is pressed into the floor by {lowest_m} m");
+    }
+}
