@@ -45,7 +45,7 @@ impl Horizon {
 }
 
 impl Tube {
-    /// Works out what owners that bend may expect of a tube that has just made a step of `dt` seconds: of one that touches nothing else
+    /// Works out what owners that bend may expect of a tube that has just made a step of `dt` seconds: of one that touches nothing that moves
     /// its next step where they are soft, keep up with it, and no link joins it to them; and where they are slower one step of theirs.
     pub(super) fn foresee(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.stepper.horizon.forget();
@@ -81,7 +81,7 @@ impl Tube {
     }
 
     /// Whether the owners of its contacts expect of the tube the step of [`Self::foretell`] after one of `dt` seconds: tubes with steps
-    /// as long, while it touches nothing else. One whole substep, implicit, tells how the next one goes.
+    /// as long, while it touches nothing that moves. One whole substep, implicit, tells how the next one goes.
     pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
         let (factor, span_s) = self.stepper.last();
         let whole = span_s == dt && factor.slots() == self.now.u.len() && self.accelerations.len() == self.now.u.len();
