@@ -10,6 +10,7 @@
 
 mod acted;
 
+use super::is_borne;
 use super::other::turned;
 use super::{Impulse, Ledger, Site};
 use crate::{AgentId, Body, CurveState, Inertia, RigidState, SimTime, Snapshot};
@@ -163,8 +164,9 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
         }
     });
     if inertia.slots() == pushed.len() {
-        inertia.respond(&mut pushed);
-        inertia.respond(&mut carried);
+        let borne = is_borne(inertia.feet(), pushed.iter().step_by(2).sum());
+        inertia.respond(&mut pushed, borne);
+        inertia.respond(&mut carried, borne);
     }
     let before =
         Motion::of(member, state, |k| state.velocities[k], |k| inertia.spins.get(k).copied().unwrap_or_default());

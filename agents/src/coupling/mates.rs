@@ -139,7 +139,9 @@ impl Mates {
             let reach_m = slack_m + (speed_m_s + mate.speed(velocities)) * h_s;
             let Some(there) = mate.to_touch() else { continue };
             touches(here, &there, reach_m, room, &mut self.touches);
+            let first = contacts.len();
             mate.add_contacts(&self.touches, (h_s, slack_m), velocities, contacts);
+            mate.other.bear(contacts[first..].iter().map(|contact| -contact.normal));
         }
     }
 

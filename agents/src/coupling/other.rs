@@ -47,6 +47,8 @@ pub struct Other {
     height_m: Option<f64>,
     /// Whether impulses only press it on what it stands on, while a solve takes that for granted.
     pressed: Option<bool>,
+    /// Whether what it lies on bears what it is given, of what bends.
+    borne: bool,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
     /// What is expected of them after that: in how many seconds it begins, N and N·m.
@@ -98,11 +100,13 @@ impl Other {
     /// Takes in the newest state of `neighbour` as it was published; whether it is one that can be touched or held.
     pub fn see(&mut self, neighbour: &Neighbour) -> bool {
         let snapshot = &neighbour.snapshot;
+        let known = self.id() == Some(neighbour.id);
         self.neighbour = Some(neighbour.clone());
         // a tool that rests is pushed as any that moves: its drive keeps it there
         let sleeps = snapshot.at_rest && !matches!(snapshot.body, Body::Tool(_));
         (self.held, self.led) = (sleeps || matches!(snapshot.inertia, Inertia::Immovable), false);
         (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
+        self.borne |= !known;
         self.coming.clear();
         self.lasting.clear();
         self.taken_back.clear();

@@ -28,6 +28,8 @@ const SLOWER: f64 = 1.01;
 #[derive(Debug, Clone, Default)]
 pub struct Horizon {
     factor: Factor,
+    /// The same where the tube lies on something fixed.
+    standing: Factor,
     /// Its length, seconds; zero where no slower owner is near.
     span_s: f64,
 }
@@ -36,6 +38,11 @@ impl Horizon {
     /// The factor of the foreseen step, where there is one.
     pub fn factor(&self) -> Option<&Factor> {
         (self.span_s > 0.0).then_some(&self.factor)
+    }
+
+    /// The same with what the tube lies on.
+    pub fn standing(&self) -> Option<&Factor> {
+        (self.span_s > 0.0).then_some(&self.standing)
     }
 
     /// Nobody needs it.
@@ -66,25 +73,29 @@ impl Tube {
         if !(span_s.is_finite() && (slower || alone)) {
             return;
         }
-        let mut gained = std::mem::take(&mut self.accelerations);
+        let [mut gained, mut standing] =
+            [&mut self.accelerations, &mut self.standing_accelerations].map(std::mem::take);
         let span_s = slower.then_some(span_s);
         let look = |stepper: &mut Stepper, now: &mut Config, setting: &Setting<'_>, _: &mut [Tie]| {
-            stepper.look_ahead(now, setting, (span_s, &mut gained))
+            stepper.look_ahead(now, setting, span_s, [&mut gained, &mut standing])
         };
         let ahead_s = self.step_by(dt, look);
-        self.accelerations = gained;
+        (self.accelerations, self.standing_accelerations) = (gained, standing);
         if soft {
             self.ahead_s = ahead_s.unwrap_or(0.0);
         } else {
-            self.accelerations.iter_mut().skip(1).step_by(2).for_each(|turning| *turning = DVec3::ZERO);
+            for list in [&mut self.accelerations, &mut self.standing_accelerations] {
+                list.iter_mut().skip(1).step_by(2).for_each(|turning| *turning = DVec3::ZERO);
+            }
         }
     }
 
     /// Whether the owners of its contacts expect of the tube the step of [`Self::foretell`] after one of `dt` seconds: tubes with steps
     /// as long, while it touches nothing that moves. One whole substep, implicit, tells how the next one goes.
     pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
-        let (factor, span_s) = self.stepper.last();
-        let whole = span_s == dt && factor.slots() == self.now.u.len() && self.accelerations.len() == self.now.u.len();
+        let whole = self.stepper.span_s() == dt
+            && self.stepper.factor().slots() == self.now.u.len()
+            && self.accelerations.len() == self.now.u.len();
         if !whole || self.spec.integrator != Integrator::ImplicitEuler || self.stepper.contacts.touches_what_moves() {
             return false;
         }
@@ -116,20 +127,28 @@ impl Tube {
         list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
         momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
         list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
-        respond((stepper.last().0, matter.held), list);
-        list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
+        let standing = stepper.footing.factor();
+        self.standing_accelerations.extend(list.iter().filter(|_| standing.is_some()));
+        let accelerate = |factor: &Factor, list: &mut Vec<DVec3>| {
+            respond((factor, matter.held), list);
+            list.iter_mut().zip(&now.u).for_each(|(then, u)| *then = (*then - *u) / dt);
+        };
+        accelerate(stepper.factor(), list);
+        standing.into_iter().for_each(|standing| accelerate(standing, &mut self.standing_accelerations));
         self.ahead_s = dt;
     }
 }
 
 impl Stepper {
     /// Solves one implicit step from `now`, of `span_s` seconds by a factor of its own, or as long as the last substep and by the factor
-    /// of that. How it accelerates every slot goes to `gained`. Returns the length of the step; `None` where it has no factor.
+    /// of that. How it accelerates every slot goes to `gained`, and how it does with what it lies on to `standing`. Returns the length of the
+    /// step; `None` where it has no factor.
     fn look_ahead(
         &mut self,
         now: &Config,
         setting: &Setting<'_>,
-        (span_s, gained): (Option<f64>, &mut Vec<DVec3>),
+        span_s: Option<f64>,
+        [gained, standing]: [&mut Vec<DVec3>; 2],
     ) -> Option<f64> {
         let Setting { matter, division, springs, integrator, .. } = *setting;
         let h = span_s.unwrap_or(self.span_s);
@@ -139,16 +158,24 @@ impl Stepper {
         let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
         let Self { rows, rhs, factor, horizon, footing, .. } = self;
         assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
+        let lies = !footing.feet().is_empty();
+        standing.clear();
+        standing.extend(rhs.iter().filter(|_| lies));
         if span_s.is_some() {
-            footing.bear(rows, matter.held);
             horizon.factor.factor(rows).ok()?;
-            horizon.factor.solve(rhs);
+            if lies {
+                footing.bear(rows, matter.held);
+                horizon.standing.factor(rows).ok()?;
+            }
             horizon.span_s = h;
-        } else {
-            footing.factor().unwrap_or(factor).solve(rhs);
         }
+        horizon.factor().unwrap_or(factor).solve(rhs);
+        horizon.standing().or(footing.factor()).filter(|_| lies).into_iter().for_each(|factor| factor.solve(standing));
         gained.clear();
-        gained.extend(rhs.iter().zip(&now.u).map(|(then, now)| (*then - *now) / h));
+        gained.extend_from_slice(rhs);
+        for list in [gained, standing] {
+            list.iter_mut().zip(&now.u).for_each(|(then, now)| *then = (*then - *now) / h);
+        }
         Some(h)
     }
 }

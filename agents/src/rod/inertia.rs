@@ -5,18 +5,24 @@
 use super::band::Factor;
 use super::config::Matter;
 use super::contact::respond;
+use crate::coupling::{Foot, Lies};
 use glam::DVec3;
 
 /// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
 #[derive(Debug, Clone, Default)]
 pub struct CurveInertia {
     factor: Factor,
+    /// Where something fixed carries it, and its answer there.
+    feet: Vec<Foot>,
+    standing: Factor,
     held: [bool; 2],
     /// How fast each segment turns, rad/s, world axes.
     pub spins: Vec<DVec3>,
     /// How each slot will accelerate in its next step, or did in the last one without what others gave at its start, m/s² and rad/s²;
     /// empty before the first.
     pub accelerations: Vec<DVec3>,
+    /// The same where something fixed carries it through that step; empty where nothing does.
+    pub standing_accelerations: Vec<DVec3>,
     /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
     pub span_s: f64,
     /// The length of the step that the accelerations foretell, seconds; zero where they are those of the last one.
@@ -39,6 +45,26 @@ impl CurveInertia {
         self.spins.extend(velocities.iter().skip(1).step_by(2));
     }
 
+    /// Takes over where it lies.
+    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>) {
+        self.feet.clear();
+        if let Some((feet, standing)) = lies {
+            self.feet.extend_from_slice(feet);
+            self.standing.copy_from(standing);
+        }
+    }
+
+    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
+        let standing = Some(&self.standing_accelerations).filter(|list| borne && !list.is_empty());
+        standing.unwrap_or(&self.accelerations)
+    }
+
+    /// Where it lies.
+    pub(crate) fn feet(&self) -> &[Foot] {
+        &self.feet
+    }
+
     /// Takes over what the tube weighs.
     pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
@@ -49,7 +75,7 @@ impl CurveInertia {
     /// What is on its way changes by how much how each slot accelerates in the step that is foretold: `changed` are the velocities that
     /// it adds when that step begins, and `carried` how far it has moved the tube by then, divided by that step, m/s. The answer goes to
     /// `changed`, m/s² (docs/theory/soft.md, eq. 16e).
-    pub(crate) fn take_back(&self, changed: &mut [DVec3], carried: &mut [DVec3]) {
+    pub(crate) fn take_back(&self, borne: bool, changed: &mut [DVec3], carried: &mut [DVec3]) {
         let damped = self.ahead_s * self.damping_per_s;
         for (v, c) in changed.iter_mut().zip(&mut *carried) {
             let both = *v + *c;
@@ -57,7 +83,7 @@ impl CurveInertia {
             *c = both;
         }
         self.momenta(changed);
-        self.respond(changed);
+        self.respond(changed, borne);
         changed.iter_mut().zip(carried).for_each(|(v, both)| *v = (*v - *both) / self.ahead_s);
     }
 
@@ -83,13 +109,15 @@ impl CurveInertia {
         }
     }
 
-    /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s).
+    /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s), with what it lies on, where that
+    /// has `borne` them, or without.
     ///
     /// # Panics
     /// Where there are not as many as [`Self::slots`].
-    pub fn respond(&self, impulses: &mut [DVec3]) {
+    pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        respond((&self.factor, self.held), impulses);
+        let lies = borne && !self.feet.is_empty();
+        respond((if lies { &self.standing } else { &self.factor }, self.held), impulses);
     }
 }
 

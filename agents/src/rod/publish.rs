@@ -51,10 +51,11 @@ impl Tube {
         if company.is_watched() || self.steps == 0 {
             into.acceleration = if self.steps == 0 { self.spec.gravity } else { self.acceleration };
             let inertia = into.inertia.curve_mut();
-            let (own, span_s) = self.stepper.last();
-            let factor = self.stepper.horizon.factor().unwrap_or(own);
-            inertia.copy_from((factor, span_s), self.matter.held, &self.now.u);
+            let (answer, lies) = self.stepper.told();
+            inertia.copy_from(answer, self.matter.held, &self.now.u);
+            inertia.stand(lies);
             inertia.accelerations.clone_from(&self.accelerations);
+            inertia.standing_accelerations.clone_from(&self.standing_accelerations);
             inertia.ahead_s = self.ahead_s;
             inertia.weigh(&self.matter, &self.division.length, &self.now.t);
         } else {

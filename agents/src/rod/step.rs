@@ -17,6 +17,7 @@ use super::past::Past;
 use super::project::Projector;
 use super::system::{Iterate, Scene, assemble};
 use super::turn::{exp, unit};
+use crate::coupling::Lies;
 use glam::{DMat3, DVec3};
 
 /// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
@@ -147,7 +148,7 @@ impl Stepper {
         }
         self.prepare(now, setting)?;
         let Self { company, factor, footing, .. } = self;
-        let answer = footing.under(company.received().sum(), setting.matter.held).unwrap_or(factor);
+        let answer = footing.under(company.received().sum()).unwrap_or(factor);
         company.received().apply(now, (answer, ties), (setting.matter, setting.division), way_m);
         Ok(())
     }
@@ -189,9 +190,17 @@ impl Stepper {
         &self.factor
     }
 
-    /// The same with what the tube lies on, and how long that substep was, seconds; zero before the first.
-    pub fn last(&self) -> (&Factor, f64) {
-        (self.footing.factor().unwrap_or(&self.factor), self.span_s)
+    /// How long that substep was, seconds; zero before the first.
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    /// What others may know of how the tube answers impulses: its factor for the step that they foresee or the last one, the length of the
+    /// last one, and where it lies with its factor there.
+    pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
+        let Self { footing, horizon, factor, span_s, .. } = self;
+        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.feet(), standing));
+        ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
     }
 
     /// Finds what the tube lies on after its last substep, where others want to know (`watched`).

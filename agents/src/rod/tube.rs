@@ -48,6 +48,8 @@ pub struct Tube {
     pub(super) acceleration: DVec3,
     /// The same of each node; empty where nobody is near.
     pub(super) accelerations: Vec<DVec3>,
+    /// The same where what it lies on carries it; empty where they do not foretell, or it lies on nothing.
+    pub(super) standing_accelerations: Vec<DVec3>,
     /// The length of the step that these foretell, seconds; zero where they are those of the last one.
     pub(super) ahead_s: f64,
     pub(super) resolution: Resolution,
@@ -100,6 +102,7 @@ impl Tube {
             at_rest: false,
             acceleration: DVec3::ZERO,
             accelerations: vec![],
+            standing_accelerations: vec![],
             ahead_s: 0.0,
             time: SimTime::ZERO,
             wave_from_s: 0.0,
@@ -244,6 +247,7 @@ impl Tube {
     /// Notes how the tube moves before its step, for [`Self::end_watch`]: its momentum, where anybody wants to know.
     fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
         self.accelerations.clear();
+        self.standing_accelerations.clear();
         self.accelerations.extend(self.now.u.iter().filter(|_| watched));
         watched.then(|| self.momentum().0)
     }

@@ -6,6 +6,7 @@
 use super::company::Company;
 use super::contact::Contacts;
 use super::doubling::Doubling;
+use super::footing::Footing;
 use super::foretold::Foretold;
 use super::holds::Tie;
 use super::lattice::Lattice;
@@ -42,6 +43,8 @@ pub struct SoftBody {
     pub(super) acceleration: DVec3,
     /// What it tells others of its next step.
     pub(super) foretold: Foretold,
+    /// Where fixed solids carry it.
+    pub(super) footing: Footing,
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
     before: Vec<DVec3>,
@@ -87,6 +90,7 @@ impl SoftBody {
             grips: vec![],
             acceleration: spec.gravity,
             foretold: Foretold::default(),
+            footing: Footing::default(),
             at_rest: false,
             doubling: Doubling::default(),
             quiet_s: 0.0,

@@ -22,8 +22,10 @@ const SQUEEZED: Settings = Settings { iterations: 300, ..SETTINGS };
 const SLACK_SHARE: f64 = 0.02;
 /// Deeper than this share of the mean edge is through a solid, not beside it.
 const DEEP_SHARE: f64 = 0.5;
-/// Where the number of a fixed solid stands in a key; the bit above tells agents from them.
+/// Where the number of a fixed solid stands in a key, below [`WALLS_END`].
 const WALL_SHIFT: u32 = 48;
+/// The keys of contacts with agents start here.
+const WALLS_END: u64 = 1 << 63;
 
 /// The contacts of one soft body.
 pub(super) struct Contacts {
@@ -183,6 +185,12 @@ impl Contacts {
     /// The mean length of an edge of the skin, metres.
     pub fn edge_m(&self) -> f64 {
         self.slack_m / SLACK_SHARE
+    }
+
+    /// Where fixed solids pressed in the last substep: what each place joins, and its normal.
+    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
+        let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
 
     /// The contacts of the last substep and their impulses, N·s.

@@ -17,6 +17,8 @@ pub(super) struct Foretold {
     pub span_s: f64,
     /// How each vertex will accelerate in it without what others give, m/s²; empty where nobody wants to know.
     pub accelerations: Vec<DVec3>,
+    /// The same where what it lies on carries it; empty where it lies on nothing.
+    pub standing: Vec<DVec3>,
     /// The length of the last substep, seconds.
     last_s: f64,
     /// How contacts pressed each vertex in the last substep, and in the one before, N.
@@ -50,12 +52,17 @@ impl SoftBody {
     /// many substeps more that took.
     pub(super) fn foretell(&mut self, dt: f64) -> u32 {
         self.foretold.accelerations.clear();
+        self.foretold.standing.clear();
         self.foretold.span_s = self.foretold.last_s;
         if !self.company.is_watched() {
+            self.footing.forget();
             return 0;
         }
         let divided = dt > self.foretold.last_s * WHOLE;
-        if divided && self.assemble(dt) {
+        self.footing.find(&self.contacts);
+        if divided {
+            self.assemble(dt);
+            self.system.factor();
             self.foretold.span_s = dt;
         }
         let Self { foretold, system, lattice, velocities, free: before, given, .. } = self;
@@ -68,9 +75,20 @@ impl SoftBody {
         momenta.iter_mut().zip(foretold.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
         let still = velocities.iter().zip(&lattice.mass_kg).map(|(now, mass)| *now * *mass);
         momenta.iter_mut().zip(still).for_each(|(momentum, still)| *momentum = still + *momentum * (span_s / last_s));
+        let lies = !self.footing.is_empty();
+        foretold.standing.extend(momenta.iter().filter(|_| lies));
         system.respond(&mut momenta);
-        momenta.iter_mut().zip(&*velocities).for_each(|(a, now)| *a = (*a - *now) / span_s);
         foretold.accelerations = momenta;
-        u32::from(divided)
+        if lies {
+            self.footing.keep(self.system.answer());
+            self.assemble(dt);
+            self.footing.bear(&mut self.system);
+            self.system.factor();
+            self.system.respond(&mut self.foretold.standing);
+        }
+        for list in [&mut self.foretold.accelerations, &mut self.foretold.standing] {
+            list.iter_mut().zip(&self.velocities).for_each(|(a, now)| *a = (*a - *now) / span_s);
+        }
+        u32::from(divided) + u32::from(lies)
     }
 }

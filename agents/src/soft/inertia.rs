@@ -3,16 +3,22 @@
 //! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::system::Factor;
+use crate::coupling::{Foot, Lies};
 use glam::DVec3;
 
 /// A soft body's answer to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
 #[derive(Debug, Clone, Default)]
 pub struct SoftInertia {
     factor: Factor,
+    /// Where something fixed carries it, and its answer there.
+    feet: Vec<Foot>,
+    standing: Factor,
     /// Of each vertex by itself, 1/kg.
     mobilities: Vec<f64>,
     /// How each vertex will accelerate without what others give, m/s².
     pub accelerations: Vec<DVec3>,
+    /// The same where something fixed carries it through that step; empty where nothing does.
+    pub standing_accelerations: Vec<DVec3>,
     /// The length of the substep that ended last, seconds: published velocities are the means over it.
     pub span_s: f64,
     /// Mass of each vertex, kg, and damping, 1/s.
@@ -28,6 +34,26 @@ impl SoftInertia {
         self.mobilities.extend_from_slice(mobilities);
     }
 
+    /// Takes over where it lies.
+    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>) {
+        self.feet.clear();
+        if let Some((feet, standing)) = lies {
+            self.feet.extend_from_slice(feet);
+            self.standing.copy_from(standing);
+        }
+    }
+
+    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
+        let standing = Some(&self.standing_accelerations).filter(|list| borne && !list.is_empty());
+        standing.unwrap_or(&self.accelerations)
+    }
+
+    /// Where it lies.
+    pub(crate) fn feet(&self) -> &[Foot] {
+        &self.feet
+    }
+
     /// How many slots it knows: one a vertex; zero before the first step.
     #[must_use]
     pub const fn slots(&self) -> usize {
@@ -41,20 +67,22 @@ impl SoftInertia {
 
     /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), change of its acceleration in the step
     /// that comes, m/s²: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
-    pub(crate) fn take_back(&self, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
+    pub(crate) fn take_back(&self, borne: bool, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
         room.clear();
         room.extend(shares.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
-        self.respond(room);
+        self.respond(room, borne);
         let damped = 2.0 + self.span_s * self.damping_per_s;
         shares.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
     }
 
-    /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s).
+    /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s), with what it lies on, where that has `borne` them,
+    /// or without.
     ///
     /// # Panics
     /// Where there are not as many as [`Self::slots`].
-    pub fn respond(&self, impulses: &mut [DVec3]) {
+    pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        self.factor.respond(impulses);
+        let lies = borne && !self.feet.is_empty();
+        if lies { &self.standing } else { &self.factor }.respond(impulses);
     }
 }

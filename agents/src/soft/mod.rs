@@ -12,6 +12,7 @@ mod company;
 mod contact;
 mod doubling;
 mod fold;
+mod footing;
 mod foretold;
 mod grid;
 mod holds;

@@ -23,8 +23,11 @@ impl SoftBody {
         soft.velocities.clone_from(&self.velocities);
         if self.company.is_watched() && self.steps > 0 {
             let inertia = into.inertia.soft_mut();
-            inertia.copy_from(self.system.answer(), &self.contacts.mobilities);
+            let (answer, lies) = self.footing.told(self.system.answer());
+            inertia.copy_from(answer, &self.contacts.mobilities);
+            inertia.stand(lies);
             inertia.accelerations.clone_from(&self.foretold.accelerations);
+            inertia.standing_accelerations.clone_from(&self.foretold.standing);
             inertia.span_s = self.foretold.span_s;
             inertia.mass_kg.clone_from(&self.lattice.mass_kg);
             inertia.damping_per_s = self.spec.matter.damping_per_s;

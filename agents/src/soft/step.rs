@@ -43,7 +43,8 @@ impl SoftBody {
 
     /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
     pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
-        if !self.assemble(h) {
+        self.assemble(h);
+        if !self.system.factor() {
             return Err("its stiffness has no inverse");
         }
         let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
@@ -56,8 +57,8 @@ impl SoftBody {
         Ok(())
     }
 
-    /// Finds the forces on where it is, and how it answers impulses in a substep of `h` seconds; whether it does.
-    pub(super) fn assemble(&mut self, h: f64) -> bool {
+    /// Forms the system of a substep of `h` seconds from where it is.
+    pub(super) fn assemble(&mut self, h: f64) {
         let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
         system.begin(h);
@@ -70,7 +71,6 @@ impl SoftBody {
         ties.iter_mut().for_each(|tie| tie.add(positions[tie.vertex], h, system));
         contacts.mobilities.clear();
         contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
-        system.factor()
     }
 
     /// Lets contact act on the foreseen velocities.
@@ -91,19 +91,20 @@ impl SoftBody {
 
     /// Takes in what others gave since the last step, and looks who is near.
     fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
-        let Self { system, positions, velocities, given, company, foretold, .. } = self;
+        let Self { system, positions, velocities, given, company, foretold, footing, .. } = self;
         given.clear();
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
+            let answer = footing.under(sums, system.answer());
             given.extend_from_slice(sums);
             for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
                 let past = moment.dot(*sum) / (foretold.span_s * sum.length_squared()).max(f64::MIN_POSITIVE);
                 *sum *= past.clamp(0.0, 1.0);
                 *given -= *sum;
             }
-            system.respond(sums);
-            system.respond(carried);
+            answer.respond(sums);
+            answer.respond(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
             positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);
         }

@@ -62,6 +62,11 @@ impl System {
         }
     }
 
+    /// Adds what joins the velocities of two vertices, `i` not below `j`, kg.
+    pub fn join(&mut self, (i, j): (u32, u32), inertia: DMat3) {
+        self.add((i as usize, j as usize), inertia);
+    }
+
     /// Adds an inertia to a vertex, kg.
     pub fn weigh(&mut self, vertex: usize, inertia: DMat3) {
         self.add((vertex, vertex), inertia);

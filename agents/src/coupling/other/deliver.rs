@@ -45,6 +45,7 @@ impl Other {
         let Flight { mut sums, mut carried, .. } = flight;
         if !sums.is_empty() {
             self.carry_off(carried[0]);
+            self.bear(sums.iter().step_by(self.stride()).copied());
             self.respond(&mut sums);
             self.respond(&mut carried);
             [sums[0], carried[0]] = self.rise([sums[0], carried[0]]);
@@ -92,8 +93,8 @@ impl Other {
     /// changes of how it accelerates in that step, m/s², which goes to `changed`.
     pub(super) fn find_change(&self, changed: &mut [DVec3], carried: &mut Vec<DVec3>) {
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Soft(soft)) => soft.take_back(changed, carried),
-            Some(Inertia::Curve(curve)) => curve.take_back(changed, carried),
+            Some(Inertia::Soft(soft)) => soft.take_back(self.borne, changed, carried),
+            Some(Inertia::Curve(curve)) => curve.take_back(self.borne, changed, carried),
             _ => {}
         }
     }

@@ -4,7 +4,7 @@
 //! towards the ground, which the body does not feel ([`Other::respond`]). Theory: docs/theory/coupling.md, eq. 7f.
 
 use super::Other;
-use crate::coupling::Impulse;
+use crate::coupling::{Foot, Impulse, is_borne};
 use crate::{Inertia, Stand};
 use glam::DVec3;
 
@@ -78,6 +78,24 @@ impl Other {
     pub fn lift_m_s(&self, normal: DVec3, h: f64) -> f64 {
         let stand = self.footing().filter(|_| self.fall(h).is_none());
         stand.map_or(0.0, |stand| 0.5 * h * stand.weight_m_s2 * (-normal.dot(stand.normal)).max(0.0))
+    }
+
+    /// Takes in whom it touches by their pushes, a direction each: whether what it lies on bears them, where it bends (eq. 7k). One that is
+    /// to be lifted off that answers as if it lay on nothing.
+    pub fn bear(&mut self, pushes: impl Iterator<Item = DVec3>) {
+        let mut pushes = pushes.peekable();
+        if pushes.peek().is_some() && !self.feet().is_empty() {
+            self.borne = is_borne(self.feet(), pushes.sum());
+        }
+    }
+
+    /// Where it lies, if it bends.
+    pub(super) fn feet(&self) -> &[Foot] {
+        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
+            Some(Inertia::Curve(curve)) => curve.feet(),
+            Some(Inertia::Soft(soft)) => soft.feet(),
+            _ => &[],
+        }
     }
 
     /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a); whether it stands at all. While a solve looks

@@ -47,10 +47,10 @@ impl Other {
         room.clear();
         room.resize(into.len(), DVec3::ZERO);
         room.iter_mut().zip(lasts).for_each(|(free, lasts)| *free = *lasts * h);
-        curve.respond(room);
+        curve.respond(room, self.borne);
         room.iter_mut().zip(&*into).for_each(|(free, gain)| *free += *gain);
         curve.momenta(room);
-        curve.respond(room);
+        curve.respond(room, self.borne);
         let (late, reckoned) = (0.5 * (parts - 1.0) / parts, self.reckoned_s() / h);
         into.iter_mut().zip(&*room).for_each(|(gain, free)| *gain -= *gain * reckoned + *free * late);
     }

@@ -26,10 +26,10 @@ impl Other {
         let changed = || self.taken_back.get(slot).copied().unwrap_or_default();
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
             Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == slots => {
-                curve.accelerations[slot] + changed()
+                curve.foretold(self.borne)[slot] + changed()
             }
             Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == slots => {
-                soft.accelerations[slot] + changed()
+                soft.foretold(self.borne)[slot] + changed()
             }
             _ if slot.is_multiple_of(self.stride()) => self.acceleration(),
             _ => DVec3::ZERO,

@@ -134,10 +134,10 @@ impl TubeContacts {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
-    /// Where fixed solids pressed in the last solve: what each place joins, its normal, and what it gave along it, N·s.
-    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3, f64)> {
+    /// Where fixed solids pressed in the last solve: what each place joins, and its normal.
+    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
-        fixed.map(|(c, impulse)| (c.slots, c.normal, impulse.dot(c.normal))).filter(|(.., given)| *given > 0.0)
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
 
     /// Whether the last search found any contact with what moves, itself included.

@@ -47,7 +47,7 @@ fn a_step_that_was_divided_foretells_a_whole_one() {
     for vertex in [0, 31, 62, 124] {
         let mut answers = [vec![DVec3::ZERO; 125], vec![DVec3::ZERO; 125]];
         answers.iter_mut().for_each(|list| list[vertex] = DVec3::new(0.1, 0.2, 0.3));
-        told.respond(&mut answers[0]);
+        told.respond(&mut answers[0], false);
         still.system.respond(&mut answers[1]);
         for (told, made) in answers[0].iter().zip(&answers[1]) {
             assert!(told.distance(*made) < 1e-6 * answers[1][vertex].length(), "{told} for {made}"); // h in nanoseconds

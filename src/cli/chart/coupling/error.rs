@@ -231,7 +231,7 @@ fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
         carried[2 * segment + 1] += moved.angular;
     });
     if inertia.slots() == carried.len() {
-        inertia.respond(&mut carried);
+        inertia.respond(&mut carried, false);
         state.positions.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, by)| *x += *by);
     }
     body

@@ -129,7 +129,7 @@ fn with_mail(stage: &Stage, tube: AgentId, owner: AgentId) -> f64 {
         });
     }
     let mut answer = impulses.clone();
-    inertia.respond(&mut answer);
+    inertia.respond(&mut answer, false);
     let velocity =
         |slot: usize| if slot.is_multiple_of(2) { curve.velocities[slot / 2] } else { inertia.spins[slot / 2] };
     let work = impulses.iter().zip(&answer).enumerate().map(|(slot, (j, dv))| j.dot(velocity(slot) + *dv * 0.5));

@@ -110,7 +110,7 @@ fn the_published_inertia_is_the_inverse_mass_of_every_point() {
             let mut slots = vec![DVec3::ZERO; curve.slots()];
             slots[2 * segment] = axis * (1.0 - share);
             slots[2 * segment + 2] = axis * share;
-            curve.respond(&mut slots);
+            curve.respond(&mut slots, false);
             let got = slots[2 * segment].lerp(slots[2 * segment + 2], share);
             let want = want * axis;
             assert!((got - want).length() <= 1e-11 * want.length(), "{arc_m}: {got} is not {want}");
