@@ -58,9 +58,9 @@ impl Footing {
         (!self.feet.is_empty()).then_some(&self.factor)
     }
 
-    /// The same where it lies under these impulses, one a slot; `None` where they lift it off.
-    pub fn under(&self, impulses: &[DVec3]) -> Option<&Factor> {
-        self.factor().filter(|_| is_borne(&self.feet, impulses.iter().step_by(2).sum()))
+    /// The same where it lies under this push, N·s; `None` where that lifts it off.
+    pub fn under(&self, push: DVec3) -> Option<&Factor> {
+        self.factor().filter(|_| is_borne(&self.feet, push))
     }
 
     /// Adds the feet to a system.

@@ -50,9 +50,9 @@ impl Received {
         !self.any
     }
 
-    /// What came, N·s at nodes and N·m·s at segments.
-    pub fn sum(&self) -> &[DVec3] {
-        &self.sum
+    /// What came, at all nodes together, N·s.
+    pub fn push(&self) -> DVec3 {
+        [&self.sum, &self.fresh].into_iter().flat_map(|list| list.iter().step_by(2)).sum()
     }
 
     /// What of it acts through the substep that comes, N·s and N·m·s in slots; empty for nothing.

@@ -148,7 +148,7 @@ impl Stepper {
         }
         self.prepare(now, setting)?;
         let Self { company, factor, footing, .. } = self;
-        let answer = footing.under(company.received().sum()).unwrap_or(factor);
+        let answer = footing.under(company.received().push()).unwrap_or(factor);
         company.received().apply(now, (answer, ties), (setting.matter, setting.division), way_m);
         Ok(())
     }
