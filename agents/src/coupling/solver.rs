@@ -59,6 +59,8 @@ pub struct Solver {
     known: Vec<Known>,
     known_h: f64,
     stiffness: f64,
+    /// The same three as the last solve found them.
+    before: (Vec<Known>, f64, f64),
     scale: Vec<f64>,
     free: Vec<DVec3>,
     now: Iterate,
@@ -117,6 +119,13 @@ impl Solver {
         self.stiffness = 1.0;
     }
 
+    /// Forgets the last solve alone: it was asked with what turned out to be wrong.
+    pub fn take_back(&mut self) {
+        std::mem::swap(&mut self.known, &mut self.before.0);
+        self.known.iter_mut().for_each(|known| known.taken = false);
+        (self.known_h, self.stiffness) = (self.before.1, self.before.2);
+    }
+
     /// The impulse of each contact of the last solve, N·s, in the order the contacts were given.
     #[must_use]
     pub fn impulses(&self) -> &[DVec3] {
@@ -144,6 +153,7 @@ impl Solver {
         self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
         self.scale.clear();
         self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
+        (self.before.1, self.before.2) = (self.known_h, self.stiffness);
         self.start(problem);
         self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
     }
@@ -180,6 +190,7 @@ impl Solver {
 
     fn remember(&mut self, problem: &Problem<'_>) {
         let Self { known, now, .. } = self;
+        std::mem::swap(known, &mut self.before.0);
         let named = problem.contacts.iter().zip(&now.lambda);
         known.clear();
         known.extend(named.map(|(c, &lambda)| Known { key: c.key, lambda, taken: false }));

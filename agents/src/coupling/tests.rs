@@ -112,6 +112,30 @@ fn the_solve_agrees_with_gauss_seidel_on_random_problems() {
     }
 }
 
+/// A body that yields to nothing asks for impulses without end: who was taken for one is solved for anew.
+#[test]
+fn a_solve_that_is_taken_back_leaves_no_trace() {
+    let mut noise = Noise(17);
+    let (mut body, mut rigid) = (Dense::random(6, &mut noise), Dense::diagonal(&[1e-9; 6]));
+    let contacts = random_contacts(5, 6, 0.3, &mut noise);
+    let free: Vec<DVec3> = (0..6).map(|_| noise.vector()).collect();
+    let mobilities = body.mobilities();
+    let few = Settings { iterations: 10, tolerance_m_s: 1e-11 };
+    let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &mobilities, settings: few };
+    let [one, other] = [false, true].map(|strays| {
+        let mut solver = Solver::default();
+        solver.solve(&problem, &mut free.clone(), &mut body);
+        if strays {
+            solver.solve(&problem, &mut free.clone(), &mut rigid);
+            solver.take_back();
+        }
+        let mut velocities = free.clone();
+        solver.solve(&problem, &mut velocities, &mut body);
+        velocities
+    });
+    assert_eq!(one, other);
+}
+
 /// The first solve asks the body, the second one finds that W costs less.
 #[test]
 fn a_solve_forming_its_matrix_gives_what_one_that_does_not_gives() {

@@ -244,6 +244,7 @@ impl Meeting {
                 break;
             }
             self.velocities.clone_from(&self.free);
+            if is_blow { self.blow.take_back() } else { self.press.take_back() }
         }
         company.release();
     }

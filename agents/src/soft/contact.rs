@@ -133,6 +133,7 @@ impl Contacts {
                 break;
             }
             velocities.copy_from_slice(free);
+            solver.take_back();
         }
         company.mates_mut().release();
     }
