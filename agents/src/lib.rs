@@ -26,7 +26,7 @@ pub use drift::DRIFT_S;
 pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
-    Anchor, Body, Bounds, Clasp, CurveState, Grasp, Grip, HASH_START, Inertia, RigidState, Snapshot, SoftState, Stand,
-    ToolState,
+    Anchor, Body, Bounds, Clasp, CurveState, Grasp, Grip, HASH_START, Inertia, LiesOn, RigidState, Snapshot, SoftState,
+    Stand, ToolState, Upheld,
 };
 pub use time::{SimSpan, SimTime};

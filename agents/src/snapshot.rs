@@ -3,8 +3,10 @@
 //! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
 //! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
 
+mod lies;
 mod stand;
 
+pub use lies::{LiesOn, Upheld};
 pub use stand::Stand;
 
 use crate::coupling::{Ledger, PairState, Rebound, Sprung};
@@ -51,6 +53,8 @@ pub struct Snapshot {
     pub sprung: Rare<Sprung>,
     /// What fixed solids gave it in its last step: it was not there before, and late impulses may have spared it.
     pub rebound: Rare<Rebound>,
+    /// On whom it lies, where something fixed holds that one up.
+    pub lies: Rare<LiesOn>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -359,6 +363,7 @@ impl Snapshot {
         self.drift_m = 0.0;
         self.sprung.set(None);
         self.rebound.set(None);
+        self.lies.set(None);
         self.pairs.clear();
         self.bonds.clear();
     }
@@ -376,6 +381,7 @@ impl Snapshot {
             && self.acceleration.is_finite()
             && self.sprung.get().is_none_or(Sprung::is_finite)
             && self.rebound.get().is_none_or(Rebound::is_finite)
+            && self.lies.get().is_none_or(LiesOn::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

@@ -69,6 +69,23 @@ impl Slots {
         linear.sum::<DVec3>() + angular.map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum::<DVec3>()
     }
 
+    /// Marks the slots of a contact with something fixed: those of two parts of one body have weights of both signs.
+    pub(crate) fn mark_fixed(&self, fixed: &mut [bool]) {
+        if self.linear().iter().all(|(_, weight)| *weight >= 0.0) {
+            self.linear().iter().for_each(|(slot, _)| fixed[*slot as usize] = true);
+        }
+    }
+
+    /// Whether all of the slots below `fixed.len()` that it gathers from are marked.
+    pub(crate) fn is_fixed(&self, fixed: &[bool]) -> bool {
+        self.linear().iter().all(|(slot, _)| fixed.get(*slot as usize).is_none_or(|fixed| *fixed))
+    }
+
+    /// The arm at which it gathers from a spin in `slot` or after it.
+    pub(crate) fn arm_from(&self, slot: usize) -> Option<DVec3> {
+        self.angular().iter().find(|(at, _)| *at as usize >= slot).map(|(_, arm)| *arm)
+    }
+
     /// Adds the impulses and angular impulses Jᵀ λ (eq. 2).
     pub fn scatter(&self, impulse: DVec3, into: &mut [DVec3]) {
         for &(slot, w) in self.linear() {

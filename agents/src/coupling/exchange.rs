@@ -8,7 +8,7 @@ use super::beside::carried;
 use super::laws::Wave;
 use super::taken::Taken;
 use super::{Impulse, Ledger, Site};
-use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings};
+use crate::{AgentId, Neighbour, SimTime, Snapshot, Surroundings, Upheld};
 use glam::DVec3;
 
 /// How an agent's couplings act.
@@ -78,6 +78,8 @@ pub struct PairState {
     pub inverse_mass_per_kg: Option<[f64; 2]>,
     /// What is left in the energy tank, joules; `None` where the law keeps none.
     pub tank_j: Option<f64>,
+    /// How the other side lies on the owner, where something fixed holds the owner up there.
+    pub bears: Option<Upheld>,
     /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
     pub parasitic_kg: f64,
     /// What this end of a line sends; with wave variables both sides publish the pair.
@@ -98,6 +100,7 @@ impl PairState {
             in_flight_n_s: 0.0,
             inverse_mass_per_kg: None,
             tank_j: None,
+            bears: None,
             parasitic_kg: 0.0,
             wave: None,
         }
@@ -146,7 +149,7 @@ impl Exchange {
             owned.ledger.turn(taken, around.time);
             owned.step_impulse = DVec3::ZERO;
             owned.parts.clear();
-            (owned.state.contacts, owned.state.penetration_m) = (0, 0.0);
+            (owned.state.contacts, owned.state.penetration_m, owned.state.bears) = (0, 0.0, None);
         }
     }
 
@@ -203,6 +206,16 @@ impl Exchange {
         &mut self.taken[at]
     }
 
+    /// Gives `to` an impulse that acts and may be taken so many seconds after the step's start; nobody expects it to go on.
+    pub fn give_late(&mut self, to: AgentId, site: Site, times_s: [f64; 2], impulse: Impulse) {
+        let now = self.now;
+        let owned = self.owned_mut(to);
+        owned.ledger.give_late(site, now, times_s, impulse);
+        owned.step_impulse += impulse.linear;
+        owned.state.impulse_n_s += impulse.linear.length();
+        owned.active = now;
+    }
+
     /// Gives `to` an impulse that acts `after_s` seconds into the step.
     pub fn give(&mut self, to: AgentId, site: Site, after_s: f64, impulse: Impulse) {
         let now = self.now;
@@ -228,6 +241,11 @@ impl Exchange {
     #[must_use]
     pub fn pair(&self, to: AgentId) -> Option<&PairState> {
         self.owned.iter().find(|o| o.ledger.with == to).map(|o| &o.state)
+    }
+
+    /// Lets others know that `from` may soon give something here: who gives here too then looks at what it gives from the first on.
+    pub fn expect(&mut self, from: AgentId) {
+        self.taken_mut(from);
     }
 
     /// What `other` has been given and had not taken in the snapshot that is seen: J − J_ack, and how far that has carried it

@@ -61,7 +61,11 @@ pub struct Page {
 pub struct Coming {
     /// From when on it may be taken.
     pub due: SimTime,
-    /// What it adds to the page in use.
+    /// When it acts.
+    pub acts: SimTime,
+    /// The number of the page on which it stands.
+    pub page: u64,
+    /// What it adds to that page.
     pub entry: Entry,
 }
 
@@ -203,35 +207,53 @@ impl Ledger {
 
     /// Books an impulse that acted `after_s` seconds after `time`.
     pub fn give(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) {
+        let (page, entry) = self.book(site, time, after_s, impulse);
+        let grains = SimSpan::from_secs_f64(after_s).map_or(0, |after| after.as_nanos() / GRAIN_NS);
+        if grains > 0 {
+            let due = time + SimSpan::from_nanos(grains * GRAIN_NS);
+            self.announce(Coming { due, acts: due, page, entry });
+        }
+    }
+
+    /// Books an impulse that acts and may be taken so many seconds after `time`, past the end of the owner's step too.
+    pub fn give_late(&mut self, site: Site, time: SimTime, [acts_s, due_s]: [f64; 2], impulse: Impulse) {
+        let (page, entry) = self.book(site, time, acts_s, impulse);
+        let [acts, due] = [acts_s, due_s].map(|s| time + SimSpan::from_secs_f64(s).unwrap_or(SimSpan::ZERO));
+        self.announce(Coming { due, acts, page, entry });
+    }
+
+    /// Writes on the page in use: its number, and what was written.
+    fn book(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) -> (u64, Entry) {
         if self.pages.is_empty() {
             self.pages.push(Page { number: 0, origin: time, entries: Vec::new() });
         }
-        let Some(page) = self.pages.last_mut() else { return };
+        let page = self.pages.last_mut().expect("one was made");
         let after_origin_s = time.secs_after(page.origin) + after_s;
         let entry = Entry { site, sum: impulse, moment: impulse * after_origin_s };
         page.add(entry);
         self.revision += 1;
-        let grains = SimSpan::from_secs_f64(after_s).map_or(0, |after| after.as_nanos() / GRAIN_NS);
-        if grains > 0 {
-            self.announce(time + SimSpan::from_nanos(grains * GRAIN_NS), entry);
+        (page.number, entry)
+    }
+
+    /// Notes that a part of a page acts late.
+    fn announce(&mut self, part: Coming) {
+        let same = |known: &&mut Coming| {
+            (known.due, known.acts, known.page) == (part.due, part.acts, part.page)
+                && known.entry.site == part.entry.site
+        };
+        match self.coming.iter_mut().find(same) {
+            Some(known) => known.entry.add(&part.entry),
+            None => self.coming.push(part),
         }
     }
 
-    /// Notes that a part of the page in use acts late.
-    fn announce(&mut self, due: SimTime, part: Entry) {
-        match self.coming.iter_mut().find(|coming| coming.due == due && coming.entry.site == part.site) {
-            Some(known) => known.entry.add(&part),
-            None => self.coming.push(Coming { due, entry: part }),
-        }
-    }
-
-    /// Begins a step of the owner at `now`: what was to come has acted. Tears out the pages that the other side has taken
+    /// Begins a step of the owner at `now`: what was to come has acted, but for what waits for somebody's answer. Tears out the pages that the other side has taken
     /// whole, and turns over one that is full.
     ///
     /// `taken` is the other side's copy, `None` where it has none yet. A full page is only turned when none waits before it:
     /// a side that has stopped acknowledging costs two pages and no more.
     pub fn turn(&mut self, taken: Option<&Self>, now: SimTime) {
-        self.coming.clear();
+        self.coming.retain(|coming| coming.due > coming.acts && coming.due > now);
         let settled = |page: &Page| taken.and_then(|t| t.page(page.number)).is_some_and(|t| t.entries == page.entries);
         if self.pages.len() > 1 && settled(&self.pages[0]) {
             self.pages.remove(0);
@@ -303,8 +325,8 @@ impl Ledger {
         self.copy_from(given);
         let Self { pages, coming, .. } = self;
         coming.retain(|coming| coming.due >= until);
-        if let Some(page) = pages.last_mut() {
-            coming.iter().for_each(|coming| page.take_out(&coming.entry));
+        for late in coming.iter() {
+            pages.iter_mut().filter(|page| page.number == late.page).for_each(|page| page.take_out(&late.entry));
         }
     }
 
@@ -389,6 +411,24 @@ mod tests {
         assert_eq!(read_until(&given, 1.042), (1.5, false, true), "the owner's next step begins: all has acted");
     }
 
+    #[test]
+    fn what_waits_for_an_answer_is_taken_when_that_is_read_however_often_its_owner_steps() {
+        let (mut given, mut taken) = (Ledger::new(AgentId(1)), Ledger::new(AgentId(0)));
+        given.give_late(Site::Whole, at(1.0), [0.1, 0.2], pushed(0.5));
+        given.turn(None, at(1.15));
+        let mut read_until = |until: f64| {
+            let mut reading = Ledger::new(AgentId(0));
+            reading.read(&given, at(until));
+            let mut seen = (0.0, 0.0);
+            reading.since(Some(&taken), at(until), |_, sum, way| seen = (sum.linear.x, way.linear.x));
+            taken = reading;
+            seen
+        };
+        assert_eq!(read_until(1.2), (0.0, 0.0));
+        let (sum, way) = read_until(1.3);
+        assert!((sum - 0.5).abs() < 1e-15 && (way - 0.1).abs() < 1e-12, "{sum} {way}"); // it has acted for 0.2 s
+    }
+
     proptest! {
         /// Whatever is lost, repeated, seen late or not due yet, the other side ends with every impulse once, and with
         /// their times.
@@ -402,7 +442,7 @@ mod tests {
             let mut acknowledged = vec![];
             let mut taken: Option<Ledger> = None;
             let (mut now, mut total, mut moment) = (0.0, 0.0, 0.0);
-            let (mut received, mut arrived) = (0.0, 0.0);
+            let (mut received, mut arrived, mut until) = (0.0, 0.0, 0.0_f64);
             let mut take = |ledger: &Ledger, taken: &mut Option<Ledger>, now: f64, until: f64| {
                 if taken.as_ref().is_some_and(|known| !ledger.is_beyond(known)) {
                     return; // an older reading
@@ -425,15 +465,19 @@ mod tests {
                     total += size;
                     moment += size * (now + after);
                 }
+                given.give_late(Site::Arc(f64::from(site)), at(now), [after, after + 0.05], pushed(size));
+                total += size;
+                moment += size * (now + after);
                 published.push(given.clone());
                 // the other side reads the newest, an old one, or nothing
                 let read = match what { 0 => None, 1 => published.last(), _ => published.get(published.len().saturating_sub(1 + late)) };
                 if let Some(ledger) = read {
-                    take(ledger, &mut taken, now, now + 0.5 * gap);
+                    until = now.max(until) + 0.5 * gap; // no step of a reader ends before the one before it
+                    take(ledger, &mut taken, now, until);
                     acknowledged.extend(taken.clone());
                 }
             }
-            take(&given, &mut taken, now, now + 0.1);
+            take(&given, &mut taken, now, until.max(now) + 0.2);
             prop_assert!((received - total).abs() < 1e-12 * 200.0, "{received} {total}");
             prop_assert!((arrived - moment).abs() < 1e-9, "{arrived} {moment}");
             prop_assert!(given.is_settled(taken.as_ref()));

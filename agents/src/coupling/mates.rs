@@ -9,7 +9,7 @@ mod mate;
 mod tanks;
 
 pub use far::Far;
-pub use mate::Mate;
+pub use mate::{Feet, Mate};
 
 use super::touch::{TouchRoom, touches};
 use super::{Contact, Exchange, Impulse, Link, PairKind, PairState, Placed, Site, Touch};
@@ -27,6 +27,8 @@ pub struct Mates {
     count: usize,
     touches: Vec<Touch>,
     impulses: Vec<DVec3>,
+    /// Which of the owner's slots fixed solids press in the substep.
+    pressed: Vec<bool>,
     tanks: Tanks,
 }
 
@@ -202,18 +204,25 @@ impl Mates {
     ) {
         self.impulses.clear();
         self.impulses.resize(self.all().last().map_or(own, Mate::end), DVec3::ZERO);
-        self.note(contacts);
+        self.note(contacts, own);
         springs.for_each(|spring| self.pass_on(&spring, start));
         let Self { list, count, impulses, exchange, tanks, .. } = self;
         list[..*count].iter_mut().for_each(|mate| mate.take(impulses, (exchange, tanks), (start, h)));
     }
 
-    fn note<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>) {
-        let Self { list, count, impulses, .. } = self;
+    /// Notes the contacts of a substep, those with fixed solids first; the owner has `own` slots.
+    fn note<'a>(&mut self, contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>, own: usize) {
+        let Self { list, count, impulses, pressed, .. } = self;
         let mates = &mut list[..*count];
+        pressed.clear();
+        pressed.resize(own, false);
         for (contact, impulse) in contacts {
             contact.slots.scatter(*impulse, impulses);
-            mates.iter_mut().find(|mate| mate.is_of(contact)).into_iter().for_each(|mate| mate.note(contact, *impulse));
+            match mates.iter_mut().find(|mate| mate.is_of(contact)) {
+                Some(mate) => mate.note(contact, *impulse, pressed),
+                None if *impulse != DVec3::ZERO => contact.slots.mark_fixed(pressed),
+                None => {}
+            }
         }
     }
 

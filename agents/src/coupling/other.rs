@@ -9,6 +9,7 @@ mod astray;
 mod deliver;
 mod ground;
 mod held;
+mod lying;
 mod motion;
 mod places;
 
@@ -18,6 +19,7 @@ use super::sprung::Lean;
 use super::{Exchange, Form, Twist};
 use crate::{AgentId, Body, Inertia, Neighbour, Surroundings, ToolState};
 use glam::{DQuat, DVec3};
+use lying::Lying;
 pub(super) use motion::turned;
 use std::sync::Arc;
 
@@ -49,6 +51,8 @@ pub struct Other {
     pressed: Option<bool>,
     /// Whether what it lies on bears what it is given, of what bends.
     borne: bool,
+    /// How it lies on another agent that something fixed holds up.
+    lying: Option<Lying>,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
     /// What is expected of them after that: in how many seconds it begins, N and N·m.
@@ -107,6 +111,7 @@ impl Other {
         (self.held, self.led) = (sleeps || matches!(snapshot.inertia, Inertia::Immovable), false);
         (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
         self.borne |= !known;
+        self.lying = None;
         self.coming.clear();
         self.lasting.clear();
         self.taken_back.clear();

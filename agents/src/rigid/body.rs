@@ -21,8 +21,8 @@ use crate::coupling::{Form, FormKind, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
-    Agent, AgentId, Body, Companion, Grip, Neighbour, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError,
-    StepReport, Surroundings, check_span,
+    Agent, AgentId, Body, Companion, Grip, LiesOn, Neighbour, Resolution, RigidState, SimSpan, Snapshot, Stand,
+    StepError, StepReport, Surroundings, check_span,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -61,6 +61,8 @@ pub struct RigidBody {
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
+    /// On whom it lies.
+    pub(super) lies: Option<LiesOn>,
     /// In how many seconds of free flight something fixed may be in its way, where others have to know.
     pub(super) lands_s: Option<f64>,
     /// For how long it has stood, seconds.
@@ -136,6 +138,7 @@ impl RigidBody {
             borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
+            lies: None,
             lands_s: None,
             stood_s: 0.0,
             hold: Hold::default(),
@@ -218,6 +221,7 @@ impl RigidBody {
         self.hold.forget();
         self.borne.forget();
         self.settle(around, dt);
+        self.lies = None; // others in that world hold it too
     }
 
     /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.

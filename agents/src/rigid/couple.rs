@@ -11,8 +11,11 @@ use super::leant;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
+use crate::coupling::beside::bends;
 use crate::coupling::{Impulse, Law, Place, Six};
-use crate::{AgentId, Body, Bounds, Inertia, SimSpan, SimTime, Snapshot, Stand, Surroundings};
+use crate::{
+    AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
+};
 use glam::DVec3;
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -140,6 +143,11 @@ impl RigidBody {
         self.stand = if seen { self.feet() } else { None };
         self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
         self.bear();
+        self.lies = self.upheld(around);
+        if self.lies.is_some() {
+            let presses = |n: &&Neighbour| !n.owned && bends(n) && n.form.is_some() && n.law == Law::Ledger;
+            around.neighbours.iter().filter(presses).for_each(|n| self.company.exchange.expect(n.id));
+        }
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received[0] != DVec3::ZERO;
         let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
@@ -163,6 +171,24 @@ impl RigidBody {
         if let Some(Stand { normal, .. }) = self.stand {
             self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
         }
+    }
+
+    /// On whom it lies, where one alone says that something fixed holds it up under the body (eq. 7l).
+    fn upheld(&self, around: &Surroundings<'_>) -> Option<LiesOn> {
+        if self.hold.is_known() || !self.ties.is_empty() || self.island.is_some() {
+            return None;
+        }
+        let mut all = around.neighbours.iter().filter_map(|n| {
+            let upheld = n.snapshot.pairs.iter().find(|pair| pair.with == around.me)?.bears?;
+            Some(LiesOn { on: n.id, at: n.snapshot.time, step_s: n.step_s, upheld })
+        });
+        let lies = all.next().filter(|_| all.next().is_none())?;
+        // what pushes it along, or turns it, the one that bears it tells too late
+        let Upheld { stand, velocity, .. } = lies.upheld;
+        let otherwise = self.motion.velocity - velocity;
+        let along = otherwise - stand.normal * stand.normal.dot(otherwise);
+        let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
+        (along.length() + swing < STANDING_M_S).then_some(lies)
     }
 
     /// In how many seconds of free flight something fixed may be in its way, where that is soon.
@@ -263,6 +289,7 @@ impl RigidBody {
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
         into.lands_s = self.lands_s;
         into.sprung.set(self.hold.published());
+        into.lies.set(self.lies.filter(|_| !self.at_rest));
         into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
         self.company.exchange.write(into);
         into.touches.clear();

@@ -54,8 +54,8 @@ fn evenly(
 /// What of a ledger is due by `at`.
 fn due((given, taken): (&Ledger, Option<&Ledger>), now: SimTime, at: SimTime) -> [Impulse; 2] {
     let [mut sum, mut carried] = new(given, taken, now);
-    let Some(page) = given.pages.last() else { return [sum, carried] };
-    for coming in given.coming.iter().filter(|coming| coming.due > at) {
+    for coming in given.coming.iter().filter(|coming| coming.acts > at) {
+        let Some(page) = given.pages.iter().find(|page| page.number == coming.page) else { continue };
         sum += -coming.entry.sum;
         carried += coming.entry.moment - coming.entry.sum * now.secs_after(page.origin);
     }

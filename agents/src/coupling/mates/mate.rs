@@ -3,6 +3,7 @@
 //! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the owner's solve, entries in the ledger.
 //! Never here: the solve itself, the owner's own state. Theory: docs/theory/coupling.md.
 
+mod feet;
 mod memory;
 
 use super::far::Far;
@@ -11,6 +12,7 @@ use crate::coupling::{
     Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S, inverse_mass,
 };
 use crate::{Anchor, Inertia, Neighbour, Surroundings};
+pub use feet::Feet;
 use glam::DVec3;
 
 /// The bit that tells the keys of contacts with others from those with walls and with the tube itself.
@@ -65,6 +67,8 @@ pub struct Mate {
     /// What links give it in the substep, in its slots: that lasts, and is no blow.
     lasting: Vec<DVec3>,
     room: Vec<DVec3>,
+    /// How a rigid body stands on the owner.
+    feet: Feet,
 }
 
 impl Mate {
@@ -336,7 +340,11 @@ impl Mate {
     }
 
     /// Notes what one contact did in a substep that stands.
-    pub fn note(&mut self, contact: &Contact, impulse: DVec3) {
+    /// Which of the owner's slots something fixed presses is told by `fixed`.
+    pub fn note(&mut self, contact: &Contact, impulse: DVec3, fixed: &[bool]) {
+        if !self.other.is_many() {
+            self.feet.add(contact, impulse, (self.other.centre(), self.slots.0, fixed));
+        }
         if impulse != DVec3::ZERO {
             self.acted = true;
             self.now += 1;
@@ -393,7 +401,9 @@ impl Mate {
         if self.other.is_many() {
             self.other.go_on_by(h, &self.gains);
         } else {
+            let before = self.other.centre();
             self.other.go_on(h);
+            self.feet.go(self.other.centre() - before, h);
         }
     }
 
@@ -418,6 +428,9 @@ impl Mate {
             pair.kind = if self.linked { PairKind::Attachment } else { PairKind::Ledger };
             (pair.contacts, pair.penetration_m) = (self.contacts, self.depth_m);
             pair.inverse_mass_per_kg = self.weighed.or(pair.inverse_mass_per_kg);
+            let bears = self.other.upheld(&self.feet, self.friction).filter(|_| !self.linked);
+            pair.bears = bears.filter(|_| account.bore);
+            account.bore = bears.is_some();
         }
     }
 

@@ -28,6 +28,8 @@ pub struct Account {
     pub astray: Astray,
     /// What its slots were given a second in the step before.
     pub last: Vec<DVec3>,
+    /// Whether the other lay on the owner in the step before.
+    pub bore: bool,
     /// Steps in which the two have pressed on each other since they met.
     pressed: u32,
 }
@@ -47,7 +49,16 @@ impl Tanks {
     pub fn of(&mut self, with: AgentId, mass_kg: f64) -> &mut Account {
         let at = self.0.iter().position(|account| account.with == with).unwrap_or_else(|| {
             let (tank, astray) = (Tank::of(mass_kg), Astray::default());
-            self.0.push(Account { with, tank, expected: None, idle_s: 0.0, astray, last: vec![], pressed: 1 });
+            self.0.push(Account {
+                with,
+                tank,
+                expected: None,
+                idle_s: 0.0,
+                astray,
+                last: vec![],
+                bore: false,
+                pressed: 1,
+            });
             self.0.len() - 1
         });
         self.0[at].idle_s = 0.0;
@@ -66,6 +77,7 @@ impl Tanks {
             if account.idle_s > 0.0 {
                 account.pressed = 0;
                 account.last.clear();
+                account.bore = false;
             }
             if account.idle_s > LOOSE_S {
                 account.astray.forget();

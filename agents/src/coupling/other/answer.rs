@@ -39,7 +39,9 @@ impl Other {
                 let stand = self.stands(impulses[0], impulses[1]);
                 impulses[0] *= *inverse_mass;
                 impulses[1] = *inverse_inertia * impulses[1];
-                if let Some(normal) = stand {
+                if stand.is_some() && self.lying.is_some() {
+                    impulses.fill(DVec3::ZERO); // who bears it answers first
+                } else if let Some(normal) = stand {
                     impulses[0] -= normal * normal.dot(impulses[0]);
                     impulses[1] = DVec3::ZERO;
                 }
@@ -53,7 +55,7 @@ impl Other {
     /// The normal of what it stands on, where such an impulse only presses it down there (eq. 7a).
     fn stands(&self, linear: DVec3, angular: DVec3) -> Option<DVec3> {
         let stand = self.grounded()?;
-        let pressed = self.pressed.unwrap_or_else(|| stand.bears(self.pose.centre, Impulse { linear, angular }));
+        let pressed = self.pressed.unwrap_or_else(|| self.is_pressed(&stand, Impulse { linear, angular }));
         pressed.then_some(stand.normal)
     }
 
@@ -87,8 +89,10 @@ impl Other {
         }
         let Body::Curve(curve) = &neighbour.snapshot.body else {
             let impulse = Impulse { linear: impulses[0], angular: impulses[1] };
-            if impulse != Impulse::ZERO {
-                exchange.give(neighbour.id, Site::Whole, after_s, impulse);
+            match self.answered_s(after_s, impulse) {
+                _ if impulse == Impulse::ZERO => {}
+                Some(times_s) => exchange.give_late(neighbour.id, Site::Whole, times_s, impulse),
+                None => exchange.give(neighbour.id, Site::Whole, after_s, impulse),
             }
             return;
         };

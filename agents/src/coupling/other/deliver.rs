@@ -56,6 +56,9 @@ impl Other {
             self.shift(&carried);
             self.take_back(&sums, &mut carried);
         }
+        if from.is_none() {
+            self.lie(around, exchange);
+        }
         (self.answer, self.carried) = (sums, carried);
     }
 
@@ -121,13 +124,12 @@ impl Other {
 
     /// Takes what acts only after `at` out of what has been given, and lists it.
     fn put_off(&mut self, flight: &mut Flight<'_>, (ledger, taken): (&Ledger, Option<&Ledger>), at: SimTime) {
-        let Some(page) = ledger.pages.last() else { return };
         let same = taken.filter(|taken| taken.revision == ledger.revision);
-        let t = at.secs_after(page.origin);
-        for coming in same.unwrap_or(ledger).coming.iter().filter(|coming| coming.due > at) {
-            let entry = &coming.entry;
+        for coming in same.unwrap_or(ledger).coming.iter().filter(|coming| coming.acts.secs_after(at) > SOON_S) {
+            let Some(page) = ledger.pages.iter().find(|page| page.number == coming.page) else { continue };
+            let (entry, t) = (&coming.entry, at.secs_after(page.origin));
             flight.add(entry.site, -entry.sum, entry.moment - entry.sum * t);
-            self.coming.push((coming.due.secs_after(at), [entry.sum.linear, entry.sum.angular]));
+            self.coming.push((coming.acts.secs_after(at), [entry.sum.linear, entry.sum.angular]));
         }
     }
 

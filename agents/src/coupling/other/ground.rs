@@ -112,7 +112,7 @@ impl Other {
             return false;
         };
         let sum = Impulse { linear: *linear, angular: *angular };
-        let gives_way = sum != Impulse::ZERO && !stand.bears(self.pose.centre, sum);
+        let gives_way = sum != Impulse::ZERO && !self.is_pressed(&stand, sum);
         self.pressed = Some(!gives_way);
         gives_way
     }
@@ -129,7 +129,8 @@ impl Other {
 
     /// How it stands, where impulses may move it.
     fn footing(&self) -> Option<Stand> {
-        let stand = self.neighbour.as_ref()?.snapshot.stand?;
+        let lies = self.lying.as_ref().map(|lying| lying.upheld.stand);
+        let stand = lies.or(self.neighbour.as_ref()?.snapshot.stand)?;
         (!self.held && self.lean.is_none()).then_some(stand)
     }
 }

@@ -13,7 +13,9 @@ impl Other {
     pub fn acceleration(&self) -> DVec3 {
         match (&self.neighbour, &self.lean) {
             (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
-            (Some(neighbour), None) if !self.held => neighbour.snapshot.acceleration + self.carried_by_others()[0],
+            (Some(neighbour), None) if !self.held => {
+                self.held_still(neighbour.snapshot.acceleration + self.carried_by_others()[0])
+            }
             _ => DVec3::ZERO,
         }
     }
