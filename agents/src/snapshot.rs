@@ -9,7 +9,7 @@ mod stand;
 pub use lies::{LiesOn, Upheld};
 pub use stand::Stand;
 
-use crate::coupling::{Ledger, PairState, Rebound, Sprung};
+use crate::coupling::{Ledger, PairState, Rebound, Six, Sprung};
 use crate::rod::CurveInertia;
 use crate::soft::SoftInertia;
 use crate::{AgentId, Rare, Resolution, SimSpan, SimTime};
@@ -55,6 +55,9 @@ pub struct Snapshot {
     pub rebound: Rare<Rebound>,
     /// On whom it lies, where something fixed holds that one up.
     pub lies: Rare<LiesOn>,
+    /// How it answers impulses among those whose world it shares, about its centre of mass: velocities (m/s, rad/s) of impulses (N·s,
+    /// N·m·s); none where it shares none, or where something fixed holds that world.
+    pub within: Rare<Six>,
     /// The box around its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
     /// What it has given to others, in couplings that it owns.
@@ -364,6 +367,7 @@ impl Snapshot {
         self.sprung.set(None);
         self.rebound.set(None);
         self.lies.set(None);
+        self.within.set(None);
         self.pairs.clear();
         self.bonds.clear();
     }
@@ -382,6 +386,7 @@ impl Snapshot {
             && self.sprung.get().is_none_or(Sprung::is_finite)
             && self.rebound.get().is_none_or(Rebound::is_finite)
             && self.lies.get().is_none_or(LiesOn::is_finite)
+            && self.within.get().is_none_or(Six::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

@@ -138,3 +138,31 @@ fn a_soft_ball_that_falls_a_metre_on_a_soft_block_of_its_rate_lies_on_it() {
         assert!(number(pair, "/penetration_max_m") < 3e-3, "{rate_hz} Hz: {pair}");
     }
 }
+
+/// The slab gave as if the lowest box were alone, and expected nothing of what lay on that: 13 mm deep at 240 Hz, through at 60.
+#[test]
+fn a_stack_of_boxes_stands_on_a_soft_slab_at_equal_and_unequal_rates() {
+    let floor = "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\n";
+    let slab = "[[object]]\nname = \"slab\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.2, 0.2, 0.05]\nsegments = [4, 4, 2]\nposition_m = [0, 0, 0.026]\nyoung_pa = 1e5\ndensity_kg_m3 = 1050.0\ndamping_per_s = 3.0\n";
+    let cube = |name: &str, z: f64, hz: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.03, 0.03, 0.03]\nposition_m = [0, 0, {z}]\nmass_kg = 0.5\nrestitution = 0.0\nrate_hz = {hz:?}\n[[probe]]\nobject = \"{name}\"\nevery_ms = 10.0\n"
+        )
+    };
+    for [slab_hz, box_hz] in [[240.0, 240.0], [60.0, 60.0], [120.0, 240.0], [240.0, 60.0]] {
+        let (low, high) = (cube("low", 0.082, box_hz), cube("high", 0.1425, box_hz));
+        let report =
+            Folder::with(&format!("{floor}{slab}rate_hz = {slab_hz:?}\n{low}{high}")).lockstep(&["--seconds", "3"]);
+        let what = format!("{slab_hz} : {box_hz} Hz");
+        let [low, high] = [0, 1].map(|probe| point(&report, &format!("/probes/{probe}/position_m")));
+        let pairs = report["couplings"].as_array().unwrap();
+        let pair =
+            pairs.iter().find(|pair| pair["a"] == "slab").unwrap_or_else(|| panic!("{what}: nobody on the slab"));
+        let carried = number(pair, "/force_n") / (2.0 * 0.5 * 9.81);
+        println!("{what}: {} deep, {carried} of the weight, at {low:?} and {high:?}", number(pair, "/penetration_m"));
+        assert!(number(pair, "/penetration_m") < 1e-3, "{what}: {pair}");
+        assert!((carried - 1.0).abs() < 0.05, "{what}: {carried} of the weight of both");
+        assert!((high[2] - low[2] - 0.06).abs() < 5e-4, "{what}: {low:?} and {high:?}");
+        assert!(low[2] > 0.074, "{what}: it is at {low:?}, the slab's top at 0.05");
+    }
+}

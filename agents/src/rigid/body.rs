@@ -17,7 +17,7 @@ use super::ties::Ties;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::beside::{self, bends, is_driven};
-use crate::coupling::{Form, FormKind, Six, SolidForm, Twist};
+use crate::coupling::{Form, FormKind, Impulse, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
@@ -63,6 +63,10 @@ pub struct RigidBody {
     pub(super) stand: Option<Stand>,
     /// On whom it lies.
     pub(super) lies: Option<LiesOn>,
+    /// Its inverse mass among those whose world it shares, where that is known, about its centre.
+    pub(super) within: Option<Six>,
+    /// How far what it was given late has carried it, kg·m and kg·m², until its world takes that.
+    pub(super) late: Option<Impulse>,
     /// In how many seconds of free flight something fixed may be in its way, where others have to know.
     pub(super) lands_s: Option<f64>,
     /// For how long it has stood, seconds.
@@ -139,6 +143,8 @@ impl RigidBody {
             acceleration: spec.gravity,
             stand: None,
             lies: None,
+            within: None,
+            late: None,
             lands_s: None,
             stood_s: 0.0,
             hold: Hold::default(),

@@ -12,11 +12,11 @@ use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
 use crate::coupling::beside::bends;
-use crate::coupling::{Impulse, Law, Place, Six};
+use crate::coupling::{Impulse, Law, Place, Six, Twist};
 use crate::{
     AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
 };
-use glam::DVec3;
+use glam::{DQuat, DVec3};
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
 /// a single hard step must not send it flying in others' eyes.
@@ -40,6 +40,10 @@ impl RigidBody {
         let before = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.company.exchange.open(around);
         self.company.pairs.open();
+        if fellows.is_empty() {
+            self.within = None;
+        }
+        self.late = None;
         if self.hold.is_known() {
             self.follow(around, dt);
         } else {
@@ -75,9 +79,20 @@ impl RigidBody {
                 Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
                 None => carried,
             };
-            self.shift(carried);
+            if self.within.is_some() {
+                self.late = Some(carried);
+            } else {
+                self.shift(carried);
+            }
             self.world.moved();
         }
+    }
+
+    /// Moves by a `way` that its world has for it, metres and radians.
+    pub(super) fn go_by(&mut self, [way, turn]: Twist) {
+        self.motion.position += way;
+        self.motion.rotation = (DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
+        self.world.moved();
     }
 
     /// Takes back what the ground carried of the weight of a body that was lifted off it `since_s` seconds ago, by what is left
@@ -203,6 +218,13 @@ impl RigidBody {
     /// What merely took back the impulses that were received in this step is left out: it will take back the next ones too,
     /// but only those.
     fn support(&self, dt: f64) -> DVec3 {
+        if let Some(within) = self.within {
+            // the world that it shares takes what it is given, too
+            let [linear, angular] = self.received;
+            let given = [linear * self.spread.mass_kg, self.motion.inertia_times(&self.spread, angular)];
+            let changed = self.motion.velocity - (self.begun - linear) - self.coupled - within.times(given)[0];
+            return changed / dt - self.gravity;
+        }
         let held = self.touching || !self.ties.is_empty();
         if !(self.steady && held) {
             return DVec3::ZERO;
@@ -290,6 +312,7 @@ impl RigidBody {
         into.lands_s = self.lands_s;
         into.sprung.set(self.hold.published());
         into.lies.set(self.lies.filter(|_| !self.at_rest));
+        into.within.set(self.within.filter(|_| !self.at_rest));
         into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
         self.company.exchange.write(into);
         into.touches.clear();

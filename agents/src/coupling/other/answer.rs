@@ -37,6 +37,11 @@ impl Other {
         match inertia {
             Some(Inertia::Rigid { inverse_mass, inverse_inertia }) => {
                 let stand = self.stands(impulses[0], impulses[1]);
+                let within = self.neighbour.as_ref().and_then(|n| n.snapshot.within.get());
+                if let (Some(within), None, [linear, angular]) = (within, stand, &mut *impulses) {
+                    [*linear, *angular] = within.times([*linear, *angular]);
+                    return;
+                }
                 impulses[0] *= *inverse_mass;
                 impulses[1] = *inverse_inertia * impulses[1];
                 if stand.is_some() && self.lying.is_some() {

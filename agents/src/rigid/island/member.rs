@@ -39,6 +39,10 @@ pub(super) struct Member {
     pub bent: Twist,
     /// Nothing but gravity and the island moves it in this step: its body is asked for nothing between the parts.
     pub alone: bool,
+    /// Whether one that bends presses it, and wants to know how it answers among its fellows,
+    pub asked: bool,
+    /// and how it does, where that is known: its inverse mass about its centre.
+    pub answer: Option<Six>,
     /// Whether it touched anything in the last part.
     pub touching: bool,
     /// How deep it sank into anything in the last part, metres, ≥ 0.
@@ -62,6 +66,8 @@ impl Member {
             springs: None,
             bent: [DVec3::ZERO; 2],
             alone: false,
+            asked: false,
+            answer: None,
             touching: body.touching,
             depth_m: 0.0,
             joined_s: 0.0,

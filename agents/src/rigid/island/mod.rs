@@ -19,7 +19,8 @@ mod watch;
 
 use super::motion::Motion;
 use super::{Joint, RigidBody, RigidError};
-use crate::coupling::Six;
+use crate::coupling::beside::bends;
+use crate::coupling::{Law, Six};
 use crate::{AgentId, Companion, SimSpan, StepError, StepReport, Surroundings, check_span};
 use crew::Crew;
 use direct::{Direct, Reach};
@@ -59,6 +60,13 @@ enum Solver {
     Few(Box<Direct>),
     /// A rapier3d world, for many.
     Many(Box<Pile>),
+}
+
+impl Solver {
+    /// Whether it knows how the member `index` answers impulses among the others.
+    fn knows(&self, index: usize) -> bool {
+        matches!(self, Self::Few(direct) if direct.moves(index, [DVec3::ZERO; 2]).is_some())
+    }
 }
 
 /// A step is solved in parts no longer than this, seconds.
@@ -236,12 +244,17 @@ impl Island {
 
     /// Everybody takes what it was given since its last step. What that has carried it by goes through nobody here.
     fn begin(&mut self, crew: &mut Crew<'_, '_>, dt_s: f64) {
+        let mut given = false;
         self.before.clear();
         for index in 0..self.members.len() {
             let (body, around) = crew.body(self.members[index].seat);
             let before = body.motion;
             self.before.push((before, body.touching));
             body.begin(around, &self.fellows, dt_s);
+            if let Some(carried) = body.late.filter(|_| !self.solver.knows(index)) {
+                body.shift(carried);
+                body.late = None;
+            }
             if body.motion.position != before.position || body.motion.rotation != before.rotation {
                 body.go_part(&before, self.free_share(index, &body.motion));
             }
@@ -249,6 +262,34 @@ impl Island {
             let member = &mut self.members[index];
             (member.motion, member.gravity, member.springs) = (body.motion, body.gravity, None);
             member.alone = body.ties.is_empty() && body.company.guests().is_empty();
+            member.asked = around.neighbours.iter().any(|n| !n.owned && bends(n) && n.law == Law::Ledger);
+            given |= member.asked && body.received != [DVec3::ZERO; 2];
+        }
+        self.carry(crew);
+        self.ask(given);
+    }
+
+    /// Asks how members answer what bends, where something was `given` to one: only then does it press.
+    fn ask(&mut self, given: bool) {
+        let Solver::Few(direct) = &mut self.solver else { return };
+        if given {
+            direct.ask();
+        } else if !self.members.iter().any(|member| member.asked) {
+            direct.forget(&mut self.members);
+        }
+    }
+
+    /// Moves everybody by how far what came late has carried one of them: contact and joints take the others along.
+    fn carry(&mut self, crew: &mut Crew<'_, '_>) {
+        for index in 0..self.members.len() {
+            let Some(carried) = crew.body(self.members[index].seat).0.late.take() else { continue };
+            let Solver::Few(direct) = &self.solver else { continue };
+            let moves = direct.moves(index, [carried.linear, carried.angular]);
+            for (member, way) in self.members.iter_mut().zip(moves.into_iter().flatten()) {
+                let body = crew.body(member.seat).0;
+                body.go_by(way);
+                member.motion = body.motion;
+            }
         }
     }
 
@@ -370,7 +411,7 @@ impl Island {
                 (member.motion.velocity, member.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
             }
             let (body, around) = crew.body(member.seat);
-            (body.motion, body.at_rest) = (member.motion, at_rest);
+            (body.motion, body.at_rest, body.within) = (member.motion, at_rest, member.answer);
             body.led(around, dt_s, (member.touching, member.depth_m));
         }
     }

@@ -68,9 +68,20 @@ impl Matrix {
 
     /// Solves for `x`, six numbers a body; `false`, and `x` as it was, where the matrix is not positive.
     pub(super) fn solve(&mut self, x: &mut [f64]) -> bool {
-        if !self.envelope.factor() {
-            return false;
+        let positive = self.factor();
+        if positive {
+            self.solve_again(x);
         }
+        positive
+    }
+
+    /// Factors the matrix; whether it is positive.
+    pub(super) fn factor(&mut self) -> bool {
+        self.envelope.factor()
+    }
+
+    /// Solves for `x` by the factor there is.
+    pub(super) fn solve_again(&mut self, x: &mut [f64]) {
         self.ordered.clear();
         self.ordered.resize(x.len(), 0.0);
         for (six, &place) in x.chunks_exact(6).zip(self.order.places()) {
@@ -80,6 +91,5 @@ impl Matrix {
         for (six, &place) in x.chunks_exact_mut(6).zip(self.order.places()) {
             six.copy_from_slice(&self.ordered[6 * place as usize..][..6]);
         }
-        true
     }
 }

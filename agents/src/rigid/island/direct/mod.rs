@@ -8,6 +8,7 @@
 //! chain neither stretches nor loses energy, and a stack does not sink, whatever stands on it. Overlaps from before are
 //! pushed out by displacements alone: they leave no velocity behind.
 
+mod answer;
 mod bodies;
 mod joints;
 mod matrix;
@@ -21,6 +22,7 @@ mod sweep;
 use super::Held;
 use super::member::{Ground, Member};
 use crate::rigid::motion::Motion;
+use answer::Answers;
 use bodies::{contact_rows, energy_j, gap_now, is_soft, middle, push, spring_rows, weigh};
 use glam::DVec3;
 use joints::JointRow;
@@ -53,6 +55,7 @@ pub(super) struct Direct {
     approach: Vec<f64>,
     /// What the impulses of the way took out of the motion, joules: bounces give back no more.
     taken_j: f64,
+    answers: Answers,
 }
 
 /// A part's flight is corrected at most this often for the turning of the bodies: each time leaves a hundredth.
@@ -83,6 +86,23 @@ impl Direct {
     pub(super) fn settle(&mut self, members: &[Member], ground: &[Ground], held: &[Held]) {
         self.near.list(members, ground, held);
         self.known.clear();
+        self.answers = Answers::default();
+    }
+
+    /// Nobody asks how members answer impulses.
+    pub(super) fn forget(&mut self, members: &mut [Member]) {
+        self.answers.forget(members);
+    }
+
+    /// A step begins in which something is given: its first part finds how members answer impulses.
+    pub(super) fn ask(&mut self) {
+        self.answers.ask();
+    }
+
+    /// By how much an impulse on the member `index` moves each of them, as contact and joints held them in the last step; `None` where it
+    /// was not asked, or where something fixed holds them.
+    pub(super) fn moves(&self, index: usize, impulse: Twist) -> Option<impl Iterator<Item = Twist>> {
+        self.answers.moves(index, impulse)
     }
 
     /// The longest part that jointed bodies take, seconds: none turns far, and none trembles between the forces that its
@@ -170,6 +190,7 @@ impl Direct {
         }
         self.remember(0, h);
         self.taken_j = energy_j(&self.masses, &self.free) - energy_j(&self.masses, &self.velocities);
+        self.answers.find(&mut self.newton, (&self.rows, &self.masses), members);
         for (member, (now, free)) in members.iter_mut().zip(self.velocities.iter().zip(&self.free)) {
             member.bent = [now[0] - free[0], now[1] - free[1]];
         }

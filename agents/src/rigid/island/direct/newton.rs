@@ -69,6 +69,17 @@ impl Newton {
         }
     }
 
+    /// Factors how all bodies answer impulses together, as the rows of the last solve give way; whether they do.
+    pub(super) fn hold(&mut self, rows: &[Row], masses: &[Mass]) -> bool {
+        self.assemble(rows, masses);
+        self.matrix.factor()
+    }
+
+    /// Turns impulses into the velocities they cause by that factor, six numbers a body.
+    pub(super) fn respond(&mut self, impulses: &mut [f64]) {
+        self.matrix.solve_again(impulses);
+    }
+
     /// Learns whom the next solves' rows join.
     pub(super) fn link(&mut self, bodies: usize, pairs: impl Iterator<Item = (u32, u32)> + Clone) {
         self.matrix.link(bodies, pairs);
