@@ -53,6 +53,8 @@ pub struct Other {
     borne: bool,
     /// How it lies on another agent that something fixed holds up.
     lying: Option<Lying>,
+    /// Its weight, m/s², where it is seen in the air and has come down since on what it now stands on, which carries that.
+    landing: Option<DVec3>,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
     /// What is expected of them after that: in how many seconds it begins, N and N·m.
@@ -111,7 +113,7 @@ impl Other {
         (self.held, self.led) = (sleeps || matches!(snapshot.inertia, Inertia::Immovable), false);
         (self.age_s, self.height_m, self.lean, self.pressed) = (0.0, None, None, None);
         self.borne |= !known;
-        self.lying = None;
+        (self.lying, self.landing) = (None, None);
         self.coming.clear();
         self.lasting.clear();
         self.taken_back.clear();

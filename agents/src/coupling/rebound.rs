@@ -4,7 +4,7 @@
 //! In: the body's own account. Out: how much of it falls away. Never here: contacts. Theory: docs/theory/coupling.md, eq. 4d, 5a.
 
 use super::Impulse;
-use crate::SimTime;
+use crate::{AgentId, SimTime};
 use glam::DVec3;
 
 /// What fixed solids gave in one step, as if at one moment.
@@ -20,6 +20,8 @@ pub struct Rebound {
     pub carried: DVec3,
     /// The momentum with which the body came, N·s: between half of what was given, where it bounced without loss, and all.
     pub met_n_s: f64,
+    /// Who bends and stood between the body and them when the step began.
+    pub past: Option<AgentId>,
 }
 
 impl Rebound {
@@ -83,8 +85,14 @@ mod tests {
     }
 
     /// 3 N·s, 20 ms before the end of a step at 0.1 s; half of it stopped the body.
-    const BLOW: fn() -> Rebound =
-        || Rebound { start: at(0.05), end: at(0.1), given: up(3.0), carried: DVec3::Z * 0.06, met_n_s: 1.5 };
+    const BLOW: fn() -> Rebound = || Rebound {
+        start: at(0.05),
+        end: at(0.1),
+        given: up(3.0),
+        carried: DVec3::Z * 0.06,
+        met_n_s: 1.5,
+        past: None,
+    };
 
     fn carried(way: f64) -> Impulse {
         Impulse { linear: DVec3::Z * way, angular: DVec3::ZERO }

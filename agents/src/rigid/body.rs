@@ -308,7 +308,7 @@ impl Agent for RigidBody {
             }
         }
         self.steps += 1;
-        self.note_borne(around.time, dt);
+        self.note_borne(around, dt);
         self.doubt(&before, touching, (dt_s, parts));
         let at_rest = self.rest(dt_s);
         self.tell(around, dt_s);

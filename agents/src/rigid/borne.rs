@@ -4,8 +4,8 @@
 //! given, had they come in time. Never here: contacts, ledgers. Theory: docs/theory/coupling.md, eq. 4d.
 
 use super::RigidBody;
-use crate::coupling::{Impulse, Rebound, since_s, spared};
-use crate::{SimSpan, SimTime};
+use crate::coupling::{Impulse, Law, Rebound, since_s, spared};
+use crate::{AgentId, Body, Neighbour, SimSpan, SimTime, Surroundings};
 use glam::DVec3;
 
 /// What fixed solids gave, step by step.
@@ -21,6 +21,8 @@ pub(super) struct Borne {
 const FORGET_S: f64 = 1.0;
 /// A change of velocity below this is rounding, m/s: contact with fixed solids is solved in single precision.
 const CHANGED_M_S: f64 = 1e-6;
+/// What is seen within 60° of the way down stands under a body: the cosine.
+const UNDER: f64 = 0.5;
 
 impl Borne {
     /// Notes what fixed solids gave in a step, where they gave something.
@@ -67,9 +69,10 @@ impl Borne {
 }
 
 impl RigidBody {
-    /// Notes what fixed solids gave in a step of `dt` that began at `start`: all that neither gravity nor others did, without
+    /// Notes what fixed solids gave in a step of `dt` that begins now: all that neither gravity nor others did, without
     /// what only carried the weight. That they go on to give: others expect it ([`RigidBody::support`]).
-    pub(super) fn note_borne(&mut self, start: SimTime, dt: SimSpan) {
+    pub(super) fn note_borne(&mut self, around: &Surroundings<'_>, dt: SimSpan) {
+        let start = around.time;
         let dt_s = dt.as_secs_f64();
         let fall = self.gravity * dt_s;
         let change = self.motion.velocity - self.begun - self.coupled - fall;
@@ -85,12 +88,36 @@ impl RigidBody {
             angular: if alone { self.motion.angular - self.begun_at.1 } else { DVec3::ZERO },
         };
         let given = if is_blow { given * blow } else { Impulse::ZERO };
-        let mut rebound =
-            Rebound { start, end: start + dt, given, carried: way * (blow * self.spread.mass_kg), met_n_s: 0.0 };
+        let mut rebound = Rebound {
+            start,
+            end: start + dt,
+            given,
+            carried: way * (blow * self.spread.mass_kg),
+            met_n_s: 0.0,
+            past: None,
+        };
         let came = self.begun + self.gravity * -rebound.age_s(start);
         let size = given.linear.length();
         rebound.met_n_s = (-came.dot(given.linear.normalize_or_zero()) * self.spread.mass_kg).clamp(0.5 * size, size);
+        rebound.past = self.past(around, given.linear);
         self.borne.note(rebound);
+    }
+
+    /// Who bends and was nearest to the body where its step began, of those that stood between it and what then gave it an impulse.
+    fn past(&self, around: &Surroundings<'_>, given: DVec3) -> Option<AgentId> {
+        if given == DVec3::ZERO {
+            return None;
+        }
+        let nearer = |a: &DVec3, b: &DVec3| a.length_squared().total_cmp(&b.length_squared());
+        let nearest = |points: &[DVec3]| points.iter().map(|point| self.begun_at.0 - *point).min_by(nearer);
+        let pushes = |n: &&Neighbour| !n.owned && n.form.is_some() && n.law == Law::Ledger;
+        let ways = around.neighbours.iter().filter(pushes).filter_map(|n| match &n.snapshot.body {
+            Body::Curve(curve) => Some((n.id, nearest(&curve.positions)?)),
+            Body::Soft(soft) => Some((n.id, nearest(&soft.positions)?)),
+            _ => None,
+        });
+        let under = |way: DVec3| way.dot(given) > UNDER * way.length() * given.length();
+        ways.filter(|(_, way)| under(*way)).min_by(|a, b| nearer(&a.1, &b.1)).map(|(id, _)| id)
     }
 }
 
@@ -105,7 +132,14 @@ mod tests {
     /// 3 N·s that stopped it 2 ms before the end of a step at 0.1 s.
     fn landed() -> Borne {
         let mut borne = Borne::default();
-        borne.note(Rebound { start: at(0.08), end: at(0.10), given: up(3.0), carried: DVec3::Z * 0.006, met_n_s: 3.0 });
+        borne.note(Rebound {
+            start: at(0.08),
+            end: at(0.10),
+            given: up(3.0),
+            carried: DVec3::Z * 0.006,
+            met_n_s: 3.0,
+            past: None,
+        });
         borne
     }
 

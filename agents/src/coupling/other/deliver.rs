@@ -5,6 +5,7 @@
 //! Theory: docs/theory/coupling.md, eq. 5–6b.
 
 use super::Other;
+use super::ground::LIFTED_M;
 use crate::coupling::{Exchange, Impulse, Ledger, Rebound, Site, Twist, acknowledged};
 use crate::{AgentId, Body, DT_MAX_S, Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
@@ -40,7 +41,10 @@ impl Other {
             self.share(&mut flight, around, at);
         }
         if let Some(rebound) = neighbour.snapshot.rebound.get().filter(|_| !self.held && self.lean.is_none()) {
-            flight.leave_out(rebound, (at, self.pose.centre, from));
+            let in_the_air = flight.leave_out(rebound, (at, self.pose.centre), (around.me, from));
+            if let Some(stand) = neighbour.snapshot.stand.filter(|_| in_the_air) {
+                self.take_off(&stand, neighbour.snapshot.acceleration);
+            }
         }
         let Flight { mut sums, mut carried, .. } = flight;
         if !sums.is_empty() {
@@ -179,20 +183,28 @@ fn given(giver: &Neighbour, to: AgentId) -> Option<&Ledger> {
 
 impl Flight<'_> {
     /// Takes out what fixed solids would not have given a rigid body (eq. 4d), and what they gave it only after `at`, where it was
-    /// on its way to whoever sees it `from` there and only comes back (eq. 5a).
-    fn leave_out(&mut self, rebound: &Rebound, (at, centre, from): (SimTime, DVec3, Option<DVec3>)) {
+    /// on its way to whoever sees it `from` there, or past who bends, and only comes back (eq. 5a). Whether it is still in the air then.
+    fn leave_out(
+        &mut self,
+        rebound: &Rebound,
+        (at, centre): (SimTime, DVec3),
+        (me, from): (AgentId, Option<DVec3>),
+    ) -> bool {
         let of = |slots: &[DVec3]| match *slots {
             [linear, angular, ..] => Impulse { linear, angular },
             _ => Impulse::ZERO,
         };
-        let Inertia::Rigid { inverse_mass, .. } = self.to.snapshot.inertia else { return };
+        let Inertia::Rigid { inverse_mass, .. } = self.to.snapshot.inertia else { return false };
         let before = centre - rebound.way(at) * inverse_mass;
-        let comes = rebound.age_s(at) < 0.0 && from.is_some_and(|from| (before - from).dot(rebound.given.linear) > 0.0);
+        let ahead = |from: DVec3| (before - from).dot(rebound.given.linear) > 0.0;
+        let comes = rebound.age_s(at) < 0.0 && from.map_or(rebound.past == Some(me), ahead);
         let share = if comes { 1.0 } else { rebound.spared_by([of(&self.sums), of(&self.carried)], at) };
         let [given, way] = rebound.part(share, at);
         if given != Impulse::ZERO {
             self.add(Site::Whole, -given, -way);
         }
+        let height_m = -rebound.way(at).dot(rebound.given.linear.normalize_or_zero()) * inverse_mass;
+        comes && height_m > LIFTED_M
     }
 
     fn add(&mut self, site: Site, sum: Impulse, moved: Impulse) {

@@ -9,7 +9,7 @@ use crate::{Inertia, Stand};
 use glam::DVec3;
 
 /// Who is expected higher than this above what it stands on is off it, metres.
-const LIFTED_M: f64 = 1e-4;
+pub(super) const LIFTED_M: f64 = 1e-4;
 
 /// How a body that was lifted off the ground moves along its normal.
 #[derive(Debug, Clone, Copy)]
@@ -122,6 +122,14 @@ impl Other {
         self.pressed = None;
     }
 
+    /// It is seen before it came down where it now stands: it falls as it did, with what of `acceleration` the ground has taken.
+    pub(super) fn take_off(&mut self, stand: &Stand, acceleration: DVec3) {
+        let weight = stand.normal * (-stand.weight_m_s2 - acceleration.dot(stand.normal));
+        self.landing = Some(weight);
+        self.pose.centre += weight * (0.5 * self.age_s * self.age_s);
+        self.velocities[0] += weight * self.age_s;
+    }
+
     /// How it stands, where it has not been lifted off that.
     pub(super) fn grounded(&self) -> Option<Stand> {
         self.footing().filter(|_| self.height_m.is_none_or(|height_m| height_m < LIFTED_M))
@@ -129,6 +137,9 @@ impl Other {
 
     /// How it stands, where impulses may move it.
     fn footing(&self) -> Option<Stand> {
+        if self.landing.is_some() {
+            return None;
+        }
         let lies = self.lying.as_ref().map(|lying| lying.upheld.stand);
         let stand = lies.or(self.neighbour.as_ref()?.snapshot.stand)?;
         (!self.held && self.lean.is_none()).then_some(stand)

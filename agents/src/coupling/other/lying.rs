@@ -30,6 +30,7 @@ impl Other {
         if given != Impulse::ZERO && !lies.upheld.bears(lies.upheld.centre, given) {
             return;
         }
+        self.landing = None;
         self.lying = Some(Lying { upheld: lies.upheld, next_s: lies.at.secs_after(around.time), step_s: lies.step_s });
         let since_s = -lies.at.secs_after(around.time);
         self.pose =

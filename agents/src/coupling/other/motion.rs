@@ -14,7 +14,8 @@ impl Other {
         match (&self.neighbour, &self.lean) {
             (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
             (Some(neighbour), None) if !self.held => {
-                self.held_still(neighbour.snapshot.acceleration + self.carried_by_others()[0])
+                let falls = self.landing.unwrap_or_default();
+                self.held_still(neighbour.snapshot.acceleration + falls + self.carried_by_others()[0])
             }
             _ => DVec3::ZERO,
         }
