@@ -172,6 +172,12 @@ pub fn bends(neighbour: &Neighbour) -> bool {
     matches!(neighbour.snapshot.body, Body::Curve(_) | Body::Soft(_))
 }
 
+/// Whether a neighbour bends and gives by the ledger what contact with it gives: who looks does not own that.
+#[must_use]
+pub fn may_press(neighbour: &Neighbour) -> bool {
+    !neighbour.owned && bends(neighbour) && neighbour.form.is_some() && neighbour.law == Law::Ledger
+}
+
 /// Whether a neighbour is a tool whose drive has a say in how it moves: to whom is linked to it it is led.
 #[must_use]
 pub fn is_driven(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {

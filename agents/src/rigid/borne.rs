@@ -4,8 +4,9 @@
 //! given, had they come in time. Never here: contacts, ledgers. Theory: docs/theory/coupling.md, eq. 4d.
 
 use super::RigidBody;
-use crate::coupling::{Impulse, Law, Rebound, since_s, spared};
-use crate::{AgentId, Body, Neighbour, SimSpan, SimTime, Surroundings};
+use crate::coupling::beside::may_press;
+use crate::coupling::{Impulse, Rebound, since_s, spared};
+use crate::{AgentId, Body, SimSpan, SimTime, Surroundings};
 use glam::DVec3;
 
 /// What fixed solids gave, step by step.
@@ -110,8 +111,7 @@ impl RigidBody {
         }
         let nearer = |a: &DVec3, b: &DVec3| a.length_squared().total_cmp(&b.length_squared());
         let nearest = |points: &[DVec3]| points.iter().map(|point| self.begun_at.0 - *point).min_by(nearer);
-        let pushes = |n: &&Neighbour| !n.owned && n.form.is_some() && n.law == Law::Ledger;
-        let ways = around.neighbours.iter().filter(pushes).filter_map(|n| match &n.snapshot.body {
+        let ways = around.neighbours.iter().filter(|n| may_press(n)).filter_map(|n| match &n.snapshot.body {
             Body::Curve(curve) => Some((n.id, nearest(&curve.positions)?)),
             Body::Soft(soft) => Some((n.id, nearest(&soft.positions)?)),
             _ => None,

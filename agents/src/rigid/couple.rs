@@ -11,11 +11,9 @@ use super::leant;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
 use super::obstacles::Mine;
-use crate::coupling::beside::bends;
+use crate::coupling::beside::may_press;
 use crate::coupling::{Impulse, Law, Place, Six, Twist};
-use crate::{
-    AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
-};
+use crate::{AgentId, Body, Bounds, Inertia, LiesOn, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld};
 use glam::{DQuat, DVec3};
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -160,8 +158,8 @@ impl RigidBody {
         self.bear();
         self.lies = self.upheld(around);
         if self.lies.is_some() {
-            let presses = |n: &&Neighbour| !n.owned && bends(n) && n.form.is_some() && n.law == Law::Ledger;
-            around.neighbours.iter().filter(presses).for_each(|n| self.company.exchange.expect(n.id));
+            let pressing = around.neighbours.iter().filter(|n| may_press(n));
+            pressing.for_each(|n| self.company.exchange.expect(n.id));
         }
         self.company.knock(around, &self.world.mover, &self.motion, dt);
         let held = self.held_up || self.received[0] != DVec3::ZERO;

@@ -5,7 +5,7 @@
 use super::band::Factor;
 use super::config::Matter;
 use super::contact::respond;
-use crate::coupling::{Foot, Lies};
+use crate::coupling::{Carried, Foot, Lies};
 use glam::DVec3;
 
 /// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
@@ -13,16 +13,13 @@ use glam::DVec3;
 pub struct CurveInertia {
     factor: Factor,
     /// Where something fixed carries it, and its answer there.
-    feet: Vec<Foot>,
-    standing: Factor,
+    standing: Carried<Factor>,
     held: [bool; 2],
     /// How fast each segment turns, rad/s, world axes.
     pub spins: Vec<DVec3>,
     /// How each slot will accelerate in its next step, or did in the last one without what others gave at its start, m/s² and rad/s²;
     /// empty before the first.
     pub accelerations: Vec<DVec3>,
-    /// The same where something fixed carries it through that step; empty where nothing does.
-    pub standing_accelerations: Vec<DVec3>,
     /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
     pub span_s: f64,
     /// The length of the step that the accelerations foretell, seconds; zero where they are those of the last one.
@@ -45,24 +42,19 @@ impl CurveInertia {
         self.spins.extend(velocities.iter().skip(1).step_by(2));
     }
 
-    /// Takes over where it lies.
-    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>) {
-        self.feet.clear();
-        if let Some((feet, standing)) = lies {
-            self.feet.extend_from_slice(feet);
-            self.standing.copy_from(standing);
-        }
-    }
-
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
-    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
-        let standing = Some(&self.standing_accelerations).filter(|list| borne && !list.is_empty());
-        standing.unwrap_or(&self.accelerations)
+    /// Takes over where it lies and how it will accelerate there.
+    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
+        self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
     /// Where it lies.
     pub(crate) fn feet(&self) -> &[Foot] {
-        &self.feet
+        self.standing.feet()
+    }
+
+    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
+        self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
     }
 
     /// Takes over what the tube weighs.
@@ -116,8 +108,7 @@ impl CurveInertia {
     /// Where there are not as many as [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        let lies = borne && !self.feet.is_empty();
-        respond((if lies { &self.standing } else { &self.factor }, self.held), impulses);
+        respond((self.standing.factor().filter(|_| borne).unwrap_or(&self.factor), self.held), impulses);
     }
 }
 

@@ -53,9 +53,8 @@ impl Tube {
             let inertia = into.inertia.curve_mut();
             let (answer, lies) = self.stepper.told();
             inertia.copy_from(answer, self.matter.held, &self.now.u);
-            inertia.stand(lies);
+            inertia.stand(lies, &self.standing_accelerations);
             inertia.accelerations.clone_from(&self.accelerations);
-            inertia.standing_accelerations.clone_from(&self.standing_accelerations);
             inertia.ahead_s = self.ahead_s;
             inertia.weigh(&self.matter, &self.division.length, &self.now.t);
         } else {

@@ -3,7 +3,7 @@
 //! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::system::Factor;
-use crate::coupling::{Foot, Lies};
+use crate::coupling::{Carried, Foot, Lies};
 use glam::DVec3;
 
 /// A soft body's answer to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
@@ -11,14 +11,11 @@ use glam::DVec3;
 pub struct SoftInertia {
     factor: Factor,
     /// Where something fixed carries it, and its answer there.
-    feet: Vec<Foot>,
-    standing: Factor,
+    standing: Carried<Factor>,
     /// Of each vertex by itself, 1/kg.
     mobilities: Vec<f64>,
     /// How each vertex will accelerate without what others give, m/s².
     pub accelerations: Vec<DVec3>,
-    /// The same where something fixed carries it through that step; empty where nothing does.
-    pub standing_accelerations: Vec<DVec3>,
     /// The length of the substep that ended last, seconds: published velocities are the means over it.
     pub span_s: f64,
     /// Mass of each vertex, kg, and damping, 1/s.
@@ -34,24 +31,19 @@ impl SoftInertia {
         self.mobilities.extend_from_slice(mobilities);
     }
 
-    /// Takes over where it lies.
-    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>) {
-        self.feet.clear();
-        if let Some((feet, standing)) = lies {
-            self.feet.extend_from_slice(feet);
-            self.standing.copy_from(standing);
-        }
-    }
-
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
-    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
-        let standing = Some(&self.standing_accelerations).filter(|list| borne && !list.is_empty());
-        standing.unwrap_or(&self.accelerations)
+    /// Takes over where it lies and how it will accelerate there.
+    pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
+        self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
     /// Where it lies.
     pub(crate) fn feet(&self) -> &[Foot] {
-        &self.feet
+        self.standing.feet()
+    }
+
+    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
+        self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
     }
 
     /// How many slots it knows: one a vertex; zero before the first step.
@@ -82,7 +74,6 @@ impl SoftInertia {
     /// Where there are not as many as [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        let lies = borne && !self.feet.is_empty();
-        if lies { &self.standing } else { &self.factor }.respond(impulses);
+        self.standing.factor().filter(|_| borne).unwrap_or(&self.factor).respond(impulses);
     }
 }

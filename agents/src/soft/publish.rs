@@ -25,9 +25,8 @@ impl SoftBody {
             let inertia = into.inertia.soft_mut();
             let (answer, lies) = self.footing.told(self.system.answer());
             inertia.copy_from(answer, &self.contacts.mobilities);
-            inertia.stand(lies);
+            inertia.stand(lies, &self.foretold.standing);
             inertia.accelerations.clone_from(&self.foretold.accelerations);
-            inertia.standing_accelerations.clone_from(&self.foretold.standing);
             inertia.span_s = self.foretold.span_s;
             inertia.mass_kg.clone_from(&self.lattice.mass_kg);
             inertia.damping_per_s = self.spec.matter.damping_per_s;

@@ -19,8 +19,8 @@ mod watch;
 
 use super::motion::Motion;
 use super::{Joint, RigidBody, RigidError};
-use crate::coupling::beside::bends;
-use crate::coupling::{Law, Six};
+use crate::coupling::Six;
+use crate::coupling::beside::may_press;
 use crate::{AgentId, Companion, SimSpan, StepError, StepReport, Surroundings, check_span};
 use crew::Crew;
 use direct::{Direct, Reach};
@@ -262,7 +262,7 @@ impl Island {
             let member = &mut self.members[index];
             (member.motion, member.gravity, member.springs) = (body.motion, body.gravity, None);
             member.alone = body.ties.is_empty() && body.company.guests().is_empty();
-            member.asked = around.neighbours.iter().any(|n| !n.owned && bends(n) && n.law == Law::Ledger);
+            member.asked = around.neighbours.iter().any(may_press);
             given |= member.asked && body.received != [DVec3::ZERO; 2];
         }
         self.carry(crew);
