@@ -132,8 +132,6 @@ pub struct Contact {
     /// The velocity across the normal by which the two are to come back to where friction holds them, m/s, with its sign turned: what
     /// friction brings to zero is u + this.
     pub back_m_s: DVec3,
-    /// The share of what is amiss that this owner sets right, in 0 … 1: others who press on the same body set right the rest.
-    pub share: f64,
     /// Age of what is known of the other body, seconds, ≥ 0. A depth is taken back over this where it is longer than the
     /// step: what has been pushed out already shows only that much later.
     pub age_s: f64,
@@ -180,7 +178,6 @@ mod tests {
             friction,
             rebound_m_s: 0.0,
             back_m_s: DVec3::ZERO,
-            share: 1.0,
             age_s: 0.0,
         }
     }

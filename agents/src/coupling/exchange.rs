@@ -136,6 +136,8 @@ pub struct Exchange {
 const END_S: f64 = 1.0 / 60.0;
 /// A part begins so much earlier or later than its share of the step.
 const END_SLACK: f64 = 0.01;
+/// What a body is given is expected to last up to so many times what it was given in the step before: a blow is not.
+const AT_MOST: f64 = 2.0;
 /// How long a coupling that does nothing is still published, seconds.
 const LINGER_S: f64 = 1.0;
 
@@ -308,14 +310,14 @@ impl Exchange {
 }
 
 impl Owned {
-    /// Notes what a body was given a second at the end of a step of `dt_s` seconds. It is expected to go on where the step
-    /// before ended with as much: a blow does not.
+    /// Notes what a body was given a second at the end of a step of `dt_s` seconds. It is expected to go on, up to twice what the step
+    /// before ended with: a blow does not.
     fn go_on(&mut self, dt_s: f64) {
         let late = self.parts.iter().filter(|(after_s, _)| *after_s >= dt_s - END_S * (1.0 + END_SLACK));
         let now = late.fold(Impulse::ZERO, |sum, (_, part)| sum + *part) * dt_s.min(END_S).recip();
         let before = std::mem::replace(&mut self.force, now);
-        let weaker = before.linear.length_squared() < now.linear.length_squared();
-        self.ledger.force = if weaker { before } else { now };
+        let [was, is] = [before, now].map(|force| force.linear.length());
+        self.ledger.force = if is > AT_MOST * was { now * (AT_MOST * was / is) } else { now };
     }
 }
 

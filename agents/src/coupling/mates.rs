@@ -109,10 +109,9 @@ impl Mates {
         self.for_touched(around, |mate, tanks| mate.recall(tanks, (around.time, dt)));
     }
 
-    /// Recalls for a step of `dt` seconds what those that are only touched were given, and how those on whom others press too moved otherwise
-    /// than expected.
+    /// Recalls for a step of `dt` seconds what those that are only touched were given.
     pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
-        self.for_touched(around, |mate, tanks| mate.regain(tanks, (around.time, dt)));
+        self.for_touched(around, |mate, tanks| mate.regain(tanks, dt));
     }
 
     /// Does `act` with each to whom no link leads.
@@ -179,7 +178,7 @@ impl Mates {
 
     /// Turns the impulses on the others, one a slot, into the velocities they cause; the owner's own slots are left alone.
     pub fn respond(&self, impulses: &mut [DVec3]) {
-        self.all().iter().for_each(|mate| mate.other.respond(mate.slots_mut(impulses)));
+        self.all().iter().for_each(|mate| mate.respond(impulses));
     }
 
     /// The size of the inverse mass of each slot of the others, behind those of the owner (docs/theory/contact.md, eq. 9).

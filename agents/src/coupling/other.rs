@@ -57,8 +57,18 @@ pub struct Other {
     landing: Option<DVec3>,
     /// What other owners have announced for a rigid body: in how many seconds it acts.
     coming: Vec<(f64, Twist)>,
-    /// What is expected of them after that: in how many seconds it begins, N and N·m.
-    lasting: Vec<(f64, Twist)>,
+    /// What is expected of them after that.
+    lasting: Vec<Lasting>,
+}
+
+/// What another owner goes on giving, a blow at the start of each of its steps (eq. 6e).
+#[derive(Debug, Clone, Copy)]
+struct Lasting {
+    /// In how many seconds its next step begins, and how long its steps are.
+    after_s: f64,
+    step_s: f64,
+    /// N and N·m.
+    force: Twist,
 }
 
 /// A body at rest is immovable until something comes at it faster than this, m/s: what is laid down gently is not noticed.

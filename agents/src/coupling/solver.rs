@@ -211,7 +211,6 @@ impl Solver {
             self.now.caused.clear();
             self.now.caused.resize(contacts.len(), DVec3::ZERO);
         }
-        self.share(contacts);
         self.ahead.clone_from(&self.now);
         let (mut momentum, mut taken) = (1.0, true);
         loop {
@@ -234,18 +233,6 @@ impl Solver {
         }
         self.products = report.iterations;
         report
-    }
-
-    /// Leaves to other owners of contact with the same body their shares of what is amiss with the impulses of the last solve: of friction,
-    /// and of what pressed then (docs/theory/coupling.md, eq. 6c).
-    fn share(&mut self, contacts: &[Contact]) {
-        let Self { free, now, .. } = self;
-        for (k, contact) in contacts.iter().enumerate().filter(|(_, contact)| contact.share < 1.0) {
-            let amiss = free[k] + now.caused[k];
-            let along = contact.normal * contact.normal.dot(amiss);
-            let presses = now.lambda[k].dot(contact.normal) > 0.0;
-            free[k] -= if presses { amiss } else { amiss - along } * (1.0 - contact.share);
-        }
     }
 
     /// Forms W where that costs less than the last solve did; the most products that may be taken.

@@ -64,7 +64,6 @@ fn random_contacts(count: u32, slots: u32, friction: f64, noise: &mut Noise) -> 
             friction,
             rebound_m_s: 0.0,
             back_m_s: DVec3::ZERO,
-            share: 1.0,
             age_s: 0.0,
         }
     };
@@ -225,7 +224,6 @@ fn contacts_between_parts_of_one_body_keep_its_momentum() {
         friction: 0.4,
         rebound_m_s: 0.0,
         back_m_s: DVec3::ZERO,
-        share: 1.0,
         age_s: 0.0,
     };
     let free: Vec<DVec3> =
@@ -254,7 +252,6 @@ fn slide_on_incline(slope: f64, friction: f64) -> f64 {
                 friction,
                 rebound_m_s: 0.0,
                 back_m_s: DVec3::ZERO,
-                share: 1.0,
                 age_s: 0.0,
             }
         })
@@ -309,7 +306,6 @@ fn contacts_that_stay_open_cost_no_answer() {
         friction: 0.5,
         rebound_m_s: 0.0,
         back_m_s: DVec3::ZERO,
-        share: 1.0,
         age_s: 0.0,
     }];
     let problem = Problem { contacts: &contacts, kin: &[], h_s: 0.01, mobilities: &[1.0], settings: PATIENT };
@@ -334,7 +330,6 @@ fn an_impulse_passes_to_the_next_of_kin() {
             friction: 0.5,
             rebound_m_s: 0.0,
             back_m_s: DVec3::ZERO,
-            share: 1.0,
             age_s: 0.0,
         }];
         let mut velocities = [DVec3::new(0.1, 0.0, -1.0)];

@@ -13,7 +13,9 @@ use super::motion::Motion;
 use super::obstacles::Mine;
 use crate::coupling::beside::may_press;
 use crate::coupling::{Impulse, Law, Place, Six, Twist};
-use crate::{AgentId, Body, Bounds, Inertia, LiesOn, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld};
+use crate::{
+    AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
+};
 use glam::{DQuat, DVec3};
 
 /// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
@@ -201,7 +203,12 @@ impl RigidBody {
         let otherwise = self.motion.velocity - velocity;
         let along = otherwise - stand.normal * stand.normal.dot(otherwise);
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
-        (along.length() + swing < STANDING_M_S).then_some(lies)
+        // who helps to bear it takes it for free, as all do who bear a body together
+        let lifts = |n: &Neighbour| {
+            let given = n.snapshot.given.iter().find(|ledger| ledger.with == around.me);
+            n.id != lies.on && given.is_some_and(|ledger| ledger.force.linear.dot(stand.normal) > 0.0)
+        };
+        (along.length() + swing < STANDING_M_S && !around.neighbours.iter().any(lifts)).then_some(lies)
     }
 
     /// In how many seconds of free flight something fixed may be in its way, where that is soon.

@@ -138,17 +138,8 @@ impl Meeting {
             let with = guest.and_then(|(_, g)| g.other.id()).map_or(u64::MAX, |id| u64::from(id.0));
             let key = mixed(touch.key ^ mixed(with));
             let (normal, gap_m) = (touch.normal, touch.gap_m);
-            let contact = Contact {
-                key,
-                slots,
-                normal,
-                gap_m,
-                friction,
-                rebound_m_s,
-                back_m_s: DVec3::ZERO,
-                share: 1.0,
-                age_s: 0.0,
-            };
+            let contact =
+                Contact { key, slots, normal, gap_m, friction, rebound_m_s, back_m_s: DVec3::ZERO, age_s: 0.0 };
             self.found.push(Found { contact, guest: guest.map(|(i, _)| i), approach_m_s });
         }
     }

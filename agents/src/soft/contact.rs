@@ -171,7 +171,6 @@ impl Contacts {
                         friction,
                         rebound_m_s: 0.0,
                         back_m_s: DVec3::ZERO,
-                        share: 1.0,
                         age_s: 0.0,
                     });
                 }

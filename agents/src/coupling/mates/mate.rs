@@ -62,6 +62,8 @@ pub struct Mate {
     evenly: bool,
     /// What bends was given a second in the substep before, N and N·m in slots; empty for nothing.
     lasts: Vec<DVec3>,
+    /// Into how many parts a rigid body is divided among those who press on it, ≥ 1.
+    split: f64,
     /// By how much its mean velocities in the substep tried are above those at its start, in slots.
     gains: Vec<DVec3>,
     /// What links give it in the substep, in its slots: that lasts, and is no blow.
@@ -102,7 +104,7 @@ impl Mate {
         [&mut lasting, &mut back, &mut lasts].into_iter().for_each(Vec::clear);
         let gains = std::mem::take(&mut self.gains);
         let kept = Self { other, room, lasting, back, lasts, gains, ..Self::default() };
-        *self = Self { friction: (friction * there).sqrt(), fade: 1.0, ..kept };
+        *self = Self { friction: (friction * there).sqrt(), fade: 1.0, split: 1.0, ..kept };
         if stale { self.other.see(neighbour) } else { self.other.meet(neighbour, around, exchange, None) }
     }
 
@@ -155,6 +157,28 @@ impl Mate {
         } else {
             velocities[self.slots.0] += fall;
             velocities[self.slots.0 + 1..][..1].iter_mut().for_each(|spin| *spin += turn);
+        }
+        self.share(velocities, h);
+    }
+
+    /// Takes out of its velocities in the mean of a substep `h` what the other parts of a body that is divided would make of what the owner
+    /// gave last (eq. 6c).
+    fn share(&mut self, velocities: &mut [DVec3], h: f64) {
+        if self.split == 1.0 || self.lasts.len() != self.slots.1 {
+            return;
+        }
+        self.room.clear();
+        self.room.extend(self.lasts.iter().map(|last| *last * (h * (self.split - 1.0))));
+        self.other.respond(&mut self.room);
+        self.slots_mut(velocities).iter_mut().zip(&self.room).for_each(|(v, dv)| *v -= *dv);
+    }
+
+    /// Turns impulses, in slots of all, into the velocities that they cause in the owner's solve.
+    pub fn respond(&self, all: &mut [DVec3]) {
+        let list = self.slots_mut(all);
+        self.other.respond(list);
+        if self.split > 1.0 {
+            list.iter_mut().for_each(|v| *v *= self.split);
         }
     }
 
@@ -231,7 +255,6 @@ impl Mate {
             friction: self.friction,
             rebound_m_s: 0.0,
             back_m_s: self.back_m_s(touch),
-            share: 1.0 / (1 + self.other.other_givers()) as f64,
             age_s: self.other.answers_within_s(),
         }
     }
@@ -275,6 +298,7 @@ impl Mate {
 
     /// Appends the size of the inverse mass of its slots.
     pub fn scale(&self, mobilities: &mut Vec<f64>) {
+        let from = mobilities.len();
         let inertia = self.other.neighbour().filter(|_| !self.other.is_held()).map(|n| &n.snapshot.inertia);
         match inertia {
             Some(_) if self.other.mobility().is_some() => {
@@ -288,6 +312,7 @@ impl Mate {
             Some(Inertia::Soft(soft)) if soft.slots() == self.slots.1 => soft.scale(mobilities),
             _ => mobilities.extend(std::iter::repeat_n(0.0, self.slots.1)),
         }
+        mobilities[from..].iter_mut().for_each(|mobility| *mobility *= self.split);
     }
 
     /// The far end of a link to this agent, for a substep of `h` seconds.
@@ -389,6 +414,9 @@ impl Mate {
             let list = &mut impulses[first..end];
             if self.evenly {
                 self.spread(list, h);
+            } else {
+                self.lasts.clear();
+                self.lasts.extend(list.iter().map(|all| *all / h));
             }
             self.other.book(exchange, (start, h), list);
             self.last(exchange, (start, h));

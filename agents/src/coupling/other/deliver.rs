@@ -4,8 +4,8 @@
 //! its velocities and its place, and what those others will give it. Never here: what it does next.
 //! Theory: docs/theory/coupling.md, eq. 5–6b.
 
-use super::Other;
 use super::ground::LIFTED_M;
+use super::{Lasting, Other};
 use crate::coupling::{Exchange, Impulse, Ledger, Rebound, Site, Twist, acknowledged};
 use crate::{AgentId, Body, DT_MAX_S, Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
@@ -121,7 +121,10 @@ impl Other {
             }
             let from_s = giver.snapshot.time.secs_after(at);
             if ledger.force != Impulse::ZERO && (from_s > -DT_MAX_S || giver.snapshot.at_rest) {
-                self.lasting.push((from_s, [ledger.force.linear, ledger.force.angular]));
+                // one that rests goes on from now on, one that is late has given its next blow before now
+                let earliest_s = if giver.snapshot.at_rest { 0.0 } else { -giver.step_s };
+                let force = [ledger.force.linear, ledger.force.angular];
+                self.lasting.push(Lasting { after_s: from_s.max(earliest_s), step_s: giver.step_s, force });
             }
         }
     }
@@ -137,24 +140,54 @@ impl Other {
         }
     }
 
-    /// Takes what other owners have announced for the last `h` seconds, which have passed already.
+    /// Takes what other owners give in the last `h` seconds, which have passed already.
     pub(super) fn receive(&mut self, h: f64) {
         let mut coming = std::mem::take(&mut self.coming);
         coming.retain_mut(|(after_s, impulse)| {
             *after_s -= h;
             let due = *after_s <= 0.0;
             if due {
-                let mut change = *impulse;
-                self.respond(&mut change);
-                self.leave(change[0]);
-                self.velocities[0] += change[0];
-                self.velocities[1] += change[1];
-                self.shift(&change.map(|change| change * -*after_s));
+                self.take_late(*impulse, -*after_s);
             }
             !due
         });
         self.coming = coming;
-        self.lasting.iter_mut().for_each(|(from_s, _)| *from_s -= h);
+        let mut lasting = std::mem::take(&mut self.lasting);
+        for giver in &mut lasting {
+            if let Some((after_s, lasts_s)) = giver.within(h) {
+                self.take_late(giver.force.map(|force| force * lasts_s), h - after_s);
+            }
+            giver.after_s = (giver.after_s - h).max(0.0);
+        }
+        self.lasting = lasting;
+    }
+
+    /// Takes an impulse that has acted for `since_s` seconds.
+    fn take_late(&mut self, impulse: Twist, since_s: f64) {
+        let mut change = impulse;
+        self.respond(&mut change);
+        self.leave(change[0]);
+        self.velocities[0] += change[0];
+        self.velocities[1] += change[1];
+        self.shift(&change.map(|change| change * since_s));
+    }
+
+    /// By how much faster a rigid body moves in the mean of the next `h` seconds by what other owners give in them, m/s and rad/s.
+    pub(super) fn gain_by_others(&self, h: f64) -> Twist {
+        let mut sum = [DVec3::ZERO; 2];
+        let mut add = |impulse: Twist, share: f64| sum = [0, 1].map(|part| sum[part] + impulse[part] * share);
+        for (after_s, impulse) in self.coming.iter().filter(|(after_s, _)| *after_s < h - SOON_S) {
+            add(*impulse, 1.0 - after_s / h);
+        }
+        for giver in &self.lasting {
+            if let Some((after_s, lasts_s)) = giver.within(h) {
+                add(giver.force, lasts_s * (1.0 - after_s / h));
+            }
+        }
+        if sum != [DVec3::ZERO; 2] {
+            self.respond(&mut sum);
+        }
+        sum
     }
 
     /// How many others go on giving to a rigid body.
@@ -163,16 +196,25 @@ impl Other {
         self.lasting.len()
     }
 
-    /// How what other owners go on giving accelerates a rigid body, m/s² and rad/s².
-    pub(super) fn carried_by_others(&self) -> Twist {
+    /// How what other owners go on giving accelerates a rigid body in the mean, m/s².
+    pub(super) fn carried_by_others(&self) -> DVec3 {
         let mut sum = [DVec3::ZERO; 2];
-        for (_, force) in self.lasting.iter().filter(|(from_s, _)| *from_s <= SOON_S) {
-            sum = [sum[0] + force[0], sum[1] + force[1]];
+        for giver in self.lasting.iter().filter(|giver| giver.after_s <= SOON_S) {
+            sum = [0, 1].map(|part| sum[part] + giver.force[part]);
         }
         if !self.lasting.is_empty() {
             self.respond(&mut sum);
         }
-        sum
+        sum[0]
+    }
+}
+
+impl Lasting {
+    /// When in the mean it gives in the next `h` seconds, seconds from now, and for how long; `None` where it does not. What it gives for
+    /// a step of its own it gives at the start of that.
+    fn within(&self, h: f64) -> Option<(f64, f64)> {
+        let lasts_s = h - self.after_s;
+        (lasts_s > SOON_S).then(|| (self.after_s + 0.5 * (lasts_s - self.step_s).max(0.0), lasts_s))
     }
 }
 

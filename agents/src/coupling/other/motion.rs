@@ -8,14 +8,19 @@ use crate::coupling::{Sprung, Twist};
 use glam::{DQuat, DVec3};
 
 impl Other {
-    /// Its smooth acceleration, m/s²: none where impulses do not move it.
+    /// Its smooth acceleration and the mean of what others give it, m/s²: none where impulses do not move it.
     #[must_use]
     pub fn acceleration(&self) -> DVec3 {
+        let carried = if self.lean.is_none() { self.carried_by_others() } else { DVec3::ZERO };
+        self.smooth() + self.held_still(carried)
+    }
+
+    /// Its smooth acceleration, m/s²: none where impulses do not move it.
+    fn smooth(&self) -> DVec3 {
         match (&self.neighbour, &self.lean) {
             (Some(_), Some(lean)) => lean.acceleration(0.0)[0],
             (Some(neighbour), None) if !self.held => {
-                let falls = self.landing.unwrap_or_default();
-                self.held_still(neighbour.snapshot.acceleration + falls + self.carried_by_others()[0])
+                self.held_still(neighbour.snapshot.acceleration + self.landing.unwrap_or_default())
             }
             _ => DVec3::ZERO,
         }
@@ -47,7 +52,8 @@ impl Other {
             Some(lean) => lean.acceleration(h).map(|a| a * h),
             None => {
                 let falling = self.fall(h).map_or(DVec3::ZERO, |fall| fall.normal * (fall.way_m / h - fall.speed_m_s));
-                [self.acceleration() * (0.5 * h) + falling, self.carried_by_others()[1] * (0.5 * h)]
+                let [blows, turns] = self.gain_by_others(h);
+                [self.smooth() * (0.5 * h) + falling + blows, turns]
             }
         }
     }
@@ -124,13 +130,12 @@ impl Other {
             return;
         }
         if self.positions.is_empty() {
-            let (a, [_, turning]) = (self.acceleration(), self.carried_by_others());
+            let a = self.smooth();
             let fall = self.fall(h);
             let Pose { centre, rotation } = &mut self.pose;
             *centre += self.velocities[0] * h + a * (0.5 * h * h);
-            *rotation = turned(*rotation, self.velocities[1] * h + turning * (0.5 * h * h));
+            *rotation = turned(*rotation, self.velocities[1] * h);
             self.velocities[0] += a * h;
-            self.velocities[1] += turning * h;
             if let Some(fall) = fall {
                 self.settle(&fall, h);
             }

@@ -248,7 +248,6 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
         friction,
         rebound_m_s: 0.0,
         back_m_s: DVec3::ZERO,
-        share: 1.0,
         age_s: 0.0,
     }
 }
@@ -282,7 +281,6 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
         friction: (friction * touch.friction).sqrt(),
         rebound_m_s: 0.0,
         back_m_s: DVec3::ZERO,
-        share: 1.0,
         age_s: 0.0,
     }
 }

@@ -20,25 +20,24 @@ impl Mate {
         // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (rod/horizon.rs)
         let blows = |n: &Neighbour| matches!(&n.snapshot.inertia, Inertia::Curve(curve) if curve.ahead_s == 0.0);
         self.evenly = !self.other.neighbour().is_some_and(blows);
-        if !self.evenly {
-            return;
-        }
-        self.look_back(tanks, (now, dt));
         self.remember(tanks);
+        self.divide();
+        if self.evenly {
+            self.look_back(tanks, (now, dt));
+        }
     }
 
-    /// Recalls the first of these of a body that others press on too while nothing fixed holds it up: what they give it is foreseen,
-    /// what the ground gives it is not. And the second of what foretells its next step and makes no shorter ones (eq. 16h).
-    pub fn regain(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
-        let stands = self.other.neighbour().is_some_and(|n| n.snapshot.stand.is_some());
-        if self.other.other_givers() > 0 && !stands {
-            self.look_back(tanks, (now, dt));
-        } else if let Some(account) = self.other.id().and_then(|id| tanks.get(id)) {
-            account.astray.forget();
-        }
+    /// Recalls the second of these, of what foretells its next step and makes no shorter ones (eq. 16h).
+    pub fn regain(&mut self, tanks: &mut Tanks, dt: f64) {
         self.evenly = self.other.is_foretold() && self.other.parts(dt) == 1;
-        if self.evenly {
-            self.remember(tanks);
+        self.remember(tanks);
+        self.divide();
+    }
+
+    /// Divides a rigid body among those who press on it, once this owner is one of them (docs/theory/coupling.md, eq. 6c).
+    fn divide(&mut self) {
+        if !self.other.is_many() && self.lasts.iter().any(|last| *last != DVec3::ZERO) {
+            self.split = (1 + self.other.other_givers()) as f64;
         }
     }
 
