@@ -58,8 +58,7 @@ impl std::fmt::Debug for Peer {
 
 impl Peer {
     fn standing(&self) -> Standing {
-        let held_ends = self.form.as_ref().map_or(0, |form| form.held_ends());
-        Standing { id: self.shared.id, model: self.shared.model, rate_hz: self.shared.wanted_hz, held_ends }
+        Standing::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
     }
 
     fn law(&self, other: AgentId) -> Law {

@@ -19,6 +19,9 @@ pub struct Form {
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger.
     pub restitution: f64,
+    /// How high the middle of what bends is at the start, −g·x, J/kg; infinite of a soft body that is held, zero of what does not bend.
+    /// Of two that keep one rate the higher owns.
+    pub rank_j_kg: f64,
 }
 
 impl Form {

@@ -217,8 +217,12 @@ impl Stage {
 
     fn standing(&self, id: AgentId) -> Standing {
         let actor = &self.actors[id.0 as usize];
-        let held_ends = actor.agent.form().map_or(0, |form| form.held_ends());
-        Standing { id, model: actor.agent.model(), rate_hz: actor.rate_hz, held_ends }
+        Standing::new(id, actor.agent.model(), actor.rate_hz, actor.agent.form().as_deref())
+    }
+
+    /// Which of two owns their pair.
+    pub(crate) fn owner(&self, [a, b]: [AgentId; 2]) -> AgentId {
+        if owns(self.standing(a), self.standing(b)) { a } else { b }
     }
 
     /// Everything that others have given to `id` and its own newest state does not know.

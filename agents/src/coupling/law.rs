@@ -1,5 +1,6 @@
 //! Who owns a pair of agents, and by which law the two act on each other.
 
+use super::Form;
 use super::beside::PART_MAX_S;
 use crate::{AgentId, Anchor};
 use std::cmp::Ordering;
@@ -60,11 +61,23 @@ pub struct Standing {
     pub rate_hz: f64,
     /// How many ends of a tube are held in place.
     pub held_ends: u8,
+    /// How high it starts, J/kg: see [`Form::rank_j_kg`].
+    pub rank_j_kg: f64,
+}
+
+impl Standing {
+    /// That of the agent `id` of a `model`, whose scene wants `rate_hz`.
+    #[must_use]
+    pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&Form>) -> Self {
+        let held_ends = form.map_or(0, Form::held_ends);
+        Self { id, model, rate_hz, held_ends, rank_j_kg: form.map_or(0.0, |form| form.rank_j_kg) }
+    }
 }
 
 /// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the faster, of two
-/// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends, of equals the lower number. A tool is led
-/// and owns nothing.
+/// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends; of two soft bodies, two tubes that are held
+/// alike and two rigid bodies the faster, of two as fast that bend the higher (docs/decisions/0019), of equals the lower number. A tool
+/// is led and owns nothing.
 ///
 /// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
 /// all how far one falls that nothing holds (docs/decisions/0012, 0013).
@@ -83,8 +96,9 @@ pub fn owns(me: Standing, other: Standing) -> bool {
     let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
     let rate = |s: Standing| s.rate_hz.max(slowest);
     let faster = rate(me).total_cmp(&rate(other));
+    let higher = me.rank_j_kg.total_cmp(&other.rank_j_kg);
     let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
-    tube(me).cmp(&tube(other)).then(freer).then(faster).then(other.id.cmp(&me.id)).is_gt()
+    tube(me).cmp(&tube(other)).then(freer).then(faster).then(higher).then(other.id.cmp(&me.id)).is_gt()
 }
 
 #[cfg(test)]
@@ -96,10 +110,8 @@ mod tests {
         let all = ["tube", "rigid", "instrument", "sheet"]
             .into_iter()
             .flat_map(|model| [60.0, 1000.0].map(|rate_hz| (model, rate_hz)));
-        let all: Vec<_> = all
-            .zip(0..)
-            .map(|((model, rate_hz), id)| Standing { id: AgentId(id), model, rate_hz, held_ends: 0 })
-            .collect();
+        let all: Vec<_> =
+            all.zip(0..).map(|((model, rate_hz), id)| Standing::new(AgentId(id), model, rate_hz, None)).collect();
         for a in &all {
             for b in all.iter().filter(|b| b.id != a.id) {
                 let both_led = a.model == "instrument" && b.model == "instrument";
@@ -114,5 +126,7 @@ mod tests {
         let slow = |rate_hz| Standing { rate_hz, ..all[0] };
         assert!(owns(slow(5.0), Standing { held_ends: 1, ..slow(60.0) }), "beside each other both keep 60 Hz");
         assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
+        let higher = Standing { id: AgentId(9), rank_j_kg: 1.0, ..all[6] };
+        assert!(owns(higher, all[6]) && owns(all[7], higher), "the higher of two as fast");
     }
 }

@@ -73,7 +73,10 @@ impl SoftBody {
             lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
         let surface = lattice.surface();
         let edge_m = surface.edge_m;
-        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
+        let middle = positions.iter().sum::<DVec3>() / positions.len() as f64;
+        let held = lattice.held.contains(&true);
+        let rank_j_kg = if held { f64::INFINITY } else { -spec.gravity.dot(middle) };
+        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0, rank_j_kg };
         let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
         Ok(Self {
             system: lattice.system(),

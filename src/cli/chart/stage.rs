@@ -168,8 +168,7 @@ impl Stage {
     fn sight(&self, me: usize, other: usize) -> Neighbour {
         let standing = |i: usize| {
             let actor = &self.actors[i];
-            let held_ends = actor.form.as_ref().map_or(0, |form| form.held_ends());
-            Standing { id: AgentId(i as u32), model: actor.agent.model(), rate_hz: actor.rate_hz, held_ends }
+            Standing::new(AgentId(i as u32), actor.agent.model(), actor.rate_hz, actor.form.as_deref())
         };
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;

@@ -146,7 +146,7 @@ fn a_soft_ball_that_falls_on_a_soft_slab_comes_to_lie_on_it() {
         let energy_j = |stage: &Stage| stage.newest(slab).energy_j + stage.newest(ball).energy_j;
         let (start_j, mut most_j) = (energy_j(&stage), f64::NEG_INFINITY);
         stage.run(1.2, |stage| most_j = most_j.max(energy_j(stage) - start_j));
-        let owner = if rates.1 > rates.0 { ball } else { slab };
+        let owner = stage.owner([slab, ball]);
         let deep_m = stage.newest(owner).pairs[0].penetration_m;
         let low_m = stage.newest(ball).bounds.unwrap().low.z;
         println!("{rates:?}, {speed_m_s} m/s: {deep_m:.1e} m deep, bottom at {low_m}, {most_j} J");

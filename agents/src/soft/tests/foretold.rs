@@ -88,7 +88,7 @@ fn pressed(rates: (f64, f64)) -> [f64; 2] {
     let block = SoftShape::Box { size_m: DVec3::new(0.1, 0.1, 0.05), segments: [4, 4, 2] };
     let ball = stage.add(SoftBody::new(made(BALL, 1e5, DVec3::Z * 0.036)).unwrap(), rates.0);
     let block = stage.add(SoftBody::new(made(block, 5e4, DVec3::new(-0.05, -0.05, 0.085))).unwrap(), rates.1);
-    let owner = if rates.1 > rates.0 { block } else { ball };
+    let owner = stage.owner([ball, block]);
     let (mut deep_m, mut tank_j) = (0.0_f64, f64::INFINITY);
     stage.run(1.0, |_| {});
     stage.run(2.0, |stage| {

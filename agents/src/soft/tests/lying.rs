@@ -62,7 +62,8 @@ fn laid(on: On, rates: (f64, f64), faults: Faults) -> (Stage, [AgentId; 2]) {
         On::Sheet => {
             let sheet = stage.add(SoftBody::new(held_sheet()).unwrap(), rates.1);
             let block = stage.add(SoftBody::new(block(DVec3::new(0.01, 0.02, 5e-4), 3)).unwrap(), rates.0);
-            (stage, [if rates.0 > rates.1 { block } else { sheet }, block])
+            let owner = stage.owner([sheet, block]);
+            (stage, [owner, block])
         }
     }
 }

@@ -236,3 +236,50 @@ fn a_soft_block_that_falls_on_a_box_on_a_cloth_lies_on_the_box() {
         assert!(tank_j > -0.05 && highest_m < 0.186, "{rates:?}: {tank_j} J, {highest_m} m high");
     }
 }
+
+/// Three on the floor of which two bend and the third is rigid and on top.
+fn three(stage: &mut Stage, what: &str, hz: f64) -> [AgentId; 3] {
+    let lifted = |spec: SoftSpec, up_m: f64| SoftSpec { position: spec.position + DVec3::Z * up_m, ..spec };
+    let (low, middle, top) = match what {
+        "cloths" => (cloth(), lifted(cloth(), 0.005), 0.038 + 1e-3),
+        "block on a cloth" => (cloth(), block(0.006), 0.086 + 1e-3),
+        _ => {
+            let across = SoftShape::Rope {
+                path_m: vec![DVec3::new(0.0, -0.15, 0.019), DVec3::new(0.0, 0.15, 0.019)],
+                radius_m: 0.006,
+                segments: 8,
+            };
+            (rope(), SoftSpec { shape: across, ..rope() }, 0.0255 + 0.03)
+        }
+    };
+    let soft = [low, middle].map(|spec| stage.add(SoftBody::new(spec).unwrap(), hz));
+    let brick = RigidBody::new(brick(top, 0.3)).unwrap();
+    [soft[0], soft[1], stage.add(brick, hz)]
+}
+
+/// The lower of the two that bend once owned their contact: what it gave the upper one, which the box held down, knew nothing of the box,
+/// and the box went through two cloths and was shot off a block and off two ropes.
+#[test]
+fn a_box_lies_on_two_that_bend_on_each_other() {
+    for (what, hz) in
+        ["cloths", "block on a cloth", "ropes"].into_iter().flat_map(|what| [240.0, 120.0].map(|hz| (what, hz)))
+    {
+        let mut stage = Stage::new(Faults::default());
+        stage.at_once = true;
+        let all = three(&mut stage, what, hz);
+        let (mut depth_m, mut tank_j) = (0.0_f64, 0.0_f64);
+        stage.run(1.5, |stage| {
+            let pairs = || all.iter().flat_map(|id| &stage.newest(*id).pairs);
+            depth_m = pairs().map(|pair| pair.penetration_m).fold(depth_m, f64::max);
+            tank_j = pairs().filter_map(|pair| pair.tank_j).fold(tank_j, f64::min);
+        });
+        let end_m = all.iter().map(|id| pressed(&stage, *id).0).fold(0.0, f64::max);
+        println!(
+            "{what}, {hz} Hz: at {}, {depth_m} and then {end_m} m deep, {tank_j} J",
+            stage.settled(all[2], 1.5).state.position
+        );
+        assert!(stage.owner([all[0], all[1]]) == all[1], "{what}: the upper one owns");
+        assert!(depth_m < 3e-3 && end_m < 5e-4, "{what}, {hz} Hz: {depth_m} and then {end_m} m deep");
+        assert!(tank_j > -0.1, "{what}, {hz} Hz: {tank_j} J");
+    }
+}

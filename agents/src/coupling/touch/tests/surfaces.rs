@@ -33,7 +33,10 @@ fn sheet() -> (Form, Vec<DVec3>) {
         edge_m: EDGE,
         closed: false,
     };
-    (Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
+    (
+        Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0, rank_j_kg: 0.0 },
+        places.map(point).collect(),
+    )
 }
 
 /// The distance of a point from the nearest triangle.
@@ -129,7 +132,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         edge_m: 1.0,
         closed: true,
     };
-    let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 };
+    let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0, rank_j_kg: 0.0 };
     let (mut room, mut list) = (TouchRoom::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
