@@ -237,6 +237,7 @@ mod tests {
             fans: Arc::default(),
             radius_m: 0.01,
             edge_m: 1.0,
+            height_j_kg: 0.0,
             closed: false,
         };
         let positions = vec![DVec3::ZERO, DVec3::X, DVec3::new(1.0, 1.0, 0.0), DVec3::Y];
@@ -273,6 +274,7 @@ mod tests {
             fans: Arc::default(),
             radius_m: 0.0,
             edge_m: 1.0,
+            height_j_kg: 0.0,
             closed: true,
         };
         let bit = |k: u32, b: u32| f64::from(k >> b & 1);

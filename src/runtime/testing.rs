@@ -274,7 +274,7 @@ impl Agent for Dummy {
             let solid = Solid::Ball { radius_m };
             let shape = SharedShape::ball(radius_m as f32);
             let kind = FormKind::Solid(SolidForm { solid, shape, com_local: DVec3::ZERO, radius_m });
-            Arc::new(Form { kind, friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 })
+            Arc::new(Form { kind, friction: 0.0, restitution: 0.0 })
         })
     }
 

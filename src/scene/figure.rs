@@ -76,7 +76,7 @@ impl Figure {
         };
         let form = SolidForm::new(solid, DVec3::ZERO).ok()?;
         let radius = DVec3::splat(form.radius_m);
-        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 };
+        let form = Form { kind: FormKind::Solid(form), friction: 0.0, restitution: 0.0 };
         let fixed =
             Self { id: self.id, form, place: Pose::Solid(place, rotation), low: place - radius, high: place + radius };
         self.meets(&fixed, 0.0).then_some(fixed)
@@ -95,7 +95,7 @@ impl Figure {
 
 /// The shape of an agent at its start; `None` for one that nothing touches.
 pub(super) fn figure(member: &Member) -> Option<Figure> {
-    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 };
+    let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
     let (kind, place, low, high) = match &member.spec {
         Spec::Rigid(spec) => {
             let solid = SolidForm::new(spec.solid.clone(), DVec3::ZERO).ok()?;
@@ -110,7 +110,7 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
             // where it is held is no matter of places
-            (FormKind::Chain { held_ends: 0 }, Pose::Chain(curve), low, high)
+            (FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {
             let body = SoftBody::new(spec.clone()).ok()?;

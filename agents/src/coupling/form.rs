@@ -19,16 +19,24 @@ pub struct Form {
     pub friction: f64,
     /// Coefficient of restitution, 0 … 1; a pair takes the larger.
     pub restitution: f64,
-    /// How high the middle of what bends is at the start, −g·x, J/kg; infinite of a soft body that is held, zero of what does not bend.
-    /// Of two that keep one rate the higher owns.
-    pub rank_j_kg: f64,
 }
 
 impl Form {
     /// How many ends of a tube are held in place; none of anything else.
     #[must_use]
     pub const fn held_ends(&self) -> u8 {
-        if let FormKind::Chain { held_ends } = self.kind { held_ends } else { 0 }
+        if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
+    }
+
+    /// How high the middle of what bends is at the start, −g·x, J/kg; infinite of a soft body that is held, zero of what does not bend.
+    /// Of two as fast the higher owns (docs/decisions/0019).
+    #[must_use]
+    pub const fn height_j_kg(&self) -> f32 {
+        match &self.kind {
+            FormKind::Chain { height_j_kg, .. } => *height_j_kg,
+            FormKind::Surface(surface) => surface.height_j_kg,
+            FormKind::Solid(_) | FormKind::Tool(_) => 0.0,
+        }
     }
 }
 
@@ -41,6 +49,8 @@ pub enum FormKind {
     Chain {
         /// How many of its ends are held in place, 0 … 2.
         held_ends: u8,
+        /// See [`Form::height_j_kg`].
+        height_j_kg: f32,
     },
     /// A tool: its parts depend on how far its jaws are open.
     Tool(ToolShape),
@@ -61,6 +71,8 @@ pub struct SurfaceForm {
     pub radius_m: f64,
     /// Mean length of its edges at rest, metres.
     pub edge_m: f64,
+    /// See [`Form::height_j_kg`].
+    pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
     /// What lies around each vertex and edge.

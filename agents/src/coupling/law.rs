@@ -61,8 +61,8 @@ pub struct Standing {
     pub rate_hz: f64,
     /// How many ends of a tube are held in place.
     pub held_ends: u8,
-    /// How high it starts, J/kg: see [`Form::rank_j_kg`].
-    pub rank_j_kg: f64,
+    /// How high it starts, J/kg: see [`Form::height_j_kg`].
+    pub height_j_kg: f32,
 }
 
 impl Standing {
@@ -70,7 +70,7 @@ impl Standing {
     #[must_use]
     pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&Form>) -> Self {
         let held_ends = form.map_or(0, Form::held_ends);
-        Self { id, model, rate_hz, held_ends, rank_j_kg: form.map_or(0.0, |form| form.rank_j_kg) }
+        Self { id, model, rate_hz, held_ends, height_j_kg: form.map_or(0.0, Form::height_j_kg) }
     }
 }
 
@@ -96,7 +96,7 @@ pub fn owns(me: Standing, other: Standing) -> bool {
     let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
     let rate = |s: Standing| s.rate_hz.max(slowest);
     let faster = rate(me).total_cmp(&rate(other));
-    let higher = me.rank_j_kg.total_cmp(&other.rank_j_kg);
+    let higher = me.height_j_kg.total_cmp(&other.height_j_kg);
     let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
     tube(me).cmp(&tube(other)).then(freer).then(faster).then(higher).then(other.id.cmp(&me.id)).is_gt()
 }
@@ -126,7 +126,7 @@ mod tests {
         let slow = |rate_hz| Standing { rate_hz, ..all[0] };
         assert!(owns(slow(5.0), Standing { held_ends: 1, ..slow(60.0) }), "beside each other both keep 60 Hz");
         assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
-        let higher = Standing { id: AgentId(9), rank_j_kg: 1.0, ..all[6] };
+        let higher = Standing { id: AgentId(9), height_j_kg: 1.0, ..all[6] };
         assert!(owns(higher, all[6]) && owns(all[7], higher), "the higher of two as fast");
     }
 }

@@ -82,8 +82,7 @@ impl Instrument {
         let spin = DVec3::ZERO;
         let tool =
             ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
-        let form =
-            Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0, rank_j_kg: 0.0 });
+        let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
         let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
         let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
         Ok(Self {

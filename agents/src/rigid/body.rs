@@ -419,5 +419,5 @@ fn form_of(spec: &RigidSpec, spread: &Spread, world: &World) -> Form {
         solid => solid.clone(),
     };
     let kind = FormKind::Solid(SolidForm { solid, shape, com_local: spread.com, radius_m });
-    Form { kind, friction: spec.friction, restitution: spec.restitution, rank_j_kg: 0.0 }
+    Form { kind, friction: spec.friction, restitution: spec.restitution }
 }

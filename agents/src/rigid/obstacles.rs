@@ -63,7 +63,7 @@ impl Obstacles {
             let solid = slab.unwrap_or_else(|| obstacle.solid.clone());
             let mesh = matches!(solid, Solid::Mesh { .. }).then(MeshRoom::default);
             let kind = FormKind::Solid(SolidForm::new(solid, DVec3::ZERO)?);
-            let form = Form { kind, friction: obstacle.friction, restitution: obstacle.restitution, rank_j_kg: 0.0 };
+            let form = Form { kind, friction: obstacle.friction, restitution: obstacle.restitution };
             let rotation = obstacle.rotation.normalize();
             Ok(Standing { form, position: obstacle.position, rotation, slab_m, mesh })
         });

@@ -71,12 +71,12 @@ impl SoftBody {
         let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> =
             lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let surface = lattice.surface();
-        let edge_m = surface.edge_m;
         let middle = positions.iter().sum::<DVec3>() / positions.len() as f64;
         let held = lattice.held.contains(&true);
-        let rank_j_kg = if held { f64::INFINITY } else { -spec.gravity.dot(middle) };
-        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0, rank_j_kg };
+        let height_j_kg = if held { f32::INFINITY } else { -spec.gravity.dot(middle) as f32 };
+        let surface = lattice.surface(height_j_kg);
+        let edge_m = surface.edge_m;
+        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
         let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
         Ok(Self {
             system: lattice.system(),

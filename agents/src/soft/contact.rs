@@ -61,8 +61,7 @@ impl Contacts {
         let wall = |obstacle: &crate::shape::Obstacle| {
             let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
                 .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
-            let form =
-                Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0, rank_j_kg: 0.0 };
+            let form = Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
             let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
             Ok(Wall { form, position, rotation, bores: Bores::default() })
         };

@@ -256,8 +256,8 @@ impl Lattice {
         self.edges.iter().map(share).fold(0.0, f64::max)
     }
 
-    /// The skin, as others touch it.
-    pub fn surface(&self) -> SurfaceForm {
+    /// The skin, as others touch it, of a body that starts at `height_j_kg` (see [`SurfaceForm`]).
+    pub fn surface(&self, height_j_kg: f32) -> SurfaceForm {
         let mut on = vec![false; self.rest.len()];
         self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
         let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
@@ -268,6 +268,7 @@ impl Lattice {
             edges: self.edges.clone().into(),
             triangles: self.triangles.clone().into(),
             radius_m: self.radius_m,
+            height_j_kg,
             closed: !self.bricks.is_empty(),
             fans: Fans::of(&self.edges, &self.triangles).into(),
         }

@@ -16,7 +16,7 @@ use proptest::prelude::*;
 fn solid(solid: Solid, radius_m: f64) -> Form {
     let shape = solid.to_shared_shape().unwrap();
     let kind = FormKind::Solid(SolidForm { solid, shape, com_local: DVec3::ZERO, radius_m });
-    Form { kind, friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 }
+    Form { kind, friction: 0.0, restitution: 0.0 }
 }
 
 fn ball(radius_m: f64) -> Form {
@@ -43,11 +43,11 @@ fn hull(half: DVec3) -> Form {
 }
 
 fn chain() -> Form {
-    Form { kind: FormKind::Chain { held_ends: 0 }, friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 }
+    Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.0, restitution: 0.0 }
 }
 
 fn tool() -> Form {
-    Form { kind: FormKind::Tool(ToolShape::default()), friction: 0.0, restitution: 0.0, rank_j_kg: 0.0 }
+    Form { kind: FormKind::Tool(ToolShape::default()), friction: 0.0, restitution: 0.0 }
 }
 
 fn at(form: &Form, position: DVec3, rotation: DQuat) -> Placed<'_> {

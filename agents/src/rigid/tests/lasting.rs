@@ -162,7 +162,7 @@ impl Agent for Pusher {
 
     fn form(&self) -> Option<Arc<Form>> {
         let kind = FormKind::Tool(ToolShape { shaft_radius_m: 5e-3, shaft_length_m: 0.3 });
-        Some(Arc::new(Form { kind, friction: 0.3, restitution: 0.0, rank_j_kg: 0.0 }))
+        Some(Arc::new(Form { kind, friction: 0.3, restitution: 0.0 }))
     }
 
     fn resolution(&self) -> Option<crate::Resolution> {

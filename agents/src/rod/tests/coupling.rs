@@ -54,7 +54,7 @@ impl Prop {
         let form = SolidForm::new(solid, DVec3::ZERO).unwrap();
         let moment = 0.4 * mass_kg * form.radius_m * form.radius_m;
         Self {
-            form: Arc::new(Form { kind: FormKind::Solid(form), friction, restitution: 0.0, rank_j_kg: 0.0 }),
+            form: Arc::new(Form { kind: FormKind::Solid(form), friction, restitution: 0.0 }),
             exchange: Exchange::default(),
             state: RigidState { position, ..RigidState::default() },
             mass_kg,

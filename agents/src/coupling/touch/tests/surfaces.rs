@@ -31,12 +31,10 @@ fn sheet() -> (Form, Vec<DVec3>) {
         triangles: triangles.into(),
         radius_m: 1e-3,
         edge_m: EDGE,
+        height_j_kg: 0.0,
         closed: false,
     };
-    (
-        Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0, rank_j_kg: 0.0 },
-        places.map(point).collect(),
-    )
+    (Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
 }
 
 /// The distance of a point from the nearest triangle.
@@ -130,9 +128,10 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         triangles: triangles.into(),
         radius_m: 0.0,
         edge_m: 1.0,
+        height_j_kg: 0.0,
         closed: true,
     };
-    let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0, rank_j_kg: 0.0 };
+    let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 };
     let (mut room, mut list) = (TouchRoom::default(), vec![]);
     let round = ball(0.02);
     for depth in [-0.015, 0.01] {
