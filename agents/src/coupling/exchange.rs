@@ -136,8 +136,6 @@ pub struct Exchange {
 const END_S: f64 = 1.0 / 60.0;
 /// A part begins so much earlier or later than its share of the step.
 const END_SLACK: f64 = 0.01;
-/// What a body is given is expected to last up to so many times what it was given in the step before: a blow is not.
-const AT_MOST: f64 = 2.0;
 /// How long a coupling that does nothing is still published, seconds.
 const LINGER_S: f64 = 1.0;
 
@@ -258,13 +256,14 @@ impl Exchange {
         }
     }
 
-    /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
-    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+    /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way. Whether the owner `divides` bodies that others press
+    /// on, too: it then goes on with what it gave, a blow as well, until all have found together what each has to give (eq. 6c).
+    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64, divides: bool) {
         for owned in &mut self.owned {
             if !(owned.state.kind.is_penalty() || owned.state.kind == PairKind::Tlm) {
                 owned.state.force_n = owned.step_impulse.length() / dt_s;
             }
-            owned.go_on(dt_s);
+            owned.go_on(dt_s, divides);
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
             let mut on_its_way = DVec3::ZERO;
             // who is not looked at any more has settled
@@ -283,6 +282,12 @@ impl Exchange {
         copy(self.taken.iter().map(|t| &t.copy), &mut into.taken);
         into.pairs.clear();
         into.pairs.extend(self.owned.iter().filter(lively).map(|o| o.state));
+    }
+
+    /// What `to` is expected to be given a second from now on, as a whole, N and N·m: as it was told in the last step.
+    #[must_use]
+    pub fn goes_on(&self, to: AgentId) -> Impulse {
+        self.owned.iter().find(|owned| owned.ledger.with == to).map_or(Impulse::ZERO, |owned| owned.ledger.force)
     }
 
     /// Whether nothing was ever exchanged.
@@ -310,14 +315,14 @@ impl Exchange {
 }
 
 impl Owned {
-    /// Notes what a body was given a second at the end of a step of `dt_s` seconds. It is expected to go on, up to twice what the step
-    /// before ended with: a blow does not.
-    fn go_on(&mut self, dt_s: f64) {
+    /// Notes what a body was given a second at the end of a step of `dt_s` seconds: it is expected to go on, of an owner that divides no bodies
+    /// as the weaker of the last two steps ended, as a blow does not.
+    fn go_on(&mut self, dt_s: f64, divides: bool) {
         let late = self.parts.iter().filter(|(after_s, _)| *after_s >= dt_s - END_S * (1.0 + END_SLACK));
         let now = late.fold(Impulse::ZERO, |sum, (_, part)| sum + *part) * dt_s.min(END_S).recip();
         let before = std::mem::replace(&mut self.force, now);
-        let [was, is] = [before, now].map(|force| force.linear.length());
-        self.ledger.force = if is > AT_MOST * was { now * (AT_MOST * was / is) } else { now };
+        let weaker = !divides && before.linear.length_squared() < now.linear.length_squared();
+        self.ledger.force = if weaker { before } else { now };
     }
 }
 

@@ -70,7 +70,7 @@ impl Standing {
     #[must_use]
     pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&Form>) -> Self {
         let held_ends = form.map_or(0, Form::held_ends);
-        Self { id, model, rate_hz, held_ends, height_j_kg: form.map_or(0.0, Form::height_j_kg) }
+        Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, Form::height_j_kg) }
     }
 }
 

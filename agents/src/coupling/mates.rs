@@ -106,19 +106,25 @@ impl Mates {
     /// Recalls for a step of `dt` seconds how those that are only touched moved otherwise than expected, and what they were given
     /// (docs/theory/soft.md, eq. 16f, 16g).
     pub fn recall(&mut self, around: &Surroundings<'_>, dt: f64) {
-        self.for_touched(around, |mate, tanks| mate.recall(tanks, (around.time, dt)));
+        self.for_touched(around, |mate, exchange, tanks| {
+            mate.divide(exchange, tanks, around);
+            mate.recall(tanks, (around.time, dt));
+        });
     }
 
     /// Recalls for a step of `dt` seconds what those that are only touched were given.
     pub fn regain(&mut self, around: &Surroundings<'_>, dt: f64) {
-        self.for_touched(around, |mate, tanks| mate.regain(tanks, dt));
+        self.for_touched(around, |mate, exchange, tanks| {
+            mate.divide(exchange, tanks, around);
+            mate.regain(tanks, dt);
+        });
     }
 
     /// Does `act` with each to whom no link leads.
-    fn for_touched(&mut self, around: &Surroundings<'_>, mut act: impl FnMut(&mut Mate, &mut Tanks)) {
-        let Self { list, count, tanks, .. } = self;
+    fn for_touched(&mut self, around: &Surroundings<'_>, mut act: impl FnMut(&mut Mate, &Exchange, &mut Tanks)) {
+        let Self { list, count, exchange, tanks, .. } = self;
         let touched = |mate: &&mut Mate| mate.other.id().is_some_and(|id| !is_linked(id, around));
-        list[..*count].iter_mut().filter(touched).for_each(|mate| act(mate, tanks));
+        list[..*count].iter_mut().filter(touched).for_each(|mate| act(mate, exchange, tanks));
     }
 
     /// Appends the velocities that the others would have without the owner, in slots, on the mean of a substep `h`: what is given at
@@ -260,7 +266,7 @@ impl Mates {
     pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.tanks.close(dt);
         if !self.exchange.is_empty() {
-            self.exchange.close(around, dt);
+            self.exchange.close(around, dt, true);
         }
     }
 

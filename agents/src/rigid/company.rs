@@ -207,7 +207,7 @@ impl Company {
             }
         }
         self.pairs.close(dt);
-        self.exchange.close(around, dt);
+        self.exchange.close(around, dt, false);
         self.count = 0;
     }
 

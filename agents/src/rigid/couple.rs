@@ -203,7 +203,7 @@ impl RigidBody {
         let otherwise = self.motion.velocity - velocity;
         let along = otherwise - stand.normal * stand.normal.dot(otherwise);
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
-        // who helps to bear it takes it for free, as all do who bear a body together
+        // two that bear it together divide it among them (eq. 6c)
         let lifts = |n: &Neighbour| {
             let given = n.snapshot.given.iter().find(|ledger| ledger.with == around.me);
             n.id != lies.on && given.is_some_and(|ledger| ledger.force.linear.dot(stand.normal) > 0.0)

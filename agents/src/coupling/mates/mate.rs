@@ -9,7 +9,7 @@ mod memory;
 use super::far::Far;
 use super::tanks::{Account, Tanks};
 use crate::coupling::{
-    Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, WAKE_M_S, inverse_mass,
+    Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, Twist, WAKE_M_S, inverse_mass,
 };
 use crate::{Anchor, Inertia, Neighbour, Surroundings};
 pub use feet::Feet;
@@ -62,8 +62,9 @@ pub struct Mate {
     evenly: bool,
     /// What bends was given a second in the substep before, N and N·m in slots; empty for nothing.
     lasts: Vec<DVec3>,
-    /// Into how many parts a rigid body is divided among those who press on it, ≥ 1.
+    /// Into how many parts a rigid body is divided among those who press on it, ≥ 1, and what the owner's goes on being given, N and N·m.
     split: f64,
+    part: Twist,
     /// By how much its mean velocities in the substep tried are above those at its start, in slots.
     gains: Vec<DVec3>,
     /// What links give it in the substep, in its slots: that lasts, and is no blow.
@@ -158,19 +159,18 @@ impl Mate {
             velocities[self.slots.0] += fall;
             velocities[self.slots.0 + 1..][..1].iter_mut().for_each(|spin| *spin += turn);
         }
-        self.share(velocities, h);
+        self.divide_by(velocities, h);
     }
 
     /// Takes out of its velocities in the mean of a substep `h` what the other parts of a body that is divided would make of what the owner
-    /// gave last (eq. 6c).
-    fn share(&mut self, velocities: &mut [DVec3], h: f64) {
-        if self.split == 1.0 || self.lasts.len() != self.slots.1 {
+    /// goes on giving (eq. 6c).
+    fn divide_by(&self, velocities: &mut [DVec3], h: f64) {
+        if self.split == 1.0 {
             return;
         }
-        self.room.clear();
-        self.room.extend(self.lasts.iter().map(|last| *last * (h * (self.split - 1.0))));
-        self.other.respond(&mut self.room);
-        self.slots_mut(velocities).iter_mut().zip(&self.room).for_each(|(v, dv)| *v -= *dv);
+        let mut moved = self.part.map(|part| part * (h * (self.split - 1.0)));
+        self.other.respond(&mut moved);
+        self.slots_mut(velocities).iter_mut().zip(moved).for_each(|(v, dv)| *v -= dv);
     }
 
     /// Turns impulses, in slots of all, into the velocities that they cause in the owner's solve.
@@ -414,9 +414,6 @@ impl Mate {
             let list = &mut impulses[first..end];
             if self.evenly {
                 self.spread(list, h);
-            } else {
-                self.lasts.clear();
-                self.lasts.extend(list.iter().map(|all| *all / h));
             }
             self.other.book(exchange, (start, h), list);
             self.last(exchange, (start, h));

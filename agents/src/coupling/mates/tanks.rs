@@ -95,6 +95,11 @@ impl Account {
         (self.pressed - 1).is_multiple_of(WEIGH_EVERY)
     }
 
+    /// Whether the two pressed on each other in the step before.
+    pub const fn presses(&self) -> bool {
+        self.pressed > 0
+    }
+
     /// How much of push-out it still allows: all of it until half the reserve is spent.
     pub fn fade(&self) -> f64 {
         (2.0 * self.tank.share()).clamp(LEAST, 1.0)

@@ -6,6 +6,7 @@
 
 use super::ground::LIFTED_M;
 use super::{Lasting, Other};
+use crate::coupling::beside::PART_MAX_S;
 use crate::coupling::{Exchange, Impulse, Ledger, Rebound, Site, Twist, acknowledged};
 use crate::{AgentId, Body, DT_MAX_S, Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
@@ -121,10 +122,10 @@ impl Other {
             }
             let from_s = giver.snapshot.time.secs_after(at);
             if ledger.force != Impulse::ZERO && (from_s > -DT_MAX_S || giver.snapshot.at_rest) {
-                // one that rests goes on from now on, one that is late has given its next blow before now
-                let earliest_s = if giver.snapshot.at_rest { 0.0 } else { -giver.step_s };
                 let force = [ledger.force.linear, ledger.force.angular];
-                self.lasting.push(Lasting { after_s: from_s.max(earliest_s), step_s: giver.step_s, force });
+                // a tube makes no longer parts beside others
+                let step_s = giver.step_s.min(PART_MAX_S);
+                self.lasting.push(Lasting { after_s: from_s.max(0.0), step_s, force });
             }
         }
     }
@@ -188,12 +189,6 @@ impl Other {
             self.respond(&mut sum);
         }
         sum
-    }
-
-    /// How many others go on giving to a rigid body.
-    #[must_use]
-    pub const fn other_givers(&self) -> usize {
-        self.lasting.len()
     }
 
     /// How what other owners go on giving accelerates a rigid body in the mean, m/s².

@@ -156,7 +156,7 @@ impl Agent for Pusher {
         let taken = &mut self.taken;
         self.exchange.take(around, around.time + dt, |_, _, sum, _| *taken += sum.linear);
         self.state.tip += self.state.velocity * dt.as_secs_f64();
-        self.exchange.close(around, dt.as_secs_f64());
+        self.exchange.close(around, dt.as_secs_f64(), false);
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
     }
 

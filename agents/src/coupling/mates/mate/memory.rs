@@ -5,8 +5,8 @@
 
 use super::super::tanks::Tanks;
 use super::Mate;
-use crate::coupling::PUSH_OUT_SHARE;
-use crate::{Inertia, Neighbour, SimTime};
+use crate::coupling::{Exchange, PUSH_OUT_SHARE};
+use crate::{Inertia, Neighbour, SimTime, Surroundings};
 use glam::DVec3;
 
 /// The share of the way that a place came from where friction holds it that is taken back in a step, or in one of the other's where that
@@ -20,25 +20,33 @@ impl Mate {
         // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (rod/horizon.rs)
         let blows = |n: &Neighbour| matches!(&n.snapshot.inertia, Inertia::Curve(curve) if curve.ahead_s == 0.0);
         self.evenly = !self.other.neighbour().is_some_and(blows);
-        self.remember(tanks);
-        self.divide();
         if self.evenly {
             self.look_back(tanks, (now, dt));
+            self.remember(tanks);
         }
     }
 
     /// Recalls the second of these, of what foretells its next step and makes no shorter ones (eq. 16h).
     pub fn regain(&mut self, tanks: &mut Tanks, dt: f64) {
         self.evenly = self.other.is_foretold() && self.other.parts(dt) == 1;
-        self.remember(tanks);
-        self.divide();
+        if self.evenly {
+            self.remember(tanks);
+        }
     }
 
-    /// Divides a rigid body among those who press on it, once this owner is one of them (docs/theory/coupling.md, eq. 6c).
-    fn divide(&mut self) {
-        if !self.other.is_many() && self.lasts.iter().any(|last| *last != DVec3::ZERO) {
-            self.split = (1 + self.other.other_givers()) as f64;
+    /// Divides a rigid body among those who press on it, once this owner is one of them, but for one that lies on this owner, who answers
+    /// alone for all that presses it (docs/theory/coupling.md, eq. 6c, 7l).
+    pub fn divide(&mut self, exchange: &Exchange, tanks: &mut Tanks, around: &Surroundings<'_>) {
+        let Some(it) = self.other.neighbour().filter(|_| !self.other.is_many()) else { return };
+        let bears = it.snapshot.lies.get().is_some_and(|lies| lies.on == around.me);
+        if bears || !tanks.get(it.id).is_some_and(|account| account.presses()) {
+            return;
         }
+        let presses = |n: &&Neighbour| n.snapshot.pairs.iter().any(|pair| pair.with == it.id && pair.contacts > 0);
+        let others = around.neighbours.iter().filter(|n| n.id != it.id).filter(presses).count();
+        let goes_on = exchange.goes_on(it.id);
+        self.split = (1 + others) as f64;
+        self.part = [goes_on.linear, goes_on.angular];
     }
 
     /// Recalls what it was given a second.

@@ -151,7 +151,11 @@ fn a_box_on_two_tubes_that_lie_on_the_floor_stays_on_them() {
         let step_m = 9.81 / (rates[2] * rates[2]);
         assert!(at.truncate().length() < 2e-4, "{rates:?}, {mass_kg} kg from {fall_m} m: it has gone to {at}");
         assert!((at.z - 0.04).abs() < 2e-4 + step_m, "{rates:?}, {mass_kg} kg from {fall_m} m: it is at {at}");
-        assert!(depth_m < 5e-4, "{rates:?}, {mass_kg} kg from {fall_m} m: {depth_m} m deep");
+        // what the two give first neither of them knows: it errs by its own fall in a step (eq. 7g)
+        let late_m = 1.3 * 9.81 / (rates[0] * rates[0]);
+        assert!(depth_m < 2e-4 + late_m, "{rates:?}, {mass_kg} kg from {fall_m} m: {depth_m} m deep");
+        let end_m = IDS[..2].iter().flat_map(|id| &stage.newest(*id).pairs).map(|pair| pair.penetration_m);
+        assert!(end_m.fold(0.0, f64::max) < 1e-4, "{rates:?}, {mass_kg} kg from {fall_m} m: deep in the end");
         assert!(tank_j > -0.15 * mass_kg, "{rates:?}, {mass_kg} kg from {fall_m} m: {tank_j} J");
     }
 }
