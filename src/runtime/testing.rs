@@ -177,7 +177,7 @@ impl Dummy {
                 self.given += 1.0;
             }
         }
-        self.exchange.close(around, dt_s);
+        self.exchange.close(around, dt_s, false);
     }
 }
 
