@@ -76,7 +76,7 @@ impl Standing {
 
 /// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the faster, of two
 /// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends; of two soft bodies, two tubes that are held
-/// alike and two rigid bodies the faster, of two as fast that bend the higher (docs/decisions/0019), of equals the lower number. A tool
+/// alike and two rigid bodies the faster, of two soft ones as fast the higher (docs/decisions/0019), of equals the lower number. A tool
 /// is led and owns nothing.
 ///
 /// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
@@ -96,7 +96,7 @@ pub fn owns(me: Standing, other: Standing) -> bool {
     let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
     let rate = |s: Standing| s.rate_hz.max(slowest);
     let faster = rate(me).total_cmp(&rate(other));
-    let higher = me.height_j_kg.total_cmp(&other.height_j_kg);
+    let higher = if soft(me) { me.height_j_kg.total_cmp(&other.height_j_kg) } else { Ordering::Equal };
     let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
     tube(me).cmp(&tube(other)).then(freer).then(faster).then(higher).then(other.id.cmp(&me.id)).is_gt()
 }
