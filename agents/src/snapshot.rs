@@ -8,6 +8,7 @@ mod stand;
 
 pub use lies::{LiesOn, Upheld};
 pub use stand::Stand;
+pub(crate) use stand::{Footprint, STANDING_M_S};
 
 use crate::coupling::{Ledger, PairState, Rebound, Six, Sprung};
 use crate::rod::CurveInertia;

@@ -140,7 +140,7 @@ impl Dummy {
             gifts: 0,
             taken: 0.0,
             given: 0.0,
-            exchange: Exchange::default(),
+            exchange: Exchange::wary(),
             log: None,
             me: AgentId(0),
             time: SimTime::ZERO,
@@ -177,7 +177,7 @@ impl Dummy {
                 self.given += 1.0;
             }
         }
-        self.exchange.close(around, dt_s, false);
+        self.exchange.close(around, dt_s);
     }
 }
 

@@ -130,6 +130,8 @@ pub struct Exchange {
     /// Room for one reading.
     reading: Option<Ledger>,
     now: SimTime,
+    /// Whether the owner takes all of a body that others press on, too, and so expects of two steps the weaker to go on.
+    wary: bool,
 }
 
 /// The end of a step, seconds: the last part of a slow tube's (docs/theory/coupling.md, section 3).
@@ -140,6 +142,13 @@ const END_SLACK: f64 = 0.01;
 const LINGER_S: f64 = 1.0;
 
 impl Exchange {
+    /// That of an owner that takes all of a body that others press on, too: of what it gives, a blow is not expected to go on. Of one
+    /// that divides bodies ([`Self::default`]) all is, until all owners have found together what each has to give (eq. 6c).
+    #[must_use]
+    pub fn wary() -> Self {
+        Self { wary: true, ..Self::default() }
+    }
+
     /// Begins a step: pages turn, and the step's sums start from nothing.
     pub fn open(&mut self, around: &Surroundings<'_>) {
         self.now = around.time;
@@ -256,14 +265,13 @@ impl Exchange {
         }
     }
 
-    /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way. Whether the owner `divides` bodies that others press
-    /// on, too: it then goes on with what it gave, a blow as well, until all have found together what each has to give (eq. 6c).
-    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64, divides: bool) {
+    /// Ends a step of `dt_s` seconds: forces are known, and what is still on its way.
+    pub fn close(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         for owned in &mut self.owned {
             if !(owned.state.kind.is_penalty() || owned.state.kind == PairKind::Tlm) {
                 owned.state.force_n = owned.step_impulse.length() / dt_s;
             }
-            owned.go_on(dt_s, divides);
+            owned.go_on(dt_s, self.wary);
             let other = around.neighbours.iter().find(|n| n.id == owned.ledger.with);
             let mut on_its_way = DVec3::ZERO;
             // who is not looked at any more has settled
@@ -315,13 +323,13 @@ impl Exchange {
 }
 
 impl Owned {
-    /// Notes what a body was given a second at the end of a step of `dt_s` seconds: it is expected to go on, of an owner that divides no bodies
-    /// as the weaker of the last two steps ended, as a blow does not.
-    fn go_on(&mut self, dt_s: f64, divides: bool) {
+    /// Notes what a body was given a second at the end of a step of `dt_s` seconds: it is expected to go on, of a `wary` owner as the weaker
+    /// of the last two steps ended.
+    fn go_on(&mut self, dt_s: f64, wary: bool) {
         let late = self.parts.iter().filter(|(after_s, _)| *after_s >= dt_s - END_S * (1.0 + END_SLACK));
         let now = late.fold(Impulse::ZERO, |sum, (_, part)| sum + *part) * dt_s.min(END_S).recip();
         let before = std::mem::replace(&mut self.force, now);
-        let weaker = !divides && before.linear.length_squared() < now.linear.length_squared();
+        let weaker = wary && before.linear.length_squared() < now.linear.length_squared();
         self.ledger.force = if weaker { before } else { now };
     }
 }

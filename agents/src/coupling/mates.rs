@@ -266,7 +266,7 @@ impl Mates {
     pub fn close(&mut self, around: &Surroundings<'_>, dt: f64) {
         self.tanks.close(dt);
         if !self.exchange.is_empty() {
-            self.exchange.close(around, dt, true);
+            self.exchange.close(around, dt);
         }
     }
 

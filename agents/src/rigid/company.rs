@@ -98,7 +98,7 @@ impl Company {
     /// The company of a body of this shape: nobody yet.
     pub(super) fn new(form: Arc<Form>) -> Self {
         Self {
-            exchange: Exchange::default(),
+            exchange: Exchange::wary(),
             pairs: Pairs::default(),
             room: TouchRoom::default(),
             form,
@@ -207,7 +207,7 @@ impl Company {
             }
         }
         self.pairs.close(dt);
-        self.exchange.close(around, dt, false);
+        self.exchange.close(around, dt);
         self.count = 0;
     }
 

@@ -13,6 +13,7 @@ use super::motion::Motion;
 use super::obstacles::Mine;
 use crate::coupling::beside::may_press;
 use crate::coupling::{Impulse, Law, Place, Six, Twist};
+use crate::snapshot::{Footprint, STANDING_M_S};
 use crate::{
     AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
 };
@@ -24,12 +25,10 @@ const EXPECTED_G: f64 = 3.0;
 
 /// Places nearer than this to a fixed solid carry, beside the skin, metres.
 pub(super) const FEET_M: f64 = 2e-5;
-/// A body whose feet leave the ground or come down on it faster than this does not stand, m/s.
-const STANDING_M_S: f64 = 0.05;
 /// What may be in the way of a free flight is looked for so far ahead, seconds: three steps of 10 Hz, and slower clocks are rare.
 const LANDS_S: f64 = 0.3;
-/// Feet whose normals differ by less than 8° stand on one level: the cosine.
-const LEVEL: f64 = 0.99;
+/// On one or two feet a body only balances: pushed no farther from them than this, in its radii.
+const BALANCE_RADII: f64 = 0.05;
 
 impl RigidBody {
     /// Begins a step of `dt` seconds: takes what the owners of its contacts gave, and brings everybody that it meets to its
@@ -240,30 +239,21 @@ impl RigidBody {
         if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
     }
 
-    /// The places where it stands on fixed solids, where all of them are on one level.
+    /// How it stands on fixed solids, where all of them are on one level.
     fn feet(&mut self) -> Option<Stand> {
         let Self { motion, world, company, meeting, obstacles, gravity, .. } = self;
         let (_, _, _, room, form) = company.split();
         let mine = Mine { form, mover: &world.mover, motion };
-        let (mut normal, mut count) = (None, 0_u32);
-        let (mut low, mut high, mut sum) = (DVec3::INFINITY, DVec3::NEG_INFINITY, DVec3::ZERO);
+        let mut print = Footprint::default();
         for solid in obstacles.iter_mut() {
             solid.touches(&mine, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
             for touch in &meeting.touches {
-                let first = *normal.get_or_insert(touch.normal);
                 let Place::Point(point) = touch.on_a else { return None };
-                if first.dot(touch.normal) < LEVEL {
-                    return None;
-                }
-                (low, high, sum, count) = (low.min(point), high.max(point), sum + point, count + 1);
+                print.add(point, touch.normal);
             }
         }
-        let centre = sum / f64::from(count.max(1));
-        let normal: DVec3 = normal.filter(|normal: &DVec3| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
-        let spread = (high - low) - normal * normal.dot(high - low);
-        // a square of feet bears pushes as far as half its side, a triangle less; on one or two feet a body only balances
-        let reach_m = if count > 2 { 0.25 * spread.length() } else { 0.05 * world.mover.radius_m };
-        Some(Stand { normal, centre, reach_m, weight_m_s2: (-gravity.dot(normal)).max(0.0) })
+        let normal = print.normal().filter(|normal| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
+        Some(print.stand(normal, (-gravity.dot(normal)).max(0.0), BALANCE_RADII * world.mover.radius_m))
     }
 
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.

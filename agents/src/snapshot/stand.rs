@@ -1,9 +1,14 @@
 //! How a body stands on something fixed, as others must know it who push it.
 //!
-//! In: where the ground bears it. Out: what it answers to impulses there. Never here: who pushes.
+//! In: the places where the ground bears it. Out: what it answers to impulses there. Never here: who pushes.
 
 use crate::coupling::Impulse;
 use glam::DVec3;
+
+/// Feet whose normals differ by less than 8° stand on one level: the cosine.
+const LEVEL: f64 = 0.99;
+/// A body whose feet leave the ground or come down on it faster than this does not stand, m/s.
+pub const STANDING_M_S: f64 = 0.05;
 
 /// How a body stands on something fixed: pushed towards it, near the middle of its feet, the body does not yield.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -54,5 +59,45 @@ impl Stand {
     pub fn leaves(&self, impulse: Impulse) -> Impulse {
         let linear = impulse.linear - self.normal * impulse.linear.dot(self.normal);
         Impulse { linear, angular: DVec3::ZERO }
+    }
+}
+
+/// The places where a body stands, as they are found one by one.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Footprint {
+    normal: Option<DVec3>,
+    tilted: bool,
+    low: DVec3,
+    high: DVec3,
+    sum: DVec3,
+    count: u32,
+}
+
+impl Footprint {
+    /// Takes in a `point` that is borne along the unit vector `up`.
+    pub fn add(&mut self, point: DVec3, up: DVec3) {
+        let first = *self.normal.get_or_insert(up);
+        self.tilted |= first.dot(up) < LEVEL;
+        if self.count == 0 {
+            (self.low, self.high) = (point, point);
+        }
+        (self.low, self.high) = (self.low.min(point), self.high.max(point));
+        (self.sum, self.count) = (self.sum + point, self.count + 1);
+    }
+
+    /// The normal of its feet, where there are some and all of them are on one level.
+    #[must_use]
+    pub fn normal(&self) -> Option<DVec3> {
+        self.normal.filter(|_| !self.tilted)
+    }
+
+    /// How a body stands there along its `normal`, of so much weight along that, m/s². A square of feet bears pushes as far as half its
+    /// side, a triangle less; on one or two feet a body only balances, pushed as far as `balance_m` from their middle.
+    #[must_use]
+    pub fn stand(&self, normal: DVec3, weight_m_s2: f64, balance_m: f64) -> Stand {
+        let spread = self.high - self.low;
+        let spread = spread - normal * normal.dot(spread);
+        let reach_m = if self.count > 2 { 0.25 * spread.length() } else { balance_m };
+        Stand { normal, centre: self.sum / f64::from(self.count.max(1)), reach_m, weight_m_s2 }
     }
 }

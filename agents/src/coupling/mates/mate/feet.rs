@@ -5,24 +5,16 @@
 
 use crate::Stand;
 use crate::coupling::Contact;
+use crate::snapshot::{Footprint, STANDING_M_S};
 use glam::DVec3;
 
-/// Feet whose normals differ by less than 8° stand on one level: the cosine.
-const LEVEL: f64 = 0.99;
 /// The share of what the body is given that something fixed has to give its owner at the same places.
 const CARRIED: f64 = 0.99;
-/// A body that moves faster than this along the normal does not stand, m/s.
-const STANDING_M_S: f64 = 0.05;
 
 /// The places at which a body was pressed in a step.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Feet {
-    normal: Option<DVec3>,
-    tilted: bool,
-    low: DVec3,
-    high: DVec3,
-    sum: DVec3,
-    count: u32,
+    print: Footprint,
     /// What it was given in all, and where something fixed stands against it, N·s.
     all_n_s: f64,
     carried_n_s: f64,
@@ -41,14 +33,7 @@ impl Feet {
             return;
         }
         self.carried_n_s += along;
-        let (point, up) = (centre - arm, -contact.normal);
-        let first = *self.normal.get_or_insert(up);
-        self.tilted |= first.dot(up) < LEVEL;
-        if self.count == 0 {
-            (self.low, self.high) = (point, point);
-        }
-        (self.low, self.high) = (self.low.min(point), self.high.max(point));
-        (self.sum, self.count) = (self.sum + point, self.count + 1);
+        self.print.add(centre - arm, -contact.normal);
     }
 
     /// It has come by `way` in `h` seconds.
@@ -57,17 +42,12 @@ impl Feet {
     }
 
     /// How it stands there, if it does, and how it moves, where `weight_m_s2` tells how fast it would fall along a normal.
-    /// A square of feet bears pushes as far as half its side.
     pub fn stand(&self, weight_m_s2: impl Fn(DVec3) -> f64) -> Option<(Stand, DVec3)> {
-        let normal = self.normal.filter(|_| !self.tilted && self.carried_n_s > CARRIED * self.all_n_s)?;
+        let normal = self.print.normal().filter(|_| self.carried_n_s > CARRIED * self.all_n_s)?;
         let velocity = self.way / self.span_s;
         if !velocity.is_finite() || velocity.dot(normal).abs() > STANDING_M_S {
             return None;
         }
-        let spread = self.high - self.low;
-        let spread = spread - normal * normal.dot(spread);
-        let reach_m = if self.count > 2 { 0.25 * spread.length() } else { 0.0 };
-        let weight_m_s2 = weight_m_s2(normal);
-        Some((Stand { normal, centre: self.sum / f64::from(self.count), reach_m, weight_m_s2 }, velocity))
+        Some((self.print.stand(normal, weight_m_s2(normal), 0.0), velocity))
     }
 }
