@@ -27,6 +27,6 @@ pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
     Anchor, Body, Bounds, Clasp, CurveState, Grasp, Grip, HASH_START, Inertia, LiesOn, RigidState, Snapshot, SoftState,
-    Stand, ToolState, Upheld,
+    Stand, Tips, ToolState, Upheld,
 };
 pub use time::{SimSpan, SimTime};

@@ -5,10 +5,12 @@
 
 mod lies;
 mod stand;
+mod tips;
 
 pub use lies::{LiesOn, Upheld};
 pub use stand::Stand;
 pub(crate) use stand::{Footprint, STANDING_M_S};
+pub use tips::Tips;
 
 use crate::coupling::{Ledger, PairState, Rebound, Six, Sprung};
 use crate::rod::CurveInertia;
@@ -47,6 +49,8 @@ pub struct Snapshot {
     pub inertia: Inertia,
     /// How it stands on something fixed; `None` where it does not, or not on one level.
     pub stand: Option<Stand>,
+    /// How it tips over an edge or a corner that something fixed bears; none where it does not.
+    pub tips: Rare<Tips>,
     /// In how many seconds of free flight something fixed may be in its way, ≥ 0; `None` where nothing is soon, and where that is not
     /// told: it stands, or others hold it.
     pub lands_s: Option<f64>,
@@ -364,6 +368,7 @@ impl Snapshot {
         self.grips.clear();
         (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
         self.stand = None;
+        self.tips.set(None);
         self.drift_m = 0.0;
         self.sprung.set(None);
         self.rebound.set(None);
@@ -388,6 +393,7 @@ impl Snapshot {
             && self.rebound.get().is_none_or(Rebound::is_finite)
             && self.lies.get().is_none_or(LiesOn::is_finite)
             && self.within.get().is_none_or(Six::is_finite)
+            && self.tips.get().is_none_or(Tips::is_finite)
             && self.grips.iter().all(|grip| grip.force_n.is_finite())
             && self.given.iter().all(Ledger::is_finite)
     }

@@ -100,13 +100,17 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     });
     if let Some(rebound) = member.snapshot.rebound.get() {
         let by_then = Impulse { linear: carried.linear + given.linear * h, angular: DVec3::ZERO };
-        let [back, way] = rebound.part(rebound.spared_by([given, by_then], at), at);
+        let [back, way] = rebound.part(rebound.spared_by([given, by_then], at, (*inverse_mass, *inverse_inertia)), at);
         // both are brought to the common time by the velocity
         (given, carried) = (given - back, carried - way + back * h);
     }
     let stand = member.snapshot.stand;
     if let Some(stand) = stand.filter(|stand| stand.bears(state.position, given)) {
         (given, carried) = (stand.leaves(given), stand.leaves(carried));
+    }
+    let tips = member.snapshot.tips.get();
+    if let Some(tips) = tips {
+        (given, carried) = [given, carried].map(|all| tips.hold((*inverse_mass, *inverse_inertia), all)).into();
     }
     let all = [given.linear, carried.linear].map(|impulse| impulse * *inverse_mass);
     let since_s = all[1].length() / all[0].length().max(f64::MIN_POSITIVE);
@@ -118,7 +122,9 @@ pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Opti
     let a = member.snapshot.acceleration;
     state.position += state.velocity * h + a * (0.5 * h * h);
     state.velocity += a * h;
-    state.rotation = turned(state.rotation, state.spin * h);
+    let turning = tips.map_or(DVec3::ZERO, |tips| tips.turning);
+    state.rotation = turned(state.rotation, state.spin * h + turning * (0.5 * h * h));
+    state.spin += turning * h;
     Some(state)
 }
 

@@ -5,7 +5,7 @@
 
 use super::Impulse;
 use crate::{AgentId, SimTime};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What fixed solids gave in one step, as if at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,19 +37,21 @@ impl Rebound {
         at.secs_after(self.end) + self.carried.length() / self.given.linear.length().max(f64::MIN_POSITIVE)
     }
 
-    /// The share of it that `late` would have spared, which is on its way to the body and has carried it so far by `at`.
+    /// The share of it that `late` would have spared a body of so much inverse mass and inertia, which is on its way to it and has carried
+    /// it so far by `at`.
     #[must_use]
-    pub fn spared_by(&self, [late, carried]: [Impulse; 2], at: SimTime) -> f64 {
+    pub fn spared_by(&self, [late, carried]: [Impulse; 2], at: SimTime, inverse: (f64, DMat3)) -> f64 {
         // what the body had read when it began is in its state
         let since_s = since_s(late, carried).min(at.secs_after(self.start));
         let is_earlier = self.age_s(at) < since_s;
-        if is_earlier { spared(late, (self.given, self.met_n_s)) } else { 0.0 }
+        if is_earlier { spared(late, (self.given, self.met_n_s), inverse) } else { 0.0 }
     }
 
-    /// A share of it: the impulse, and the way at `at`.
+    /// A share of it: the impulse, and the way at `at`, kg·m and kg·m².
     #[must_use]
     pub fn part(&self, share: f64, at: SimTime) -> [Impulse; 2] {
-        [self.given * share, Impulse { linear: self.way(at) * share, angular: DVec3::ZERO }]
+        let way = Impulse { linear: self.way(at), angular: self.given.angular * self.age_s(at) };
+        [self.given * share, way * share]
     }
 
     /// Whether every number is finite.
@@ -64,10 +66,11 @@ pub(crate) fn since_s(late: Impulse, carried: Impulse) -> f64 {
     2.0 * carried.linear.length() / late.linear.length()
 }
 
-/// The share of what was `given` that `late` would have spared: what points its way takes from the momentum with which the body
-/// came, and with that all that it bounced by.
-pub(crate) fn spared(late: Impulse, (given, met_n_s): (Impulse, f64)) -> f64 {
-    let share = late.linear.dot(given.linear) / (given.linear.length() * met_n_s);
+/// The share of what was `given` that `late` would have spared: what slows the body where it was struck takes from the momentum with
+/// which it came, and with that all that it bounced by.
+pub(crate) fn spared(late: Impulse, (given, met_n_s): (Impulse, f64), (mass, inertia): (f64, DMat3)) -> f64 {
+    let at_blow = |by: Impulse| given.linear.dot(by.linear * mass) + given.angular.dot(inertia * by.angular);
+    let share = at_blow(late) * given.linear.length() / (at_blow(given) * met_n_s);
     if share.is_nan() { 0.0 } else { share.clamp(0.0, 1.0) }
 }
 
@@ -94,6 +97,9 @@ mod tests {
         past: None,
     };
 
+    /// 1 kg that nothing turns.
+    const MASSES: (f64, DMat3) = (1.0, DMat3::ZERO);
+
     fn carried(way: f64) -> Impulse {
         Impulse { linear: DVec3::Z * way, angular: DVec3::ZERO }
     }
@@ -101,7 +107,7 @@ mod tests {
     #[test]
     fn what_was_given_before_a_bounce_spares_as_much_of_it() {
         // 1 N·s, 30 ms ago in the mean: two thirds of the momentum with which it came
-        let share = BLOW().spared_by([up(1.0), carried(0.03)], at(0.09));
+        let share = BLOW().spared_by([up(1.0), carried(0.03)], at(0.09), MASSES);
         assert!((share - 2.0 / 3.0).abs() < 1e-12, "{share}");
         let [given, way] = BLOW().part(share, at(0.09));
         assert!((given.linear.z - 2.0).abs() < 1e-12 && (way.linear.z - 0.02).abs() < 1e-12, "{given:?} {way:?}");
@@ -110,16 +116,29 @@ mod tests {
     #[test]
     fn what_was_given_after_a_bounce_or_against_it_spares_nothing() {
         for late in [[up(1.0), carried(0.002)], [up(-1.0), carried(-0.03)], [Impulse::ZERO; 2]] {
-            assert_eq!(BLOW().spared_by(late, at(0.09)), 0.0, "{late:?}");
+            assert_eq!(BLOW().spared_by(late, at(0.09), MASSES), 0.0, "{late:?}");
         }
         // whatever it has carried, none of it is older than the step in which it was not known
         let late = Rebound { start: at(0.085), ..BLOW() };
-        assert_eq!(late.spared_by([up(1.0), carried(0.03)], at(0.09)), 0.0);
+        assert_eq!(late.spared_by([up(1.0), carried(0.03)], at(0.09), MASSES), 0.0);
     }
 
     #[test]
     fn the_way_back_from_a_bounce_leads_behind_what_it_bounced_on() {
         assert!((BLOW().way(at(0.07)).z + 0.03).abs() < 1e-12);
         assert!((BLOW().age_s(at(0.07)) + 0.01).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_presses_the_place_that_was_struck_further_down_spares_nothing() {
+        // a rod of 1 kg from −1 to 1 m, struck at one end, lifted elsewhere
+        let masses = (1.0, DMat3::from_diagonal(DVec3::splat(3.0)));
+        let given = |x: f64| Impulse { angular: DVec3::X * x, ..up(1.0) };
+        let blow_at = |x: f64| Rebound { given: given(x), carried: DVec3::Z * 0.02, met_n_s: 1.0, ..BLOW() };
+        let lift = |x: f64| [Impulse { angular: DVec3::X * (0.5 * x), ..up(0.5) }, carried(0.015)];
+        let share = |x: f64| blow_at(-1.0).spared_by(lift(x), at(0.09), masses);
+        // at x it moves that end by 1 − 3 x, of 4 for as much there
+        assert!((share(-1.0) - 0.5).abs() < 1e-12 && (share(0.0) - 0.125).abs() < 1e-12, "{}", share(0.0));
+        assert_eq!(share(0.5), 0.0);
     }
 }

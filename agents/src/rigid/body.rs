@@ -22,7 +22,7 @@ use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
 use crate::{
     Agent, AgentId, Body, Companion, Grip, LiesOn, Neighbour, Resolution, RigidState, SimSpan, Snapshot, Stand,
-    StepError, StepReport, Surroundings, check_span,
+    StepError, StepReport, Surroundings, Tips, check_span,
 };
 use glam::DVec3;
 use std::sync::Arc;
@@ -61,6 +61,8 @@ pub struct RigidBody {
     /// What others may expect, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
+    /// How it tips.
+    pub(super) tips: Option<Tips>,
     /// On whom it lies.
     pub(super) lies: Option<LiesOn>,
     /// Its inverse mass among those whose world it shares, where that is known, about its centre.
@@ -142,6 +144,7 @@ impl RigidBody {
             borne: Borne::default(),
             acceleration: spec.gravity,
             stand: None,
+            tips: None,
             lies: None,
             within: None,
             late: None,

@@ -7,7 +7,7 @@ use super::RigidBody;
 use crate::coupling::beside::may_press;
 use crate::coupling::{Impulse, Rebound, since_s, spared};
 use crate::{AgentId, Body, SimSpan, SimTime, Surroundings};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// What fixed solids gave, step by step.
 #[derive(Default)]
@@ -39,27 +39,28 @@ impl Borne {
     }
 
     /// Takes out what fixed solids gave in place of `late`, an impulse that comes at `now` and has been carrying the body by
-    /// `carried` kg·m since it was given, `unread_s` seconds ago at most: as much of what they gave since then as points its way, and how
-    /// far that has carried the body by now.
+    /// `carried` kg·m since it was given, `unread_s` seconds ago at most: as much of what they gave since then as it would have spared a
+    /// body of so much `inverse` mass and inertia, and how far that has carried the body by now.
     pub(super) fn in_place_of(
         &mut self,
         [late, carried]: [Impulse; 2],
         (now, unread_s): (SimTime, f64),
+        inverse: (f64, DMat3),
     ) -> [Impulse; 2] {
         let since_s = since_s(late, carried).min(unread_s);
         let recent = |step: &Rebound| step.age_s(now) < since_s;
-        let (mut all, mut way, mut met_n_s) = (Impulse::ZERO, DVec3::ZERO, 0.0);
+        let (mut all, mut way, mut met_n_s) = (Impulse::ZERO, Impulse::ZERO, 0.0);
         for step in self.steps.iter().filter(|step| recent(step)) {
             met_n_s += step.met_n_s;
-            all += step.given;
-            way += step.way(now);
+            let [given, moved] = step.part(1.0, now);
+            (all, way) = (all + given, way + moved);
         }
-        let share = spared(late, (all, met_n_s));
+        let share = spared(late, (all, met_n_s), inverse);
         for step in self.steps.iter_mut().filter(|step| recent(step)) {
             let left = 1.0 - share;
             (step.given, step.carried, step.met_n_s) = (step.given * left, step.carried * left, step.met_n_s * left);
         }
-        [all * share, Impulse { linear: way * share, angular: DVec3::ZERO }]
+        [all * share, way * share]
     }
 
     /// The body moved with others, in a world that they share: what held it up is not known apart.
@@ -143,6 +144,9 @@ mod tests {
         borne
     }
 
+    /// 1 kg that nothing turns.
+    const MASSES: (f64, DMat3) = (1.0, DMat3::ZERO);
+
     fn at(seconds: f64) -> SimTime {
         SimTime::ZERO + SimSpan::from_secs_f64(seconds).unwrap()
     }
@@ -151,23 +155,26 @@ mod tests {
     fn fixed_solids_give_back_what_a_late_impulse_would_have_spared_them_and_no_more() {
         let mut borne = landed();
         // it acted 10 ms ago in the mean, the fixed solid 2 ms before the end of its step
-        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY));
+        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY), MASSES);
         assert!((given.linear.z - 2.0).abs() < 1e-12 && (given.angular.x - 2.0).abs() < 1e-12, "{given:?}");
         assert!((way.linear.z - 0.004).abs() < 1e-12, "{way:?}");
         // what is left has carried it for 5 ms more
-        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.105), f64::INFINITY));
+        let [given, way] = borne.in_place_of([up(2.0), up(0.02)], (at(0.105), f64::INFINITY), MASSES);
         assert!((given.linear.z - 1.0).abs() < 1e-12 && (way.linear.z - 0.007).abs() < 1e-12, "{given:?} {way:?}");
-        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), f64::INFINITY), MASSES), [Impulse::ZERO; 2]);
     }
 
     #[test]
     fn what_presses_the_other_way_or_acted_later_spares_nothing() {
         let mut borne = landed();
-        assert_eq!(borne.in_place_of([up(-2.0), up(-0.02)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.13), f64::INFINITY)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of([up(2.0), up(0.0)], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
-        assert_eq!(borne.in_place_of([Impulse::ZERO, Impulse::ZERO], (at(0.10), f64::INFINITY)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(-2.0), up(-0.02)], (at(0.10), f64::INFINITY), MASSES), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.13), f64::INFINITY), MASSES), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.0)], (at(0.10), f64::INFINITY), MASSES), [Impulse::ZERO; 2]);
+        assert_eq!(
+            borne.in_place_of([Impulse::ZERO, Impulse::ZERO], (at(0.10), f64::INFINITY), MASSES),
+            [Impulse::ZERO; 2]
+        );
         // the giver's state before it was read a millisecond ago: it was given after the blow
-        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), 1e-3)), [Impulse::ZERO; 2]);
+        assert_eq!(borne.in_place_of([up(2.0), up(0.02)], (at(0.10), 1e-3), MASSES), [Impulse::ZERO; 2]);
     }
 }

@@ -7,13 +7,13 @@
 use super::RigidBody;
 use super::clearance::Fall;
 use super::company::{Held, Span};
+use super::footing::FEET_M;
 use super::leant;
 use super::meeting::{Me, Scope};
 use super::motion::Motion;
-use super::obstacles::Mine;
 use crate::coupling::beside::may_press;
-use crate::coupling::{Impulse, Law, Place, Six, Twist};
-use crate::snapshot::{Footprint, STANDING_M_S};
+use crate::coupling::{Impulse, Law, Six, Twist};
+use crate::snapshot::STANDING_M_S;
 use crate::{
     AgentId, Body, Bounds, Inertia, LiesOn, Neighbour, SimSpan, SimTime, Snapshot, Stand, Surroundings, Upheld,
 };
@@ -23,12 +23,8 @@ use glam::{DQuat, DVec3};
 /// a single hard step must not send it flying in others' eyes.
 const EXPECTED_G: f64 = 3.0;
 
-/// Places nearer than this to a fixed solid carry, beside the skin, metres.
-pub(super) const FEET_M: f64 = 2e-5;
 /// What may be in the way of a free flight is looked for so far ahead, seconds: three steps of 10 Hz, and slower clocks are rare.
 const LANDS_S: f64 = 0.3;
-/// On one or two feet a body only balances: pushed no farther from them than this, in its radii.
-const BALANCE_RADII: f64 = 0.05;
 
 impl RigidBody {
     /// Begins a step of `dt` seconds: takes what the owners of its contacts gave, and brings everybody that it meets to its
@@ -76,7 +72,7 @@ impl RigidBody {
             let carried = match self.stand {
                 Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
                 Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
-                None => carried,
+                None => self.hold(carried),
             };
             if self.within.is_some() {
                 self.late = Some(carried);
@@ -107,7 +103,8 @@ impl RigidBody {
     /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both. They were given
     /// at most so many seconds before now.
     fn spare(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
-        let [back, way] = self.borne.in_place_of([given, carried], since);
+        let inverse = self.motion.inverse_inertia(&self.spread);
+        let [back, way] = self.borne.in_place_of([given, carried], since, inverse);
         self.motion.velocity -= back.linear / self.spread.mass_kg;
         self.motion.angular -= back.angular;
         [given - back, carried - way]
@@ -154,7 +151,7 @@ impl RigidBody {
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
         let stood = self.stand.is_some();
-        self.stand = if seen { self.feet() } else { None };
+        (self.stand, self.tips) = if seen { self.footing() } else { (None, None) };
         self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
         self.bear();
         self.lies = self.upheld(around);
@@ -176,7 +173,7 @@ impl RigidBody {
     /// Says what others may expect of a body that has not stepped yet: it stands where it was put down, and does not fall into
     /// the ground.
     pub(super) fn put_down(&mut self) {
-        self.stand = self.feet();
+        (self.stand, self.tips) = self.footing();
         self.bear();
     }
 
@@ -239,30 +236,19 @@ impl RigidBody {
         if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
     }
 
-    /// How it stands on fixed solids, where all of them are on one level.
-    fn feet(&mut self) -> Option<Stand> {
-        let Self { motion, world, company, meeting, obstacles, gravity, .. } = self;
-        let (_, _, _, room, form) = company.split();
-        let mine = Mine { form, mover: &world.mover, motion };
-        let mut print = Footprint::default();
-        for solid in obstacles.iter_mut() {
-            solid.touches(&mine, 2.0 * world.mover.skin_m() + FEET_M, room, &mut meeting.touches);
-            for touch in &meeting.touches {
-                let Place::Point(point) = touch.on_a else { return None };
-                print.add(point, touch.normal);
-            }
-        }
-        let normal = print.normal().filter(|normal| normal.dot(motion.velocity).abs() < STANDING_M_S)?;
-        Some(print.stand(normal, (-gravity.dot(normal)).max(0.0), BALANCE_RADII * world.mover.radius_m))
-    }
-
     /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
     pub(super) fn shift(&mut self, carried: Impulse) {
-        let Self { motion, spread, world, gravity, touching, .. } = self;
+        let Self { motion, spread, world, gravity, touching, tips, .. } = self;
         let way = carried.linear / spread.mass_kg;
         let mut moved = Motion { velocity: way, angular: carried.angular, ..*motion };
-        let all_at_once = Fall { gravity: DVec3::ZERO, spin_max: moved.spin_max(spread) };
-        let share = world.free_time(&moved, all_at_once, 1.0);
+        let turn = moved.spin_max(spread);
+        // what lifts it off one side turns it over its feet on the other
+        let lifts = tips.filter(|tips| tips.normal.dot(way) > 0.0);
+        let clear_m = FEET_M + 2.0 * world.mover.skin_m() + world.mover.radius_m * turn;
+        let raised = lifts.map_or(DVec3::ZERO, |tips| tips.normal * clear_m);
+        moved.position += raised;
+        let share = world.free_time(&moved, Fall { gravity: DVec3::ZERO, spin_max: turn }, 1.0);
+        moved.position -= raised;
         moved.fly(spread, DVec3::ZERO, share);
         (motion.position, motion.rotation) = (moved.position, moved.rotation);
         if !*touching {
@@ -307,6 +293,7 @@ impl RigidBody {
         into.lands_s = self.lands_s;
         into.sprung.set(self.hold.published());
         into.lies.set(self.lies.filter(|_| !self.at_rest));
+        into.tips.set(self.tips);
         into.within.set(self.within.filter(|_| !self.at_rest));
         into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
         self.company.exchange.write(into);

@@ -209,7 +209,7 @@ impl Meeting {
                 slots.iter_mut().step_by(2).for_each(|v| *v += gained);
             } else {
                 slots[0] += gained;
-                slots[1] += guest.other.gain(h)[1];
+                slots[1] += guest.other.gain(h)[1] + guest.other.turning() * (0.5 * h);
             }
         }
     }

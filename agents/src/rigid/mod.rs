@@ -18,6 +18,7 @@ mod clearance;
 mod company;
 mod couple;
 mod flight;
+mod footing;
 mod hold;
 mod island;
 mod joint;

@@ -4,8 +4,8 @@
 //! ([`super::meeting`]).
 
 use super::company::{Company, Guest, placed};
-use super::couple::FEET_M;
 use super::flight::TOUCH_S;
+use super::footing::FEET_M;
 use super::meeting::{Found, Me, Meeting, Strike};
 use super::obstacles::{Mine, Obstacles};
 use crate::coupling::tank::RESERVE_M_S;

@@ -70,6 +70,7 @@ pub struct Footprint {
     low: DVec3,
     high: DVec3,
     sum: DVec3,
+    last: DVec3,
     count: u32,
 }
 
@@ -82,7 +83,7 @@ impl Footprint {
             (self.low, self.high) = (point, point);
         }
         (self.low, self.high) = (self.low.min(point), self.high.max(point));
-        (self.sum, self.count) = (self.sum + point, self.count + 1);
+        (self.sum, self.last, self.count) = (self.sum + point, point, self.count + 1);
     }
 
     /// The normal of its feet, where there are some and all of them are on one level.
@@ -99,5 +100,15 @@ impl Footprint {
         let spread = spread - normal * normal.dot(spread);
         let reach_m = if self.count > 2 { 0.25 * spread.length() } else { balance_m };
         Stand { normal, centre: self.sum / f64::from(self.count.max(1)), reach_m, weight_m_s2 }
+    }
+
+    /// Its one or two feet, twice the same for one; `None` for more.
+    #[must_use]
+    pub fn ends(&self) -> Option<[DVec3; 2]> {
+        match self.count {
+            1 => Some([self.last; 2]),
+            2 => Some([self.sum - self.last, self.last]),
+            _ => None,
+        }
     }
 }

@@ -42,6 +42,11 @@ impl Other {
                     [*linear, *angular] = within.times([*linear, *angular]);
                     return;
                 }
+                if let (Some(tips), [linear, angular]) = (self.tips(), &mut *impulses) {
+                    [*linear, *angular] =
+                        tips.answer((*inverse_mass, *inverse_inertia), [*linear, *angular], self.pressed);
+                    return;
+                }
                 impulses[0] *= *inverse_mass;
                 impulses[1] = *inverse_inertia * impulses[1];
                 if stand.is_some() && self.lying.is_some() {

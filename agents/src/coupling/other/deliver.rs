@@ -43,8 +43,8 @@ impl Other {
         }
         if let Some(rebound) = neighbour.snapshot.rebound.get().filter(|_| !self.held && self.lean.is_none()) {
             let in_the_air = flight.leave_out(rebound, (at, self.pose.centre), (around.me, from));
-            if let Some(stand) = neighbour.snapshot.stand.filter(|_| in_the_air) {
-                self.take_off(&stand, neighbour.snapshot.acceleration);
+            if in_the_air {
+                self.take_off(neighbour);
             }
         }
         let Flight { mut sums, mut carried, .. } = flight;
@@ -231,11 +231,15 @@ impl Flight<'_> {
             [linear, angular, ..] => Impulse { linear, angular },
             _ => Impulse::ZERO,
         };
-        let Inertia::Rigid { inverse_mass, .. } = self.to.snapshot.inertia else { return false };
+        let Inertia::Rigid { inverse_mass, inverse_inertia } = self.to.snapshot.inertia else { return false };
         let before = centre - rebound.way(at) * inverse_mass;
         let ahead = |from: DVec3| (before - from).dot(rebound.given.linear) > 0.0;
         let comes = rebound.age_s(at) < 0.0 && from.map_or(rebound.past == Some(me), ahead);
-        let share = if comes { 1.0 } else { rebound.spared_by([of(&self.sums), of(&self.carried)], at) };
+        let share = if comes {
+            1.0
+        } else {
+            rebound.spared_by([of(&self.sums), of(&self.carried)], at, (inverse_mass, inverse_inertia))
+        };
         let [given, way] = rebound.part(share, at);
         if given != Impulse::ZERO {
             self.add(Site::Whole, -given, -way);

@@ -5,7 +5,7 @@
 
 use super::Other;
 use crate::coupling::{Foot, Impulse, is_borne};
-use crate::{Inertia, Stand};
+use crate::{Inertia, Neighbour, Stand, Tips};
 use glam::DVec3;
 
 /// Who is expected higher than this above what it stands on is off it, metres.
@@ -101,18 +101,23 @@ impl Other {
     /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a); whether it stands at all. While a solve looks
     /// for impulses its answer to them must be linear: one that changed with the line on which they act would have no end.
     pub fn press(&mut self) -> bool {
-        self.pressed = self.grounded().map(|_| true);
+        self.pressed = (self.grounded().is_some() || self.tips().is_some()).then_some(true);
         self.pressed.is_some()
     }
 
     /// Takes the sum of the impulses that a solve found, in its slots: whether they tip it or lift it, and so meet the free body
     /// in another solve.
     pub fn gives_way(&mut self, impulses: &[DVec3]) -> bool {
-        let (Some(true), Some(stand), [linear, angular]) = (self.pressed, self.footing(), impulses) else {
-            return false;
-        };
+        let (Some(true), [linear, angular]) = (self.pressed, impulses) else { return false };
         let sum = Impulse { linear: *linear, angular: *angular };
-        let gives_way = sum != Impulse::ZERO && !self.is_pressed(&stand, sum);
+        let holds = match (self.footing(), self.tips(), self.neighbour.as_ref().map(|n| &n.snapshot.inertia)) {
+            (Some(stand), ..) => self.is_pressed(&stand, sum),
+            (None, Some(tips), Some(Inertia::Rigid { inverse_mass, inverse_inertia })) => {
+                tips.is_pressed((*inverse_mass, *inverse_inertia), sum)
+            }
+            _ => return false,
+        };
+        let gives_way = sum != Impulse::ZERO && !holds;
         self.pressed = Some(!gives_way);
         gives_way
     }
@@ -122,17 +127,29 @@ impl Other {
         self.pressed = None;
     }
 
-    /// It is seen before it came down where it now stands: it falls as it did, with what of `acceleration` the ground has taken.
-    pub(super) fn take_off(&mut self, stand: &Stand, acceleration: DVec3) {
-        let weight = stand.normal * (-stand.weight_m_s2 - acceleration.dot(stand.normal));
+    /// It is seen before it came down where it now stands or tips: it falls as it did, with what of its acceleration the ground has taken.
+    pub(super) fn take_off(&mut self, neighbour: &Neighbour) {
+        let (snapshot, turning) = (&neighbour.snapshot, self.turning());
+        let of_stand = |stand: &Stand| stand.normal * (-stand.weight_m_s2 - snapshot.acceleration.dot(stand.normal));
+        let of_tips = |tips: &Tips| tips.gravity - snapshot.acceleration;
+        let taken = snapshot.stand.as_ref().map(of_stand).or(self.tips().map(of_tips));
+        let Some(weight) = taken else { return };
         self.landing = Some(weight);
-        self.pose.centre += weight * (0.5 * self.age_s * self.age_s);
-        self.velocities[0] += weight * self.age_s;
+        let age_s = self.age_s;
+        self.shift(&[weight, -turning].map(|a| a * (0.5 * age_s * age_s)));
+        self.velocities[0] += weight * age_s;
+        self.velocities[1] -= turning * age_s;
     }
 
     /// How it stands, where it has not been lifted off that.
     pub(super) fn grounded(&self) -> Option<Stand> {
         self.footing().filter(|_| self.height_m.is_none_or(|height_m| height_m < LIFTED_M))
+    }
+
+    /// How it tips over an edge or a corner, where impulses may move it.
+    pub(super) fn tips(&self) -> Option<&Tips> {
+        let free = !self.held && self.lean.is_none() && self.lying.is_none() && self.landing.is_none();
+        self.neighbour.as_ref().filter(|_| free).and_then(|n| n.snapshot.tips.get())
     }
 
     /// How it stands, where impulses may move it.

@@ -26,6 +26,12 @@ impl Other {
         }
     }
 
+    /// How it turns ever faster, rad/s²: of what tips.
+    #[must_use]
+    pub fn turning(&self) -> DVec3 {
+        self.tips().map_or(DVec3::ZERO, |tips| tips.turning)
+    }
+
     /// The same of a slot of what bends, m/s² or rad/s²: a tube tells how each of its nodes and segments accelerates, a soft body of
     /// its vertices.
     #[must_use]
@@ -53,7 +59,7 @@ impl Other {
             None => {
                 let falling = self.fall(h).map_or(DVec3::ZERO, |fall| fall.normal * (fall.way_m / h - fall.speed_m_s));
                 let [blows, turns] = self.gain_by_others(h);
-                [self.smooth() * (0.5 * h) + falling + blows, turns]
+                [self.smooth() * (0.5 * h) + falling + blows, self.turning() * (0.5 * h) + turns]
             }
         }
     }
@@ -130,12 +136,13 @@ impl Other {
             return;
         }
         if self.positions.is_empty() {
-            let a = self.smooth();
+            let (a, turning) = (self.smooth(), self.turning());
             let fall = self.fall(h);
             let Pose { centre, rotation } = &mut self.pose;
             *centre += self.velocities[0] * h + a * (0.5 * h * h);
-            *rotation = turned(*rotation, self.velocities[1] * h);
+            *rotation = turned(*rotation, self.velocities[1] * h + turning * (0.5 * h * h));
             self.velocities[0] += a * h;
+            self.velocities[1] += turning * h;
             if let Some(fall) = fall {
                 self.settle(&fall, h);
             }

@@ -10,6 +10,7 @@ mod closed;
 mod crossing;
 mod felt;
 mod gripper;
+mod leaning;
 mod meetings;
 mod rates;
 mod received;

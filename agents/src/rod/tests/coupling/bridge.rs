@@ -117,7 +117,7 @@ fn a_block_stands_on_two_tubes_of_any_clocks() {
 }
 
 /// A tube of 20 cm on the floor.
-fn laid(x: f64) -> TubeSpec {
+pub(super) fn laid(x: f64) -> TubeSpec {
     let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
     let path_m = vec![DVec3::new(x, -0.1, 0.01), DVec3::new(x, 0.1, 0.01)];
     let free = TubeSpec::free(path_m, Section::hollow(0.01, 0.002, material), 8);
