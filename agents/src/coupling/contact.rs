@@ -149,6 +149,11 @@ impl Contact {
         if self.rebound_m_s > 0.0 { bias.min(-self.rebound_m_s) } else { bias }
     }
 
+    /// Asks no more for what is inside to come out.
+    pub fn leave_inside(&mut self) {
+        (self.gap_m, self.rebound_m_s) = (self.gap_m.max(0.0), 0.0);
+    }
+
     /// The impulse nearest to `impulse` that the contact can give (eq. 7): no pull, friction inside its disc.
     #[must_use]
     pub fn project(&self, impulse: DVec3) -> DVec3 {

@@ -12,7 +12,7 @@ pub use far::Far;
 pub use mate::{Feet, Mate};
 
 use super::touch::{TouchRoom, touches};
-use super::{Contact, Exchange, Impulse, Link, PairKind, PairState, Placed, Site, Touch};
+use super::{Contact, Exchange, FormKind, Impulse, Link, PairKind, PairState, Placed, Site, Touch, View};
 use crate::{AgentId, Neighbour, SimSpan, Snapshot, Surroundings};
 use glam::DVec3;
 use tanks::Tanks;
@@ -146,6 +146,7 @@ impl Mates {
             let reach_m = slack_m + (speed_m_s + mate.speed(velocities)) * h_s;
             let Some(there) = mate.to_touch() else { continue };
             touches(here, &there, reach_m, room, &mut self.touches);
+            drop_far_side(here, &there, &mut self.touches);
             let first = contacts.len();
             mate.add_contacts(&self.touches, (h_s, slack_m), velocities, contacts);
             mate.other.bear(contacts[first..].iter().map(|contact| -contact.normal));
@@ -175,6 +176,24 @@ impl Mates {
         impulses.resize(slots, DVec3::ZERO);
         contacts.for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
         list[..*count].iter_mut().any(|mate| mate.gives_way(impulses))
+    }
+
+    /// Whether the impulses that a solve found would add more energy than the tank of their pair can bear: the first of them whose
+    /// push-out has not been given up yet.
+    pub fn overspends<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)> + Clone,
+        velocities: &[DVec3],
+    ) -> bool {
+        let Self { list, count, tanks, .. } = self;
+        list[..*count].iter_mut().any(|mate| mate.overspends(contacts.clone(), velocities, tanks))
+    }
+
+    /// Takes push-out from the contacts with those whose tank could not bear it.
+    pub fn leave_inside(&self, contacts: &mut [Contact]) {
+        for mate in self.all().iter().filter(|mate| mate.is_spent()) {
+            contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::leave_inside);
+        }
     }
 
     /// Ends a solve.
@@ -280,6 +299,19 @@ impl Mates {
         self.exchange.write(into);
         into.touches.extend(self.all().iter().filter(|mate| mate.must_wake()).filter_map(|mate| mate.other.id()));
     }
+}
+
+/// Drops the places of a closed skin that are more than half way through a solid and lead out of it on the side that is away from the
+/// skin's middle: pushed to both sides, a thin plate in a soft body would be given energy without end.
+fn drop_far_side(here: &Placed<'_>, there: &Placed<'_>, touches: &mut Vec<Touch>) {
+    let (FormKind::Surface(skin), View::Surface(positions)) = (&here.form.kind, here.view) else { return };
+    let (FormKind::Solid(solid), View::Solid { position, .. }) = (&there.form.kind, there.view) else { return };
+    let half_m = 0.5 * f64::from(solid.shape.compute_local_aabb().half_extents().min_element());
+    if !skin.closed || touches.iter().all(|touch| touch.gap_m > -half_m) {
+        return;
+    }
+    let towards = positions.iter().sum::<DVec3>() / positions.len() as f64 - position;
+    touches.retain(|touch| touch.gap_m > -half_m || touch.normal.dot(towards) > 0.0);
 }
 
 fn is_linked(other: AgentId, around: &Surroundings<'_>) -> bool {

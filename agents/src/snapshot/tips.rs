@@ -63,7 +63,7 @@ impl Tips {
         }
     }
 
-    /// Whether an impulse only presses it on its feet, as [`Self::pin`] takes it to.
+    /// Whether an impulse only presses it on its feet.
     #[must_use]
     pub fn is_pressed(&self, inverse: (f64, DMat3), impulse: Impulse) -> bool {
         self.gives(inverse, impulse).iter().all(|n_s| *n_s >= 0.0)

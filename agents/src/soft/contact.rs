@@ -107,7 +107,8 @@ impl Contacts {
         self.mobilities.truncate(own);
     }
 
-    /// Solves the contacts of the list: what stands is taken to be pressed, and where that was wrong to be free (coupling.md, eq. 7a).
+    /// Solves the contacts of the list: what stands is taken to be pressed, and where that was wrong to be free (coupling.md, eq. 7a). A
+    /// pair whose push-out would add more energy than its tank can bear is solved again without (section 5).
     fn solve(
         &mut self,
         (h_s, settings): (f64, Settings),
@@ -116,22 +117,23 @@ impl Contacts {
         company: &mut Company,
     ) {
         let Self { list: contacts, mobilities, solver, free, .. } = self;
-        let problem = Problem { contacts, kin: &[], h_s, mobilities, settings };
         let own = system.vertices();
         let stands = company.mates_mut().press();
-        if stands {
-            free.clear();
-            free.extend_from_slice(velocities);
-        }
+        free.clear();
+        free.extend_from_slice(velocities);
         loop {
+            let problem = Problem { contacts, kin: &[], h_s, mobilities, settings };
             solver.solve(&problem, velocities, &mut |impulses: &mut [DVec3]| {
                 system.respond(&mut impulses[..own]);
                 company.mates().respond(impulses);
             });
-            // each time round one more who stands gives way
-            if !stands || !company.mates_mut().gives_way(contacts.iter().zip(solver.impulses()), velocities.len()) {
+            let found = || contacts.iter().zip(solver.impulses());
+            // each time round one more who stands gives way, or is pushed out no more
+            let gives_way = stands && company.mates_mut().gives_way(found(), velocities.len());
+            if !gives_way && !company.mates_mut().overspends(found(), velocities) {
                 break;
             }
+            company.mates().leave_inside(contacts);
             velocities.copy_from_slice(free);
             solver.take_back();
         }

@@ -49,6 +49,8 @@ pub struct Mate {
     work_j: f64,
     /// How much of push-out the pair's tank allows.
     fade: f64,
+    /// Whether the tank cannot bear any in this substep.
+    spent: bool,
     /// The substep tried, seconds.
     span_s: f64,
     woken: bool,
@@ -196,6 +198,26 @@ impl Mate {
     pub fn gives_way(&mut self, all: &[DVec3]) -> bool {
         let (first, end) = (self.slots.0, self.end());
         self.other.gives_way(&all[first..end])
+    }
+
+    /// Whether the impulses of a solve, with the velocities after it, would add more energy than its tank can bear. It is then pushed out
+    /// no more in this substep.
+    pub fn overspends<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)>,
+        velocities: &[DVec3],
+        tanks: &mut Tanks,
+    ) -> bool {
+        let Some(account) = self.other.id().and_then(|id| tanks.get(id)).filter(|_| !self.spent) else { return false };
+        let own = contacts.filter(|(contact, _)| self.is_of(contact));
+        let work_j: f64 = own.map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
+        self.spent = work_j > account.most_j();
+        self.spent
+    }
+
+    /// Whether it is pushed out no more in this substep.
+    pub fn is_spent(&self) -> bool {
+        self.spent
     }
 
     /// The fastest of its points through a substep for which all slots have these velocities, m/s.
@@ -355,7 +377,7 @@ impl Mate {
 
     /// Forgets the contacts of the substep before.
     pub fn begin(&mut self) {
-        (self.now, self.work_j) = (0, 0.0);
+        (self.now, self.work_j, self.spent) = (0, 0.0, false);
     }
 
     /// Notes the work of one contact against the velocity after it, both sides', J: what only carries a weight does none.

@@ -43,6 +43,8 @@ const LOOSE_S: f64 = 0.05;
 const WEIGH_EVERY: u32 = 4;
 /// The share of push-out that an empty tank leaves: bodies without any would sink for good.
 const LEAST: f64 = 0.25;
+/// The most that one solve may add, in full tanks.
+const MOST_RESERVES: f64 = 100.0;
 
 impl Tanks {
     /// The tank of the pair with `with`; a full one for a pair whose reduced mass is `mass_kg`.
@@ -103,6 +105,11 @@ impl Account {
     /// How much of push-out it still allows: all of it until half the reserve is spent.
     pub fn fade(&self) -> f64 {
         (2.0 * self.tank.share()).clamp(LEAST, 1.0)
+    }
+
+    /// The most that one solve may add, joules: what push-out takes while a body comes to rest is far less.
+    pub fn most_j(&self) -> f64 {
+        self.tank.left_j().max(0.0) + MOST_RESERVES * self.tank.reserve_j()
     }
 
     /// How the other should move when the next step begins, with the impulse on its way to it.
