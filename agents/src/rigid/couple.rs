@@ -46,7 +46,9 @@ impl RigidBody {
         }
         self.received_before = self.received[0];
         self.received = [self.motion.velocity - before[0], self.motion.spin(&self.spread) - before[1]];
-        let held = self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
+        // what bends holds it by what it gives
+        let given = self.received[0] != DVec3::ZERO;
+        let held = given || self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
         self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
         self.company.gather(around, (&self.world.mover, &self.motion), fellows);
         (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);

@@ -31,6 +31,8 @@ pub(super) struct Member {
     pub restitution: f64,
     /// Its state: the truth, in double precision.
     pub motion: Motion,
+    /// The velocity and the spin that it was given at the start of the step, until its first part has begun, m/s and rad/s.
+    pub received: Twist,
     /// Gravity of the part being solved, m/s²; zero where a spring's solution has it already.
     pub gravity: DVec3,
     /// How springs on it, and tools that press it, resist what the island does to it in the part being solved, about its centre of mass.
@@ -62,6 +64,7 @@ impl Member {
             friction: body.company.form.friction,
             restitution: body.company.form.restitution,
             motion: body.motion,
+            received: [DVec3::ZERO; 2],
             gravity: body.gravity,
             springs: None,
             bent: [DVec3::ZERO; 2],

@@ -251,6 +251,7 @@ impl Island {
             let before = body.motion;
             self.before.push((before, body.touching));
             body.begin(around, &self.fellows, dt_s);
+            self.members[index].received = body.received;
             if let Some(carried) = body.late.filter(|_| !self.solver.knows(index)) {
                 body.shift(carried);
                 body.late = None;

@@ -74,6 +74,8 @@ const PUSH_MAX_M_S: f64 = 1.0;
 const SLOP_SHARE: f64 = 1e-5;
 /// A contact that closes slower than this many parts' gravity does not bounce.
 const BOUNCE_PARTS: f64 = 2.0;
+/// Who bounces by no more than this stays on what presses it.
+const STAYS: f64 = 0.5;
 /// A part turns no jointed body farther, radians: past it the impulses' directions are stale.
 const TURN_MAX: f64 = 0.1;
 /// A part lasts at most this many radians of the fastest tremor of a tight chain: RATTLE is stable below 2.
@@ -355,14 +357,28 @@ impl Direct {
         }
     }
 
-    fn note_approach(&mut self, members: &[Member]) {
+    /// Notes how fast contacts close. What pressed a member at the start of the step on one that it touches presses, and is no approach,
+    /// where the two stay on what they fall on.
+    fn note_approach(&mut self, members: &mut [Member]) {
         weigh(members, &mut self.masses, &mut self.velocities);
         self.rows.clear();
         for contact in &self.near.contacts {
             contact_rows(contact, members, DVec3::ZERO, &mut self.rows);
         }
-        self.approach.clear();
-        self.approach.extend(self.rows.iter().step_by(3).map(|row| row.velocity(&self.velocities)));
+        self.free.clear();
+        let own = |(member, [v, w]): (&mut Member, &Twist)| {
+            let [dv, dw] = std::mem::take(&mut member.received);
+            [*v - dv, *w - dw]
+        };
+        self.free.extend(members.iter_mut().zip(&self.velocities).map(own));
+        let mut approach = std::mem::take(&mut self.approach);
+        approach.clear();
+        let closing = |(index, row): (usize, &Row)| {
+            let presses = self.near.contacts[index].restitution <= STAYS && self.is_touch(index, members);
+            row.velocity(if presses { &self.free } else { &self.velocities })
+        };
+        approach.extend(self.rows.iter().step_by(3).enumerate().map(closing));
+        self.approach = approach;
     }
 
     /// Notes for every member whether it touches anything and how deep.
