@@ -34,7 +34,7 @@ pub use lasting::smooth;
 pub use law::{Law, Link, Standing, owns};
 pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
 pub(crate) use mates::Feet;
-pub use mates::{Far, Mate, Mates, Pulled, Search};
+pub use mates::{Far, Mate, Mates, Owner, Pulled, Search};
 pub use other::{Astray, Other, WAKE_M_S};
 pub use rebound::Rebound;
 pub(crate) use rebound::{since_s, spared};

@@ -246,7 +246,7 @@ impl Company {
 
     /// Begins a solve: whether somebody stands on something fixed, which is taken to carry what presses it (eq. 7a).
     pub(super) fn press(&mut self) -> bool {
-        self.guests_mut().iter_mut().map(|guest| guest.other.press()).filter(|stands| *stands).count() > 0
+        self.guests_mut().iter_mut().map(|guest| guest.other.press(true)).filter(|stands| *stands).count() > 0
     }
 
     /// Whether what a solve `gives`, one impulse a slot, tips or lifts somebody who stands: the first of them. Their slots start at

@@ -9,7 +9,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::system::System;
 use crate::coupling::touch::{TouchRoom, touches};
 use crate::coupling::{
-    Contact, Form, FormKind, Placed, Problem, Search, Settings, Slots, SolidForm, Solver, Touch, View,
+    Contact, Form, FormKind, Owner, Placed, Problem, Search, Settings, Slots, SolidForm, Solver, Touch, View,
 };
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
@@ -38,8 +38,6 @@ pub(super) struct Contacts {
     /// The size of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
     room: TouchRoom,
-    /// The velocities before a solve.
-    free: Vec<DVec3>,
     slack_m: f64,
 }
 
@@ -74,7 +72,6 @@ impl Contacts {
             touches: vec![],
             mobilities: vec![],
             room: TouchRoom::default(),
-            free: vec![],
             slack_m: SLACK_SHARE * edge_m,
         })
     }
@@ -101,43 +98,13 @@ impl Contacts {
         }
         self.list.sort_unstable_by_key(|contact| contact.key);
         company.mates().scale(&mut self.mobilities);
-        self.solve((h, settings), velocities, system, company);
+        let Self { list, mobilities, solver, .. } = self;
+        let problem = Problem { contacts: &[], kin: &[], h_s: h, mobilities, settings };
+        let respond = |impulses: &mut [DVec3]| system.respond(impulses);
+        company.mates_mut().solve(solver, (list, problem), velocities, Owner { slots: own, respond, tips: true });
         company.mates_mut().watch(self.list.iter().zip(self.solver.impulses()), velocities);
         velocities.truncate(own);
         self.mobilities.truncate(own);
-    }
-
-    /// Solves the contacts of the list: what stands is taken to be pressed, and where that was wrong to be free (coupling.md, eq. 7a). A
-    /// pair whose push-out would add more energy than its tank can bear is solved again without (section 5).
-    fn solve(
-        &mut self,
-        (h_s, settings): (f64, Settings),
-        velocities: &mut [DVec3],
-        system: &System,
-        company: &mut Company,
-    ) {
-        let Self { list: contacts, mobilities, solver, free, .. } = self;
-        let own = system.vertices();
-        let stands = company.mates_mut().press();
-        free.clear();
-        free.extend_from_slice(velocities);
-        loop {
-            let problem = Problem { contacts, kin: &[], h_s, mobilities, settings };
-            solver.solve(&problem, velocities, &mut |impulses: &mut [DVec3]| {
-                system.respond(&mut impulses[..own]);
-                company.mates().respond(impulses);
-            });
-            let found = || contacts.iter().zip(solver.impulses());
-            // each time round one more who stands gives way, or is pushed out no more
-            let gives_way = stands && company.mates_mut().gives_way(found(), velocities.len());
-            if !gives_way && !company.mates_mut().overspends(found(), velocities) {
-                break;
-            }
-            company.mates().leave_inside(contacts);
-            velocities.copy_from_slice(free);
-            solver.take_back();
-        }
-        company.mates_mut().release();
     }
 
     /// Finds what may close within the substep, and says how well it is to be solved.
@@ -193,6 +160,11 @@ impl Contacts {
     pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
+    }
+
+    /// Whether something fixed pressed in the last substep.
+    pub fn is_grounded(&self) -> bool {
+        self.footholds().next().is_some()
     }
 
     /// The contacts of the last substep and their impulses, N·s.

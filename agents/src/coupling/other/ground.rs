@@ -98,10 +98,11 @@ impl Other {
         }
     }
 
-    /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a); whether it stands at all. While a solve looks
-    /// for impulses its answer to them must be linear: one that changed with the line on which they act would have no end.
-    pub fn press(&mut self) -> bool {
-        self.pressed = (self.grounded().is_some() || self.tips().is_some()).then_some(true);
+    /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a), and where `tips`, the feet over which it tips to
+    /// hold (eq. 7n); whether there is either. While a solve looks for impulses its answer to them must be linear: one that changed with the
+    /// line on which they act would have no end.
+    pub fn press(&mut self, tips: bool) -> bool {
+        self.pressed = (self.grounded().is_some() || (tips && self.tips().is_some())).then_some(true);
         self.pressed.is_some()
     }
 

@@ -3,8 +3,8 @@
 //! In: the state a substep starts from, its free velocities and its factor. Out: velocities that keep the skin apart.
 //! Never here: which contacts there are ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
 
-use super::{Skin, TubeContacts, node_slot, segment_slot};
-use crate::coupling::Settings;
+use super::{KIN, KIN_OWN, Skin, TubeContacts, node_slot, segment_slot};
+use crate::coupling::{Owner, Problem, Settings};
 use crate::rod::band::{Factor, Row};
 use crate::rod::company::Company;
 use crate::rod::config::Matter;
@@ -74,11 +74,11 @@ impl TubeContacts {
         self.scale(solved);
         company.mates().scale(&mut self.mobilities);
         let met = !company.is_empty();
-        let mut answer = |impulses: &mut [DVec3]| {
-            respond((solved.factor, solved.matter.held), &mut impulses[..own]);
-            company.mates().respond(impulses);
-        };
-        self.solve((solved.h, SETTINGS), velocities, met, &mut answer);
+        let Self { contacts, mobilities, solver, .. } = self;
+        let kin = &KIN[..if met { KIN.len() } else { KIN_OWN }];
+        let problem = Problem { contacts: &[], kin, h_s: solved.h, mobilities, settings: SETTINGS };
+        let respond = |impulses: &mut [DVec3]| respond((solved.factor, solved.matter.held), impulses);
+        company.mates_mut().solve(solver, (contacts, problem), velocities, Owner { slots: own, respond, tips: false });
         if met {
             company.mates_mut().watch(self.impulses(), velocities);
         }

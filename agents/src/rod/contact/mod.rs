@@ -10,7 +10,7 @@ mod walls;
 
 use super::company::Company;
 use crate::coupling::touch;
-use crate::coupling::{Contact, Problem, Response, Settings, Slots, Solver, SolverReport};
+use crate::coupling::{Contact, Slots, Solver};
 use crate::shape::field::Ball;
 use crate::shape::{Obstacle, ShapeError};
 pub(crate) use act::{Solved, respond};
@@ -153,24 +153,6 @@ impl TubeContacts {
     /// Whether the tube has nothing of its own to touch.
     fn is_idle(&self) -> bool {
         self.pairs.is_none() && self.walls.is_empty()
-    }
-
-    /// Solves the contacts found last: `velocities` become such that none closes.
-    fn solve(
-        &mut self,
-        (h_s, settings): (f64, Settings),
-        velocities: &mut [DVec3],
-        met: bool,
-        body: &mut impl Response,
-    ) -> SolverReport {
-        let problem = Problem {
-            contacts: &self.contacts,
-            kin: &KIN[..if met { KIN.len() } else { KIN_OWN }],
-            h_s,
-            mobilities: &self.mobilities,
-            settings,
-        };
-        self.solver.solve(&problem, velocities, body)
     }
 }
 
