@@ -5,6 +5,7 @@
 
 use super::band::Factor;
 use super::config::{Config, Matter};
+use super::contact::TubeContacts;
 use super::division::Division;
 use super::holds::Tie;
 use super::turn::{exp, unit};
@@ -127,7 +128,7 @@ impl Received {
         state: &mut Config,
         (factor, ties): (&Factor, &mut [Tie]),
         (matter, division): (&Matter, &Division),
-        way_m: f64,
+        (walls, way_m): (&TubeContacts, f64),
     ) {
         let Self { sum, carried, .. } = self;
         for list in [&mut *sum, &mut *carried] {
@@ -144,6 +145,7 @@ impl Received {
         state.u.iter_mut().zip(&*sum).for_each(|(u, change)| *u += *change);
         ties.iter_mut().for_each(|tie| tie.take(sum[2 * tie.segment], sum[2 * tie.segment + 2]));
         carry(state, carried, share);
+        walls.hold_back(&mut state.x, carried.iter().step_by(2).map(|way| *way * share), &division.arc_m);
         state.strain(matter, division);
     }
 

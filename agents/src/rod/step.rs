@@ -147,9 +147,9 @@ impl Stepper {
             return Ok(());
         }
         self.prepare(now, setting)?;
-        let Self { company, factor, footing, .. } = self;
+        let Self { company, factor, footing, contacts, .. } = self;
         let answer = footing.under(company.received().push()).unwrap_or(factor);
-        company.received().apply(now, (answer, ties), (setting.matter, setting.division), way_m);
+        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, way_m));
         Ok(())
     }
 

@@ -181,6 +181,18 @@ impl Field {
         found
     }
 
+    /// Takes back of the `way` on which a ball of `radius_m` has just come to `centre` what led it into this solid, or deeper.
+    pub fn hold_back(&self, centre: &mut DVec3, way: DVec3, radius_m: f64) {
+        let came_to = *centre;
+        for touch in self.touches(came_to, radius_m).iter() {
+            let gap_m = touch.distance_m - radius_m;
+            let before_m = gap_m - way.dot(touch.normal);
+            // what one place has taken back another of the same way out does not again
+            let now_m = gap_m + (*centre - came_to).dot(touch.normal);
+            *centre += touch.normal * (before_m.min(0.0) - now_m).max(0.0);
+        }
+    }
+
     /// Whether the inside of a span can come nearer than both of its ends: never to a flat floor without end.
     pub fn feels_spans(&self) -> bool {
         !matches!(self.kind, Kind::Plane)

@@ -129,6 +129,11 @@ impl TubeContacts {
         }
     }
 
+    /// Takes back of the `ways` that nodes have just come what led them into fixed solids; `arc_m` are their rest arc lengths.
+    pub fn hold_back(&self, positions: &mut [DVec3], ways: impl Iterator<Item = DVec3>, arc_m: &[f64]) {
+        self.walls.hold_back(positions, ways, (arc_m, &self.radii_m));
+    }
+
     /// The contacts found last, and the impulses they then gave.
     pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
         self.contacts.iter().zip(self.solver.impulses())

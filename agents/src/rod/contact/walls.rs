@@ -108,6 +108,29 @@ impl Walls {
         }
     }
 
+    /// Takes back of the `ways` that nodes have just come, none of which was known when the walls were measured, what led them into walls,
+    /// or deeper. `arc_m` and `radii_m` are those of the nodes.
+    pub fn hold_back(
+        &self,
+        positions: &mut [DVec3],
+        ways: impl Iterator<Item = DVec3>,
+        (arc_m, radii_m): (&[f64], &[f64]),
+    ) {
+        if self.last.len() != positions.len() || radii_m.len() != positions.len() {
+            return;
+        }
+        for (node, way) in ways.enumerate() {
+            let moved_m = positions[node].distance(self.last[node]);
+            for wall in &self.walls {
+                let (gap_m, at_m) = wall.nodes[node];
+                let is_near = gap_m - (self.travel_m - at_m) <= moved_m;
+                if is_near && !wall.bores.meet(arc_m[node], arc_m[node]) {
+                    wall.field.hold_back(&mut positions[node], way, radii_m[node]);
+                }
+            }
+        }
+    }
+
     /// Finds, once, what of a tube that is held starts through a solid; one that is not is pushed out as a whole.
     fn begin(&mut self, skin: &Skin<'_>) {
         if !std::mem::replace(&mut self.begun, true) && skin.held.contains(&true) {
