@@ -110,7 +110,7 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
             // where it is held is no matter of places
-            (FormKind::Chain { held_ends: 0 }, Pose::Chain(curve), low, high)
+            (FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {
             let body = SoftBody::new(spec.clone()).ok()?;

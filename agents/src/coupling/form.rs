@@ -25,14 +25,18 @@ impl Form {
     /// How many ends of a tube are held in place; none of anything else.
     #[must_use]
     pub const fn held_ends(&self) -> u8 {
-        if let FormKind::Chain { held_ends } = self.kind { held_ends } else { 0 }
+        if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
     }
 
-    /// How high the middle of a soft body is at the start, −g·x, J/kg, infinite where it is held; zero of anything else.
+    /// How high the middle of what bends is at the start, −g·x, J/kg; infinite of a soft body that is held, zero of what does not bend.
     /// Of two as fast the higher owns (docs/decisions/0019).
     #[must_use]
     pub const fn height_j_kg(&self) -> f32 {
-        if let FormKind::Surface(surface) = &self.kind { surface.height_j_kg } else { 0.0 }
+        match &self.kind {
+            FormKind::Chain { height_j_kg, .. } => *height_j_kg,
+            FormKind::Surface(surface) => surface.height_j_kg,
+            FormKind::Solid(_) | FormKind::Tool(_) => 0.0,
+        }
     }
 }
 
@@ -45,6 +49,8 @@ pub enum FormKind {
     Chain {
         /// How many of its ends are held in place, 0 … 2.
         held_ends: u8,
+        /// See [`Form::height_j_kg`].
+        height_j_kg: f32,
     },
     /// A tool: its parts depend on how far its jaws are open.
     Tool(ToolShape),

@@ -76,8 +76,8 @@ impl Standing {
 
 /// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the faster, of two
 /// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends; of two soft bodies, two tubes that are held
-/// alike and two rigid bodies the faster, of two soft ones as fast the higher (docs/decisions/0019), of equals the lower number. A tool
-/// is led and owns nothing.
+/// alike and two rigid bodies the faster, of two soft ones and of two loose tubes as fast the higher (docs/decisions/0019), of equals the
+/// lower number. A tool is led and owns nothing.
 ///
 /// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
 /// all how far one falls that nothing holds (docs/decisions/0012, 0013).
@@ -96,7 +96,9 @@ pub fn owns(me: Standing, other: Standing) -> bool {
     let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
     let rate = |s: Standing| s.rate_hz.max(slowest);
     let faster = rate(me).total_cmp(&rate(other));
-    let higher = if soft(me) { me.height_j_kg.total_cmp(&other.height_j_kg) } else { Ordering::Equal };
+    // a tube that is held lies on its hold
+    let held = me.held_ends > 0 || other.held_ends > 0;
+    let higher = if held { Ordering::Equal } else { me.height_j_kg.total_cmp(&other.height_j_kg) };
     let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
     tube(me).cmp(&tube(other)).then(freer).then(faster).then(higher).then(other.id.cmp(&me.id)).is_gt()
 }
@@ -128,5 +130,9 @@ mod tests {
         assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
         let higher = Standing { id: AgentId(9), height_j_kg: 1.0, ..all[6] };
         assert!(owns(higher, all[6]) && owns(all[7], higher), "the higher of two as fast");
+        let upper = Standing { id: AgentId(9), height_j_kg: 1.0, ..all[0] };
+        assert!(owns(upper, all[0]) && owns(all[1], upper), "tubes too");
+        let held = |s| Standing { held_ends: 2, ..s };
+        assert!(owns(held(all[0]), held(upper)), "but not those that are held");
     }
 }

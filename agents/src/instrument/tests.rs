@@ -304,7 +304,8 @@ fn scripts_that_are_none_are_refused() {
 
 #[test]
 fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
-    let form = Arc::new(Form { kind: FormKind::Chain { held_ends: 0 }, friction: 0.2, restitution: 0.0 });
+    let form =
+        Arc::new(Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.2, restitution: 0.0 });
     let asleep = |mut neighbour: Neighbour| {
         let snapshot = Snapshot {
             at_rest: true,

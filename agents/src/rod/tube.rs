@@ -110,7 +110,9 @@ impl Tube {
             steps: 0,
         };
         let held_ends = tube.matter.held.map(u8::from).iter().sum();
-        let kind = FormKind::Chain { held_ends };
+        let nodes = &tube.now.x;
+        let height_j_kg = -tube.spec.gravity.dot(nodes.iter().sum::<DVec3>() / nodes.len() as f64) as f32;
+        let kind = FormKind::Chain { held_ends, height_j_kg };
         let form = Form { kind, friction: tube.spec.friction, restitution: 0.0 };
         tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
         springs(&tube.spec.attachments, &tube.division, &mut tube.springs);

@@ -43,7 +43,7 @@ fn hull(half: DVec3) -> Form {
 }
 
 fn chain() -> Form {
-    Form { kind: FormKind::Chain { held_ends: 0 }, friction: 0.0, restitution: 0.0 }
+    Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.0, restitution: 0.0 }
 }
 
 fn tool() -> Form {
