@@ -25,6 +25,9 @@ pub struct Snapshot {
     pub time: SimTime,
     /// How far behind the scene its time may lie, written like it: who cannot keep up beside others lives on, later.
     pub put_off: SimSpan,
+    /// How long its last step was where that was shorter than its scene wants ([`crate::Agent::longest_step`]), written like its time; `None`
+    /// elsewhere.
+    pub shorter: Option<SimSpan>,
     /// How many steps led here.
     pub steps: u64,
     /// The resolution the simulation holds; `None` for a model that has none.
@@ -43,6 +46,10 @@ pub struct Snapshot {
     pub grips: Vec<Grip>,
     /// Whether the agent is at rest: others take it for immovable until they wake it.
     pub at_rest: bool,
+    /// Whether something fixed bears it: what bends has touched some within a second, a rigid body stands, or has tipped within one.
+    pub grounded: bool,
+    /// Whether it steps in one world with others.
+    pub shares: bool,
     /// Its smooth acceleration, m/s²: without what couplings and blows did. Others expect it to go on like this.
     pub acceleration: DVec3,
     /// How it answers impulses.
@@ -366,8 +373,8 @@ impl Snapshot {
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
-        (self.at_rest, self.acceleration, self.bounds) = (false, DVec3::ZERO, None);
-        self.stand = None;
+        (self.at_rest, self.shares, self.acceleration, self.bounds) = (false, false, DVec3::ZERO, None);
+        (self.stand, self.grounded) = (None, false);
         self.tips.set(None);
         self.drift_m = 0.0;
         self.sprung.set(None);
@@ -382,6 +389,12 @@ impl Snapshot {
     #[must_use]
     pub fn moment(&self) -> SimTime {
         self.time + self.put_off
+    }
+
+    /// How long its steps are as a rule, seconds, where its scene wants `wanted_s`.
+    #[must_use]
+    pub fn step_s(&self, wanted_s: f64) -> f64 {
+        self.shorter.map_or(wanted_s, SimSpan::as_secs_f64)
     }
 
     /// Whether every number that others act on is finite.

@@ -75,13 +75,14 @@ impl Peer {
     fn meets(&self, other: &Self) -> Neighbour {
         // jaws take hold of a form, also where the tool passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
+        let snapshot = other.shared.slot.latest();
         Neighbour {
             id: other.shared.id,
-            snapshot: other.shared.slot.latest(),
+            step_s: snapshot.step_s(other.shared.wanted_hz.recip()),
+            snapshot,
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
             owned: owns(self.standing(), other.standing()),
-            step_s: other.shared.wanted_hz.recip(),
         }
     }
 }

@@ -82,7 +82,7 @@ impl Actor {
             return Ok((self.step(dt)?, 0));
         }
         match self.step_as_one(dt) {
-            Ok(report) => {
+            Ok(Made { report, dt }) => {
                 let report = StepReport { work: report.work / f64::from(1 + led), ..report };
                 Ok((Made { report, dt }, led))
             }
@@ -93,7 +93,7 @@ impl Actor {
         }
     }
 
-    fn step_as_one(&mut self, dt: SimSpan) -> Result<StepReport, String> {
+    fn step_as_one(&mut self, dt: SimSpan) -> Result<Made, String> {
         let (me, time) = (self.shared.id, self.pace.time());
         self.company.gather_fellows(me, time);
         let Self { agent, eyes, hands, links, company, peers, writer, pace, .. } = self;
@@ -104,10 +104,13 @@ impl Actor {
             others.push(seat.actor.companion((time, dt), &company.fellows));
         }
         company.apart.clear();
+        // nobody's step is longer than any of them may make
+        let own = agent.longest_step(dt, &around).min(dt);
+        let dt = others.iter().map(|c| c.agent.longest_step(dt, &c.around)).fold(own, SimSpan::min);
         let report = agent.lead(dt, &around, &mut others, &mut company.apart).map_err(|e| e.to_string());
         company.companions = emptied(others);
         company.note_apart(time);
-        report
+        report.map(|report| Made { report, dt })
     }
 
     /// This agent, as one who leads it wants it.
@@ -136,6 +139,7 @@ impl Actor {
             if seat.pace.time() != time {
                 return;
             }
+            seat.pace.shorten(seat.pace.wanted(), open.dt);
             match contained(|| seat.write_snapshot(time + open.dt, open.rests)) {
                 Ok(()) => {
                     seat.pace.advance_by(open.dt);

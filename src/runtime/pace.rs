@@ -125,7 +125,7 @@ impl Pace {
     /// The length of its steps: what is wanted, or the shorter one that it made last.
     #[must_use]
     pub fn dt(&self) -> SimSpan {
-        if self.shorter == ANY { self.dt } else { self.dt.min(SimSpan::from_nanos(self.shorter.into())) }
+        self.shorter().map_or(self.dt, |shorter| self.dt.min(shorter))
     }
 
     /// The length of step that is wanted.
@@ -137,6 +137,12 @@ impl Pace {
     /// Wants steps of `dt` (above zero) from now on.
     pub const fn set_dt(&mut self, dt: SimSpan) {
         self.dt = dt;
+    }
+
+    /// The step that it made last where that was shorter than wanted.
+    #[must_use]
+    pub fn shorter(&self) -> Option<SimSpan> {
+        (self.shorter != ANY).then(|| SimSpan::from_nanos(self.shorter.into()))
     }
 
     /// Where `wanted` was to be stepped by, the agent steps by `made` (above zero), which is not longer.

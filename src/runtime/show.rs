@@ -35,12 +35,12 @@ impl Actor {
 
     /// Writes the state at `time`, to be published later; `at_rest` where the agent means to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
-        let (agent, put_off) = (&self.agent, self.pace.put_off());
+        let (agent, put_off, shorter) = (&self.agent, self.pace.put_off(), self.pace.shorter());
         self.withheld = false;
         let finite = self.writer.fill(|into| {
             into.clear();
             agent.write_snapshot(into);
-            (into.time, into.put_off, into.at_rest) = (time, put_off, at_rest);
+            (into.time, into.put_off, into.shorter, into.at_rest) = (time, put_off, shorter, at_rest);
             into.is_finite()
         });
         let model = self.shared.model;

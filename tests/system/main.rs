@@ -18,6 +18,7 @@ mod scenery;
 mod scenes;
 mod scenes_apart;
 mod scenes_coupled;
+mod scenes_crowded;
 mod scenes_soft;
 mod shares;
 mod sight;

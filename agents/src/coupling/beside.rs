@@ -12,7 +12,7 @@ use glam::DVec3;
 /// began that its places of contact are no longer there (measured: 20 mm deep at 0.1 s, 0.01 mm at 1/60 s).
 pub const PART_MAX_S: f64 = 1.0 / 60.0;
 /// A step longer than [`PART_MAX_S`] by less than this is not divided.
-const SPLIT_SLACK: f64 = 1.01;
+pub(super) const SPLIT_SLACK: f64 = 1.01;
 /// No step is made shorter than this because of somebody fast, seconds.
 const HURRY_S: f64 = 1e-3;
 /// Whom it pushes an owner may leave behind so far besides one of their steps, seconds: as long as a system lets a thread wait now and

@@ -101,6 +101,9 @@ impl Slots {
         for &(slot, w) in self.linear() {
             into.get_mut(slot as usize).into_iter().for_each(|sum| *sum += impulse * w);
         }
+        for &(slot, arm) in self.angular() {
+            into.get_mut(slot as usize).into_iter().for_each(|sum| *sum += arm.cross(impulse));
+        }
     }
 
     /// A scale for the contact's inverse mass, from the scale of each slot: Σ w² m⁻¹ + Σ r² I⁻¹ (eq. 9).

@@ -185,13 +185,14 @@ impl Stage {
         let actor = &mut self.actors[i];
         let around =
             Surroundings { me, time: actor.time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
-        let dt = actor.agent.longest_step(dt, &around);
+        let wanted = dt;
+        let dt = actor.agent.longest_step(wanted, &around);
         actor.agent.step(dt, &around).expect("a step that succeeds");
         let began = actor.time;
         actor.time += dt;
         let mut snapshot = Snapshot::default();
         actor.agent.write_snapshot(&mut snapshot);
-        snapshot.time = actor.time;
+        (snapshot.time, snapshot.shorter) = (actor.time, (dt < wanted).then_some(dt));
         if !lost {
             actor.published.push(Arc::new(snapshot));
             actor.begun = Some(began);
@@ -211,7 +212,7 @@ impl Stage {
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
         let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
         let owned = owns(self.standing(me), self.standing(id));
-        let step_s = 1.0 / actor.rate_hz;
+        let step_s = snapshot.step_s(1.0 / actor.rate_hz);
         Neighbour { id, snapshot, form: actor.agent.form(), law, owned, step_s }
     }
 

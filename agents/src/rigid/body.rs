@@ -17,6 +17,7 @@ use super::ties::Ties;
 use super::world::{PASSES, World};
 use super::{Joint, RigidError, RigidSpec, springs};
 use crate::coupling::beside::{self, bends, is_driven};
+use crate::coupling::crowd::{self, Lately};
 use crate::coupling::{Form, FormKind, Impulse, Six, SolidForm, Twist};
 use crate::drift::DRIFT_S;
 use crate::shape::{Obstacle, Solid};
@@ -78,6 +79,8 @@ pub struct RigidBody {
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
     pub(super) grips: Vec<Grip>,
     pub(super) ties: Ties,
     /// The tools that pressed it in the last part of a world that it shares.
@@ -89,7 +92,7 @@ pub struct RigidBody {
     /// Whether a joint of the scene holds the body; known from its first step on.
     jointed: Option<bool>,
     /// How deep it sank into anything in the last step of its island, metres; `None` alone.
-    sunk_m: Option<f64>,
+    pub(super) sunk_m: Option<f64>,
     /// What its steps in contact and under springs do wrong in a tenth of a second, metres.
     drift_m: f64,
 }
@@ -154,6 +157,7 @@ impl RigidBody {
             at_rest: false,
             calm_s: 0.0,
             steps: 0,
+            lately: Lately::default(),
             grips: Vec::with_capacity(4),
             ties: Ties::default(),
             leant: Vec::new(),
@@ -342,7 +346,19 @@ impl Agent for RigidBody {
         let driven = |n: &Neighbour| is_driven(n, around);
         let wild = |n: &Neighbour| driven(n) || (!n.owned && (squeezes(n) || strikes(n)));
         let part = beside::longest_step(dt, around, || self.bounds(), wild);
-        beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S))
+        let part = beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S));
+        crowd::crowded(
+            part,
+            around,
+            || self.bounds(),
+            crowd::Member {
+                bends: false,
+                shares: self.sunk_m.is_some(),
+                lies: self.lies.is_some(),
+                grounded: self.stand.is_some() || self.lately.is_grounded(),
+                lately: self.lately,
+            },
+        )
     }
 
     fn rename_time(&mut self, _by_s: f64) {

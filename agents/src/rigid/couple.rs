@@ -154,6 +154,7 @@ impl RigidBody {
         let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
         let stood = self.stand.is_some();
         (self.stand, self.tips) = if seen { self.footing() } else { (None, None) };
+        self.lately.pass(self.tips.is_some(), dt);
         self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
         self.bear();
         self.lies = self.upheld(around);
@@ -292,6 +293,7 @@ impl RigidBody {
         into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
         into.bounds = Some(self.bounds());
         (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
+        (into.shares, into.grounded) = (self.sunk_m.is_some(), self.stand.is_some() || self.lately.is_grounded());
         into.lands_s = self.lands_s;
         into.sprung.set(self.hold.published());
         into.lies.set(self.lies.filter(|_| !self.at_rest));

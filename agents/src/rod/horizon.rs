@@ -91,18 +91,23 @@ impl Tube {
     }
 
     /// Whether the owners of its contacts expect of the tube the step of [`Self::foretell`] after one of `dt` seconds: tubes with steps
-    /// as long, while it touches nothing that moves. One whole substep, implicit, tells how the next one goes.
+    /// as long, and soft bodies where it touches what moves, as long as that presses as it did. One whole substep, implicit, tells how the
+    /// next one goes.
     pub(super) fn is_foretold(&self, around: &Surroundings<'_>, dt: f64) -> bool {
-        let whole = self.stepper.span_s() == dt
-            && self.stepper.factor().slots() == self.now.u.len()
-            && self.accelerations.len() == self.now.u.len();
-        if !whole || self.spec.integrator != Integrator::ImplicitEuler || self.stepper.contacts.touches_what_moves() {
+        let Self { stepper, now, accelerations, spec, .. } = self;
+        let slots = now.u.len();
+        let whole = stepper.span_s() == dt && stepper.factor().slots() == slots && accelerations.len() == slots;
+        let touches = stepper.contacts.touches_what_moves();
+        if !whole || spec.integrator != Integrator::ImplicitEuler || (touches && !stepper.presses.lasts()) {
             return false;
         }
-        let alike = |n: &Neighbour| {
-            let lasts = (n.step_s.min(PART_MAX_S) - dt).abs() < (SLOWER - 1.0) * dt;
-            matches!(n.snapshot.body, Body::Curve(_)) && lasts && !is_linked(n, around) && keeps_up(n, around, dt)
+        let lasts = |n: &Neighbour| (n.step_s.min(PART_MAX_S) - dt).abs() < (SLOWER - 1.0) * dt;
+        let alike = |n: &Neighbour| match n.snapshot.body {
+            Body::Curve(_) => lasts(n),
+            Body::Soft(_) => touches,
+            _ => false,
         };
+        let alike = |n: &Neighbour| alike(n) && !is_linked(n, around) && keeps_up(n, around, dt);
         let mut owners = self.owners(around, dt).peekable();
         owners.peek().is_some() && owners.all(alike)
     }
@@ -127,6 +132,7 @@ impl Tube {
         list.iter_mut().zip(&now.u).for_each(|(began, u)| *began = *u * (2.0 + dt * matter.damping) - *began);
         momenta((matter.mu, matter.rotary), division.length.iter().copied().zip(now.t.iter().copied()), list);
         list.iter_mut().zip(stepper.company.spent()).for_each(|(momentum, spent)| *momentum -= *spent);
+        list.iter_mut().zip(stepper.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * dt);
         let standing = stepper.footing.factor();
         self.standing_accelerations.extend(list.iter().filter(|_| standing.is_some()));
         let accelerate = |factor: &Factor, list: &mut Vec<DVec3>| {

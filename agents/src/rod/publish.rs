@@ -28,7 +28,7 @@ impl Tube {
         into.drift_m = self.doubling.error_m();
         into.residual_m = residual::estimate_m(&self.now, &self.matter, &self.division) + into.drift_m;
         into.grips.clone_from(&self.grips);
-        into.at_rest = self.at_rest;
+        (into.at_rest, into.grounded) = (self.at_rest, self.lately.is_grounded());
         into.bounds = Some(bounds(&self.now, self.widest_m()));
         self.publish_curve(into);
         self.publish_coupling(into);

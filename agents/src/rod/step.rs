@@ -17,7 +17,7 @@ use super::past::Past;
 use super::project::Projector;
 use super::system::{Iterate, Scene, assemble};
 use super::turn::{exp, unit};
-use crate::coupling::Lies;
+use crate::coupling::{Lies, Presses};
 use glam::{DMat3, DVec3};
 
 /// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
@@ -62,6 +62,8 @@ pub struct Lost {
 #[derive(Debug, Clone, Default)]
 pub struct Stepper {
     pub(super) rows: Vec<Row>,
+    /// What contacts gave in the last substep.
+    pub(super) presses: Presses,
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
     pub(super) next: Config,
@@ -181,6 +183,7 @@ impl Stepper {
         self.factor.forget();
         self.horizon.forget();
         self.footing.forget();
+        self.presses.forget();
         self.contacts.forget();
         self.past.forget();
     }
@@ -369,6 +372,11 @@ impl Stepper {
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
             let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
             tie.book(point, (h, start + h));
+        }
+        if self.company.is_watched() {
+            self.presses.note(self.contacts.impulses(), now.u.len(), h);
+        } else {
+            self.presses.forget();
         }
         self.company.accept(self.contacts.impulses(), ties, (now.u.len(), start, h));
     }

@@ -19,6 +19,7 @@ use super::skeleton::Skeleton;
 use super::step::{Lost, Setting, Stepper, energy};
 use super::{Section, TubeSpec};
 use crate::coupling::beside::{self, has_a_say};
+use crate::coupling::crowd::{self, Lately};
 use crate::coupling::{Form, FormKind, smooth};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
 use glam::{DMat3, DVec3};
@@ -58,6 +59,8 @@ pub struct Tube {
     wave_from_s: f64,
     pub(super) dt_s: f64,
     pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
 }
 
 /// The outer radius under `pressure_pa` inside: r + p r² (1 − ν/2)/(E t) (docs/theory/rod.md, eq. 33).
@@ -108,6 +111,7 @@ impl Tube {
             wave_from_s: 0.0,
             dt_s: 0.0,
             steps: 0,
+            lately: Lately::default(),
         };
         let held_ends = tube.matter.held.map(u8::from).iter().sum();
         let nodes = &tube.now.x;
@@ -348,6 +352,7 @@ impl Agent for Tube {
         self.end_watch(before, around, dt_s);
         self.foresee(around, dt_s);
         self.time = around.time + dt;
+        self.lately.pass(self.stepper.contacts.is_grounded(), dt_s);
         self.steps += 1;
         self.at_rest = self.watch_rest(dt_s);
         let work = self.segments() as f64 * f64::from(self.stepper.solves);
@@ -359,7 +364,20 @@ impl Agent for Tube {
     }
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
-        beside::longest_step(dt, around, || bounds(&self.now, self.widest_m()), |n| has_a_say(n, around))
+        let bounds = || bounds(&self.now, self.widest_m());
+        let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
+        crowd::crowded(
+            dt,
+            around,
+            bounds,
+            crowd::Member {
+                bends: true,
+                shares: false,
+                lies: false,
+                grounded: self.lately.is_grounded(),
+                lately: self.lately,
+            },
+        )
     }
 
     fn rename_time(&mut self, by_s: f64) {

@@ -14,6 +14,7 @@ use super::spec::{SoftError, SoftSpec};
 use super::step::HASTE_MAX;
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
+use crate::coupling::crowd::{self, Lately};
 use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View};
 use crate::{
     Agent, Body, Bounds, Grip, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
@@ -50,6 +51,8 @@ pub struct SoftBody {
     before: Vec<DVec3>,
     quiet_s: f64,
     pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
 }
 
 /// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is not seen on any screen.
@@ -98,6 +101,7 @@ impl SoftBody {
             doubling: Doubling::default(),
             quiet_s: 0.0,
             steps: 0,
+            lately: Lately::default(),
             spec,
         })
     }
@@ -179,6 +183,7 @@ impl SoftBody {
         self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
         self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
         let told = self.foretell(dt);
+        self.lately.pass(self.contacts.is_grounded(), dt);
         self.steps += 1;
         self.at_rest = self.watch_rest(dt);
         self.wake_others(around, dt);
@@ -201,6 +206,18 @@ impl Agent for SoftBody {
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
+        let dt = crowd::crowded(
+            dt,
+            around,
+            || self.bounds(),
+            crowd::Member {
+                bends: true,
+                shares: false,
+                lies: false,
+                grounded: self.lately.is_grounded(),
+                lately: self.lately,
+            },
+        );
         beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
     }
 

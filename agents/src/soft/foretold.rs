@@ -5,6 +5,7 @@
 
 use super::body::SoftBody;
 use super::contact::Contacts;
+use crate::coupling::Presses;
 use glam::DVec3;
 
 /// A substep that is shorter than its step by less than this is all of it.
@@ -21,29 +22,14 @@ pub(super) struct Foretold {
     pub standing: Vec<DVec3>,
     /// The length of the last substep, seconds.
     last_s: f64,
-    /// How contacts pressed each vertex in the last substep, and in the one before, N.
-    presses: [Vec<DVec3>; 2],
+    presses: Presses,
 }
 
 impl Foretold {
     /// Notes a substep of `h` seconds of a body of so many `vertices`.
     pub fn note(&mut self, contacts: &Contacts, vertices: usize, h: f64) {
         self.last_s = h;
-        self.presses.swap(0, 1);
-        let now = &mut self.presses[0];
-        now.clear();
-        now.resize(vertices, DVec3::ZERO);
-        contacts.impulses().for_each(|(contact, impulse)| contact.slots.scatter_known(*impulse / h, now));
-    }
-
-    /// The part of what presses that was no part of it in the substep before, on each vertex, N: a blow, which does not go on (eq. 16j).
-    fn blows(&self) -> impl Iterator<Item = DVec3> {
-        let [now, before] = &self.presses;
-        let size: f64 = before.iter().map(|f| f.length_squared()).sum();
-        let along: f64 = now.iter().zip(before).map(|(now, before)| now.dot(*before)).sum();
-        let share = if size > 0.0 { (along / size).clamp(0.0, 1.0) } else { 0.0 };
-        let lasts = before.iter().copied().chain(std::iter::repeat(DVec3::ZERO));
-        now.iter().zip(lasts).map(move |(now, before)| *now - before * share)
+        self.presses.note(contacts.impulses(), vertices, h);
     }
 }
 
@@ -72,7 +58,7 @@ impl SoftBody {
         let moves = velocities.iter().zip(&*before).zip(&lattice.mass_kg);
         momenta.extend(moves.map(|((now, before), mass)| (*now * damped - *before) * *mass));
         momenta.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum -= *given);
-        momenta.iter_mut().zip(foretold.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
+        momenta.iter_mut().zip(foretold.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
         let still = velocities.iter().zip(&lattice.mass_kg).map(|(now, mass)| *now * *mass);
         momenta.iter_mut().zip(still).for_each(|(momentum, still)| *momentum = still + *momentum * (span_s / last_s));
         let lies = !self.footing.is_empty();

@@ -15,7 +15,7 @@ impl SoftBody {
         into.drift_m = self.doubling.watch.error_m();
         into.residual_m = self.lattice.residual_m(&self.positions) + into.drift_m;
         into.grips.clone_from(&self.grips);
-        into.at_rest = self.at_rest;
+        (into.at_rest, into.grounded) = (self.at_rest, self.lately.is_grounded());
         into.acceleration = self.acceleration;
         into.bounds = Some(self.bounds());
         let soft = into.body.soft_mut();

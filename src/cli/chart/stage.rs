@@ -147,11 +147,12 @@ impl Stage {
         let time: SimTime = actor.own.time;
         let dt = SimSpan::from_secs_f64(stretch / actor.rate_hz).unwrap_or(SimSpan::ZERO);
         let around = Surroundings { me, time, neighbours: &neighbours, hands: &actor.hands, links: &actor.links };
-        let dt = actor.agent.longest_step(dt, &around);
+        let wanted = dt;
+        let dt = actor.agent.longest_step(wanted, &around);
         actor.agent.step(dt, &around)?;
         actor.last_s = dt.as_secs_f64();
         actor.agent.write_snapshot(&mut actor.own);
-        actor.own.time = time + dt;
+        (actor.own.time, actor.own.shorter) = (time + dt, (dt < wanted).then_some(dt));
         if !lost {
             actor.shown.swap(0, 1);
             actor.shown[0] = Arc::new(actor.own.clone());
@@ -172,13 +173,14 @@ impl Stage {
         };
         let (actor, now) = (&self.actors[other], self.actors[me].own.time);
         let early = self.faults.due && actor.shown[0].time > now;
+        let snapshot = &actor.shown[usize::from(early)];
         Neighbour {
             id: AgentId(other as u32),
-            snapshot: Arc::clone(&actor.shown[usize::from(early)]),
+            step_s: snapshot.step_s(1.0 / actor.rate_hz),
+            snapshot: Arc::clone(snapshot),
             form: actor.form.clone(),
             law: self.law,
             owned: owns(standing(me), standing(other)),
-            step_s: 1.0 / actor.rate_hz,
         }
     }
 

@@ -292,7 +292,9 @@ fn an_agent_may_step_shorter_than_is_wanted_and_says_so() {
     let mut run = lockstep(vec![dummy.at(100.0)]);
     run.wait_until(ms(70));
     assert_eq!(run.agents()[0].stats().dt, SimSpan::from_nanos(2_000_000));
+    assert_eq!(run.agents()[0].latest().step_s(0.01), 0.002, "and tells others");
     run.wait_until(ms(200));
+    assert_eq!(run.agents()[0].latest().step_s(0.01), 0.01);
     let stats = run.shutdown().remove(0);
     // 40 steps of 2 ms, and 10 ms as before from then on
     assert_eq!((stats.steps, stats.dt), (40 + 12, SimSpan::from_nanos(10_000_000)));

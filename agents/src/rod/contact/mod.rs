@@ -145,6 +145,11 @@ impl TubeContacts {
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
 
+    /// Whether something fixed pressed in the last solve.
+    pub fn is_grounded(&self) -> bool {
+        self.footholds().next().is_some()
+    }
+
     /// Whether the last search found any contact with what moves, itself included.
     pub fn touches_what_moves(&self) -> bool {
         !self.contacts.iter().all(is_fixed)

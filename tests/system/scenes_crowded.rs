@@ -1,0 +1,134 @@
+//! Three bodies that press on each other, or two and the ground, of any clocks, as users write them: they stay where they were put.
+//!
+//! Independent answers: heights of what is stacked, from their sizes.
+
+use crate::play::{Folder, number, point};
+use serde_json::Value;
+
+const FLOOR: &str =
+    "[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = \"plane\"\nfixed = true\nfriction = 0.5\n";
+const SOFT: &str = "density_kg_m3 = 1050.0\ndamping_per_s = 3.0\n";
+/// Outer radius of the tubes, metres.
+const RADIUS_M: f64 = 0.01;
+
+fn tube(name: &str, hz: f64, ends: [[f64; 3]; 2], more: &str) -> String {
+    format!(
+        "[[object]]\nname = \"{name}\"\nmodel = \"tube\"\npath_m = {ends:?}\nradius_m = {RADIUS_M}\nwall_m = 0.002\nsegments = 16\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}{more}"
+    )
+}
+
+fn solid(name: &str, hz: f64, (at, half): ([f64; 3], [f64; 3]), mass_kg: f64) -> String {
+    format!(
+        "[[object]]\nname = \"{name}\"\nmodel = \"rigid\"\nshape = \"box\"\nposition_m = {at:?}\nhalf_extents_m = {half:?}\nmass_kg = {mass_kg:?}\nrate_hz = {hz:?}\n[[probe]]\nobject = \"{name}\"\nevery_ms = 10.0\n"
+    )
+}
+
+fn along_y(x: f64) -> [[f64; 3]; 2] {
+    [[x, -0.1, 0.0101], [x, 0.1, 0.0101]]
+}
+
+/// The deepest overlap that any pair ever had, metres, and the least that any tank holds, J.
+fn worst(report: &Value) -> (f64, f64) {
+    let pairs = report["couplings"].as_array().unwrap();
+    let deep_m = pairs.iter().map(|pair| number(pair, "/penetration_max_m")).fold(0.0, f64::max);
+    (deep_m, pairs.iter().filter_map(|pair| pair["tank_j"].as_f64()).fold(f64::INFINITY, f64::min))
+}
+
+/// It rolled to and fro on them as on rollers, 14 to 20 mm deep, or off.
+#[test]
+fn a_box_stays_on_two_tubes_on_the_floor_whose_clocks_differ() {
+    for (left, right, above) in [(60.0, 60.0, 60.0), (60.0, 61.0, 60.0), (60.0, 61.0, 240.0), (20.0, 60.0, 240.0)] {
+        for mass_kg in [0.2, 2.0] {
+            let tubes = [tube("left", left, along_y(-0.04), ""), tube("right", right, along_y(0.04), "")].concat();
+            let above = solid("box", above, ([0.0, 0.0, 0.0405], [0.06, 0.03, 0.02]), mass_kg);
+            let report = Folder::with(&format!("{FLOOR}{tubes}{above}")).lockstep(&["--seconds", "3"]);
+            let told = format!("{left} + {right} Hz, {mass_kg} kg");
+            let at = point(&report, "/probes/0/position_m");
+            assert!((at[2] - 0.04).abs() < 5e-4 && at[0].hypot(at[1]) < 0.015, "{told}: it is at {at:?}");
+            // g h² of the step before the first that is told, 2.7 mm, is no less than what a landing may leave
+            assert!(worst(&report).0 < 1.5e-3 && worst(&report).1 > -0.15, "{told}: {:?}", worst(&report));
+        }
+    }
+}
+
+/// What the tubes gave the lower one in each step was taken for an approach: it bounced, never pressed, and the upper one sank through it at
+/// 68 mm/s.
+#[test]
+fn a_stack_with_the_usual_restitution_stands_on_two_tubes() {
+    for hz in [60.0, 120.0, 240.0] {
+        let tubes = [tube("left", hz, along_y(-0.03), ""), tube("right", hz, along_y(0.03), "")].concat();
+        let [low, high] = [0.0525, 0.1135].map(|z| [0.0, 0.0, z]);
+        let stack = solid("low", hz, (low, [0.05, 0.03, 0.03]), 0.5) + &solid("high", hz, (high, [0.03; 3]), 0.5);
+        let report = Folder::with(&format!("{FLOOR}{tubes}{stack}")).lockstep(&["--seconds", "2"]);
+        for (probe, z) in [(0, 0.05), (1, 0.11)] {
+            let at = point(&report, &format!("/probes/{probe}/position_m"));
+            assert!((at[2] - z).abs() < 1e-3 && at[0].hypot(at[1]) < 2e-3, "{hz} Hz: {at:?} where {z} high is right");
+        }
+        assert!(worst(&report).0 < 2.5e-3 && worst(&report).1 > -0.02, "{hz} Hz: {:?}", worst(&report));
+    }
+}
+
+/// A step late the upper tube carried the lower one 8 mm into the floor; the plate then stuck in it, and 38 J went through its tank.
+#[test]
+fn a_plate_on_two_crossed_tubes_rolls_off_them_and_gains_nothing() {
+    for (hz, lower_first) in [(60.0, true), (120.0, false), (240.0, true), (240.0, false), (1000.0, true)] {
+        let low = tube("low", hz, [[-0.1, 0.0, 0.0101], [0.1, 0.0, 0.0101]], "");
+        let up = tube("up", hz, [[0.0, -0.1, 0.0305], [0.0, 0.1, 0.0305]], "");
+        let tubes = if lower_first { low + &up } else { up + &low };
+        let plate = solid("plate", hz, ([0.0, 0.0, 0.06], [0.06, 0.06, 0.005]), 0.4);
+        let report = Folder::with(&format!("{FLOOR}{tubes}{plate}")).lockstep(&["--seconds", "2"]);
+        let samples = report["probes"][0]["samples"].as_array().unwrap();
+        let highest = samples.iter().map(|s| number(s, "/3")).fold(0.0, f64::max);
+        assert!(highest < 0.0601, "{hz} Hz: it flew up to {highest} m");
+        assert!(worst(&report).0 < 4e-3 && worst(&report).1 > -0.03, "{hz} Hz: {:?}", worst(&report));
+    }
+}
+
+/// How the box answers changed with the line of every impulse, so the tube's solve gave next to nothing: it fell through box and floor.
+#[test]
+fn a_tube_that_falls_on_a_light_box_falls_through_neither_box_nor_floor() {
+    for (tube_hz, box_hz) in [(500.0, 60.0), (120.0, 120.0), (240.0, 240.0)] {
+        let bar = tube("tube", tube_hz, [[0.0835, -0.0326, 0.075], [-0.094, -0.0026, 0.075]], "");
+        let ends = [0.0, 0.5, 1.0].map(|at| format!("[[probe]]\nobject = \"tube\"\nat = {at:?}\nevery_ms = 5.0\n"));
+        let light = solid("box", box_hz, ([-0.0068, 0.0086, 0.031], [0.03; 3]), 0.05);
+        let text = format!("{FLOOR}{light}{bar}{}", ends.concat());
+        let report = Folder::with(&text).lockstep(&["--seconds", "1"]);
+        let samples = (1..4).flat_map(|probe| report["probes"][probe]["samples"].as_array().unwrap());
+        let lowest = samples.map(|s| number(s, "/3")).fold(f64::INFINITY, f64::min);
+        assert!(lowest > 0.9 * RADIUS_M, "{tube_hz} : {box_hz} Hz: its axis came down to {lowest} m");
+    }
+}
+
+/// Its edge on the floor, it leant through the rope: 13 mm deep.
+#[test]
+fn a_box_that_tips_off_a_rope_on_the_floor_leans_on_it_at_slow_clocks() {
+    for hz in [60.0, 61.0] {
+        let rope = format!(
+            "[[object]]\nname = \"rope\"\nmodel = \"rope\"\npath_m = [[-0.1, 0.0, 0.0061], [0.1, 0.0, 0.0061]]\nradius_m = 0.006\nsegments = 8\nyoung_pa = 1e6\nrate_hz = 60.0\n{SOFT}"
+        );
+        let above = solid("box", hz, ([0.0, 0.003, 0.05], [0.05, 0.03, 0.03]), 0.4);
+        let report = Folder::with(&format!("{FLOOR}{rope}{above}")).lockstep(&["--seconds", "3"]);
+        assert!(worst(&report).0 < 3e-3 && worst(&report).1 > -0.1, "60 : {hz} Hz: {:?}", worst(&report));
+    }
+}
+
+/// It was thrown off, or fell between them: two owners gave to the second tube, of whom neither knew what that one bore.
+#[test]
+fn a_soft_block_lies_on_two_taut_tubes_that_touch() {
+    for hz in [120.0, 240.0] {
+        let taut = |name, y: f64| {
+            let ends = [[-0.2, y, 0.2], [0.2, y, 0.2]];
+            tube(name, hz, ends, "clamp = [\"start\", \"end\"]\n")
+                .replace("young_pa = 1e6", "young_pa = 2e7")
+                .replace("radius_m = 0.01", "radius_m = 0.015")
+        };
+        let block = format!(
+            "[[object]]\nname = \"block\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.1, 0.1, 0.1]\nsegments = [3, 3, 3]\nposition_m = [0.0, 0.0, 0.27]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}[[probe]]\nobject = \"block\"\nevery_ms = 10.0\n"
+        );
+        let text = [FLOOR, &taut("a", -0.0151), &taut("b", 0.0151), &block].concat();
+        let report = Folder::with(&text).lockstep(&["--seconds", "2"]);
+        let at = point(&report, "/probes/0/position_m");
+        assert!(at[2] > 0.28, "{hz} Hz: its upper corner is at {at:?}");
+        assert!(worst(&report).0 < 2e-3 && worst(&report).1 > -0.01, "{hz} Hz: {:?}", worst(&report));
+    }
+}
