@@ -12,7 +12,6 @@ use crate::{AgentId, Bounds, Neighbour, SimSpan, Surroundings};
 const PART_S: f64 = 1.0 / 240.0;
 /// Who has touched something fixed counts as standing on it for so long, seconds: as long as couplings that do nothing are told.
 const LINGERS_S: f64 = 1.0;
-
 /// Parts that end within so many nanoseconds of where equal ones would end there.
 const SAME_NS: u64 = 1_000;
 
@@ -64,6 +63,12 @@ pub struct Member {
 }
 
 impl Member {
+    /// A body that bends, which did so lately: it shares no world, and answers for what it bears by itself.
+    #[must_use]
+    pub fn bent(lately: Lately) -> Self {
+        Self { bends: true, shares: false, lies: false, grounded: lately.is_grounded(), lately }
+    }
+
     /// What is left of a step of `dt` whose parts it has begun to make, else all of one: who leaves a crowd keeps step with those of its
     /// rate, and what two that step together expect of each other is exact (docs/theory/soft.md, eq. 16h).
     fn left_of(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {

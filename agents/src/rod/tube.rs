@@ -366,18 +366,7 @@ impl Agent for Tube {
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let bounds = || bounds(&self.now, self.widest_m());
         let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
-        crowd::crowded(
-            dt,
-            around,
-            bounds,
-            crowd::Member {
-                bends: true,
-                shares: false,
-                lies: false,
-                grounded: self.lately.is_grounded(),
-                lately: self.lately,
-            },
-        )
+        crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately))
     }
 
     fn rename_time(&mut self, by_s: f64) {

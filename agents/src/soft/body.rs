@@ -206,18 +206,7 @@ impl Agent for SoftBody {
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
-        let dt = crowd::crowded(
-            dt,
-            around,
-            || self.bounds(),
-            crowd::Member {
-                bends: true,
-                shares: false,
-                lies: false,
-                grounded: self.lately.is_grounded(),
-                lately: self.lately,
-            },
-        );
+        let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately));
         beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
     }
 
