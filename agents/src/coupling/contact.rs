@@ -69,6 +69,14 @@ impl Slots {
         linear.sum::<DVec3>() + angular.map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum::<DVec3>()
     }
 
+    /// The linear velocities among the first `own` slots that it gathers, with their weights.
+    pub(crate) fn own(&self, own: usize) -> Self {
+        let mut slots = Self::default();
+        let first = self.linear().iter().filter(|(slot, _)| (*slot as usize) < own);
+        first.for_each(|&(slot, weight)| slots.add_linear(slot, weight));
+        slots
+    }
+
     /// Marks the slots of a contact with something fixed: those of two parts of one body have weights of both signs.
     pub(crate) fn mark_fixed(&self, fixed: &mut [bool]) {
         if self.linear().iter().all(|(_, weight)| *weight >= 0.0) {

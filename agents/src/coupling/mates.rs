@@ -13,7 +13,7 @@ pub use mate::{Feet, Mate};
 
 use super::touch::{TouchRoom, touches};
 use super::{
-    Contact, Exchange, FormKind, Impulse, Link, PairKind, PairState, Placed, Problem, Site, Solver, Touch, View,
+    Contact, Exchange, Foot, FormKind, Impulse, Link, PairKind, PairState, Placed, Problem, Site, Solver, Touch, View,
 };
 use crate::{AgentId, Neighbour, SimSpan, Snapshot, Surroundings};
 use glam::DVec3;
@@ -227,6 +227,27 @@ impl Mates {
     fn leave_inside(&self, contacts: &mut [Contact]) {
         for mate in self.all().iter().filter(|mate| mate.is_spent()) {
             contacts.iter_mut().filter(|contact| mate.is_of(contact)).for_each(Contact::leave_inside);
+        }
+    }
+
+    /// Appends to `feet` those `contacts` of the last substep with somebody whom something fixed carries: what each joins of the `own` slots of
+    /// the owner, and how much it stands against being pressed there (docs/theory/coupling.md, eq. 7p).
+    pub fn carry<'a>(
+        &mut self,
+        contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)> + Clone,
+        own: usize,
+        feet: &mut Vec<Foot>,
+    ) {
+        let Self { list, count, impulses, .. } = self;
+        for mate in list[..*count].iter().filter(|mate| mate.other.is_carried()) {
+            let pressed = contacts.clone().filter(|(contact, impulse)| mate.is_of(contact) && **impulse != DVec3::ZERO);
+            impulses.clear();
+            impulses.resize(mate.end(), DVec3::ZERO);
+            pressed.clone().for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
+            if mate.bears(impulses) {
+                mate.respond(impulses);
+                feet.extend(pressed.map(|(contact, impulse)| mate.foot(contact, (*impulse, impulses), own)));
+            }
         }
     }
 

@@ -1,12 +1,12 @@
-//! What fixed solids make of what a tube is given: where they carry it, it does not give way.
+//! What fixed solids, and those whom they carry, make of what a tube is given: where they carry it, it does not give way.
 //!
-//! In: the system of the substep that ended last, and where fixed solids pressed on the tube in it. Out: how the tube answers
-//! impulses as it lies there. Never here: the tube's own contacts, which know no bond. Theory: docs/theory/coupling.md, eq. 7k.
+//! In: the system of the substep that ended last, and where they pressed on the tube in it. Out: how the tube answers
+//! impulses as it lies there. Never here: the tube's own contacts, which know no bond. Theory: docs/theory/coupling.md, eq. 7k and 7p.
 
 use super::band::{Factor, Row};
 use super::contact::TubeContacts;
 use super::sym3::Sym3;
-use crate::coupling::{Foot, Slots, is_borne};
+use crate::coupling::{Foot, Mates, Slots, is_borne};
 use glam::DVec3;
 
 /// A foot is stiffer than the tube's own system there by this factor: it gives way by a thousandth.
@@ -16,6 +16,8 @@ const STIFFER: f64 = 1e3;
 #[derive(Debug, Clone, Default)]
 pub struct Footing {
     feet: Vec<Foot>,
+    /// How many of them stand on what is fixed: the first ones.
+    fixed: usize,
     /// The system with them.
     rows: Vec<Row>,
     factor: Factor,
@@ -23,13 +25,16 @@ pub struct Footing {
 
 impl Footing {
     /// Takes in where fixed solids pressed in the substep whose system `rows` are; ends that are held need no foot.
-    pub fn stand(&mut self, rows: &[Row], contacts: &TubeContacts, held: [bool; 2]) {
+    pub fn stand(&mut self, rows: &[Row], (contacts, mates): (&TubeContacts, &mut Mates), held: [bool; 2]) {
         self.forget();
-        let foot = |(slots, normal): (Slots, DVec3)| {
-            let size = |&(slot, share): &(u32, f64)| share * share * normal.dot(rows[slot as usize].diag * normal);
-            Foot { slots, normal, stiffness: STIFFER * slots.linear().iter().map(size).sum::<f64>() }
-        };
+        let foot = |(slots, normal): (Slots, DVec3)| Foot { slots, normal, stiffness: f64::INFINITY };
         self.feet.extend(contacts.footholds().map(foot));
+        self.fixed = self.feet.len();
+        mates.carry(contacts.impulses(), rows.len(), &mut self.feet);
+        for Foot { slots, normal, stiffness } in &mut self.feet {
+            let size = |&(slot, share): &(u32, f64)| share * share * normal.dot(rows[slot as usize].diag * *normal);
+            *stiffness = stiffness.min(STIFFER * slots.linear().iter().map(size).sum::<f64>());
+        }
         if self.feet.is_empty() {
             return;
         }
@@ -46,6 +51,7 @@ impl Footing {
     /// It lies on nothing.
     pub fn forget(&mut self) {
         self.feet.clear();
+        self.fixed = 0;
     }
 
     /// Where it lies.
@@ -58,9 +64,17 @@ impl Footing {
         (!self.feet.is_empty()).then_some(&self.factor)
     }
 
-    /// The same where it lies under this push, N·s; `None` where that lifts it off.
-    pub fn under(&self, push: DVec3) -> Option<&Factor> {
-        self.factor().filter(|_| is_borne(&self.feet, push))
+    /// Whether what it lies on bears this push, N·s.
+    pub fn bears(&self, push: DVec3) -> bool {
+        is_borne(&self.feet, push)
+    }
+
+    /// Adds what the feet on others take of a change of velocities, N·s and N·m·s in slots: it presses the tube on them, and they have to
+    /// be given it.
+    pub fn press(&self, velocities: &[DVec3], into: &mut [DVec3]) {
+        for Foot { slots, normal, stiffness } in &self.feet[self.fixed..] {
+            slots.scatter(*normal * (normal.dot(slots.velocity(velocities)) * *stiffness), into);
+        }
     }
 
     /// Adds the feet to a system.

@@ -7,6 +7,7 @@ use super::band::Factor;
 use super::config::{Config, Matter};
 use super::contact::TubeContacts;
 use super::division::Division;
+use super::footing::Footing;
 use super::holds::Tie;
 use super::turn::{exp, unit};
 use crate::coupling::{Impulse, Site, Slots};
@@ -121,6 +122,7 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
     ///
+    /// `footing` is what carries the tube where the factor knows it: what that takes presses the tube on it through the substep that comes.
     /// No node is carried farther than `way_m`, and what is untimely none so far that it strains the tube. `ties` are those
     /// that the factor holds: each notes what it takes.
     pub fn apply(
@@ -128,15 +130,19 @@ impl Received {
         state: &mut Config,
         (factor, ties): (&Factor, &mut [Tie]),
         (matter, division): (&Matter, &Division),
-        (walls, way_m): (&TubeContacts, f64),
+        (walls, footing, way_m): (&TubeContacts, Option<&Footing>, f64),
     ) {
-        let Self { sum, carried, .. } = self;
+        let Self { sum, carried, fresh, slots, .. } = self;
         for list in [&mut *sum, &mut *carried] {
             hold(list, matter.held);
             factor.solve(list);
         }
         if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
             return; // impulses past all measure: better to lose them than the tube
+        }
+        if let Some(footing) = footing {
+            fresh.resize(*slots, DVec3::ZERO);
+            footing.press(sum, fresh);
         }
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };

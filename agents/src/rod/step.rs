@@ -150,8 +150,10 @@ impl Stepper {
         }
         self.prepare(now, setting)?;
         let Self { company, factor, footing, contacts, .. } = self;
-        let answer = footing.under(company.received().push()).unwrap_or(factor);
-        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, way_m));
+        let push = company.received().push();
+        let feet = Some(&*footing).filter(|footing| footing.bears(push));
+        let answer = feet.and_then(Footing::factor).unwrap_or(factor);
+        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
         Ok(())
     }
 
@@ -208,8 +210,8 @@ impl Stepper {
 
     /// Finds what the tube lies on after its last substep, where others want to know (`watched`).
     pub fn stand(&mut self, held: [bool; 2], watched: bool) {
-        let Self { footing, rows, contacts, .. } = self;
-        if watched { footing.stand(rows, contacts, held) } else { footing.forget() }
+        let Self { footing, rows, contacts, company, .. } = self;
+        if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.forget() }
     }
 
     /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.

@@ -168,7 +168,7 @@ impl Contacts {
     }
 
     /// The contacts of the last substep and their impulses, N·s.
-    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
+    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> + Clone {
         let solved = if self.list.is_empty() { &[] } else { self.solver.impulses() };
         self.list.iter().zip(solved)
     }

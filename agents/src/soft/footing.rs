@@ -1,8 +1,9 @@
-//! What fixed solids make of what a soft body is given: where they carry it, it does not give way.
+//! What fixed solids, and those whom they carry, make of what a soft body is given: where they carry it, it does not give way.
 //!
-//! In: the system of the step that comes, and where fixed solids pressed on the body in the one that ended. Out: how the body answers
-//! impulses as it lies there. Never here: the body's own contacts, which know no bond. Theory: docs/theory/coupling.md, eq. 7k.
+//! In: the system of the step that comes, and where they pressed on the body in the one that ended. Out: how the body answers
+//! impulses as it lies there. Never here: the body's own contacts, which know no bond. Theory: docs/theory/coupling.md, eq. 7k and 7p.
 
+use super::company::Company;
 use super::contact::Contacts;
 use super::system::{Factor, System};
 use crate::coupling::{Foot, Lies, Slots, is_borne};
@@ -15,26 +16,32 @@ const STIFFER: f64 = 1e3;
 #[derive(Debug, Clone, Default)]
 pub(super) struct Footing {
     feet: Vec<Foot>,
+    /// How many of them stand on what is fixed: the first ones.
+    fixed: usize,
     /// How the body answers impulses where it is lifted off.
     free: Factor,
 }
 
 impl Footing {
-    /// Finds where fixed solids pressed in the last substep.
-    pub fn find(&mut self, contacts: &Contacts) {
+    /// Finds where fixed solids pressed in the last substep, and those whom they carry.
+    pub fn find(&mut self, contacts: &Contacts, company: &mut Company) {
         self.forget();
+        let foot = |(slots, normal): (Slots, DVec3)| Foot { slots, normal, stiffness: f64::INFINITY };
+        self.feet.extend(contacts.footholds().map(foot));
+        self.fixed = self.feet.len();
+        company.mates_mut().carry(contacts.impulses(), contacts.mobilities.len(), &mut self.feet);
         let mobility = |slot: u32| contacts.mobilities[slot as usize];
-        let foot = |(slots, normal): (Slots, DVec3)| {
+        for Foot { slots, stiffness, .. } in &mut self.feet {
             let moved = slots.linear().iter().filter(|(slot, _)| mobility(*slot) > 0.0);
             let inertia = moved.map(|&(slot, share)| share * share / mobility(slot)).sum::<f64>();
-            Foot { slots, normal, stiffness: STIFFER * inertia }
-        };
-        self.feet.extend(contacts.footholds().map(foot));
+            *stiffness = stiffness.min(STIFFER * inertia);
+        }
     }
 
     /// It lies on nothing.
     pub fn forget(&mut self) {
         self.feet.clear();
+        self.fixed = 0;
     }
 
     /// Whether it lies on nothing fixed.
@@ -52,9 +59,22 @@ impl Footing {
         if self.is_empty() { (answer, None) } else { (&self.free, Some((&self.feet, answer))) }
     }
 
-    /// How a body of this `answer` answers these impulses, one a vertex: as it lies, or lifted off.
-    pub fn under<'a>(&'a self, impulses: &[DVec3], answer: &'a Factor) -> &'a Factor {
-        if self.is_empty() || is_borne(&self.feet, impulses.iter().sum()) { answer } else { &self.free }
+    /// Whether what it lies on bears these impulses, one a vertex.
+    pub fn bears(&self, impulses: &[DVec3]) -> bool {
+        is_borne(&self.feet, impulses.iter().sum())
+    }
+
+    /// How a body of this `answer` answers impulses where what it lies on `bears` them, or where it is lifted off.
+    pub fn under<'a>(&'a self, bears: bool, answer: &'a Factor) -> &'a Factor {
+        if bears || self.is_empty() { answer } else { &self.free }
+    }
+
+    /// Adds what the feet on others take of a change of `velocities`, N·s, one a vertex: it presses the body on them, and they have to
+    /// be given it.
+    pub fn press(&self, velocities: &[DVec3], into: &mut [DVec3]) {
+        for Foot { slots, normal, stiffness } in &self.feet[self.fixed..] {
+            slots.scatter(*normal * (normal.dot(slots.velocity(velocities)) * *stiffness), into);
+        }
     }
 
     /// Adds the feet to a `system` that is not yet factored.

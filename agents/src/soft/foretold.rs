@@ -45,7 +45,7 @@ impl SoftBody {
             return 0;
         }
         let divided = dt > self.foretold.last_s * WHOLE;
-        self.footing.find(&self.contacts);
+        self.footing.find(&self.contacts, &mut self.company);
         if divided {
             self.assemble(dt);
             self.system.factor();

@@ -96,7 +96,8 @@ impl SoftBody {
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
-            let answer = footing.under(sums, system.answer());
+            let borne = footing.bears(sums);
+            let answer = footing.under(borne, system.answer());
             given.extend_from_slice(sums);
             for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
                 let past = moment.dot(*sum) / (foretold.span_s * sum.length_squared()).max(f64::MIN_POSITIVE);
@@ -104,6 +105,9 @@ impl SoftBody {
                 *given -= *sum;
             }
             answer.respond(sums);
+            if borne {
+                footing.press(sums, given);
+            }
             answer.respond(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
             positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);

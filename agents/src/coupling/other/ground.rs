@@ -89,6 +89,17 @@ impl Other {
         }
     }
 
+    /// Whether it lies or stands on something fixed.
+    pub fn is_carried(&self) -> bool {
+        if self.is_many() { self.borne && !self.feet().is_empty() } else { self.grounded().is_some() }
+    }
+
+    /// Whether that bears such impulses, in its slots.
+    pub fn bears(&self, impulses: &[DVec3]) -> bool {
+        let presses = |stand: Stand| self.is_pressed(&stand, Impulse { linear: impulses[0], angular: impulses[1] });
+        if self.is_many() { self.is_carried() } else { self.grounded().is_some_and(presses) }
+    }
+
     /// Where it lies, if it bends.
     pub(super) fn feet(&self) -> &[Foot] {
         match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {

@@ -135,7 +135,7 @@ impl TubeContacts {
     }
 
     /// The contacts found last, and the impulses they then gave.
-    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> {
+    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> + Clone {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
