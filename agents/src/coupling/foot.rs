@@ -60,3 +60,10 @@ impl<F> Carried<F> {
 pub fn is_borne(feet: &[Foot], push: DVec3) -> bool {
     feet.iter().map(|foot| foot.normal).sum::<DVec3>().dot(push) < 0.0
 }
+
+/// Adds to `into` what feet take of a change of velocities, N·s and N·m·s in slots: it presses the body on them.
+pub fn press(feet: &[Foot], velocities: &[DVec3], into: &mut [DVec3]) {
+    for Foot { slots, normal, stiffness } in feet {
+        slots.scatter(*normal * (normal.dot(slots.velocity(velocities)) * *stiffness), into);
+    }
+}

@@ -230,8 +230,8 @@ impl Mates {
         }
     }
 
-    /// Appends to `feet` those `contacts` of the last substep with somebody whom something fixed carries: what each joins of the `own` slots of
-    /// the owner, and how much it stands against being pressed there (docs/theory/coupling.md, eq. 7p).
+    /// Appends to `feet` where the owner of `own` slots lies on those whom something fixed carries, by the `contacts` of the last substep
+    /// (docs/theory/coupling.md, eq. 7p).
     pub fn carry<'a>(
         &mut self,
         contacts: impl Iterator<Item = (&'a Contact, &'a DVec3)> + Clone,
@@ -239,16 +239,7 @@ impl Mates {
         feet: &mut Vec<Foot>,
     ) {
         let Self { list, count, impulses, .. } = self;
-        for mate in list[..*count].iter().filter(|mate| mate.other.is_carried()) {
-            let pressed = contacts.clone().filter(|(contact, impulse)| mate.is_of(contact) && **impulse != DVec3::ZERO);
-            impulses.clear();
-            impulses.resize(mate.end(), DVec3::ZERO);
-            pressed.clone().for_each(|(contact, impulse)| contact.slots.scatter(*impulse, impulses));
-            if mate.bears(impulses) {
-                mate.respond(impulses);
-                feet.extend(pressed.map(|(contact, impulse)| mate.foot(contact, (*impulse, impulses), own)));
-            }
-        }
+        list[..*count].iter().for_each(|mate| mate.carry(contacts.clone(), (own, impulses), feet));
     }
 
     /// Takes in what a solve found: the work of the contacts with others on both sides; `velocities` are those after it.

@@ -50,6 +50,7 @@ impl Stepper {
     }
 
     fn solve_light(&mut self) -> Result<(), Lost> {
+        self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);

@@ -7,10 +7,9 @@ use super::band::Factor;
 use super::config::{Config, Matter};
 use super::contact::TubeContacts;
 use super::division::Division;
-use super::footing::Footing;
 use super::holds::Tie;
 use super::turn::{exp, unit};
-use crate::coupling::{Impulse, Site, Slots};
+use crate::coupling::{Foot, Impulse, Site, Slots, press};
 use crate::{Neighbour, SimTime};
 use glam::DVec3;
 
@@ -122,7 +121,7 @@ impl Received {
 
     /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
     ///
-    /// `footing` is what carries the tube where the factor knows it: what that takes presses the tube on it through the substep that comes.
+    /// `feet` are those on others that the factor knows: what they take presses the tube on them through the substep that comes.
     /// No node is carried farther than `way_m`, and what is untimely none so far that it strains the tube. `ties` are those
     /// that the factor holds: each notes what it takes.
     pub fn apply(
@@ -130,7 +129,7 @@ impl Received {
         state: &mut Config,
         (factor, ties): (&Factor, &mut [Tie]),
         (matter, division): (&Matter, &Division),
-        (walls, footing, way_m): (&TubeContacts, Option<&Footing>, f64),
+        (walls, feet, way_m): (&TubeContacts, &[Foot], f64),
     ) {
         let Self { sum, carried, fresh, slots, .. } = self;
         for list in [&mut *sum, &mut *carried] {
@@ -140,9 +139,12 @@ impl Received {
         if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
             return; // impulses past all measure: better to lose them than the tube
         }
-        if let Some(footing) = footing {
+        if !feet.is_empty() {
             fresh.resize(*slots, DVec3::ZERO);
-            footing.press(sum, fresh);
+            press(feet, sum, fresh);
+        }
+        if !fresh.is_empty() {
+            hold(fresh, matter.held);
         }
         let longest = carried.iter().step_by(2).map(|way| way.length_squared()).fold(0.0, f64::max).sqrt();
         let share = if longest > way_m { way_m / longest } else { 1.0 };

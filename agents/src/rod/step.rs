@@ -151,8 +151,9 @@ impl Stepper {
         self.prepare(now, setting)?;
         let Self { company, factor, footing, contacts, .. } = self;
         let push = company.received().push();
-        let feet = Some(&*footing).filter(|footing| footing.bears(push));
-        let answer = feet.and_then(Footing::factor).unwrap_or(factor);
+        let lies = Some(&*footing).filter(|footing| footing.bears(push));
+        let answer = lies.and_then(Footing::factor).unwrap_or(factor);
+        let feet = lies.map_or(&[][..], Footing::on_others);
         company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
         Ok(())
     }

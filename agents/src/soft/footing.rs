@@ -69,12 +69,9 @@ impl Footing {
         if bears || self.is_empty() { answer } else { &self.free }
     }
 
-    /// Adds what the feet on others take of a change of `velocities`, N·s, one a vertex: it presses the body on them, and they have to
-    /// be given it.
-    pub fn press(&self, velocities: &[DVec3], into: &mut [DVec3]) {
-        for Foot { slots, normal, stiffness } in &self.feet[self.fixed..] {
-            slots.scatter(*normal * (normal.dot(slots.velocity(velocities)) * *stiffness), into);
-        }
+    /// Where it lies on others, who have to be given what presses it there.
+    pub fn on_others(&self) -> &[Foot] {
+        &self.feet[self.fixed..]
     }
 
     /// Adds the feet to a `system` that is not yet factored.

@@ -3,6 +3,7 @@
 //! In: a state, and what is around. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
+use crate::coupling::press;
 use crate::{StepError, Surroundings};
 use glam::{DMat3, DVec3};
 
@@ -106,7 +107,7 @@ impl SoftBody {
             }
             answer.respond(sums);
             if borne {
-                footing.press(sums, given);
+                press(footing.on_others(), sums, given);
             }
             answer.respond(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);

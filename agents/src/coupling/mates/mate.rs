@@ -3,13 +3,14 @@
 //! In: a neighbour, places that touch, impulses. Out: contacts in the slots of the owner's solve, entries in the ledger.
 //! Never here: the solve itself, the owner's own state. Theory: docs/theory/coupling.md.
 
+mod carrying;
 mod feet;
 mod memory;
 
 use super::far::Far;
 use super::tanks::{Account, Tanks};
 use crate::coupling::{
-    Contact, Exchange, Foot, FormKind, Other, PairKind, Place, Placed, Slots, Touch, Twist, WAKE_M_S, inverse_mass,
+    Contact, Exchange, FormKind, Other, PairKind, Place, Placed, Slots, Touch, Twist, WAKE_M_S, inverse_mass,
 };
 use crate::{Anchor, Inertia, Neighbour, Surroundings};
 pub use feet::Feet;
@@ -74,6 +75,8 @@ pub struct Mate {
     room: Vec<DVec3>,
     /// How a rigid body stands on the owner.
     feet: Feet,
+    /// Whether somebody else holds it up from below.
+    lifted: bool,
 }
 
 impl Mate {
@@ -87,6 +90,7 @@ impl Mate {
     ) -> bool {
         let known = self.look(neighbour, around, (exchange, friction), false);
         self.touched = touched;
+        self.lifted = carrying::is_lifted(neighbour, around);
         self.other.stir(around, exchange);
         known
     }
@@ -316,19 +320,6 @@ impl Mate {
     /// Whether a contact is one with this agent.
     pub fn is_of(&self, contact: &Contact) -> bool {
         contact.key >> ID_SHIFT == self.key() >> ID_SHIFT
-    }
-
-    /// Whether what it lies or stands on bears its part of impulses in slots of all.
-    pub fn bears(&self, all: &[DVec3]) -> bool {
-        self.other.bears(&all[self.slots.0..self.end()])
-    }
-
-    /// The foot that the owner of so many slots has on it by a contact with this impulse, where that and all others together `move` it.
-    pub fn foot(&self, contact: &Contact, (impulse, moved): (DVec3, &[DVec3]), own: usize) -> Foot {
-        let Contact { slots, normal, .. } = *contact;
-        let yields_m_s = normal.dot(slots.velocity_from(self.slots.0, moved));
-        let stiffness = if yields_m_s > 0.0 { impulse.dot(normal) / yields_m_s } else { f64::INFINITY };
-        Foot { slots: slots.own(own), normal, stiffness }
     }
 
     /// Appends the size of the inverse mass of its slots.

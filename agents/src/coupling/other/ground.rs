@@ -89,15 +89,19 @@ impl Other {
         }
     }
 
-    /// Whether it lies or stands on something fixed.
+    /// Whether something fixed carries it: what bends as it lies there, a rigid body as it stands there.
     pub fn is_carried(&self) -> bool {
-        if self.is_many() { self.borne && !self.feet().is_empty() } else { self.grounded().is_some() }
+        if self.is_many() {
+            self.borne && !self.feet().is_empty()
+        } else {
+            self.lying.is_none() && self.grounded().is_some()
+        }
     }
 
-    /// Whether that bears such impulses, in its slots.
-    pub fn bears(&self, impulses: &[DVec3]) -> bool {
+    /// Whether that also bears such impulses, in its slots: what bends has told by which places it is touched ([`Self::bear`]).
+    pub fn stays_under(&self, impulses: &[DVec3]) -> bool {
         let presses = |stand: Stand| self.is_pressed(&stand, Impulse { linear: impulses[0], angular: impulses[1] });
-        if self.is_many() { self.is_carried() } else { self.grounded().is_some_and(presses) }
+        self.is_carried() && (self.is_many() || self.grounded().is_some_and(presses))
     }
 
     /// Where it lies, if it bends.
