@@ -173,3 +173,28 @@ fn a_rope_on_two_crossed_tubes_presses_neither_into_the_other() {
         assert!(worst(&report).0 < 2.5e-3 && worst(&report).1 > -0.005, "{hz} Hz: {:?}", worst(&report));
     }
 }
+
+/// The middle one, pressed through a faster one below it and onto the floor, was held for carried there, and shot off 1 to 11 m.
+#[test]
+fn a_slow_cloth_between_two_faster_ones_under_a_block_is_not_shot_off() {
+    for (hz, apart_m) in [([120.0, 60.0, 60.0], 7e-4), ([100.0, 50.0, 75.0], 3e-4)] {
+        let cloth = |(name, hz, z): (&str, f64, f64)| {
+            format!(
+                "[[object]]\nname = \"{name}\"\nmodel = \"sheet\"\nsize_m = [0.3, 0.3]\nsegments = [6, 6]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, {z}]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}[[probe]]\nobject = \"{name}\"\nevery_ms = 5.0\n"
+            )
+        };
+        let heights = [0.0021, 0.0065 + apart_m, 0.011 + 2.0 * apart_m];
+        let cloths =
+            [("low", hz[0], heights[0]), ("middle", hz[1], heights[1]), ("high", hz[2], heights[2])].map(cloth);
+        let block = format!(
+            "[[object]]\nname = \"block\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.06, 0.06, 0.06]\nsegments = [3, 3, 3]\nposition_m = [0.0, 0.0, {}]\nyoung_pa = 1e5\nrate_hz = {:?}\n{SOFT}",
+            0.047 + 2.0 * apart_m,
+            hz[0]
+        );
+        let text = [FLOOR, &cloths.concat(), &block].concat();
+        let report = Folder::with(&text).lockstep(&["--seconds", "0.45"]);
+        let samples = report["probes"][1]["samples"].as_array().unwrap();
+        let highest = samples.iter().map(|s| number(s, "/3")).fold(0.0, f64::max);
+        assert!(highest < 0.02 && worst(&report).1 > -0.2, "{hz:?} Hz: {highest} m high, {:?}", worst(&report));
+    }
+}
