@@ -111,7 +111,7 @@ fn touch(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
 }
 
 /// Whether a neighbour tells of contact with `other` that it owns.
-fn touches(neighbour: &Neighbour, other: AgentId) -> bool {
+pub(super) fn touches(neighbour: &Neighbour, other: AgentId) -> bool {
     neighbour.snapshot.pairs.iter().any(|pair| pair.with == other && pair.kind == PairKind::Ledger)
 }
 

@@ -29,7 +29,7 @@ pub mod touch;
 
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
 pub use exchange::{Exchange, PairKind, PairState, acknowledged};
-pub(crate) use foot::{Carried, Foot, Lies, is_borne, press};
+pub(crate) use foot::{Carried, Foot, Lies, Stance, is_borne, press};
 pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View};
 pub(crate) use knock::Knock;
 pub use lasting::smooth;

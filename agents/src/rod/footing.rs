@@ -6,18 +6,13 @@
 use super::band::{Factor, Row};
 use super::contact::TubeContacts;
 use super::sym3::Sym3;
-use crate::coupling::{Foot, Mates, Slots, is_borne};
-use glam::DVec3;
-
-/// A foot is stiffer than the tube's own system there by this factor: it gives way by a thousandth.
-const STIFFER: f64 = 1e3;
+use crate::coupling::{Foot, Mates, Stance};
 
 /// How a tube that lies on fixed solids answers impulses.
 #[derive(Debug, Clone, Default)]
 pub struct Footing {
-    feet: Vec<Foot>,
-    /// How many of them stand on what is fixed: the first ones.
-    fixed: usize,
+    /// Where it lies.
+    pub stance: Stance,
     /// The system with them.
     rows: Vec<Row>,
     factor: Factor,
@@ -26,16 +21,14 @@ pub struct Footing {
 impl Footing {
     /// Takes in where fixed solids pressed in the substep whose system `rows` are; ends that are held need no foot.
     pub fn stand(&mut self, rows: &[Row], (contacts, mates): (&TubeContacts, &mut Mates), held: [bool; 2]) {
-        self.forget();
-        let foot = |(slots, normal): (Slots, DVec3)| Foot { slots, normal, stiffness: f64::INFINITY };
-        self.feet.extend(contacts.footholds().map(foot));
-        self.fixed = self.feet.len();
-        mates.carry(contacts.impulses(), rows.len(), &mut self.feet);
-        for Foot { slots, normal, stiffness } in &mut self.feet {
+        let inertia = |foot: &Foot| {
+            let Foot { slots, normal, .. } = foot;
             let size = |&(slot, share): &(u32, f64)| share * share * normal.dot(rows[slot as usize].diag * *normal);
-            *stiffness = stiffness.min(STIFFER * slots.linear().iter().map(size).sum::<f64>());
-        }
-        if self.feet.is_empty() {
+            slots.linear().iter().map(size).sum()
+        };
+        let carry = |feet: &mut Vec<Foot>| mates.carry(contacts.impulses(), rows.len(), feet);
+        self.stance.find(contacts.footholds(), carry, inertia);
+        if self.stance.is_empty() {
             return;
         }
         let mut standing = std::mem::take(&mut self.rows);
@@ -43,42 +36,21 @@ impl Footing {
         standing.extend_from_slice(rows);
         self.bear(&mut standing, held);
         if self.factor.factor(&standing).is_err() {
-            self.forget();
+            self.stance.forget();
         }
         self.rows = standing;
     }
 
-    /// It lies on nothing.
-    pub fn forget(&mut self) {
-        self.feet.clear();
-        self.fixed = 0;
-    }
-
-    /// Where it lies.
-    pub fn feet(&self) -> &[Foot] {
-        &self.feet
-    }
-
     /// The factor of the system with its feet; `None` where it lies on nothing.
     pub fn factor(&self) -> Option<&Factor> {
-        (!self.feet.is_empty()).then_some(&self.factor)
-    }
-
-    /// Whether what it lies on bears this push, N·s.
-    pub fn bears(&self, push: DVec3) -> bool {
-        is_borne(&self.feet, push)
-    }
-
-    /// Where it lies on others, who have to be given what presses it there.
-    pub fn on_others(&self) -> &[Foot] {
-        &self.feet[self.fixed..]
+        (!self.stance.is_empty()).then_some(&self.factor)
     }
 
     /// Adds the feet to a system.
     pub fn bear(&self, rows: &mut [Row], held: [bool; 2]) {
         let last = rows.len() as u32 - 1;
         let stays = |slot: u32| (held[0] && slot == 0) || (held[1] && slot == last);
-        for Foot { slots, normal, stiffness, .. } in &self.feet {
+        for Foot { slots, normal, stiffness, .. } in self.stance.feet() {
             let moves = || slots.linear().iter().filter(|(slot, _)| !stays(*slot));
             for &(slot, share) in moves() {
                 rows[slot as usize].diag += Sym3::outer(*normal, stiffness * share * share);

@@ -164,7 +164,7 @@ impl Stepper {
         let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
         let Self { rows, rhs, factor, horizon, footing, .. } = self;
         assemble(&scene, &Iterate { start: now, at: now, first: true }, rows, rhs);
-        let lies = !footing.feet().is_empty();
+        let lies = !footing.stance.is_empty();
         standing.clear();
         standing.extend(rhs.iter().filter(|_| lies));
         if span_s.is_some() {

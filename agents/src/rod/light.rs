@@ -15,7 +15,7 @@ impl Stepper {
     /// A substep of symplectic Euler: velocities by the forces at the start, positions by those velocities.
     pub(super) fn push(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, false);
-        self.solve_light()?;
+        self.answer()?;
         self.touch(now, scene, true);
         self.advance(now, scene, true);
         self.must_be_finite()
@@ -24,7 +24,7 @@ impl Stepper {
     /// A substep of XPBD: gravity and springs from outside, then the constraints, then contact.
     pub(super) fn project(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, true);
-        self.solve_light()?;
+        self.answer()?;
         let Self { rhs, projector, .. } = self;
         projector.project(now, rhs, (scene.matter, scene.division), scene.h);
         self.touch(now, scene, true);
@@ -47,14 +47,6 @@ impl Stepper {
         add_springs(scene, &iterate, rows, rhs);
         add_ties(scene, &iterate, rows, rhs);
         hold_ends(scene.matter, rows, rhs);
-    }
-
-    fn solve_light(&mut self) -> Result<(), Lost> {
-        self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
-        self.solves += 1;
-        self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
-        self.factor.solve(&mut self.rhs);
-        Ok(())
     }
 
     fn must_be_finite(&self) -> Result<(), Lost> {

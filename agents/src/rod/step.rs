@@ -151,9 +151,9 @@ impl Stepper {
         self.prepare(now, setting)?;
         let Self { company, factor, footing, contacts, .. } = self;
         let push = company.received().push();
-        let lies = Some(&*footing).filter(|footing| footing.bears(push));
+        let lies = Some(&*footing).filter(|footing| footing.stance.bears(push));
         let answer = lies.and_then(Footing::factor).unwrap_or(factor);
-        let feet = lies.map_or(&[][..], Footing::on_others);
+        let feet = lies.map_or(&[][..], |footing| footing.stance.on_others());
         company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
         Ok(())
     }
@@ -185,7 +185,7 @@ impl Stepper {
     pub fn forget(&mut self) {
         self.factor.forget();
         self.horizon.forget();
-        self.footing.forget();
+        self.footing.stance.forget();
         self.presses.forget();
         self.contacts.forget();
         self.past.forget();
@@ -205,14 +205,14 @@ impl Stepper {
     /// last one, and where it lies with its factor there.
     pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
         let Self { footing, horizon, factor, span_s, .. } = self;
-        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.feet(), standing));
+        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
         ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
     }
 
     /// Finds what the tube lies on after its last substep, where others want to know (`watched`).
     pub fn stand(&mut self, held: [bool; 2], watched: bool) {
         let Self { footing, rows, contacts, company, .. } = self;
-        if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.forget() }
+        if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
     }
 
     /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.
@@ -285,11 +285,17 @@ impl Stepper {
     fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
         let at = if first { now } else { &self.next };
         assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.answer()?;
+        self.touch(now, scene, first);
+        Ok(())
+    }
+
+    /// Factors the system that was built and solves it, with what others gave that acts through the substep.
+    pub(super) fn answer(&mut self) -> Result<(), Lost> {
         self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
         self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
         self.factor.solve(&mut self.rhs);
-        self.touch(now, scene, first);
         Ok(())
     }
 

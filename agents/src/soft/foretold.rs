@@ -41,7 +41,7 @@ impl SoftBody {
         self.foretold.standing.clear();
         self.foretold.span_s = self.foretold.last_s;
         if !self.company.is_watched() {
-            self.footing.forget();
+            self.footing.stance.forget();
             return 0;
         }
         let divided = dt > self.foretold.last_s * WHOLE;
@@ -61,7 +61,7 @@ impl SoftBody {
         momenta.iter_mut().zip(foretold.presses.blows()).for_each(|(momentum, blow)| *momentum -= blow * last_s);
         let still = velocities.iter().zip(&lattice.mass_kg).map(|(now, mass)| *now * *mass);
         momenta.iter_mut().zip(still).for_each(|(momentum, still)| *momentum = still + *momentum * (span_s / last_s));
-        let lies = !self.footing.is_empty();
+        let lies = !self.footing.stance.is_empty();
         foretold.standing.extend(momenta.iter().filter(|_| lies));
         system.respond(&mut momenta);
         foretold.accelerations = momenta;

@@ -97,7 +97,7 @@ impl SoftBody {
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
             // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
-            let borne = footing.bears(sums);
+            let borne = footing.stance.bears(sums.iter().sum());
             let answer = footing.under(borne, system.answer());
             given.extend_from_slice(sums);
             for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
@@ -107,7 +107,7 @@ impl SoftBody {
             }
             answer.respond(sums);
             if borne {
-                press(footing.on_others(), sums, given);
+                press(footing.stance.on_others(), sums, given);
             }
             answer.respond(carried);
             velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);

@@ -142,7 +142,7 @@ mod tests {
     fn what_is_no_mesh_at_all_is_told_what_it_is_not() {
         assert_eq!(told(""), "it is empty");
         let rubbish: Vec<u8> = (0..=255).collect();
-        for bytes in [&rubbish[..], b"XXXX\x02\0\0\0", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"] {
+        for bytes in [&rubbish[..], b"FTlg\x02\0\0\0", b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR"] {
             let told = told(bytes);
             assert!(told.contains("neither a .glb file") && told.contains("nor an OBJ file"), "{told}");
         }

@@ -75,7 +75,7 @@ pub struct Mate {
     room: Vec<DVec3>,
     /// How a rigid body stands on the owner.
     feet: Feet,
-    /// Whether somebody else holds it up from below.
+    /// Whether it bends, and somebody else holds it up from below.
     lifted: bool,
 }
 
@@ -90,7 +90,7 @@ impl Mate {
     ) -> bool {
         let known = self.look(neighbour, around, (exchange, friction), false);
         self.touched = touched;
-        self.lifted = carrying::is_lifted(neighbour, around);
+        self.lifted = self.other.lies() && carrying::is_lifted(neighbour, around);
         self.other.stir(around, exchange);
         known
     }

@@ -84,24 +84,25 @@ impl Other {
     /// to be lifted off that answers as if it lay on nothing.
     pub fn bear(&mut self, pushes: impl Iterator<Item = DVec3>) {
         let mut pushes = pushes.peekable();
-        if pushes.peek().is_some() && !self.feet().is_empty() {
+        if pushes.peek().is_some() && self.lies() {
             self.borne = is_borne(self.feet(), pushes.sum());
         }
     }
 
     /// Whether something fixed carries it: what bends as it lies there, a rigid body as it stands there.
     pub fn is_carried(&self) -> bool {
-        if self.is_many() {
-            self.borne && !self.feet().is_empty()
-        } else {
-            self.lying.is_none() && self.grounded().is_some()
-        }
+        if self.is_many() { self.borne && self.lies() } else { self.lying.is_none() && self.grounded().is_some() }
     }
 
-    /// Whether that also bears such impulses, in its slots: what bends has told by which places it is touched ([`Self::bear`]).
+    /// Whether what carries it also bears such impulses, in its slots: of what bends that is known by where it is touched ([`Self::bear`]).
     pub fn stays_under(&self, impulses: &[DVec3]) -> bool {
         let presses = |stand: Stand| self.is_pressed(&stand, Impulse { linear: impulses[0], angular: impulses[1] });
-        self.is_carried() && (self.is_many() || self.grounded().is_some_and(presses))
+        self.is_many() || self.grounded().is_some_and(presses)
+    }
+
+    /// Whether it bends and lies on something.
+    pub fn lies(&self) -> bool {
+        !self.feet().is_empty()
     }
 
     /// Where it lies, if it bends.

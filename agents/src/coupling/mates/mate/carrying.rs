@@ -4,6 +4,7 @@
 //! Theory: docs/theory/coupling.md, eq. 7p.
 
 use super::Mate;
+use crate::coupling::crowd::touches;
 use crate::coupling::{Contact, Foot};
 use crate::{Neighbour, Surroundings};
 use glam::DVec3;
@@ -46,6 +47,5 @@ impl Mate {
 /// contact, not by where it touches something fixed.
 pub(super) fn is_lifted(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
     let height = |n: &Neighbour| n.form.as_ref().map(|form| form.height_j_kg());
-    let presses = |n: &Neighbour| n.snapshot.pairs.iter().any(|pair| pair.with == neighbour.id);
-    around.neighbours.iter().any(|n| presses(n) && height(n) < height(neighbour))
+    around.neighbours.iter().any(|n| touches(n, neighbour.id) && height(n) < height(neighbour))
 }
