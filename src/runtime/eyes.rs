@@ -26,6 +26,8 @@ pub(super) struct Peer {
     pub form: Option<Arc<Form>>,
     /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the others.
     pub laws: Vec<(AgentId, Law)>,
+    /// To whom links join it.
+    pub attached: Vec<AgentId>,
 }
 
 /// What an agent looks with.
@@ -82,7 +84,7 @@ impl Peer {
             snapshot,
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
-            owned: owns(self.standing(), other.standing()),
+            owned: owns(self.standing(), other.standing(), self.attached.contains(&other.shared.id)),
         }
     }
 }

@@ -219,7 +219,8 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
         let seated = led && rigid(&form);
         let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
         writers.push(writer);
-        all.push(Peer { shared, form, laws: Vec::new() });
+        let attached = spawn.attached.iter().map(|link| link.other).collect();
+        all.push(Peer { shared, form, laws: Vec::new(), attached });
     }
     settle_laws(spawns, &mut all);
     let crowd = meet_at_all(&all).then(|| Crowd::new(all.len()));

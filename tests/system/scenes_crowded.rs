@@ -198,3 +198,63 @@ fn a_slow_cloth_between_two_faster_ones_under_a_block_is_not_shot_off() {
         assert!(highest < 0.02 && worst(&report).1 > -0.2, "{hz:?} Hz: {highest} m high, {:?}", worst(&report));
     }
 }
+
+/// Each of the two owned one side of what lay between them, and undid a step late what the other had done: the box sank through tubes on
+/// anything soft, and through ropes on what was held or faster, 10 to 17 mm.
+#[test]
+fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
+    const WEIGHT_N: f64 = 0.3 * 9.81;
+    let slab = |hz: f64, more: &str| {
+        format!(
+            "[[object]]\nname = \"low\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.25, 0.25, 0.05]\nsegments = [6, 6, 2]\nposition_m = [0.0, 0.0, 0.025]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}{more}"
+        )
+    };
+    let sheet = |hz: f64, more: &str| {
+        format!(
+            "[[object]]\nname = \"low\"\nmodel = \"sheet\"\nsize_m = [0.3, 0.3]\nsegments = [8, 8]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, 0.048]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}{more}"
+        )
+    };
+    for hz in [[60.0, 60.0, 60.0], [240.0, 240.0, 240.0], [240.0, 60.0, 60.0], [60.0, 61.0, 240.0]] {
+        // how far each may sag under 0.3 to 0.4 kg: the slab is pressed by 3 N on a tenth of its 6 dm², the sheet hangs from its edges
+        for (lower, sag_m) in [
+            (slab(hz[0], ""), 2e-3),
+            (slab(hz[0], "hold = [\"bottom\"]\n"), 2e-3),
+            (sheet(hz[0], "hold = [\"left\", \"right\", \"near\", \"far\"]\n"), 0.02),
+        ] {
+            for radius_m in [0.006, RADIUS_M] {
+                let strips = [("left", -0.03), ("right", 0.03)].map(|(name, y)| {
+                    let z = 0.05 + radius_m + 1e-4;
+                    let ends = [[-0.09, y, z], [0.09, y, z]];
+                    if radius_m == RADIUS_M { tube(name, hz[1], ends, "") } else { rope(name, ends, (radius_m, hz[1])) }
+                });
+                let top_m = 0.05 + 2.0 * radius_m;
+                let above = solid("box", hz[2], ([0.0, 0.0, top_m + 3e-4 + 0.02], [0.06, 0.05, 0.02]), 0.3);
+                let report =
+                    Folder::with(&[FLOOR, &lower, &strips.concat(), &above].concat()).lockstep(&["--seconds", "1"]);
+                let told = format!("{hz:?} Hz, radius {radius_m}, {lower}");
+                let sunk_m = top_m + 0.02 - point(&report, "/probes/0/position_m")[2];
+                assert!((-1e-4..sag_m).contains(&sunk_m), "{told}: the box is {sunk_m} m down");
+                assert!(worst(&report).0 < 1e-3 && worst(&report).1 > -0.01, "{told}: {:?}", worst(&report));
+                let pairs = report["couplings"].as_array().unwrap();
+                let borne_n: f64 =
+                    pairs.iter().filter(|pair| pair["b"] == "box").map(|pair| number(pair, "/force_n")).sum();
+                assert!((borne_n - WEIGHT_N).abs() < 0.05 * WEIGHT_N, "{told}: {borne_n} N for {WEIGHT_N}");
+            }
+        }
+    }
+}
+
+/// The slower of two that lay on a faster cloth yielded to it as a free body, and the tube on it came 10 mm deep for good.
+#[test]
+fn a_tube_crosses_a_slower_rope_on_a_faster_cloth() {
+    for hz in [[100.0, 30.0, 100.0], [240.0, 60.0, 60.0]] {
+        let cloth = format!(
+            "[[object]]\nname = \"cloth\"\nmodel = \"sheet\"\nsize_m = [0.2, 0.2]\nsegments = [5, 5]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, 0.003]\nyoung_pa = 1e6\nrate_hz = {:?}\n{SOFT}",
+            hz[0]
+        );
+        let low = rope("rope", [[0.0, -0.09, 0.0102], [0.0, 0.09, 0.0102]], (0.006, hz[1]));
+        let up = tube("tube", hz[2], [[-0.09, 0.0, 0.0283], [0.09, 0.0, 0.0283]], "");
+        let report = Folder::with(&[FLOOR, &cloth, &low, &up].concat()).lockstep(&["--seconds", "2"]);
+        assert!(worst(&report).0 < 1e-3 && worst(&report).1 > -0.01, "{hz:?} Hz: {:?}", worst(&report));
+    }
+}

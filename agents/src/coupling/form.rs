@@ -28,8 +28,14 @@ impl Form {
         if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
     }
 
-    /// How high the middle of what bends is at the start, −g·x, J/kg; infinite of a soft body that is held, zero of what does not bend.
-    /// Of two as fast the higher owns (docs/decisions/0019).
+    /// Whether it is thin and held somewhere: a sheet or rope that hangs, or is stretched.
+    #[must_use]
+    pub const fn is_hung(&self) -> bool {
+        matches!(&self.kind, FormKind::Surface(SurfaceForm { hung: true, .. }))
+    }
+
+    /// How high the middle of what bends is at the start, −g·x, J/kg; zero of what does not bend.
+    /// Of two that keep the same rate the higher owns (docs/decisions/0019).
     #[must_use]
     pub const fn height_j_kg(&self) -> f32 {
         match &self.kind {
@@ -75,6 +81,8 @@ pub struct SurfaceForm {
     pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
+    /// Whether it is thin, and held somewhere.
+    pub hung: bool,
     /// What lies around each vertex and edge.
     pub fans: Arc<Fans>,
 }

@@ -211,7 +211,7 @@ impl Stage {
         let snapshot = actor.published[newest.saturating_sub(late)].clone();
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
         let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
-        let owned = owns(self.standing(me), self.standing(id));
+        let owned = owns(self.standing(me), self.standing(id), self.are_linked(me, id));
         let step_s = snapshot.step_s(1.0 / actor.rate_hz);
         Neighbour { id, snapshot, form: actor.agent.form(), law, owned, step_s }
     }
@@ -221,9 +221,13 @@ impl Stage {
         Standing::new(id, actor.agent.model(), actor.rate_hz, actor.agent.form().as_deref())
     }
 
+    fn are_linked(&self, me: AgentId, other: AgentId) -> bool {
+        self.actors[me.0 as usize].links.iter().any(|link| link.other == other)
+    }
+
     /// Which of two owns their pair.
     pub(crate) fn owner(&self, [a, b]: [AgentId; 2]) -> AgentId {
-        if owns(self.standing(a), self.standing(b)) { a } else { b }
+        if owns(self.standing(a), self.standing(b), self.are_linked(a, b)) { a } else { b }
     }
 
     /// Everything that others have given to `id` and its own newest state does not know.

@@ -2,6 +2,7 @@
 
 use super::Form;
 use super::beside::PART_MAX_S;
+use super::crowd::PART_S;
 use crate::{AgentId, Anchor};
 use std::cmp::Ordering;
 
@@ -74,65 +75,132 @@ impl Standing {
     }
 }
 
-/// Whether `me` owns the pair with `other`: a soft body does before a tube, a tube before a rigid body, of two tubes the faster, of two
-/// that keep the same rate beside each other (60 Hz at least) the one with fewer held ends; of two soft bodies, two tubes that are held
-/// alike and two rigid bodies the faster, of two soft ones and of two loose tubes as fast the higher (docs/decisions/0019), of equals the
-/// lower number. A tool is led and owns nothing.
+impl Standing {
+    fn is_led(self) -> bool {
+        self.model == "instrument"
+    }
+
+    fn is_tube(self) -> bool {
+        self.model == "tube"
+    }
+
+    fn bends(self) -> bool {
+        self.is_tube() || matches!(self.model, "sheet" | "solid" | "rope")
+    }
+
+    /// Below which rate two that bend keep the same one beside each other, Hz: who owns makes up for the other (docs/theory/coupling.md,
+    /// eq. 7o).
+    fn common_hz(self, other: Self, linked: bool) -> f64 {
+        let tubes = self.is_tube() && other.is_tube();
+        let held = self.held_ends > 0 || other.held_ends > 0;
+        match (self.bends(), linked || (tubes && held)) {
+            (true, false) => PART_S.recip(),
+            (true, true) if tubes => PART_MAX_S.recip(),
+            _ => 0.0,
+        }
+    }
+}
+
+/// Whether `me` owns the pair with `other`, to whom a link may have it `linked`. A tool is led and owns nothing, and what bends owns before
+/// a rigid body: how that answers impulses is known exactly, however long the step (docs/decisions/0012, 0013).
 ///
-/// How a rigid body answers impulses is known exactly, however long the step; how a tube or a soft body does is not, least of
-/// all how far one falls that nothing holds (docs/decisions/0012, 0013).
+/// Of two that bend the faster owns, and of two that keep the same rate beside each other the higher, which then solves in one with that
+/// what it bears (docs/decisions/0019). But a soft body owns before a tube that does not lie on it or is linked to it; and of two tubes one of
+/// whom is held, and so lies on its hold, the one with fewer held ends does before the faster. Of equals the lower number owns.
 #[must_use]
-pub fn owns(me: Standing, other: Standing) -> bool {
-    let led = |s: Standing| s.model == "instrument";
-    let tube = |s: Standing| s.model == "tube";
-    if led(me) || led(other) {
-        return led(other) && !led(me);
+pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
+    if me.is_led() || other.is_led() {
+        return other.is_led() && !me.is_led();
     }
-    let soft = |s: Standing| matches!(s.model, "sheet" | "solid" | "rope");
-    if soft(me) != soft(other) {
-        return soft(me);
+    if me.bends() != other.bends() {
+        return me.bends();
     }
-    // two tubes beside each other step no slower than this
-    let slowest = if tube(me) && tube(other) { PART_MAX_S.recip() } else { 0.0 };
-    let rate = |s: Standing| s.rate_hz.max(slowest);
+    let common_hz = me.common_hz(other, linked);
+    let rate = |s: Standing| s.rate_hz.max(common_hz);
     let faster = rate(me).total_cmp(&rate(other));
-    // a tube that is held lies on its hold
-    let held = me.held_ends > 0 || other.held_ends > 0;
-    let higher = if held { Ordering::Equal } else { me.height_j_kg.total_cmp(&other.height_j_kg) };
-    let freer = if rate(me) == rate(other) { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
-    tube(me).cmp(&tube(other)).then(freer).then(faster).then(higher).then(other.id.cmp(&me.id)).is_gt()
+    let higher = me.height_j_kg.total_cmp(&other.height_j_kg);
+    let freer = if faster.is_eq() { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
+    let order = match (me.is_tube(), other.is_tube()) {
+        (true, false) if !linked && higher.is_gt() && faster.is_ge() => Ordering::Greater,
+        (true, false) => Ordering::Less,
+        (false, true) if !linked && higher.is_lt() && faster.is_le() => Ordering::Less,
+        (false, true) => Ordering::Greater,
+        (true, true) if me.held_ends > 0 || other.held_ends > 0 => freer.then(faster),
+        _ => faster.then(higher).then(me.rate_hz.total_cmp(&other.rate_hz)),
+    };
+    order.then(other.id.cmp(&me.id)).is_gt()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    fn standing(id: u32, model: &'static str, rate_hz: f64) -> Standing {
+        Standing::new(AgentId(id), model, rate_hz, None)
+    }
+
+    fn above(s: Standing) -> Standing {
+        Standing { id: AgentId(9), height_j_kg: 1.0, ..s }
+    }
+
     #[test]
     fn of_every_pair_exactly_one_owns_unless_both_are_led() {
-        let all = ["tube", "rigid", "instrument", "sheet"]
-            .into_iter()
-            .flat_map(|model| [60.0, 1000.0].map(|rate_hz| (model, rate_hz)));
-        let all: Vec<_> =
-            all.zip(0..).map(|((model, rate_hz), id)| Standing::new(AgentId(id), model, rate_hz, None)).collect();
+        let mut all = vec![];
+        for model in ["tube", "rigid", "instrument", "sheet"] {
+            for (rate_hz, held_ends, height_j_kg) in
+                [(60.0, 0, 0.0), (100.0, 0, 1.0), (1000.0, 0, 2.0), (1000.0, 1, 1.0)]
+            {
+                all.push(Standing { held_ends, height_j_kg, ..standing(all.len() as u32, model, rate_hz) });
+            }
+        }
         for a in &all {
             for b in all.iter().filter(|b| b.id != a.id) {
                 let both_led = a.model == "instrument" && b.model == "instrument";
-                assert_eq!(u32::from(owns(*a, *b)) + u32::from(owns(*b, *a)), u32::from(!both_led), "{a:?} {b:?}");
+                for linked in [false, true] {
+                    let owners = u32::from(owns(*a, *b, linked)) + u32::from(owns(*b, *a, linked));
+                    assert_eq!(owners, u32::from(!both_led), "{a:?} {b:?}");
+                }
             }
         }
-        assert!(owns(all[1], all[0]), "the faster");
-        assert!(owns(all[0], all[2]) && owns(all[0], all[3]), "the tube, however slow");
-        let held = Standing { held_ends: 2, ..all[1] };
-        assert!(owns(held, all[0]) && owns(all[1], Standing { held_ends: 2, ..all[0] }), "the faster");
-        assert!(owns(all[1], held) && !owns(held, all[1]), "the one that falls, of equals");
-        let slow = |rate_hz| Standing { rate_hz, ..all[0] };
-        assert!(owns(slow(5.0), Standing { held_ends: 1, ..slow(60.0) }), "beside each other both keep 60 Hz");
-        assert!(owns(all[6], all[1]) && owns(all[6], all[3]), "the sheet, though it is slower");
-        let higher = Standing { id: AgentId(9), height_j_kg: 1.0, ..all[6] };
-        assert!(owns(higher, all[6]) && owns(all[7], higher), "the higher of two as fast");
-        let upper = Standing { id: AgentId(9), height_j_kg: 1.0, ..all[0] };
-        assert!(owns(upper, all[0]) && owns(all[1], upper), "tubes too");
-        let held = |s| Standing { held_ends: 2, ..s };
-        assert!(owns(held(all[0]), held(upper)), "but not those that are held");
+    }
+
+    #[test]
+    fn what_bends_owns_before_a_rigid_body_and_nothing_before_it_is_led() {
+        let [slow, fast] = [60.0, 1000.0];
+        for model in ["tube", "sheet"] {
+            assert!(owns(standing(1, model, slow), standing(0, "rigid", fast), false));
+        }
+        assert!(owns(standing(1, "rigid", fast), standing(0, "rigid", slow), false), "the faster");
+        assert!(owns(standing(1, "rigid", slow), standing(0, "instrument", fast), false));
+    }
+
+    #[test]
+    fn of_two_that_bend_the_upper_one_owns_where_they_can_keep_step() {
+        for (upper, lower) in [("sheet", "sheet"), ("tube", "tube"), ("tube", "sheet"), ("sheet", "tube")] {
+            for (upper_hz, lower_hz) in [(60.0, 60.0), (60.0, 240.0), (240.0, 60.0), (1000.0, 240.0)] {
+                let [upper, lower] = [above(standing(0, upper, upper_hz)), standing(1, lower, lower_hz)];
+                assert!(owns(upper, lower, false), "{upper:?} on {lower:?}");
+            }
+        }
+        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "sheet", 60.0)), false), "the faster");
+        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "tube", 60.0)), false), "the soft one");
+        assert!(
+            owns(above(standing(0, "sheet", 60.0)), standing(1, "tube", 1000.0), false),
+            "the soft one, however slow"
+        );
+        assert!(owns(standing(2, "sheet", 240.0), standing(1, "sheet", 60.0), false), "as high, the faster");
+        assert!(owns(standing(0, "sheet", 60.0), standing(1, "sheet", 60.0), false), "of equals the lower number");
+    }
+
+    #[test]
+    fn links_and_holds_ask_for_no_height() {
+        let (sheet, tube) = (standing(1, "sheet", 60.0), standing(2, "tube", 60.0));
+        assert!(owns(sheet, above(tube), true), "the soft one");
+        assert!(owns(Standing { rate_hz: 61.0, ..sheet }, above(standing(0, "sheet", 60.0)), true), "the faster");
+        let held = |held_ends, s| Standing { held_ends, ..s };
+        assert!(owns(tube, held(1, above(tube)), false), "the one that falls");
+        assert!(owns(standing(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
+        assert!(owns(held(2, standing(2, "tube", 1000.0)), above(tube), false), "the faster");
+        assert!(owns(held(2, tube), held(2, above(tube)), false), "the lower number of those that are held alike");
     }
 }

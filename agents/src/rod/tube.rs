@@ -366,7 +366,8 @@ impl Agent for Tube {
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let bounds = || bounds(&self.now, self.widest_m());
         let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
-        crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately))
+        let Some(form) = self.stepper.company.form() else { return dt };
+        crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately, form))
     }
 
     fn rename_time(&mut self, by_s: f64) {

@@ -75,8 +75,7 @@ impl SoftBody {
         let velocities: Vec<_> =
             lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
         let middle = positions.iter().sum::<DVec3>() / positions.len() as f64;
-        let held = lattice.held.contains(&true);
-        let height_j_kg = if held { f32::INFINITY } else { -spec.gravity.dot(middle) as f32 };
+        let height_j_kg = -spec.gravity.dot(middle) as f32;
         let surface = lattice.surface(height_j_kg);
         let edge_m = surface.edge_m;
         let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
@@ -206,7 +205,7 @@ impl Agent for SoftBody {
 
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
-        let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately));
+        let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately, &self.contacts.form));
         beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
     }
 

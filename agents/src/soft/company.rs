@@ -2,13 +2,13 @@
 //!
 //! In: neighbours as they were published; the impulses of the contacts and links that this body owns. Out: contacts for the
 //! body's own solve, far ends of links, ledgers. Never here: the body's own state and its solve.
-//! Theory: docs/theory/coupling.md; a soft body owns every pair but those with faster soft bodies.
+//! Theory: docs/theory/coupling.md.
 
 use super::holds::Tie;
 use super::system::System;
-use crate::coupling::beside::may_touch;
+use crate::coupling::beside::{bends, may_touch};
 use crate::coupling::{Contact, Mate, Mates, PairState, Site};
-use crate::{Body, Bounds, DT_MAX_S, SimSpan, Surroundings};
+use crate::{Bounds, DT_MAX_S, SimSpan, Surroundings};
 use glam::DVec3;
 
 /// Links to one agent are shared in no more rounds than this, and well enough at this error, m/s: a tenth of what counts as rest.
@@ -33,8 +33,8 @@ pub(super) struct Company {
 impl Company {
     /// Begins a step of `dt` seconds: takes in what others gave since the last one.
     pub fn open(&mut self, around: &Surroundings<'_>, vertices: usize, dt: f64) {
-        // only another soft body may own a pair with this one
-        self.watched = around.neighbours.iter().any(|n| !n.owned && matches!(n.snapshot.body, Body::Soft(_)));
+        // only what bends may own a pair with this one
+        self.watched = around.neighbours.iter().any(|n| !n.owned && bends(n));
         self.was_given = false;
         if around.neighbours.is_empty() && self.mates.exchange.is_empty() {
             return;
@@ -62,7 +62,7 @@ impl Company {
         self.was_given.then_some([&mut self.received, &mut self.carried])
     }
 
-    /// Whether a soft body is near that needs to know how this one answers impulses.
+    /// Whether somebody is near who bends, owns the pair and needs to know how this one answers impulses.
     pub fn is_watched(&self) -> bool {
         self.watched
     }
