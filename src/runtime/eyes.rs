@@ -26,7 +26,7 @@ pub(super) struct Peer {
     pub form: Option<Arc<Form>>,
     /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the others.
     pub laws: Vec<(AgentId, Law)>,
-    /// To whom links join it.
+    /// To whom links by the ledger join it.
     pub attached: Vec<AgentId>,
 }
 

@@ -219,7 +219,7 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
         let seated = led && rigid(&form);
         let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
         writers.push(writer);
-        let attached = spawn.attached.iter().map(|link| link.other).collect();
+        let attached = spawn.attached.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other).collect();
         all.push(Peer { shared, form, laws: Vec::new(), attached });
     }
     settle_laws(spawns, &mut all);

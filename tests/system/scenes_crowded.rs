@@ -215,7 +215,7 @@ fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
         )
     };
     for hz in [[60.0, 60.0, 60.0], [240.0, 240.0, 240.0], [240.0, 60.0, 60.0], [60.0, 61.0, 240.0]] {
-        // how far each may sag under 0.3 to 0.4 kg: the slab is pressed by 3 N on a tenth of its 6 dm², the sheet hangs from its edges
+        // how far each may sag: the slab is pressed by 3 N on a tenth of its 6 dm², the sheet hangs from its edges, 30 cm apart
         for (lower, sag_m) in [
             (slab(hz[0], ""), 2e-3),
             (slab(hz[0], "hold = [\"bottom\"]\n"), 2e-3),
@@ -240,6 +240,36 @@ fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
                     pairs.iter().filter(|pair| pair["b"] == "box").map(|pair| number(pair, "/force_n")).sum();
                 assert!((borne_n - WEIGHT_N).abs() < 0.05 * WEIGHT_N, "{told}: {borne_n} N for {WEIGHT_N}");
             }
+        }
+    }
+}
+
+/// The cube took each of them for one that nothing holds up, as a held slab stands on nothing, and pressed it 10 to 16 mm into that for good.
+#[test]
+fn a_soft_cube_lies_on_what_lies_on_a_held_slab() {
+    let block = |name: &str, (size_m, segments): ([f64; 3], [u32; 3]), z: f64, hz: f64| {
+        format!(
+            "[[object]]\nname = \"{name}\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = {size_m:?}\nsegments = {segments:?}\nposition_m = [0.0, 0.0, {z}]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}"
+        )
+    };
+    for hz in [60.0, 240.0] {
+        for radius_m in [0.006, RADIUS_M] {
+            let slab = block("slab", ([0.25, 0.25, 0.05], [6, 6, 2]), 0.025, hz) + "hold = [\"bottom\"]\n";
+            let strips = [("left", -0.02), ("right", 0.02)].map(|(name, y)| {
+                let z = 0.05 + radius_m + 2e-4;
+                let ends = [[-0.09, y, z], [0.09, y, z]];
+                if radius_m == RADIUS_M { tube(name, hz, ends, "") } else { rope(name, ends, (radius_m, hz)) }
+            });
+            let cube = block("cube", ([0.06; 3], [4; 3]), 0.05 + 2.0 * radius_m + 8e-4 + 0.03, hz);
+            let report = Folder::with(&[FLOOR, &slab, &strips.concat(), &cube].concat()).lockstep(&["--seconds", "1"]);
+            assert!(worst(&report).0 < 3e-3 && worst(&report).1 > -0.02, "{hz} Hz, {radius_m}: {:?}", worst(&report));
+            let pairs = report["couplings"].as_array().unwrap();
+            let on_slab = pairs.iter().filter(|pair| pair["a"] == "slab" || pair["b"] == "slab");
+            let pressed_n: f64 = on_slab.map(|pair| number(pair, "/force_n")).sum();
+            let area_m2 = std::f64::consts::PI
+                * if radius_m == RADIUS_M { 0.01_f64.powi(2) - 0.008_f64.powi(2) } else { 0.006_f64.powi(2) };
+            let weight_n = 1050.0 * 9.81 * (0.06_f64.powi(3) + 2.0 * 0.18 * area_m2);
+            assert!((pressed_n - weight_n).abs() < 0.1 * weight_n, "{hz} Hz, {radius_m}: {pressed_n} N for {weight_n}");
         }
     }
 }

@@ -1,4 +1,4 @@
-//! How long a step may be where three bodies press on each other, or two and the ground.
+//! How long a step may be where three bodies press on each other, or two and the ground, and beside what bends and is faster.
 //!
 //! In: a step that is wanted, who is near, what they tell of whom they touch. Out: that step, or an equal part of it. Never here: the
 //! step itself, pairs of which nobody else has a say ([`super::beside`]). Theory: docs/theory/coupling.md, eq. 7o.
@@ -23,7 +23,9 @@ pub fn crowded(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> 
         return dt;
     }
     no_longer(me.left_of(dt, around), around, bounds, |n| {
-        if is_crowded(n, around, me) { Some(PART_S) } else { keeps_up(n, around, me).then_some(n.step_s.max(PART_S)) }
+        // a crowd asks for as short steps as anybody under this one may
+        let crowd_s = is_crowded(n, around, me).then_some(PART_S);
+        crowd_s.or_else(|| keeps_up(n, around, me).then_some(n.step_s.max(PART_S)))
     })
 }
 
@@ -102,7 +104,8 @@ fn keeps_up(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> boo
 }
 
 /// Whether the body that looks and a neighbour that it may touch are in a crowd, one of whom at least bends: they touch each other, or have
-/// within a second, and one shares a world with others or both are on the ground; or they are two of three in a row.
+/// within a second, and one shares a world with others or both are on the ground, or both bend and one is hung; or they are two of three in
+/// a row.
 fn is_crowded(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> bool {
     let snapshot = &neighbour.snapshot;
     let either_bends = me.bends || bends(neighbour);

@@ -31,10 +31,20 @@ impl Form {
     /// Whether it is thin and held somewhere: a sheet or rope that hangs, or is stretched.
     #[must_use]
     pub const fn is_hung(&self) -> bool {
-        matches!(&self.kind, FormKind::Surface(SurfaceForm { hung: true, .. }))
+        matches!(&self.kind, FormKind::Surface(SurfaceForm { held: true, closed: false, .. }))
     }
 
-    /// How high the middle of what bends is at the start, −g·x, J/kg; zero of what does not bend.
+    /// Whether it bends and is held somewhere.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        match &self.kind {
+            FormKind::Chain { held_ends, .. } => *held_ends > 0,
+            FormKind::Surface(surface) => surface.held,
+            FormKind::Solid(_) | FormKind::Tool(_) => false,
+        }
+    }
+
+    /// How high the middle of what bends is at the start, of what is held its lowest point, −g·x, J/kg; zero of what does not bend.
     /// Of two that keep the same rate the higher owns (docs/decisions/0019).
     #[must_use]
     pub const fn height_j_kg(&self) -> f32 {
@@ -44,6 +54,14 @@ impl Form {
             FormKind::Solid(_) | FormKind::Tool(_) => 0.0,
         }
     }
+}
+
+/// How high what bends is at its start, J/kg ([`Form::height_j_kg`]): what hangs from where it is `held` is as high as what it would bear lies.
+pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
+    let heights = || positions.iter().map(|position| -gravity.dot(*position));
+    let height =
+        if held { heights().fold(f64::INFINITY, f64::min) } else { heights().sum::<f64>() / positions.len() as f64 };
+    height as f32
 }
 
 /// The kinds of shapes.
@@ -81,8 +99,8 @@ pub struct SurfaceForm {
     pub height_j_kg: f32,
     /// Whether it encloses a volume: then nothing may be behind a triangle.
     pub closed: bool,
-    /// Whether it is thin, and held somewhere.
-    pub hung: bool,
+    /// Whether it is held somewhere.
+    pub held: bool,
     /// What lies around each vertex and edge.
     pub fans: Arc<Fans>,
 }

@@ -222,7 +222,7 @@ impl Stage {
     }
 
     fn are_linked(&self, me: AgentId, other: AgentId) -> bool {
-        self.actors[me.0 as usize].links.iter().any(|link| link.other == other)
+        self.actors[me.0 as usize].links.iter().any(|link| link.other == other && link.law == Law::Ledger)
     }
 
     /// Which of two owns their pair.

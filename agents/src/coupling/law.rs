@@ -73,9 +73,7 @@ impl Standing {
         let held_ends = form.map_or(0, Form::held_ends);
         Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, Form::height_j_kg) }
     }
-}
 
-impl Standing {
     fn is_led(self) -> bool {
         self.model == "instrument"
     }
@@ -101,12 +99,14 @@ impl Standing {
     }
 }
 
-/// Whether `me` owns the pair with `other`, to whom a link may have it `linked`. A tool is led and owns nothing, and what bends owns before
-/// a rigid body: how that answers impulses is known exactly, however long the step (docs/decisions/0012, 0013).
+/// Whether `me` owns the pair with `other`, to whom a link by the ledger may have it `linked`.
 ///
-/// Of two that bend the faster owns, and of two that keep the same rate beside each other the higher, which then solves in one with that
-/// what it bears (docs/decisions/0019). But a soft body owns before a tube that does not lie on it or is linked to it; and of two tubes one of
-/// whom is held, and so lies on its hold, the one with fewer held ends does before the faster. Of equals the lower number owns.
+/// A tool is led and owns nothing. What bends owns before a rigid body: how that answers impulses is known exactly, however long the step
+/// (docs/decisions/0012, 0013).
+/// Of two that bend the faster owns, and of two that can keep step the higher: it solves what it bears in one problem with their contact
+/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not lie on it; and of two tubes of whom
+/// one is held, and lies on its hold, the one with fewer held ends does before the faster. Who are alike in all this leave it to the
+/// rates that their scene wants, then to the lower number.
 #[must_use]
 pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
     if me.is_led() || other.is_led() {
@@ -117,16 +117,17 @@ pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
     }
     let common_hz = me.common_hz(other, linked);
     let rate = |s: Standing| s.rate_hz.max(common_hz);
+    let lies_on =
+        |tube: Standing, soft: Standing| !linked && tube.height_j_kg > soft.height_j_kg && rate(tube) >= rate(soft);
+    if me.is_tube() != other.is_tube() {
+        return if me.is_tube() { lies_on(me, other) } else { !lies_on(other, me) };
+    }
     let faster = rate(me).total_cmp(&rate(other));
-    let higher = me.height_j_kg.total_cmp(&other.height_j_kg);
-    let freer = if faster.is_eq() { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
-    let order = match (me.is_tube(), other.is_tube()) {
-        (true, false) if !linked && higher.is_gt() && faster.is_ge() => Ordering::Greater,
-        (true, false) => Ordering::Less,
-        (false, true) if !linked && higher.is_lt() && faster.is_le() => Ordering::Less,
-        (false, true) => Ordering::Greater,
-        (true, true) if me.held_ends > 0 || other.held_ends > 0 => freer.then(faster),
-        _ => faster.then(higher).then(me.rate_hz.total_cmp(&other.rate_hz)),
+    let order = if me.held_ends > 0 || other.held_ends > 0 {
+        let freer = if faster.is_eq() { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
+        freer.then(faster)
+    } else {
+        faster.then(me.height_j_kg.total_cmp(&other.height_j_kg)).then(me.rate_hz.total_cmp(&other.rate_hz))
     };
     order.then(other.id.cmp(&me.id)).is_gt()
 }

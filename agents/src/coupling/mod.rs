@@ -30,7 +30,7 @@ pub mod touch;
 pub use contact::{Contact, PUSH_OUT_SHARE, Slots};
 pub use exchange::{Exchange, PairKind, PairState, acknowledged};
 pub(crate) use foot::{Carried, Foot, Lies, Stance, is_borne, press};
-pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View};
+pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View, height_j_kg};
 pub(crate) use knock::Knock;
 pub use lasting::smooth;
 pub use law::{Law, Link, Standing, owns};

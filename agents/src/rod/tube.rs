@@ -20,7 +20,7 @@ use super::step::{Lost, Setting, Stepper, energy};
 use super::{Section, TubeSpec};
 use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::crowd::{self, Lately};
-use crate::coupling::{Form, FormKind, smooth};
+use crate::coupling::{Form, FormKind, height_j_kg, smooth};
 use crate::{Agent, Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, Surroundings, check_span};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -114,8 +114,7 @@ impl Tube {
             lately: Lately::default(),
         };
         let held_ends = tube.matter.held.map(u8::from).iter().sum();
-        let nodes = &tube.now.x;
-        let height_j_kg = -tube.spec.gravity.dot(nodes.iter().sum::<DVec3>() / nodes.len() as f64) as f32;
+        let height_j_kg = height_j_kg(&tube.now.x, tube.spec.gravity, held_ends > 0);
         let kind = FormKind::Chain { held_ends, height_j_kg };
         let form = Form { kind, friction: tube.spec.friction, restitution: 0.0 };
         tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());

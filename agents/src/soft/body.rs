@@ -15,7 +15,7 @@ use super::step::HASTE_MAX;
 use super::system::System;
 use crate::coupling::beside::{self, has_a_say};
 use crate::coupling::crowd::{self, Lately};
-use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View};
+use crate::coupling::{Form, FormKind, Knock, Law, Link, Placed, View, height_j_kg};
 use crate::{
     Agent, Body, Bounds, Grip, Neighbour, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport,
     Surroundings, check_span,
@@ -74,8 +74,8 @@ impl SoftBody {
         let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
         let velocities: Vec<_> =
             lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
-        let middle = positions.iter().sum::<DVec3>() / positions.len() as f64;
-        let height_j_kg = -spec.gravity.dot(middle) as f32;
+        let held = lattice.held.contains(&true);
+        let height_j_kg = height_j_kg(&positions, spec.gravity, held);
         let surface = lattice.surface(height_j_kg);
         let edge_m = surface.edge_m;
         let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };

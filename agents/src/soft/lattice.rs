@@ -270,7 +270,7 @@ impl Lattice {
             radius_m: self.radius_m,
             height_j_kg,
             closed: !self.bricks.is_empty(),
-            hung: self.bricks.is_empty() && self.held.contains(&true),
+            held: self.held.contains(&true),
             fans: Fans::of(&self.edges, &self.triangles).into(),
         }
     }

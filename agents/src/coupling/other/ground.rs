@@ -89,9 +89,12 @@ impl Other {
         }
     }
 
-    /// Whether something fixed carries it: what bends as it lies there, a rigid body as it stands there.
+    /// Whether something fixed carries it: what bends as it lies there or is held, a rigid body as it stands there.
     pub fn is_carried(&self) -> bool {
-        if self.is_many() { self.borne && self.lies() } else { self.lying.is_none() && self.grounded().is_some() }
+        if !self.is_many() {
+            return self.lying.is_none() && self.grounded().is_some();
+        }
+        (self.borne && self.lies()) || self.form().is_some_and(|form| form.is_held())
     }
 
     /// Whether what carries it also bears such impulses, in its slots: of what bends that is known by where it is touched ([`Self::bear`]).

@@ -33,7 +33,7 @@ fn sheet() -> (Form, Vec<DVec3>) {
         edge_m: EDGE,
         height_j_kg: 0.0,
         closed: false,
-        hung: false,
+        held: false,
     };
     (Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 }, places.map(point).collect())
 }
@@ -131,7 +131,7 @@ fn a_ball_s_middle_behind_a_closed_skin_is_pushed_out_of_it() {
         edge_m: 1.0,
         height_j_kg: 0.0,
         closed: true,
-        hung: false,
+        held: false,
     };
     let form = Form { kind: FormKind::Surface(surface), friction: 0.5, restitution: 0.0 };
     let (mut room, mut list) = (TouchRoom::default(), vec![]);
