@@ -18,6 +18,8 @@ pub(super) struct Peers {
     pub all: Vec<Peer>,
     /// `None` where no two agents could touch: then nobody looks for anybody.
     pub crowd: Option<Crowd>,
+    /// Whom links by the ledger join, each pair both ways round, sorted.
+    pub linked: Vec<[AgentId; 2]>,
 }
 
 /// One agent, as the others know it.
@@ -26,8 +28,6 @@ pub(super) struct Peer {
     pub form: Option<Arc<Form>>,
     /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the others.
     pub laws: Vec<(AgentId, Law)>,
-    /// To whom links by the ledger join it.
-    pub attached: Vec<AgentId>,
 }
 
 /// What an agent looks with.
@@ -73,8 +73,8 @@ impl Peer {
         !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
-    /// `other` as this agent sees it.
-    fn meets(&self, other: &Self) -> Neighbour {
+    /// `other`, to whom a link may have it `linked`, as this agent sees it.
+    fn meets(&self, other: &Self, linked: bool) -> Neighbour {
         // jaws take hold of a form, also where the tool passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
         let snapshot = other.shared.slot.latest();
@@ -84,7 +84,7 @@ impl Peer {
             snapshot,
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
-            owned: owns(self.standing(), other.standing(), self.attached.contains(&other.shared.id)),
+            owned: owns(self.standing(), other.standing(), linked),
         }
     }
 }
@@ -92,6 +92,12 @@ impl Peer {
 impl Peers {
     pub fn get(&self, id: AgentId) -> Option<&Peer> {
         self.all.get(id.0 as usize)
+    }
+
+    /// `other` as `me` sees it.
+    fn meet(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
+        let linked = self.linked.binary_search(&[me, other]).is_ok();
+        Some(self.get(me)?.meets(self.get(other)?, linked))
     }
 
     /// The eyes of `me`, who is linked to `links`.
@@ -202,8 +208,8 @@ impl Eyes {
     }
 
     fn list(&mut self, peers: &Peers, me: AgentId, id: AgentId) {
-        let (Some(mine), Some(theirs)) = (peers.get(me), peers.get(id)) else { return };
-        self.neighbours.push(mine.meets(theirs));
+        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.meet(me, id)) else { return };
+        self.neighbours.push(neighbour);
         self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
     }
 }
@@ -217,8 +223,8 @@ const fn is_led(form: &Form) -> bool {
 fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
     if fellow {
         (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
-    } else if let (Some(mine), Some(theirs)) = (peers.get(me), peers.get(neighbour.id)) {
-        *neighbour = mine.meets(theirs);
+    } else if let Some(stranger) = peers.meet(me, neighbour.id) {
+        *neighbour = stranger;
     }
 }
 

@@ -219,12 +219,23 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
         let seated = led && rigid(&form);
         let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
         writers.push(writer);
-        let attached = spawn.attached.iter().filter(|link| link.law == Law::Ledger).map(|link| link.other).collect();
-        all.push(Peer { shared, form, laws: Vec::new(), attached });
+        all.push(Peer { shared, form, laws: Vec::new() });
     }
     settle_laws(spawns, &mut all);
     let crowd = meet_at_all(&all).then(|| Crowd::new(all.len()));
-    (Peers { all, crowd }, writers)
+    let linked = linked(spawns);
+    (Peers { all, crowd, linked }, writers)
+}
+
+/// Whom links by the ledger join, each pair both ways round, sorted.
+fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
+    let of = |(spawn, me): (&AgentSpawn, AgentId)| {
+        let links = spawn.attached.iter().filter(|link| link.law == Law::Ledger);
+        links.map(move |link| [me, link.other]).collect::<Vec<_>>()
+    };
+    let mut linked: Vec<_> = spawns.iter().zip((0..).map(AgentId)).flat_map(of).collect();
+    linked.sort_unstable();
+    linked
 }
 
 /// Whether any two of them could touch.
