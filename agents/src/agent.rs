@@ -196,6 +196,8 @@ pub struct Neighbour {
     pub law: Law,
     /// Whether the agent that looks owns the pair ([`crate::coupling::owns`]).
     pub owned: bool,
+    /// Whether the two keep step ([`crate::coupling::keep_step`]).
+    pub in_step: bool,
     /// How long its steps are as a rule, seconds; zero where that does not matter.
     pub step_s: f64,
 }
@@ -204,7 +206,7 @@ impl Neighbour {
     /// An agent that is only looked at: it is neither touched nor owned.
     #[must_use]
     pub const fn seen(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
-        Self { id, snapshot, form: None, law: Law::Ledger, owned: false, step_s: 0.0 }
+        Self { id, snapshot, form: None, law: Law::Ledger, owned: false, in_step: false, step_s: 0.0 }
     }
 }
 

@@ -8,7 +8,7 @@ use super::crowd::{Crowd, Sight};
 use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
-use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, owns};
+use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, keep_step, owns};
 use metachron_agents::{AgentId, Neighbour, SimSpan, SimTime, Snapshot};
 use std::sync::Arc;
 
@@ -78,13 +78,15 @@ impl Peer {
         // jaws take hold of a form, also where the tool passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
         let snapshot = other.shared.slot.latest();
+        let (mine, its) = (self.standing(), other.standing());
         Neighbour {
             id: other.shared.id,
             step_s: snapshot.step_s(other.shared.wanted_hz.recip()),
             snapshot,
             form: if known { other.form.clone() } else { None },
             law: self.law(other.shared.id),
-            owned: owns(self.standing(), other.standing(), linked),
+            owned: owns(mine, its, linked),
+            in_step: keep_step(mine, its, linked),
         }
     }
 }

@@ -229,11 +229,11 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
 
 /// Whom links by the ledger join, each pair both ways round, sorted.
 fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
-    let of = |(spawn, me): (&AgentSpawn, AgentId)| {
+    let mut linked = Vec::new();
+    for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
         let links = spawn.attached.iter().filter(|link| link.law == Law::Ledger);
-        links.map(move |link| [me, link.other]).collect::<Vec<_>>()
-    };
-    let mut linked: Vec<_> = spawns.iter().zip((0..).map(AgentId)).flat_map(of).collect();
+        linked.extend(links.map(|link| [me, link.other]));
+    }
     linked.sort_unstable();
     linked
 }

@@ -29,6 +29,35 @@ fn rope(name: &str, ends: [[f64; 3]; 2], (radius_m, hz): (f64, f64)) -> String {
     )
 }
 
+/// A square sheet of 4 mm, `size_m` wide, whose middle lies at `z`.
+fn cloth(name: &str, hz: f64, (size_m, segments): (f64, u32), z: f64) -> String {
+    format!(
+        "[[object]]\nname = \"{name}\"\nmodel = \"sheet\"\nsize_m = [{size_m:?}, {size_m:?}]\nsegments = [{segments}, {segments}]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, {z:?}]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}"
+    )
+}
+
+/// A soft box, whose middle lies at `z`.
+fn block(name: &str, hz: f64, (size_m, segments): ([f64; 3], [u32; 3]), z: f64) -> String {
+    format!(
+        "[[object]]\nname = \"{name}\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = {size_m:?}\nsegments = {segments:?}\nposition_m = [0.0, 0.0, {z:?}]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}"
+    )
+}
+
+/// A slab of 25 × 25 × 5 cm on the floor.
+fn slab(hz: f64) -> String {
+    block("low", hz, ([0.25, 0.25, 0.05], [6, 6, 2]), 0.025)
+}
+
+/// Two strips along x on what is `top_m` high, ropes or, of [`RADIUS_M`], tubes; `apart_m` from its middle, `above_m` above it.
+fn strips(hz: f64, radius_m: f64, (top_m, apart_m, above_m): (f64, f64, f64)) -> String {
+    let strip = |(name, y): (&str, f64)| {
+        let z = top_m + radius_m + above_m;
+        let ends = [[-0.09, y, z], [0.09, y, z]];
+        if radius_m == RADIUS_M { tube(name, hz, ends, "") } else { rope(name, ends, (radius_m, hz)) }
+    };
+    [("left", -apart_m), ("right", apart_m)].map(strip).concat()
+}
+
 fn along_y(x: f64) -> [[f64; 3]; 2] {
     [[x, -0.1, 0.0101], [x, 0.1, 0.0101]]
 }
@@ -126,9 +155,7 @@ fn a_soft_block_lies_on_two_taut_tubes_that_touch() {
                 .replace("young_pa = 1e6", "young_pa = 2e7")
                 .replace("radius_m = 0.01", "radius_m = 0.015")
         };
-        let block = format!(
-            "[[object]]\nname = \"block\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.1, 0.1, 0.1]\nsegments = [3, 3, 3]\nposition_m = [0.0, 0.0, 0.27]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}[[probe]]\nobject = \"block\"\nevery_ms = 10.0\n"
-        );
+        let block = block("block", hz, ([0.1; 3], [3; 3]), 0.27) + "[[probe]]\nobject = \"block\"\nevery_ms = 10.0\n";
         let text = [FLOOR, &taut("a", -0.0151), &taut("b", 0.0151), &block].concat();
         let report = Folder::with(&text).lockstep(&["--seconds", "2"]);
         let at = point(&report, "/probes/0/position_m");
@@ -141,14 +168,10 @@ fn a_soft_block_lies_on_two_taut_tubes_that_touch() {
 #[test]
 fn a_soft_plate_on_two_ropes_presses_the_cloth_under_them_with_the_weight_of_all() {
     for hz in [60.0, 120.0, 240.0] {
-        let cloth = format!(
-            "[[object]]\nname = \"cloth\"\nmodel = \"sheet\"\nsize_m = [0.24, 0.24]\nsegments = [6, 6]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, 0.0021]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}"
-        );
+        let cloth = cloth("cloth", hz, (0.24, 6), 0.0021);
         let ropes = [("left", -0.04), ("right", 0.04)]
             .map(|(name, y)| rope(name, [[-0.09, y, 0.0102], [0.09, y, 0.0102]], (0.006, hz)));
-        let plate = format!(
-            "[[object]]\nname = \"plate\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.12, 0.12, 0.02]\nsegments = [4, 4, 1]\nposition_m = [0.0, 0.0, 0.0265]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}"
-        );
+        let plate = block("plate", hz, ([0.12, 0.12, 0.02], [4, 4, 1]), 0.0265);
         let text = [FLOOR, &cloth, &ropes.concat(), &plate].concat();
         let report = Folder::with(&text).lockstep(&["--seconds", "2"]);
         assert!(worst(&report).0 < 1e-3 && worst(&report).1 > -0.03, "{hz} Hz: {:?}", worst(&report));
@@ -179,18 +202,12 @@ fn a_rope_on_two_crossed_tubes_presses_neither_into_the_other() {
 fn a_slow_cloth_between_two_faster_ones_under_a_block_is_not_shot_off() {
     for (hz, apart_m) in [([120.0, 60.0, 60.0], 7e-4), ([100.0, 50.0, 75.0], 3e-4)] {
         let cloth = |(name, hz, z): (&str, f64, f64)| {
-            format!(
-                "[[object]]\nname = \"{name}\"\nmodel = \"sheet\"\nsize_m = [0.3, 0.3]\nsegments = [6, 6]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, {z}]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}[[probe]]\nobject = \"{name}\"\nevery_ms = 5.0\n"
-            )
+            cloth(name, hz, (0.3, 6), z) + &format!("[[probe]]\nobject = \"{name}\"\nevery_ms = 5.0\n")
         };
         let heights = [0.0021, 0.0065 + apart_m, 0.011 + 2.0 * apart_m];
         let cloths =
             [("low", hz[0], heights[0]), ("middle", hz[1], heights[1]), ("high", hz[2], heights[2])].map(cloth);
-        let block = format!(
-            "[[object]]\nname = \"block\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.06, 0.06, 0.06]\nsegments = [3, 3, 3]\nposition_m = [0.0, 0.0, {}]\nyoung_pa = 1e5\nrate_hz = {:?}\n{SOFT}",
-            0.047 + 2.0 * apart_m,
-            hz[0]
-        );
+        let block = block("block", hz[0], ([0.06; 3], [3; 3]), 0.047 + 2.0 * apart_m);
         let text = [FLOOR, &cloths.concat(), &block].concat();
         let report = Folder::with(&text).lockstep(&["--seconds", "0.45"]);
         let samples = report["probes"][1]["samples"].as_array().unwrap();
@@ -204,33 +221,18 @@ fn a_slow_cloth_between_two_faster_ones_under_a_block_is_not_shot_off() {
 #[test]
 fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
     const WEIGHT_N: f64 = 0.3 * 9.81;
-    let slab = |hz: f64, more: &str| {
-        format!(
-            "[[object]]\nname = \"low\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = [0.25, 0.25, 0.05]\nsegments = [6, 6, 2]\nposition_m = [0.0, 0.0, 0.025]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}{more}"
-        )
-    };
-    let sheet = |hz: f64, more: &str| {
-        format!(
-            "[[object]]\nname = \"low\"\nmodel = \"sheet\"\nsize_m = [0.3, 0.3]\nsegments = [8, 8]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, 0.048]\nyoung_pa = 1e6\nrate_hz = {hz:?}\n{SOFT}{more}"
-        )
-    };
     for hz in [[60.0, 60.0, 60.0], [240.0, 240.0, 240.0], [240.0, 60.0, 60.0], [60.0, 61.0, 240.0]] {
         // how far each may sag: the slab is pressed by 3 N on a tenth of its 6 dm², the sheet hangs from its edges, 30 cm apart
         for (lower, sag_m) in [
-            (slab(hz[0], ""), 2e-3),
-            (slab(hz[0], "hold = [\"bottom\"]\n"), 2e-3),
-            (sheet(hz[0], "hold = [\"left\", \"right\", \"near\", \"far\"]\n"), 0.02),
+            (slab(hz[0]), 2e-3),
+            (slab(hz[0]) + "hold = [\"bottom\"]\n", 2e-3),
+            (cloth("low", hz[0], (0.3, 8), 0.048) + "hold = [\"left\", \"right\", \"near\", \"far\"]\n", 0.02),
         ] {
             for radius_m in [0.006, RADIUS_M] {
-                let strips = [("left", -0.03), ("right", 0.03)].map(|(name, y)| {
-                    let z = 0.05 + radius_m + 1e-4;
-                    let ends = [[-0.09, y, z], [0.09, y, z]];
-                    if radius_m == RADIUS_M { tube(name, hz[1], ends, "") } else { rope(name, ends, (radius_m, hz[1])) }
-                });
+                let strips = strips(hz[1], radius_m, (0.05, 0.03, 1e-4));
                 let top_m = 0.05 + 2.0 * radius_m;
                 let above = solid("box", hz[2], ([0.0, 0.0, top_m + 3e-4 + 0.02], [0.06, 0.05, 0.02]), 0.3);
-                let report =
-                    Folder::with(&[FLOOR, &lower, &strips.concat(), &above].concat()).lockstep(&["--seconds", "1"]);
+                let report = Folder::with(&[FLOOR, &lower, &strips, &above].concat()).lockstep(&["--seconds", "1"]);
                 let told = format!("{hz:?} Hz, radius {radius_m}, {lower}");
                 let sunk_m = top_m + 0.02 - point(&report, "/probes/0/position_m")[2];
                 assert!((-1e-4..sag_m).contains(&sunk_m), "{told}: the box is {sunk_m} m down");
@@ -247,24 +249,15 @@ fn what_lies_on_something_soft_bears_a_box_at_any_clocks() {
 /// The cube took each of them for one that nothing holds up, as a held slab stands on nothing, and pressed it 10 to 16 mm into that for good.
 #[test]
 fn a_soft_cube_lies_on_what_lies_on_a_held_slab() {
-    let block = |name: &str, (size_m, segments): ([f64; 3], [u32; 3]), z: f64, hz: f64| {
-        format!(
-            "[[object]]\nname = \"{name}\"\nmodel = \"solid\"\nshape = \"box\"\nsize_m = {size_m:?}\nsegments = {segments:?}\nposition_m = [0.0, 0.0, {z}]\nyoung_pa = 1e5\nrate_hz = {hz:?}\n{SOFT}"
-        )
-    };
     for hz in [60.0, 240.0] {
         for radius_m in [0.006, RADIUS_M] {
-            let slab = block("slab", ([0.25, 0.25, 0.05], [6, 6, 2]), 0.025, hz) + "hold = [\"bottom\"]\n";
-            let strips = [("left", -0.02), ("right", 0.02)].map(|(name, y)| {
-                let z = 0.05 + radius_m + 2e-4;
-                let ends = [[-0.09, y, z], [0.09, y, z]];
-                if radius_m == RADIUS_M { tube(name, hz, ends, "") } else { rope(name, ends, (radius_m, hz)) }
-            });
-            let cube = block("cube", ([0.06; 3], [4; 3]), 0.05 + 2.0 * radius_m + 8e-4 + 0.03, hz);
-            let report = Folder::with(&[FLOOR, &slab, &strips.concat(), &cube].concat()).lockstep(&["--seconds", "1"]);
+            let slab = slab(hz) + "hold = [\"bottom\"]\n";
+            let strips = strips(hz, radius_m, (0.05, 0.02, 2e-4));
+            let cube = block("cube", hz, ([0.06; 3], [4; 3]), 0.05 + 2.0 * radius_m + 8e-4 + 0.03);
+            let report = Folder::with(&[FLOOR, &slab, &strips, &cube].concat()).lockstep(&["--seconds", "1"]);
             assert!(worst(&report).0 < 3e-3 && worst(&report).1 > -0.02, "{hz} Hz, {radius_m}: {:?}", worst(&report));
             let pairs = report["couplings"].as_array().unwrap();
-            let on_slab = pairs.iter().filter(|pair| pair["a"] == "slab" || pair["b"] == "slab");
+            let on_slab = pairs.iter().filter(|pair| pair["a"] == "low" || pair["b"] == "low");
             let pressed_n: f64 = on_slab.map(|pair| number(pair, "/force_n")).sum();
             let area_m2 = std::f64::consts::PI
                 * if radius_m == RADIUS_M { 0.01_f64.powi(2) - 0.008_f64.powi(2) } else { 0.006_f64.powi(2) };
@@ -278,10 +271,7 @@ fn a_soft_cube_lies_on_what_lies_on_a_held_slab() {
 #[test]
 fn a_tube_crosses_a_slower_rope_on_a_faster_cloth() {
     for hz in [[100.0, 30.0, 100.0], [240.0, 60.0, 60.0]] {
-        let cloth = format!(
-            "[[object]]\nname = \"cloth\"\nmodel = \"sheet\"\nsize_m = [0.2, 0.2]\nsegments = [5, 5]\nthickness_m = 0.004\nposition_m = [0.0, 0.0, 0.003]\nyoung_pa = 1e6\nrate_hz = {:?}\n{SOFT}",
-            hz[0]
-        );
+        let cloth = cloth("cloth", hz[0], (0.2, 5), 0.003);
         let low = rope("rope", [[0.0, -0.09, 0.0102], [0.0, 0.09, 0.0102]], (0.006, hz[1]));
         let up = tube("tube", hz[2], [[-0.09, 0.0, 0.0283], [0.09, 0.0, 0.0283]], "");
         let report = Folder::with(&[FLOOR, &cloth, &low, &up].concat()).lockstep(&["--seconds", "2"]);

@@ -4,9 +4,8 @@
 //! step itself, pairs of which nobody else has a say ([`super::beside`]). Theory: docs/theory/coupling.md, eq. 7o.
 
 use super::beside::{SPLIT_SLACK, bends, is_linked, no_longer};
-use super::{Form, FormKind, PairKind};
-use crate::{AgentId, Body, Bounds, Neighbour, SimSpan, Surroundings};
-use std::sync::Arc;
+use super::{Form, PairKind};
+use crate::{AgentId, Bounds, Neighbour, SimSpan, Surroundings};
 
 /// In a crowd nobody makes longer steps than this, seconds: the parts of a rigid body in contact. In longer ones what two owners give to
 /// one body changes too much from one look to the next: at 60 Hz boxes rolled off tubes and fell through cloths.
@@ -23,9 +22,9 @@ pub fn crowded(dt: SimSpan, around: &Surroundings<'_>, bounds: impl FnOnce() -> 
         return dt;
     }
     no_longer(me.left_of(dt, around), around, bounds, |n| {
-        // a crowd asks for as short steps as anybody under this one may
+        // a crowd asks for as short steps as anybody with whom this one keeps step
         let crowd_s = is_crowded(n, around, me).then_some(PART_S);
-        crowd_s.or_else(|| keeps_up(n, around, me).then_some(n.step_s.max(PART_S)))
+        crowd_s.or_else(|| (n.owned && n.in_step).then_some(n.step_s.max(PART_S)))
     })
 }
 
@@ -59,8 +58,6 @@ pub struct Member {
     pub bends: bool,
     /// Whether it is thin and held ([`Form::is_hung`]).
     pub hung: bool,
-    /// How many ends of it are held, of a tube.
-    pub held_ends: Option<u8>,
     /// Whether others share its world.
     pub shares: bool,
     /// Whether it lies on somebody that something fixed holds up, who answers for all that presses it (eq. 7l).
@@ -75,9 +72,8 @@ impl Member {
     /// A body of this form that bends, which did so lately: it shares no world, and answers for what it bears by itself.
     #[must_use]
     pub fn bent(lately: Lately, form: &Form) -> Self {
-        let held_ends = matches!(form.kind, FormKind::Chain { .. }).then(|| form.held_ends());
         let (hung, grounded) = (form.is_hung(), lately.is_grounded());
-        Self { bends: true, hung, held_ends, shares: false, lies: false, grounded, lately }
+        Self { bends: true, hung, shares: false, lies: false, grounded, lately }
     }
 
     /// What is left of a step of `dt` whose parts it has begun to make, else all of one: who leaves a crowd keeps step with those of its
@@ -92,17 +88,6 @@ impl Member {
     }
 }
 
-/// Whether the body that looks makes no longer steps than a neighbour: it owns their contact, and both bend. Links have clocks of their own,
-/// and so have two tubes of whom one lies on its hold ([`super::owns`]).
-fn keeps_up(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> bool {
-    let held = |form: &Arc<Form>| form.held_ends() > 0;
-    let on_hold = match (me.held_ends, &neighbour.snapshot.body) {
-        (Some(ends), Body::Curve(_)) => ends > 0 || neighbour.form.as_ref().is_some_and(held),
-        _ => false,
-    };
-    me.bends && neighbour.owned && bends(neighbour) && !on_hold && !is_linked(neighbour, around)
-}
-
 /// Whether the body that looks and a neighbour that it may touch are in a crowd, one of whom at least bends: they touch each other, or have
 /// within a second, and one shares a world with others or both are on the ground, or both bend and one is hung; or they are two of three in
 /// a row.
@@ -110,11 +95,9 @@ fn is_crowded(neighbour: &Neighbour, around: &Surroundings<'_>, me: Member) -> b
     let snapshot = &neighbour.snapshot;
     let either_bends = me.bends || bends(neighbour);
     let either_hung = me.hung || neighbour.form.as_ref().is_some_and(|form| form.is_hung());
-    if me.bends && bends(neighbour) && either_hung && touch(neighbour, around) {
-        return true;
-    }
+    let hung = me.bends && bends(neighbour) && either_hung;
     let held_up = me.shares || snapshot.shares || (me.grounded && snapshot.grounded);
-    if either_bends && held_up && touch(neighbour, around) {
+    if either_bends && (hung || held_up) && touch(neighbour, around) {
         return true;
     }
     // who bears it answers for both that press it (eq. 7l)
@@ -152,15 +135,15 @@ fn has_taken(neighbour: &Neighbour, around: &Surroundings<'_>) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::coupling::{Ledger, PairState};
-    use crate::{CurveState, RigidState, SimTime, Snapshot};
+    use crate::coupling::{FormKind, Ledger, PairState};
+    use crate::{Body, CurveState, RigidState, SimTime, Snapshot};
     use glam::DVec3;
+    use std::sync::Arc;
 
     const ME: AgentId = AgentId(0);
     const FREE: Member = Member {
         bends: false,
         hung: false,
-        held_ends: None,
         shares: false,
         lies: false,
         grounded: false,
@@ -234,25 +217,11 @@ mod tests {
 
     #[test]
     fn who_owns_keeps_step_with_who_bends_below_up_to_the_rate_of_crowds() {
-        let below = |step_s| Neighbour { owned: true, step_s, ..neighbour(1, tube(), &[], &[]) };
+        let below = |step_s| Neighbour { owned: true, in_step: true, step_s, ..neighbour(1, tube(), &[], &[]) };
         let bound = |me, below| parts(me, &[below]);
         assert_eq!([1.0 / 60.0, 1.0 / 120.0, 1e-3].map(|step_s| bound(BENT, below(step_s))), [1, 2, 4]);
         assert_eq!(bound(BENT, Neighbour { owned: false, ..below(1e-3) }), 1, "who is owned has its own clock");
-        assert_eq!(bound(FREE, below(1e-3)), 1, "what does not bend too");
-        let lies = |held_ends| Member { held_ends: Some(held_ends), ..BENT };
-        assert_eq!([0, 1].map(|held_ends| bound(lies(held_ends), below(1e-3))), [4, 1], "a held tube lies on its hold");
-        let link = crate::coupling::Link {
-            other: AgentId(1),
-            here: crate::Anchor::Arc(0.0),
-            there: crate::Anchor::Arc(0.0),
-            stiffness_n_m: 1.0,
-            damping_n_s_m: 0.0,
-            rest_m: 0.0,
-            law: crate::coupling::Law::Ledger,
-        };
-        let (links, neighbours) = ([link], [below(1e-3)]);
-        let around = Surroundings { neighbours: &neighbours, links: &links, ..Surroundings::alone(ME, SimTime::ZERO) };
-        assert!(!keeps_up(&neighbours[0], &around, BENT), "links have clocks of their own");
+        assert_eq!(bound(BENT, Neighbour { in_step: false, ..below(1e-3) }), 1, "and who does not keep step");
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! impulses that are still on their way. Never here: threads, pacing, wall time.
 
 use super::audit::{Member, settled};
-use super::{Impulse, Law, Link, Standing, acknowledged, owns};
+use super::{Impulse, Law, Link, Standing, acknowledged, keep_step, owns};
 use crate::{Agent, AgentId, Inertia, Neighbour, Pull, RigidState, SimSpan, SimTime, Snapshot, Surroundings};
 use glam::{DMat3, DVec3};
 use std::sync::Arc;
@@ -211,9 +211,10 @@ impl Stage {
         let snapshot = actor.published[newest.saturating_sub(late)].clone();
         let pair = self.laws.iter().find(|(a, b, _)| (*a, *b) == (me, id) || (*a, *b) == (id, me));
         let law = pair.map_or(Law::Ledger, |(_, _, law)| *law);
-        let owned = owns(self.standing(me), self.standing(id), self.are_linked(me, id));
+        let (mine, its, linked) = (self.standing(me), self.standing(id), self.are_linked(me, id));
+        let (owned, in_step) = (owns(mine, its, linked), keep_step(mine, its, linked));
         let step_s = snapshot.step_s(1.0 / actor.rate_hz);
-        Neighbour { id, snapshot, form: actor.agent.form(), law, owned, step_s }
+        Neighbour { id, snapshot, form: actor.agent.form(), law, owned, in_step, step_s }
     }
 
     fn standing(&self, id: AgentId) -> Standing {

@@ -86,17 +86,23 @@ impl Standing {
         self.is_tube() || matches!(self.model, "sheet" | "solid" | "rope")
     }
 
-    /// Below which rate two that bend keep the same one beside each other, Hz: who owns makes up for the other (docs/theory/coupling.md,
-    /// eq. 7o).
+    /// Below which rate the two keep the same one beside each other, Hz.
     fn common_hz(self, other: Self, linked: bool) -> f64 {
-        let tubes = self.is_tube() && other.is_tube();
-        let held = self.held_ends > 0 || other.held_ends > 0;
-        match (self.bends(), linked || (tubes && held)) {
-            (true, false) => PART_S.recip(),
-            (true, true) if tubes => PART_MAX_S.recip(),
-            _ => 0.0,
+        match (keep_step(self, other, linked), self.is_tube() && other.is_tube()) {
+            (true, _) => PART_S.recip(),
+            (false, true) => PART_MAX_S.recip(),
+            (false, false) => 0.0,
         }
     }
+}
+
+/// Whether two, whom a link by the ledger may have `linked`, keep step beside each other: who owns makes no longer steps than the other, down
+/// to those of a crowd (docs/theory/coupling.md, eq. 7o). They do where both bend, but for two tubes of whom one lies on its hold; links have
+/// clocks of their own.
+#[must_use]
+pub fn keep_step(a: Standing, b: Standing, linked: bool) -> bool {
+    let held = a.held_ends > 0 || b.held_ends > 0;
+    a.bends() && b.bends() && !linked && !(a.is_tube() && b.is_tube() && held)
 }
 
 /// Whether `me` owns the pair with `other`, to whom a link by the ledger may have it `linked`.
@@ -203,5 +209,9 @@ mod tests {
         assert!(owns(standing(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
         assert!(owns(held(2, standing(2, "tube", 1000.0)), above(tube), false), "the faster");
         assert!(owns(held(2, tube), held(2, above(tube)), false), "the lower number of those that are held alike");
+        assert!(!keep_step(tube, held(1, above(tube)), false), "a held tube lies on its hold");
+        assert!(keep_step(sheet, held(1, above(tube)), false) && keep_step(tube, above(tube), false));
+        assert!(!keep_step(sheet, above(tube), true), "links have clocks of their own");
+        assert!(!keep_step(sheet, above(standing(0, "rigid", 60.0)), false), "what does not bend too");
     }
 }

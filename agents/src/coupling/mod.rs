@@ -33,7 +33,7 @@ pub(crate) use foot::{Carried, Foot, Lies, Stance, is_borne, press};
 pub use form::{Form, FormKind, Place, Placed, SolidForm, SurfaceForm, Touch, View, height_j_kg};
 pub(crate) use knock::Knock;
 pub use lasting::smooth;
-pub use law::{Law, Link, Standing, owns};
+pub use law::{Law, Link, Standing, keep_step, owns};
 pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
 pub(crate) use mates::Feet;
 pub use mates::{Far, Mate, Mates, Owner, Pulled, Search};

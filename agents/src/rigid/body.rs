@@ -354,7 +354,6 @@ impl Agent for RigidBody {
             crowd::Member {
                 bends: false,
                 hung: false,
-                held_ends: None,
                 shares: self.sunk_m.is_some(),
                 lies: self.lies.is_some(),
                 grounded: self.stand.is_some() || self.lately.is_grounded(),

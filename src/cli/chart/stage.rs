@@ -5,7 +5,7 @@
 //! in a run whose turns cost nothing, or when that time has come. Never here: what is measured of it.
 
 use metachron_agents::coupling::audit::Member;
-use metachron_agents::coupling::{Form, Law, Link, Standing, owns};
+use metachron_agents::coupling::{Form, Law, Link, Standing, keep_step, owns};
 use metachron_agents::{Agent, AgentId, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, Surroundings};
 use std::sync::Arc;
 
@@ -182,6 +182,7 @@ impl Stage {
             form: actor.form.clone(),
             law: self.law,
             owned: owns(standing(me), standing(other), linked),
+            in_step: keep_step(standing(me), standing(other), linked),
         }
     }
 

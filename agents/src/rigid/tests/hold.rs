@@ -1,7 +1,7 @@
 //! Bodies that springs hold while others own contact with them: others foresee what they do.
 
 use super::*;
-use crate::coupling::{Exchange, Impulse, Law, Other, Site};
+use crate::coupling::{Exchange, Impulse, Other, Site};
 use crate::{Neighbour, RigidState};
 
 const ME: AgentId = AgentId(0);
@@ -53,8 +53,7 @@ impl Held {
         let mut owner = Snapshot { time: self.owner_time, ..Snapshot::default() };
         self.owner.write(&mut owner);
         let form = self.body.form();
-        let neighbours =
-            [Neighbour { id: OWNER, snapshot: Arc::new(owner), form, law: Law::Ledger, owned: false, step_s: 0.0 }];
+        let neighbours = [Neighbour { form, ..Neighbour::seen(OWNER, Arc::new(owner)) }];
         let around = Surroundings { me: ME, time: self.time, neighbours: &neighbours, hands, links: &[] };
         let dt = SimSpan::from_secs_f64(h).unwrap();
         self.body.step(dt, &around).unwrap();
