@@ -5,6 +5,7 @@ mod chart_policies;
 mod cli;
 mod coupling;
 mod fit;
+mod golden;
 mod groups;
 mod guide;
 mod idle;
