@@ -4,9 +4,9 @@
 //! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`crate::conformance`].
 
 use crate::coupling::{Form, Law, Link};
-use crate::rigid::RigidBody;
 use crate::{Anchor, Body, Resolution, SimSpan, SimTime, Snapshot};
 use glam::DVec3;
+use std::any::Any;
 use std::sync::Arc;
 
 /// An agent's number: its place in the scene, fixed for a run.
@@ -64,8 +64,8 @@ pub trait Agent: Send {
         None
     }
 
-    /// The rigid body that this is, if it is one.
-    fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
+    /// The body of this agent that an island of its model can step in its own turn; `None` for a model without islands.
+    fn island_body(&mut self) -> Option<&mut dyn Any> {
         None
     }
 

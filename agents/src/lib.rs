@@ -8,6 +8,7 @@ pub mod conformance;
 pub mod coupling;
 mod drift;
 mod envelope;
+mod impulse_response;
 pub mod instrument;
 mod rare;
 mod resolution;
@@ -23,10 +24,11 @@ pub use agent::{
     Agent, AgentId, Companion, DT_MAX_S, Neighbour, Pull, StepError, StepReport, Surroundings, check_span,
 };
 pub use drift::DRIFT_S;
+pub use impulse_response::{CurveResponse, ImpulseResponse};
 pub use rare::Rare;
 pub use resolution::{N_MAX, Resolution, ResolutionRange};
 pub use snapshot::{
-    Anchor, Body, Bounds, Clasp, CurveState, Grasp, Grip, HASH_START, Inertia, LiesOn, RigidState, Snapshot, SoftState,
-    Stand, Tips, ToolState, Upheld,
+    Anchor, Body, Bounds, Clasp, CurveState, GRASP_BELOW, Grasp, Grip, HASH_START, Inertia, LiesOn, RigidState,
+    Snapshot, SoftState, Stand, Tips, ToolState, Upheld,
 };
 pub use time::{SimSpan, SimTime};

@@ -13,10 +13,9 @@ pub(crate) use stand::{Footprint, STANDING_M_S};
 pub use tips::Tips;
 
 use crate::coupling::{Ledger, PairState, Rebound, Six, Sprung};
-use crate::rod::CurveInertia;
-use crate::soft::SoftInertia;
-use crate::{AgentId, Rare, Resolution, SimSpan, SimTime};
+use crate::{AgentId, ImpulseResponse, Rare, Resolution, SimSpan, SimTime};
 use glam::{DMat3, DQuat, DVec3};
+use std::any::Any;
 
 /// The state an agent last published, stamped with its own time.
 #[derive(Debug, Clone, Default)]
@@ -95,10 +94,8 @@ pub enum Inertia {
         /// 1/(kg·m²), world axes.
         inverse_inertia: DMat3,
     },
-    /// A tube.
-    Curve(CurveInertia),
-    /// A soft body.
-    Soft(SoftInertia),
+    /// A deformable: the factor of its own step.
+    Deformable(Box<dyn ImpulseResponse>),
 }
 
 /// Where matter is and how fast it may leave.
@@ -164,6 +161,9 @@ pub struct RigidState {
     /// Angular velocity in world axes, rad/s.
     pub spin: DVec3,
 }
+
+/// Jaws that pass below this opening grasp.
+pub const GRASP_BELOW: f64 = 0.2;
 
 /// A driven tool: the tip between its jaws, the shaft along the tool's own −z.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -344,25 +344,25 @@ impl Body {
 }
 
 impl Inertia {
-    /// A soft body's to write into, keeping its storage when this is one already.
-    pub fn soft_mut(&mut self) -> &mut SoftInertia {
-        if !matches!(self, Self::Soft(_)) {
-            *self = Self::Soft(SoftInertia::default());
-        }
+    /// The response of a deformable; `None` of any other body.
+    #[must_use]
+    pub fn response(&self) -> Option<&dyn ImpulseResponse> {
         match self {
-            Self::Soft(soft) => soft,
-            _ => unreachable!("made a soft body above"),
+            Self::Deformable(response) => Some(response.as_ref()),
+            _ => None,
         }
     }
 
-    /// A tube's to write into, keeping its storage when this is one already.
-    pub fn curve_mut(&mut self) -> &mut CurveInertia {
-        if !matches!(self, Self::Curve(_)) {
-            *self = Self::Curve(CurveInertia::default());
+    /// A model's own response to write into, keeping its storage when it is one of that type already.
+    pub fn response_mut<R: ImpulseResponse + Default>(&mut self) -> &mut R {
+        if !matches!(self, Self::Deformable(response) if (response.as_ref() as &dyn Any).is::<R>()) {
+            *self = Self::Deformable(Box::<R>::default());
         }
         match self {
-            Self::Curve(curve) => curve,
-            _ => unreachable!("made a curve above"),
+            Self::Deformable(response) => {
+                (response.as_mut() as &mut dyn Any).downcast_mut().expect("of this type since above")
+            }
+            _ => unreachable!("made a deformable above"),
         }
     }
 }

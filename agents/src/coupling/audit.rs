@@ -155,7 +155,9 @@ fn rigid(
 }
 
 fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &CurveState) {
-    let Inertia::Curve(inertia) = &member.snapshot.inertia else { return still(sum, member, state) };
+    let response = member.snapshot.inertia.response();
+    let curve = response.and_then(|response| Some((response, response.curve()?.spins())));
+    let Some((inertia, spins)) = curve else { return still(sum, member, state) };
     let mut pushed = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
     let (mut carried, mut delivered) = (pushed.clone(), DVec3::ZERO);
     on_their_way(member, members, |_, site, dj, moved| {
@@ -170,15 +172,14 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
         }
     });
     if inertia.slots() == pushed.len() {
-        let borne = is_borne(inertia.feet(), pushed.iter().step_by(2).sum());
+        let borne = is_borne(inertia.supports(), pushed.iter().step_by(2).sum());
         inertia.respond(&mut pushed, borne);
         inertia.respond(&mut carried, borne);
     }
-    let before =
-        Motion::of(member, state, |k| state.velocities[k], |k| inertia.spins.get(k).copied().unwrap_or_default());
+    let before = Motion::of(member, state, |k| state.velocities[k], |k| spins.get(k).copied().unwrap_or_default());
     let shifted = |k: usize| state.positions[k] + carried[2 * k];
     let velocity = |k: usize| state.velocities[k] + pushed[2 * k];
-    let spin = |k: usize| inertia.spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
+    let spin = |k: usize| spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
     let moved = CurveState { positions: (0..state.positions.len()).map(shifted).collect(), ..state.clone() };
     // what a spring of the tube takes of them is its far end's: the sum over all is of what was given
     let momentum = before.momentum + delivered;

@@ -4,8 +4,7 @@
 //! has to be waited for. Never here: the step itself. Theory: docs/theory/coupling.md, eq. 7g.
 
 use super::{Impulse, Law};
-use crate::instrument::GRASP_BELOW;
-use crate::{AgentId, Body, Bounds, Inertia, Neighbour, SimSpan, Surroundings, ToolState};
+use crate::{AgentId, Body, Bounds, GRASP_BELOW, Neighbour, SimSpan, Surroundings, ToolState};
 use glam::DVec3;
 
 /// Beside others a body that bends makes no longer substeps than this, seconds: in a longer one it falls so far from where it
@@ -120,10 +119,8 @@ pub fn leaves_behind(
 
 /// How long the step is that a soft body foretells, seconds: past it nobody knows how it bends.
 fn told_s(neighbour: &Neighbour) -> Option<f64> {
-    match &neighbour.snapshot.inertia {
-        Inertia::Soft(soft) => Some(soft.span_s).filter(|told_s| *told_s > 0.0),
-        _ => None,
-    }
+    let response = neighbour.snapshot.inertia.response().filter(|response| response.curve().is_none())?;
+    Some(response.forecast_s()).filter(|told_s| *told_s > 0.0)
 }
 
 /// Whether a neighbour with steps of `step_s` seconds has to live at one pace with a body that makes steps of `dt`: they are linked, hold

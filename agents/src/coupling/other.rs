@@ -17,7 +17,7 @@ pub use astray::Astray;
 
 use super::sprung::Lean;
 use super::{Exchange, Form, Twist};
-use crate::{AgentId, Body, Inertia, Neighbour, Surroundings, ToolState};
+use crate::{AgentId, Body, ImpulseResponse, Inertia, Neighbour, Surroundings, ToolState};
 use glam::{DQuat, DVec3};
 use lying::Lying;
 pub(super) use motion::turned;
@@ -245,13 +245,15 @@ impl Other {
         &mut self.velocities
     }
 
+    /// The published response of a deformable.
+    pub(super) fn response(&self) -> Option<&dyn ImpulseResponse> {
+        self.neighbour.as_ref().and_then(|n| n.snapshot.inertia.response())
+    }
+
     /// A tube's velocities in slots: nodes as published, segments as its inertia tells.
     fn interleave(&mut self, nodes: &[DVec3]) {
-        let neighbour = self.neighbour.as_ref();
-        let spins = match neighbour.map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Curve(curve)) => &curve.spins[..],
-            _ => &[],
-        };
+        let response = self.neighbour.as_ref().and_then(|n| n.snapshot.inertia.response());
+        let spins = response.and_then(|response| response.curve()).map_or(&[][..], |curve| curve.spins());
         for (k, v) in nodes.iter().enumerate() {
             self.velocities.push(*v);
             if k + 1 < nodes.len() {

@@ -7,11 +7,11 @@
 
 use super::ToolSpec;
 use crate::coupling::{FormKind, SolidForm};
-use crate::{AgentId, Anchor, Body, Clasp, CurveState, Grasp, Neighbour, RigidState, SoftState, Surroundings};
+use crate::{
+    AgentId, Anchor, Body, Clasp, CurveState, GRASP_BELOW, Grasp, Neighbour, RigidState, SoftState, Surroundings,
+};
 use glam::{DQuat, DVec3};
 
-/// Jaws that pass below this opening grasp.
-pub(crate) const GRASP_BELOW: f64 = 0.2;
 /// Jaws that pass above this opening let go.
 pub(super) const RELEASE_ABOVE: f64 = 0.3;
 /// The hold reaches its full stiffness in this time, seconds: the tube is not torn to the tip at once.

@@ -13,7 +13,6 @@ mod script;
 mod spec;
 mod tool;
 
-pub(crate) use jaws::GRASP_BELOW;
 pub use spec::{Keyframe, ToolError, ToolSpec};
 pub use tool::Instrument;
 

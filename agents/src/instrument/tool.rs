@@ -8,15 +8,15 @@
 
 use super::drive::{Drive, Led};
 use super::felt::Felt;
-use super::jaws::{GRASP_BELOW, Jaws, let_in, nearest};
+use super::jaws::{Jaws, let_in, nearest};
 use super::script::{Pose, Script};
 use super::spec::REACH_MAX_M;
 use super::{ToolError, ToolSpec};
 use crate::coupling::{Form, FormKind, Knock, Placed, View, beside};
 use crate::shape::ToolShape;
 use crate::{
-    Agent, AgentId, Anchor, Body, Bounds, Neighbour, Pull, Resolution, SimSpan, Snapshot, StepError, StepReport,
-    Surroundings, ToolState, check_span,
+    Agent, AgentId, Anchor, Body, Bounds, GRASP_BELOW, Neighbour, Pull, Resolution, SimSpan, Snapshot, StepError,
+    StepReport, Surroundings, ToolState, check_span,
 };
 use glam::{DQuat, DVec3};
 use std::fmt;

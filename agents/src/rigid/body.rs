@@ -26,6 +26,7 @@ use crate::{
     StepError, StepReport, Surroundings, Tips, check_span,
 };
 use glam::DVec3;
+use std::any::Any;
 use std::sync::Arc;
 
 /// A rigid body that lives by its own steps.
@@ -377,7 +378,7 @@ impl Agent for RigidBody {
         Some(self.company.form.clone())
     }
 
-    fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
+    fn island_body(&mut self) -> Option<&mut dyn Any> {
         Some(self)
     }
 

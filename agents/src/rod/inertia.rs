@@ -6,6 +6,7 @@ use super::band::Factor;
 use super::config::Matter;
 use super::contact::respond;
 use crate::coupling::{Carried, Foot, Lies};
+use crate::{CurveResponse, ImpulseResponse};
 use glam::DVec3;
 
 /// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
@@ -47,51 +48,26 @@ impl CurveInertia {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
-    /// Where it lies.
-    pub(crate) fn feet(&self) -> &[Foot] {
-        self.standing.feet()
-    }
-
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
-    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
-        self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
-    }
-
     /// Takes over what the tube weighs.
     pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();
         self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));
     }
+}
 
-    /// What is on its way changes by how much how each slot accelerates in the step that is foretold: `changed` are the velocities that
-    /// it adds when that step begins, and `carried` how far it has moved the tube by then, divided by that step, m/s. The answer goes to
-    /// `changed`, m/s² (docs/theory/soft.md, eq. 16e).
-    pub(crate) fn take_back(&self, borne: bool, changed: &mut [DVec3], carried: &mut [DVec3]) {
-        let damped = self.ahead_s * self.damping_per_s;
-        for (v, c) in changed.iter_mut().zip(&mut *carried) {
-            let both = *v + *c;
-            *v = both + *c * damped;
-            *c = both;
-        }
-        self.momenta(changed);
-        self.respond(changed, borne);
-        changed.iter_mut().zip(carried).for_each(|(v, both)| *v = (*v - *both) / self.ahead_s);
-    }
-
-    /// Turns velocities in slots into momenta (docs/theory/rod.md, eq. 11).
-    pub(crate) fn momenta(&self, list: &mut [DVec3]) {
-        momenta((self.mu, self.rotary), self.segments.iter().copied(), list);
-    }
-
-    /// How many slots it knows: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.
-    #[must_use]
-    pub fn slots(&self) -> usize {
+impl ImpulseResponse for CurveInertia {
+    /// Node k is slot 2k, segment k slot 2k + 1.
+    fn slots(&self) -> usize {
         self.factor.slots()
     }
 
-    /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
-    pub(crate) fn scale(&self, into: &mut Vec<f64>) {
+    fn respond(&self, impulses: &mut [DVec3], supported: bool) {
+        assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
+        respond((self.standing.factor().filter(|_| supported).unwrap_or(&self.factor), self.held), impulses);
+    }
+
+    fn append_mobilities(&self, into: &mut Vec<f64>) {
         let first = into.len();
         into.extend(self.factor.scales());
         for (end, slot) in [(0, first), (1, into.len() - 1)] {
@@ -101,14 +77,51 @@ impl CurveInertia {
         }
     }
 
-    /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s), with what it lies on, where that
-    /// has `borne` them, or without.
-    ///
-    /// # Panics
-    /// Where there are not as many as [`Self::slots`].
-    pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
-        assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        respond((self.standing.factor().filter(|_| borne).unwrap_or(&self.factor), self.held), impulses);
+    fn accelerations(&self, supported: bool) -> &[DVec3] {
+        self.standing.accelerations().filter(|_| supported).unwrap_or(&self.accelerations)
+    }
+
+    fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    fn forecast_s(&self) -> f64 {
+        self.ahead_s
+    }
+
+    /// Damping acts on what has been carried; elastic forces on the sum (docs/theory/soft.md, eq. 16e).
+    fn elastic_change(&self, supported: bool, changed: &mut [DVec3], carried: &mut Vec<DVec3>) {
+        let damped = self.ahead_s * self.damping_per_s;
+        for (v, c) in changed.iter_mut().zip(&mut *carried) {
+            let both = *v + *c;
+            *v = both + *c * damped;
+            *c = both;
+        }
+        CurveResponse::momenta(self, changed);
+        self.respond(changed, supported);
+        changed.iter_mut().zip(carried).for_each(|(v, both)| *v = (*v - *both) / self.ahead_s);
+    }
+
+    fn supports(&self) -> &[Foot] {
+        self.standing.feet()
+    }
+
+    fn curve(&self) -> Option<&dyn CurveResponse> {
+        Some(self)
+    }
+
+    fn boxed_clone(&self) -> Box<dyn ImpulseResponse> {
+        Box::new(self.clone())
+    }
+}
+
+impl CurveResponse for CurveInertia {
+    fn spins(&self) -> &[DVec3] {
+        &self.spins
+    }
+
+    fn momenta(&self, velocities: &mut [DVec3]) {
+        momenta((self.mu, self.rotary), self.segments.iter().copied(), velocities);
     }
 }
 

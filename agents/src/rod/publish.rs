@@ -3,6 +3,7 @@
 //! In: a tube between two steps. Out: its curve, and what others need to touch it. Never here: any change of its state.
 
 use super::config::Config;
+use super::inertia::CurveInertia;
 use super::residual;
 use super::tube::Tube;
 use crate::{Bounds, Inertia, Snapshot};
@@ -50,7 +51,7 @@ impl Tube {
         let company = &self.stepper.company;
         if company.is_watched() || self.steps == 0 {
             into.acceleration = if self.steps == 0 { self.spec.gravity } else { self.acceleration };
-            let inertia = into.inertia.curve_mut();
+            let inertia = into.inertia.response_mut::<CurveInertia>();
             let (answer, lies) = self.stepper.told();
             inertia.copy_from(answer, self.matter.held, &self.now.u);
             inertia.stand(lies, &self.standing_accelerations);

@@ -3,6 +3,7 @@
 //! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::system::Factor;
+use crate::ImpulseResponse;
 use crate::coupling::{Carried, Foot, Lies};
 use glam::DVec3;
 
@@ -35,45 +36,49 @@ impl SoftInertia {
     pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
+}
 
-    /// Where it lies.
-    pub(crate) fn feet(&self) -> &[Foot] {
-        self.standing.feet()
-    }
-
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
-    pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
-        self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
-    }
-
-    /// How many slots it knows: one a vertex; zero before the first step.
-    #[must_use]
-    pub const fn slots(&self) -> usize {
+impl ImpulseResponse for SoftInertia {
+    /// One a vertex.
+    fn slots(&self) -> usize {
         self.factor.vertices()
     }
 
-    /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
-    pub(crate) fn scale(&self, into: &mut Vec<f64>) {
+    fn respond(&self, impulses: &mut [DVec3], supported: bool) {
+        assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
+        self.standing.factor().filter(|_| supported).unwrap_or(&self.factor).respond(impulses);
+    }
+
+    fn append_mobilities(&self, into: &mut Vec<f64>) {
         into.extend_from_slice(&self.mobilities);
     }
 
-    /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), change of its acceleration in the step
-    /// that comes, m/s²: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
-    pub(crate) fn take_back(&self, borne: bool, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
-        room.clear();
-        room.extend(shares.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
-        self.respond(room, borne);
-        let damped = 2.0 + self.span_s * self.damping_per_s;
-        shares.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
+    fn accelerations(&self, supported: bool) -> &[DVec3] {
+        self.standing.accelerations().filter(|_| supported).unwrap_or(&self.accelerations)
     }
 
-    /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s), with what it lies on, where that has `borne` them,
-    /// or without.
-    ///
-    /// # Panics
-    /// Where there are not as many as [`Self::slots`].
-    pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
-        assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
-        self.standing.factor().filter(|_| borne).unwrap_or(&self.factor).respond(impulses);
+    fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    fn forecast_s(&self) -> f64 {
+        self.span_s
+    }
+
+    /// Elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
+    fn elastic_change(&self, supported: bool, changed: &mut [DVec3], room: &mut Vec<DVec3>) {
+        room.clear();
+        room.extend(changed.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
+        self.respond(room, supported);
+        let damped = 2.0 + self.span_s * self.damping_per_s;
+        changed.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
+    }
+
+    fn supports(&self) -> &[Foot] {
+        self.standing.feet()
+    }
+
+    fn boxed_clone(&self) -> Box<dyn ImpulseResponse> {
+        Box::new(self.clone())
     }
 }

@@ -3,6 +3,7 @@
 //! In: a body between two steps. Out: its vertices, and what others need to touch it. Never here: any change of its state.
 
 use super::body::SoftBody;
+use super::inertia::SoftInertia;
 use crate::{Inertia, Snapshot};
 
 impl SoftBody {
@@ -22,7 +23,7 @@ impl SoftBody {
         soft.positions.clone_from(&self.positions);
         soft.velocities.clone_from(&self.velocities);
         if self.company.is_watched() && self.steps > 0 {
-            let inertia = into.inertia.soft_mut();
+            let inertia = into.inertia.response_mut::<SoftInertia>();
             let (answer, lies) = self.footing.told(self.system.answer());
             inertia.copy_from(answer, &self.contacts.mobilities);
             inertia.stand(lies, &self.foretold.standing);

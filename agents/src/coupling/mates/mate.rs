@@ -334,8 +334,9 @@ impl Mate {
                 let trace = (0..3).map(|i| inverse_inertia.col(i)[i]).sum::<f64>();
                 mobilities.extend([*inverse_mass, trace / 3.0]);
             }
-            Some(Inertia::Curve(curve)) if curve.slots() == self.slots.1 => curve.scale(mobilities),
-            Some(Inertia::Soft(soft)) if soft.slots() == self.slots.1 => soft.scale(mobilities),
+            Some(Inertia::Deformable(response)) if response.slots() == self.slots.1 => {
+                response.append_mobilities(mobilities);
+            }
             _ => mobilities.extend(std::iter::repeat_n(0.0, self.slots.1)),
         }
         mobilities[from..].iter_mut().for_each(|mobility| *mobility *= self.split);

@@ -56,8 +56,9 @@ impl Other {
                     impulses[1] = DVec3::ZERO;
                 }
             }
-            Some(Inertia::Curve(curve)) if curve.slots() == impulses.len() => curve.respond(impulses, self.borne),
-            Some(Inertia::Soft(soft)) if soft.slots() == impulses.len() => soft.respond(impulses, self.borne),
+            Some(Inertia::Deformable(response)) if response.slots() == impulses.len() => {
+                response.respond(impulses, self.borne);
+            }
             _ => impulses.fill(DVec3::ZERO),
         }
     }

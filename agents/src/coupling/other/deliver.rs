@@ -89,21 +89,16 @@ impl Other {
     pub(super) fn foretold_s(&self) -> Option<f64> {
         let slots = self.velocities.len();
         let inertia = self.neighbour.as_ref().map(|n| &n.snapshot.inertia).filter(|_| !self.held);
-        let step_s = match inertia {
-            Some(Inertia::Soft(soft)) if soft.slots() == slots => soft.span_s,
-            Some(Inertia::Curve(curve)) if curve.slots() == slots => curve.ahead_s,
-            _ => return None,
-        };
+        let response = inertia.and_then(Inertia::response).filter(|response| response.slots() == slots)?;
+        let step_s = response.forecast_s();
         (step_s > 0.0).then_some(step_s)
     }
 
     /// What is on its way, `changed` as velocities that have `carried` it so far, both one a slot as shares of the step that it foretells,
     /// changes of how it accelerates in that step, m/s², which goes to `changed`.
     pub(super) fn find_change(&self, changed: &mut [DVec3], carried: &mut Vec<DVec3>) {
-        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Soft(soft)) => soft.take_back(self.borne, changed, carried),
-            Some(Inertia::Curve(curve)) => curve.take_back(self.borne, changed, carried),
-            _ => {}
+        if let Some(response) = self.response() {
+            response.elastic_change(self.borne, changed, carried);
         }
     }
 

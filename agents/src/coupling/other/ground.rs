@@ -110,11 +110,7 @@ impl Other {
 
     /// Where it lies, if it bends.
     pub(super) fn feet(&self) -> &[Foot] {
-        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Curve(curve)) => curve.feet(),
-            Some(Inertia::Soft(soft)) => soft.feet(),
-            _ => &[],
-        }
+        self.response().map_or(&[], |response| response.supports())
     }
 
     /// Begins a solve: what it stands on is taken to carry all that presses it (eq. 7a), and where `tips`, the feet over which it tips to

@@ -4,8 +4,8 @@
 //! Never here: the spring. Theory: docs/theory/coupling.md, eq. 9a; soft.md, eq. 16f, 16h.
 
 use super::Other;
+use crate::Anchor;
 use crate::coupling::Place;
-use crate::{Anchor, Inertia};
 use glam::DVec3;
 
 impl Other {
@@ -34,23 +34,20 @@ impl Other {
         into.clear();
         into.extend((0..self.velocities().len()).map(|slot| self.acceleration_of(slot) * h));
         let parts = f64::from(self.parts(h));
-        let (curve, lasts) = match (self.neighbour.as_ref().map(|n| &n.snapshot.inertia), lasts) {
-            (Some(Inertia::Curve(curve)), Some(lasts)) if parts > 1.0 && curve.slots() == into.len() && !self.held => {
-                (curve, lasts)
-            }
-            _ => {
-                into.iter_mut().for_each(|gain| *gain *= 0.5);
-                return self.spring_back(h, lasts, [into, room]);
-            }
+        let response = self.response().filter(|r| parts > 1.0 && r.slots() == into.len() && !self.held);
+        let curve = response.and_then(|response| Some((response, response.curve()?)));
+        let Some(((response, curve), lasts)) = curve.zip(lasts) else {
+            into.iter_mut().for_each(|gain| *gain *= 0.5);
+            return self.spring_back(h, lasts, [into, room]);
         };
         // in steps of its own what is free of both only comes so far
         room.clear();
         room.resize(into.len(), DVec3::ZERO);
         room.iter_mut().zip(lasts).for_each(|(free, lasts)| *free = *lasts * h);
-        curve.respond(room, self.borne);
+        response.respond(room, self.borne);
         room.iter_mut().zip(&*into).for_each(|(free, gain)| *free += *gain);
         curve.momenta(room);
-        curve.respond(room, self.borne);
+        response.respond(room, self.borne);
         let (late, reckoned) = (0.5 * (parts - 1.0) / parts, self.reckoned_s() / h);
         into.iter_mut().zip(&*room).for_each(|(gain, free)| *gain -= *gain * reckoned + *free * late);
     }
@@ -103,10 +100,6 @@ impl Other {
 
     /// By how much the velocities of a tube or soft body are reckoned ahead, seconds of its acceleration.
     pub(super) fn reckoned_s(&self) -> f64 {
-        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Curve(curve)) => 0.5 * curve.span_s,
-            Some(Inertia::Soft(soft)) => 0.5 * soft.span_s,
-            _ => 0.0,
-        }
+        self.response().map_or(0.0, |response| 0.5 * response.span_s())
     }
 }

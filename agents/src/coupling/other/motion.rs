@@ -38,12 +38,9 @@ impl Other {
     pub fn acceleration_of(&self, slot: usize) -> DVec3 {
         let slots = self.velocities.len();
         let changed = || self.taken_back.get(slot).copied().unwrap_or_default();
-        match self.neighbour.as_ref().map(|n| &n.snapshot.inertia) {
-            Some(Inertia::Curve(curve)) if !self.held && curve.accelerations.len() == slots => {
-                curve.foretold(self.borne)[slot] + changed()
-            }
-            Some(Inertia::Soft(soft)) if !self.held && soft.accelerations.len() == slots => {
-                soft.foretold(self.borne)[slot] + changed()
+        match self.response() {
+            Some(response) if !self.held && response.accelerations(false).len() == slots => {
+                response.accelerations(self.borne)[slot] + changed()
             }
             _ if slot.is_multiple_of(self.stride()) => self.acceleration(),
             _ => DVec3::ZERO,

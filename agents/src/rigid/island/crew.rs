@@ -20,7 +20,7 @@ impl<'a, 'c> Crew<'a, 'c> {
         around: &'a Surroundings<'a>,
         others: &'a mut [Companion<'c>],
     ) -> Result<Self, StepError> {
-        if others.iter_mut().all(|other| other.agent.rigid_mut().is_some()) {
+        if others.iter_mut().all(|other| rigid(other).is_some()) {
             Ok(Self { leader, around, others })
         } else {
             Err(StepError::Alone { model: "rigid" })
@@ -43,7 +43,13 @@ impl<'a, 'c> Crew<'a, 'c> {
             return (self.leader, self.around);
         }
         let other = &mut self.others[seat - 1];
-        let body = other.agent.rigid_mut().expect("every companion was found to be rigid");
-        (body, &other.around)
+        let around = &other.around;
+        let body = other.agent.island_body().and_then(|body| body.downcast_mut());
+        (body.expect("every companion was found to be rigid"), around)
     }
+}
+
+/// The rigid body of a companion, if it is one.
+fn rigid<'a>(other: &'a mut Companion<'_>) -> Option<&'a mut RigidBody> {
+    other.agent.island_body()?.downcast_mut()
 }

@@ -6,7 +6,7 @@ use crate::coupling::beside::leaves_behind;
 use crate::coupling::harness::{Faults, Stage};
 use crate::coupling::{Law, Link};
 use crate::soft::SoftInertia;
-use crate::{Anchor, Inertia, Neighbour};
+use crate::{Anchor, ImpulseResponse, Neighbour};
 use std::sync::Arc;
 
 const BALL: SoftShape = SoftShape::Ball { radius_m: 0.035, segments: 4 };
@@ -15,17 +15,15 @@ const BALL: SoftShape = SoftShape::Ball { radius_m: 0.035, segments: 4 };
 fn another(owned: bool, told_s: f64) -> Neighbour {
     let mut snapshot = Snapshot::default();
     snapshot.body.soft_mut();
-    snapshot.inertia.soft_mut().span_s = told_s;
+    snapshot.inertia.response_mut::<SoftInertia>().span_s = told_s;
     Neighbour { owned, step_s: 1.0 / 60.0, ..Neighbour::seen(AgentId(1), Arc::new(snapshot)) }
 }
 
 fn told(body: &SoftBody) -> SoftInertia {
     let mut snapshot = Snapshot::default();
     body.write_snapshot(&mut snapshot);
-    match snapshot.inertia {
-        Inertia::Soft(told) => told,
-        other => panic!("{other:?}"),
-    }
+    assert!(snapshot.inertia.response().is_some(), "{:?}", snapshot.inertia);
+    std::mem::take(snapshot.inertia.response_mut())
 }
 
 /// One of 16 parts answered a blow as free vertices do, for the whole step in which it was not known.

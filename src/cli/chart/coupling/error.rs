@@ -221,7 +221,7 @@ fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
 /// A tube moved by what others gave it since they did.
 fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
     let mut body = member.snapshot.body.clone();
-    let (Body::Curve(state), Inertia::Curve(inertia)) = (&mut body, &member.snapshot.inertia) else { return body };
+    let (Body::Curve(state), Some(inertia)) = (&mut body, member.snapshot.inertia.response()) else { return body };
     let mut carried = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
     on_their_way(member, members, |_, site, _, moved| {
         let Site::Arc(arc_m) = site else { return };

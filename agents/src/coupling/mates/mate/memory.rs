@@ -6,7 +6,7 @@
 use super::super::tanks::Tanks;
 use super::Mate;
 use crate::coupling::{Exchange, PUSH_OUT_SHARE};
-use crate::{Inertia, Neighbour, SimTime, Surroundings};
+use crate::{Neighbour, SimTime, Surroundings};
 use glam::DVec3;
 
 /// The share of the way that a place came from where friction holds it that is taken back in a step, or in one of the other's where that
@@ -18,7 +18,8 @@ impl Mate {
     /// and what it was given.
     pub fn recall(&mut self, tanks: &mut Tanks, (now, dt): (SimTime, f64)) {
         // a tube that is ahead of who owns it, or linked to it, takes what it is given in blows (rod/horizon.rs)
-        let blows = |n: &Neighbour| matches!(&n.snapshot.inertia, Inertia::Curve(curve) if curve.ahead_s == 0.0);
+        let blows =
+            |n: &Neighbour| n.snapshot.inertia.response().is_some_and(|r| r.curve().is_some() && r.forecast_s() == 0.0);
         self.evenly = !self.other.neighbour().is_some_and(blows);
         if self.evenly {
             self.look_back(tanks, (now, dt));

@@ -6,7 +6,7 @@ use crate::coupling::harness::{Faults, Stage};
 use crate::coupling::{Law, Link, Site, acknowledged};
 use crate::rod::{Tube, TubeSpec};
 use crate::shape::Solid;
-use crate::{AgentId, Anchor, Body, Inertia, Neighbour, Snapshot};
+use crate::{AgentId, Anchor, Body, Neighbour, Snapshot};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
@@ -116,7 +116,9 @@ fn a_tube_lies_over_an_immovable_bar_at_any_rates() {
 fn with_mail(stage: &Stage, tube: AgentId, owner: AgentId) -> f64 {
     let snapshot = stage.newest(tube);
     let Body::Curve(curve) = &snapshot.body else { panic!("a tube") };
-    let Inertia::Curve(inertia) = &snapshot.inertia else { return snapshot.energy_j };
+    let response = snapshot.inertia.response();
+    let known = response.and_then(|response| Some((response, response.curve()?.spins())));
+    let Some((inertia, spins)) = known else { return snapshot.energy_j };
     let mut impulses = vec![DVec3::ZERO; inertia.slots()];
     let seen = Neighbour::seen(tube, Arc::new(snapshot.clone()));
     for ledger in stage.newest(owner).given.iter().filter(|ledger| ledger.with == tube) {
@@ -130,8 +132,7 @@ fn with_mail(stage: &Stage, tube: AgentId, owner: AgentId) -> f64 {
     }
     let mut answer = impulses.clone();
     inertia.respond(&mut answer, false);
-    let velocity =
-        |slot: usize| if slot.is_multiple_of(2) { curve.velocities[slot / 2] } else { inertia.spins[slot / 2] };
+    let velocity = |slot: usize| if slot.is_multiple_of(2) { curve.velocities[slot / 2] } else { spins[slot / 2] };
     let work = impulses.iter().zip(&answer).enumerate().map(|(slot, (j, dv))| j.dot(velocity(slot) + *dv * 0.5));
     snapshot.energy_j + work.sum::<f64>()
 }

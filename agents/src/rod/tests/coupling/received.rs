@@ -2,8 +2,8 @@
 
 use super::super::{Random, free_tube, millis, reference_spec, run};
 use crate::coupling::{Impulse, Ledger, Site};
-use crate::rod::{Tube, TubeSpec};
-use crate::{Agent, AgentId, Neighbour, Resolution, SimTime, Snapshot, Surroundings};
+use crate::rod::{CurveInertia, Tube, TubeSpec};
+use crate::{Agent, AgentId, ImpulseResponse, Neighbour, Resolution, SimTime, Snapshot, Surroundings};
 use glam::DVec3;
 use std::sync::Arc;
 
@@ -102,7 +102,7 @@ fn the_published_inertia_is_the_inverse_mass_of_every_point() {
     }
     let mut snapshot = Snapshot::default();
     tube.write_snapshot(&mut snapshot);
-    let curve = snapshot.inertia.curve_mut();
+    let curve = snapshot.inertia.response_mut::<CurveInertia>();
     for arc_m in [0.0, 0.02, 0.31, 0.5, 0.77, 1.0] {
         let (segment, share) = tube.division().locate(arc_m);
         let want = tube.inverse_mass(arc_m).unwrap();
