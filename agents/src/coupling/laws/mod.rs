@@ -5,6 +5,8 @@
 
 mod penalty;
 mod tlm;
+mod wave;
 
 pub use penalty::push_off_n;
-pub use tlm::{Drawn, End, Line, Wave};
+pub use tlm::{Drawn, End, Line};
+pub use wave::Wave;

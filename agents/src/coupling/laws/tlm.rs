@@ -7,23 +7,11 @@
 //! has f = Z v + c. Z = k T, so the line has the mass k T² of its own. What was sent is published as its integral over time:
 //! readings that are lost or made twice take and repeat nothing, and means over a step only dissipate.
 
+use super::Wave;
 use crate::coupling::beside::MEETS_S;
 use crate::{SimSpan, SimTime};
 use glam::{DMat3, DVec3};
 use std::collections::VecDeque;
-
-/// What one end publishes.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
-pub struct Wave {
-    /// ∫ w dt since the run began, N·s.
-    pub sent: DVec3,
-    /// The delay of the line, seconds; zero as long as the owner of the pair has not chosen it.
-    pub delay_s: f64,
-    /// From this end to the other one when the line was made, metres; zero for a line of a contact.
-    pub start: DVec3,
-    /// From when on both ends feel how far the link was stretched when it was made.
-    pub since: SimTime,
-}
 
 /// One end of a link during a step.
 #[derive(Debug, Clone, Copy)]

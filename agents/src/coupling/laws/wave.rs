@@ -1,0 +1,17 @@
+//! What one end of a transmission line publishes (docs/theory/coupling.md, eq. 10).
+
+use crate::SimTime;
+use glam::DVec3;
+
+/// What one end publishes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Wave {
+    /// ∫ w dt since the run began, N·s.
+    pub sent: DVec3,
+    /// The delay of the line, seconds; zero as long as the owner of the pair has not chosen it.
+    pub delay_s: f64,
+    /// From this end to the other one when the line was made, metres; zero for a line of a contact.
+    pub start: DVec3,
+    /// From when on both ends feel how far the link was stretched when it was made.
+    pub since: SimTime,
+}

@@ -1,0 +1,73 @@
+//! What a step took, and why one is refused or given up.
+
+use crate::SimSpan;
+
+/// What a step took and what it led to.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StepReport {
+    /// Work done, in the model's unit: a declared machine gives its price in seconds.
+    /// Tube: segments × systems solved: one a substep, more where its rule iterates, and those of its own error estimate. Rigid, instrument: 1. Synthetic: its declared microseconds.
+    pub work: f64,
+    /// Into how many substeps the step was divided, ≥ 1.
+    pub substeps: u32,
+    /// Whether the agent could sleep: it has not moved for a while and nothing acts on it.
+    pub at_rest: bool,
+}
+
+/// Why a step was refused, or given up.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum StepError {
+    /// The span was zero, or longer than the model can take. State: untouched.
+    #[error("step span is {dt_s} s; it must be above zero and at most {max_s} s")]
+    BadSpan {
+        /// The span asked for, in seconds.
+        dt_s: f64,
+        /// The longest span the model takes, in seconds.
+        max_s: f64,
+    },
+    /// The state stopped being finite. The agent must not step again; its last snapshot stands.
+    #[error("the state of this {model} is no longer finite after a step of {dt_s} s: {what}")]
+    Diverged {
+        /// The model's name.
+        model: &'static str,
+        /// The span of the failed step, in seconds.
+        dt_s: f64,
+        /// The quantity that was lost first, and where.
+        what: String,
+    },
+    /// The substeps are too long for the integrator. State: untouched.
+    #[error(
+        "a substep of {substep_s:.2e} s is too long for {integrator}, which carries at most {limit_s:.2e} s with the {segments} segments of this {model}: give it more substeps or a shorter step, fewer segments, or an implicit integrator"
+    )]
+    Unstable {
+        /// The model's name.
+        model: &'static str,
+        /// The integrator's name.
+        integrator: &'static str,
+        /// How finely the body is divided.
+        segments: usize,
+        /// The substep that the step would have, in seconds.
+        substep_s: f64,
+        /// The longest that the integrator carries, in seconds.
+        limit_s: f64,
+    },
+    /// The model cannot step others in its world. State: untouched.
+    #[error("a {model} has no world that others could share")]
+    Alone {
+        /// The model's name.
+        model: &'static str,
+    },
+}
+
+/// The longest step any model takes, in seconds: past it a real-time agent has lost touch with its scene.
+pub const DT_MAX_S: f64 = 1.0;
+
+/// The length of `dt` in seconds, if a model may step by it.
+///
+/// # Errors
+/// [`StepError::BadSpan`] for zero and for more than [`DT_MAX_S`].
+pub fn check_span(dt: SimSpan) -> Result<f64, StepError> {
+    let dt_s = dt.as_secs_f64();
+    if dt_s > 0.0 && dt_s <= DT_MAX_S { Ok(dt_s) } else { Err(StepError::BadSpan { dt_s, max_s: DT_MAX_S }) }
+}
