@@ -2,8 +2,8 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use metachron::runtime::{AgentSpawn, Drive, Pool, Priority, Run, SystemClock};
-use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
-use metachron_agents::{N_MAX, Resolution, ResolutionRange};
+use metachron_core::{N_MAX, Resolution, ResolutionRange};
+use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -2,8 +2,10 @@
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use glam::DVec3;
-use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
-use metachron_agents::{Agent, AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, SimTime, Surroundings};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange, SimSpan, SimTime};
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Material, Section, TubeSpec};
 
 /// A tube of a metre that hangs from one end and swings.
 fn tube(segments: usize) -> Tube {

@@ -4,7 +4,7 @@
 //! Nothing is measured: a frame takes setup + fill + c · triangles, so every run gives the same numbers on any computer.
 
 use metachron::control::{FrameWork, Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Status};
-use metachron_agents::{AgentId, ResolutionRange};
+use metachron_core::{AgentId, ResolutionRange};
 use plotters::prelude::*;
 use plotters::style::register_font;
 use std::error::Error;

@@ -12,7 +12,7 @@ use metachron::compositor::{Camera, Gpu, Hit, Picture, Ray};
 use metachron::frame::{Session, WindowFailure, WindowPlan, play_in_window};
 use metachron::runtime::AgentState;
 use metachron::scene::{self, Source};
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};

@@ -16,8 +16,8 @@ use crate::frame::{
 use crate::runtime::{AgentState, Spread};
 use crate::scene::Scene;
 use crate::scene::format::ExecutorKind;
-use metachron_agents::AgentId;
 use metachron_budget::Bound;
+use metachron_core::AgentId;
 use std::path::PathBuf;
 
 /// Told of every frame; answers whether to go on.
@@ -248,7 +248,7 @@ fn oracle_report(scene: &Scene, oracle: &Oracle) -> OracleReport {
 }
 
 fn probe(probe: &ProbeOutcome) -> ProbeReport {
-    let row = |&(time, at): &(metachron_agents::SimTime, glam::DVec3)| [time.as_secs_f64(), at.x, at.y, at.z];
+    let row = |&(time, at): &(metachron_core::SimTime, glam::DVec3)| [time.as_secs_f64(), at.x, at.y, at.z];
     ProbeReport {
         object: probe.object.clone(),
         at: probe.at,

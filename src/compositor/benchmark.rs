@@ -11,8 +11,8 @@ use super::offscreen::{Gpu, GpuError, Offscreen};
 use super::picture::Style;
 use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
-use metachron_agents::shape::{Generator, Model, Pattern, Placement, Tom, generate};
-use metachron_agents::{AgentId, Resolution, SimTime};
+use metachron_core::{AgentId, Resolution, SimTime};
+use metachron_geometry::{Generator, Model, Pattern, Placement, Tom, generate};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 

@@ -14,8 +14,8 @@ use super::skin::{ROPE_LEVEL, SkinRoom, SkinWish, curve_of_rope, drawn_radius_m}
 use super::solids::{Solids, add_prop, add_solid, kind, sort_solids};
 use super::view::Camera;
 use glam::{DQuat, DVec3, Vec3};
-use metachron_agents::shape::{Primitive, Rounding, SkinFrame};
-use metachron_agents::{AgentId, Anchor, Body, Resolution};
+use metachron_core::{AgentId, Anchor, Body, Resolution};
+use metachron_geometry::{Primitive, Rounding, SkinFrame};
 use std::f64::consts::TAU;
 
 /// Repeats of the skin's texture around a tube; the shader has the same number.
@@ -313,7 +313,7 @@ mod tests {
     use super::super::gather::{Actor, States};
     use super::super::view::Size;
     use super::*;
-    use metachron_agents::{CurveState, SimTime, Snapshot};
+    use metachron_core::{CurveState, SimTime, Snapshot};
     use std::sync::Arc;
 
     const SIZE: Size = Size { width: 640, height: 360 };

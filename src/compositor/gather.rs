@@ -10,11 +10,11 @@ use super::pose;
 use super::survey::Seen;
 use super::view::{Camera, Size};
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::SurfaceForm;
-use metachron_agents::shape::{
+use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
+use metachron_geometry::SurfaceForm;
+use metachron_geometry::{
     Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
 };
-use metachron_agents::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
 use std::sync::Arc;
 
 /// Which states a frame shows.

@@ -7,7 +7,7 @@
 //! its triangles on its way, more than were asked for: as long as the frame's allowance lasts, then it jumps.
 
 use super::picture::MeshKey;
-use metachron_agents::shape::{Cut, Tom};
+use metachron_geometry::{Cut, Tom};
 
 /// What gliding may cost in a frame.
 #[derive(Debug, Clone, Copy)]
@@ -87,7 +87,7 @@ impl Glide {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_agents::shape::{Generator, generate};
+    use metachron_geometry::{Generator, generate};
 
     fn tom() -> Tom {
         Tom::new(&generate(Generator::Blob, 1, 2000)).unwrap()

@@ -2,7 +2,7 @@
 //!
 //! In: what a policy asks for. Out: numbers that [`super::Stage::compose`] draws at. Never here: which level is right.
 
-use metachron_agents::{N_MAX, Resolution};
+use metachron_core::{N_MAX, Resolution};
 
 /// How the light on a surface is worked out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]

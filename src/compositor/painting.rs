@@ -5,8 +5,8 @@
 use super::compose::Paint;
 use super::gather::Stage;
 use super::level::Shading;
-use metachron_agents::AgentId;
-use metachron_agents::shape::{Texture, Wrap};
+use metachron_core::AgentId;
+use metachron_geometry::{Texture, Wrap};
 use std::sync::Arc;
 
 /// The texture of one actor.

@@ -5,9 +5,9 @@
 use super::gather::{Form, Stage, Track};
 use super::view::Ray;
 use glam::{DQuat, DVec3, Vec3};
-use metachron_agents::coupling::SurfaceForm;
-use metachron_agents::shape::{Primitive, PrimitiveMesh, Rounding, Solid, ToolShape};
-use metachron_agents::{AgentId, Anchor, Body, CurveState, SoftState, ToolState};
+use metachron_core::{AgentId, Anchor, Body, CurveState, SoftState, ToolState};
+use metachron_geometry::SurfaceForm;
+use metachron_geometry::{Primitive, PrimitiveMesh, Rounding, Solid, ToolShape};
 
 /// What a ray hit.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -156,7 +156,7 @@ fn hit_mesh(mesh: &PrimitiveMesh, size: Rounding, ray: Ray) -> Option<f64> {
 mod tests {
     use super::super::gather::{Actor, Look, Material, States};
     use super::*;
-    use metachron_agents::{RigidState, SimTime, Snapshot};
+    use metachron_core::{RigidState, SimTime, Snapshot};
     use std::sync::Arc;
 
     fn stage(forms: Vec<(Form, Body)>) -> Stage {

@@ -7,8 +7,8 @@ use super::level::Shading;
 use super::skin::Skins;
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
-use metachron_agents::Resolution;
-use metachron_agents::shape::{Cut, Model, Primitive, PrimitiveMesh, PrimitiveVertex, Texture, patch};
+use metachron_core::Resolution;
+use metachron_geometry::{Cut, Model, Primitive, PrimitiveMesh, PrimitiveVertex, Texture, patch};
 use std::sync::Arc;
 
 /// What colours mean.

@@ -4,7 +4,7 @@
 //! Never here: which snapshots an object has. Curves that were divided anew in between are matched by rest arc length.
 
 use glam::{DQuat, DVec3};
-use metachron_agents::{Body, CurveState, RigidState, SimTime, Snapshot, SoftState, ToolState};
+use metachron_core::{Body, CurveState, RigidState, SimTime, Snapshot, SoftState, ToolState};
 
 /// Past this age states are no longer carried on, seconds: an agent that stopped must not fly apart.
 const BEYOND_MAX_S: f64 = 0.1;

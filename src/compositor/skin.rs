@@ -6,8 +6,8 @@
 use super::level::Shading;
 use super::picture::MeshCorner;
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::SurfaceForm;
-use metachron_agents::{CurveState, SoftState};
+use metachron_core::{CurveState, SoftState};
+use metachron_geometry::SurfaceForm;
 
 /// Level of the patches that a rope is drawn with.
 pub const ROPE_LEVEL: u8 = 2;

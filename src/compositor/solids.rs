@@ -8,8 +8,8 @@ use super::glide::{Allowance, Glide};
 use super::level::{Level, Shading};
 use super::picture::{FloorDraw, MeshKey, Picture, SolidInstance, SolidKind, SolidRun};
 use glam::{DVec3, Vec3};
-use metachron_agents::shape::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
-use metachron_agents::{Body, ToolState};
+use metachron_core::{Body, ToolState};
+use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
 
 /// Level at which fixed solids are drawn.
 const PROP_LEVEL: u8 = 4;

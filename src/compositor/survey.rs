@@ -5,7 +5,7 @@
 use super::gather::{Form, Stage, Track};
 use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
-use metachron_agents::{AgentId, Body, CurveState};
+use metachron_core::{AgentId, Body, CurveState};
 
 /// An actor as the camera sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -152,8 +152,8 @@ fn tube_measures(curve: &CurveState) -> Option<(f64, f64)> {
 mod tests {
     use super::super::gather::{Actor, Look, Material, States};
     use super::*;
-    use metachron_agents::shape::Solid;
-    use metachron_agents::{RigidState, SimTime, Snapshot};
+    use metachron_core::{RigidState, SimTime, Snapshot};
+    use metachron_geometry::Solid;
     use std::sync::Arc;
 
     const SIZE: Size = Size { width: 800, height: 600 };

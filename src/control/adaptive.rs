@@ -12,9 +12,9 @@ use super::hierarchy::leave_out_members;
 use super::ladder::{Ladder, Rung};
 use super::plan::LevelDemand;
 use super::status::Status;
-use metachron_agents::AgentId;
 use metachron_budget::Bound;
 use metachron_budget::adaptive::{Adaptive, Offer, Plan, Settings, Time};
+use metachron_core::AgentId;
 
 /// A weight that moved by less than this, in proportion, is the weight it was: what trembles changes no level.
 const TREMBLE: f64 = 0.05;

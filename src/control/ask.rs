@@ -6,10 +6,10 @@ use super::ladder::{Ladder, Ladders, Rung};
 use super::level;
 use super::plan::{LevelDemand, Seen};
 use super::worth;
-use metachron_agents::Resolution;
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::cost::value::Value;
 use metachron_budget::select::Entry;
+use metachron_core::Resolution;
 
 /// Ticks of a second: costs are whole nanoseconds.
 pub(super) const TICKS: f64 = 1e9;

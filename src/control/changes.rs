@@ -3,7 +3,7 @@
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
 use super::plan::{LevelDemand, Seen};
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 
 /// So many frames back a level that returns is a reversal.
 const REMEMBERED: usize = 3;
@@ -50,7 +50,7 @@ mod tests {
     use super::super::level::Span;
     use super::super::view::{Kind, ObjectView, Shading};
     use super::*;
-    use metachron_agents::{Resolution, ResolutionRange};
+    use metachron_core::{Resolution, ResolutionRange};
 
     #[test]
     fn a_level_that_comes_back_is_a_reversal_and_what_was_out_of_sight_is_new() {

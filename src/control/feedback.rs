@@ -10,10 +10,10 @@ use super::plan::{LevelDemand, Seen, steers};
 use super::policy::Law;
 use super::status::Status;
 use super::view::{Kind, ObjectView};
-use metachron_agents::{AgentId, N_MAX, Resolution};
 use metachron_budget::grisoni::{GrisoniLaw, Limits};
 use metachron_budget::log_law::LogLaw;
 use metachron_budget::share::{Share, water_level};
+use metachron_core::{AgentId, N_MAX, Resolution};
 
 /// Intervals of a tube at ε̂ = 1: ε̂ = 40 ε/L.
 const INTERVALS_AT_ONE: f64 = 40.0;

@@ -8,10 +8,10 @@ use super::groups::{Groups, Impostors};
 use super::plan::LevelDemand;
 use super::policy::Policy;
 use super::select;
-use metachron_agents::AgentId;
 use metachron_budget::select::incremental::Keep;
 use metachron_budget::select::tree::{Cut, Node, Tree};
 use metachron_budget::select::{Entry, Level, maciel, mason, mason_flat};
+use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
 /// What these policies remember from frame to frame.
@@ -124,10 +124,10 @@ mod tests {
     use super::super::price::Prices;
     use super::super::view::{Kind, ObjectView};
     use super::*;
-    use metachron_agents::ResolutionRange;
     use metachron_budget::cost::benefit::Sliders;
     use metachron_budget::cost::value::Value;
     use metachron_budget::select::tree_exact::exact;
+    use metachron_core::ResolutionRange;
 
     /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a mesh by itself.
     fn rows() -> Vec<Seen> {

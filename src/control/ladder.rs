@@ -8,9 +8,9 @@ use super::plan::Seen;
 use super::price::Prices;
 use super::view::{Kind, ObjectView, Shading};
 use super::worth;
-use metachron_agents::{AgentId, N_MAX, Resolution, ResolutionRange};
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::hysteresis;
+use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange};
 
 /// Rungs of all objects together, an octave of polygons each: one object may have fine steps, of hundreds each has coarse ones.
 const STEPS: usize = 256;

@@ -4,8 +4,8 @@
 //! Never here: how much there is to share. Theory: `docs/theory/control.md`, eq. 15 and 16.
 
 use super::view::{Kind, ObjectView};
-use metachron_agents::{N_MAX, Resolution, ResolutionRange};
 use metachron_budget::hysteresis::{self, BAND};
+use metachron_core::{N_MAX, Resolution, ResolutionRange};
 use std::f64::consts::PI;
 
 /// How many levels n a primitive has: `0..=N_MAX`.

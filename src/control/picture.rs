@@ -23,10 +23,10 @@ use super::status::Status;
 use super::view::ObjectView;
 use super::worth;
 use ahead::Ahead;
-use metachron_agents::{AgentId, Resolution};
 use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::cost::pipeline::Pipeline;
 use metachron_budget::cost::value::Value;
+use metachron_core::{AgentId, Resolution};
 
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
 const SPEED_NEWS: f64 = 0.2;

@@ -5,7 +5,7 @@
 use super::ask::Promise;
 use super::level::{self, Span};
 use super::view::{ObjectView, Shading};
-use metachron_agents::{AgentId, Resolution};
+use metachron_core::{AgentId, Resolution};
 use std::time::Duration;
 
 /// What the last frame took.

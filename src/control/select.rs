@@ -7,7 +7,6 @@ use super::ask::{Ask, Promise, TICKS, demand, left_out};
 use super::level::Held;
 use super::plan::LevelDemand;
 use super::policy::Policy;
-use metachron_agents::AgentId;
 use metachron_budget::select::barrier::{Limits, interior_point};
 use metachron_budget::select::funkhouser::{self, Scan};
 use metachron_budget::select::gobbetti::{Mesh, Resolutions, closed_form};
@@ -16,6 +15,7 @@ use metachron_budget::select::marginal::{self, Fit};
 use metachron_budget::select::robin_hood::{Instance, TooLittle, distribute};
 use metachron_budget::select::threshold::{self, STATIC_PX};
 use metachron_budget::select::{Level, Mode, Problem, Selection};
+use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
 /// What a Newton step of the interior point takes a mesh, seconds.

@@ -3,7 +3,7 @@
 //! In: plain numbers. Out: the weight by which an object shares in the picture's polygons. Never here: state.
 
 use super::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
-use metachron_agents::{AgentId, ResolutionRange};
+use metachron_core::{AgentId, ResolutionRange};
 
 /// How the light on a surface is worked out: the rendering algorithm of (FS93), cheapest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
@@ -130,7 +130,7 @@ impl ObjectView {
         Self {
             id: AgentId(id),
             kind,
-            range: ResolutionRange::fixed(metachron_agents::Resolution { eps_m: 1.0, n: 0 }),
+            range: ResolutionRange::fixed(metachron_core::Resolution { eps_m: 1.0, n: 0 }),
             shading: Default::default(),
             pixels: 100.0,
             distance_m: 1.0,

@@ -19,14 +19,16 @@ use crate::runtime::{
 use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, PriorityKind, ShadingKind, ValueKind};
 use crate::scene::{self, Member, Scene, Scenery, Spec};
 use glam::DVec3;
-use metachron_agents::coupling::FormKind;
-use metachron_agents::instrument::Instrument;
-use metachron_agents::rigid::RigidBody;
-use metachron_agents::rod::Tube;
-use metachron_agents::shape::{Primitive, Solid, ToolShape, patch};
-use metachron_agents::soft::{SoftBody, SoftShape, SoftSpec};
-use metachron_agents::synthetic::Synthetic;
-use metachron_agents::{Agent, AgentId, N_MAX, ResolutionRange};
+use metachron_contact::Agent;
+use metachron_core::{AgentId, N_MAX, ResolutionRange};
+use metachron_geometry::FormKind;
+use metachron_geometry::{Primitive, Solid, ToolShape, patch};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rod::Tube;
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::{SoftShape, SoftSpec};
+use metachron_models::synthetic::Synthetic;
+use metachron_models::tool::Instrument;
 use std::borrow::Cow;
 use std::sync::Arc;
 

@@ -6,8 +6,8 @@
 
 use crate::scene::Scene;
 use glam::DVec3;
-use metachron_agents::coupling::{PairKind, PairState};
-use metachron_agents::{AgentId, Body, Snapshot};
+use metachron_core::{AgentId, Body, Snapshot};
+use metachron_core::{PairKind, PairState};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -297,8 +297,8 @@ fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapsh
 mod tests {
     use super::*;
     use crate::scene::{Source, load};
-    use metachron_agents::coupling::{Ahead, Impulse, Ledger, Site};
-    use metachron_agents::{SimTime, ToolState};
+    use metachron_core::{Ahead, Impulse, Ledger, Site};
+    use metachron_core::{SimTime, ToolState};
 
     fn two_balls() -> Scene {
         let text = "format = 1\nobject = [\n{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 },\n\

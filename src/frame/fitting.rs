@@ -13,9 +13,14 @@ use crate::runtime::AgentState;
 use crate::scene::format::{ExecutorKind, MODELS};
 use crate::scene::ties::Faults;
 use crate::scene::{Member, Probe, Scene, Spec};
-use metachron_agents::rod::{Integrator, Tube, TubeSpec};
-use metachron_agents::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
-use metachron_agents::{Agent, AgentId, Body, ResolutionRange, SimSpan, Snapshot};
+use metachron_contact::Agent;
+use metachron_core::{AgentId, Body, ResolutionRange, SimSpan, Snapshot};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
+use metachron_models::soft::Side;
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
 use std::time::Duration;
 
@@ -186,7 +191,7 @@ pub fn play_points(
         }
     }
     let outcome = session.end(None, false);
-    let path = |samples: &[(metachron_agents::SimTime, glam::DVec3)]| Path {
+    let path = |samples: &[(metachron_core::SimTime, glam::DVec3)]| Path {
         samples: samples.iter().map(|(time, place)| (time.as_secs_f64(), *place)).collect(),
     };
     let stats = || outcome.agents.iter().map(|agent| &agent.stats);

@@ -6,7 +6,7 @@ use super::holding::Holding;
 use super::purse::Tally;
 use crate::control::{self, ErrorControl, ErrorMeasure, RateControl, RateDemand};
 use crate::runtime::{Demand, Governor, TurnMeasure};
-use metachron_agents::{Resolution, SimSpan};
+use metachron_core::{Resolution, SimSpan};
 use std::sync::Arc;
 
 /// An agent's own rate control as the runtime wants it, and what it and the frame loop tell each other.

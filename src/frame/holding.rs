@@ -3,8 +3,8 @@
 //! In: where a controller rests. Out: one sentence where an agent cannot hold what it is to hold. Never here: the law
 //! ([`crate::control::ErrorControl`]).
 
-use metachron_agents::AgentId;
 use metachron_budget::Bound;
+use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 

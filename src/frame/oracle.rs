@@ -14,7 +14,7 @@ use super::trace::{Trace, Traced, mass_kg, momentum, points};
 use crate::scene::Scene;
 use crate::scene::format::{ExecutorKind, MODELS};
 use crate::scene::ties::Faults;
-use metachron_agents::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use std::collections::BTreeMap;
 use std::time::Duration;
 

@@ -7,7 +7,7 @@ use super::holding::Held;
 use super::trace::Trace;
 use crate::runtime::{AgentStats, Sample};
 use glam::DVec3;
-use metachron_agents::Resolution;
+use metachron_core::Resolution;
 use serde::Serialize;
 
 /// One frame: a row of `--frames-csv`.

@@ -9,7 +9,7 @@ use crate::control::{self, Policy};
 use crate::runtime::{self, AgentStats};
 use crate::scene::Spec;
 use crate::scene::format::PolicyKind;
-use metachron_agents::{Body, SimTime, Snapshot};
+use metachron_core::{Body, SimTime, Snapshot};
 use std::time::Duration;
 
 /// Mass at which the user's hand takes hold of something that has none of its own, kilograms.

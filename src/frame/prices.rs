@@ -4,8 +4,11 @@
 
 use cpu_time::ThreadTime;
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
-use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Surroundings};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, SimSpan, SimTime};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Material, Section, TubeSpec};
 
 /// Every integrator carries it.
 const DT: SimSpan = SimSpan::from_nanos(100_000);

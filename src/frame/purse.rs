@@ -7,8 +7,8 @@
 
 use super::cast::ROOM;
 use crate::control::ObjectView;
-use metachron_agents::AgentId;
 use metachron_budget::adaptive::joint::{Between, Drawing, Market, Worker, temporal_error_px};
+use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 

@@ -21,7 +21,8 @@ use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices,
 use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
 use crate::scene::Scene;
 use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
-use metachron_agents::{AgentId, Body, Pull, SimTime};
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Body, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -5,8 +5,8 @@
 use crate::runtime::Faults;
 use crate::scene::ties::{Coupling, CouplingKind};
 use crate::scene::{Scene, Spec};
-use metachron_agents::AgentId;
-use metachron_agents::coupling::{Law, Link};
+use metachron_contact::{Law, Link};
+use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
 /// What ties every agent of a scene to others.

@@ -5,7 +5,7 @@
 use super::couplings::Coupling;
 use crate::scene::{Scene, Spec};
 use glam::DVec3;
-use metachron_agents::{AgentId, Body, CurveState, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, SimTime, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
@@ -107,7 +107,7 @@ fn flow(curve: &CurveState) -> DVec3 {
 mod tests {
     use super::*;
     use crate::scene::{Source, load};
-    use metachron_agents::{RigidState, SimSpan};
+    use metachron_core::{RigidState, SimSpan};
 
     #[test]
     fn who_takes_another_time_for_its_own_is_traced_on_by_the_scenes() {

@@ -16,7 +16,8 @@ use crate::control::Policy;
 use crate::runtime::Drive;
 use crate::scene::{self, Scene, SceneError, Source};
 use glam::DVec3;
-use metachron_agents::{AgentId, Pull, SimSpan};
+use metachron_contact::Pull;
+use metachron_core::{AgentId, SimSpan};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 

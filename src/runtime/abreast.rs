@@ -7,8 +7,9 @@
 use super::eyes::newest;
 use super::fellows::Fellows;
 use super::turn::Actor;
-use metachron_agents::coupling::beside::{is_beside, leaves_behind};
-use metachron_agents::{AgentId, Bounds, Neighbour, SimSpan, SimTime, Surroundings};
+use metachron_contact::beside::{is_beside, leaves_behind};
+use metachron_contact::{Neighbour, Surroundings};
+use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 

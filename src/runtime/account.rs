@@ -5,7 +5,7 @@
 
 use super::pace::Pace;
 use super::times::Times;
-use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;

@@ -12,7 +12,7 @@ use super::sync::atomic::{
     fence,
 };
 use super::sync::thread::{self, Thread};
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::sync::PoisonError;
 use std::time::Duration;
 

@@ -12,7 +12,7 @@ mod sight;
 pub(super) use sight::Sight;
 
 use berth::{Berth, Reach, Seen};
-use metachron_agents::{AgentId, Bounds, SimTime};
+use metachron_core::{AgentId, Bounds, SimTime};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
 

@@ -8,8 +8,10 @@ use super::crowd::{Crowd, Sight};
 use super::fellows::Fellows;
 use super::handle::Shared;
 use super::slot::{LatestSlot, SlotWriter};
-use metachron_agents::coupling::{Form, FormKind, Law, Standing, acknowledged, keep_step, owns};
-use metachron_agents::{AgentId, Neighbour, SimSpan, SimTime, Snapshot};
+use metachron_contact::Neighbour;
+use metachron_contact::{Law, Standing, acknowledged, keep_step, owns};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Form, FormKind};
 use std::sync::Arc;
 
 /// What is known of all agents of a run from the start.

@@ -5,7 +5,7 @@
 //! Never here: a model of physics, time passing.
 
 use super::machine::{GOLDEN, mix};
-use metachron_agents::{AgentId, DT_MAX_S, SimSpan};
+use metachron_core::{AgentId, DT_MAX_S, SimSpan};
 
 /// How an agent's life is disturbed.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]

@@ -3,7 +3,7 @@
 //! In: the numbers of all who do. Out: whether one is among them, and in which world: a name that changes when somebody is no
 //! longer among them, so that who looked past them before looks again. Never here: why they share it.
 
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 
 /// All that step as one.
 #[derive(Debug, Default)]

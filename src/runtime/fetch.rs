@@ -6,7 +6,7 @@
 
 use super::handle::Shared;
 use super::turn::Actor;
-use metachron_agents::{Body, Inertia, Snapshot};
+use metachron_core::{Body, Inertia, Snapshot};
 use std::hint::black_box;
 use std::sync::atomic::Ordering::Relaxed;
 

@@ -2,7 +2,7 @@
 //!
 //! Never here: a control law. The runtime measures and obeys; it decides no ε.
 
-use metachron_agents::{Resolution, SimSpan};
+use metachron_core::{Resolution, SimSpan};
 
 /// Steers one agent by what its turns take.
 pub trait Governor: Send {

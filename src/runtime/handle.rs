@@ -9,7 +9,7 @@ use super::slot::LatestSlot;
 use super::switchboard::Switchboard;
 use super::times::Times;
 use super::watch::{Sample, Trace};
-use metachron_agents::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
 use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;

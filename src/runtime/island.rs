@@ -1,6 +1,6 @@
 //! Agents that share one world for a while: one of them, the leader, makes the turns of all.
 //!
-//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_agents::Agent::lead`]).
+//! In: agents that hand themselves over ([`seats`]), one world that steps them ([`metachron_contact::Agent::lead`]).
 //! Out: every one's own states, account and ear, as if it made its turns itself: nobody else notices. One turn of a leader:
 //!
 //! take in    who waits at the door
@@ -19,7 +19,8 @@ use super::account::Entry;
 use super::fellows::Fellows;
 use super::pace::{Start, Timeline};
 use super::turn::{Actor, Made, Open, contained};
-use metachron_agents::{Companion, DT_MAX_S, SimSpan, SimTime, StepReport, Surroundings};
+use metachron_contact::{Companion, Surroundings};
+use metachron_core::{DT_MAX_S, SimSpan, SimTime, StepReport};
 use std::time::Duration;
 
 impl Actor {

@@ -2,7 +2,7 @@
 
 use super::testing::{Dummy, Fault, Log, eventually, on_every_executor, system};
 use super::{AgentState, Clock, Command, Drive, ManualClock, Run};
-use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 use std::time::Duration;

@@ -17,7 +17,7 @@ use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use super::switchboard::Switchboard;
 use super::turn::{Actor, Effort, Next};
 use cores::Cores;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 use std::sync::Arc;

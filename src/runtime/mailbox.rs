@@ -3,7 +3,8 @@
 //! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded by construction: a kind has one
 //! place, a newer command takes it. Never here: what an agent does with them ([`super::turn`] does).
 
-use metachron_agents::{AgentId, Anchor, Pull, Resolution, SimSpan};
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
 use std::sync::atomic::{
     AtomicBool,
     Ordering::{Acquire, Release},

@@ -59,7 +59,7 @@ pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
 pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
 pub use watch::{SAMPLES_MAX, Sample, Watch};
 
-use metachron_agents::{AgentId, SimTime};
+use metachron_core::{AgentId, SimTime};
 use std::time::Duration;
 
 /// Agents that run, whoever keeps the time.

@@ -5,7 +5,7 @@
 
 use super::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::utils::CachePadded;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 
 /// A bit an agent. Words lie far apart: agents of one word mostly share a worker, and workers must not disturb each other.
 #[derive(Debug)]

@@ -11,7 +11,7 @@ mod timeline;
 
 pub use timeline::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
 
-use metachron_agents::{SimSpan, SimTime};
+use metachron_core::{SimSpan, SimTime};
 use std::time::Duration;
 
 /// How far an agent may lag before it gives up the gap, wall time.

@@ -6,7 +6,7 @@
 
 use super::account::AgentState;
 use super::handle::AgentHandle;
-use metachron_agents::{SimTime, Snapshot};
+use metachron_core::{SimTime, Snapshot};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -111,7 +111,7 @@ mod tests {
     use super::super::testing::Dummy;
     use super::super::{Command, Lockstep, Machine, Run};
     use super::*;
-    use metachron_agents::AgentId;
+    use metachron_core::AgentId;
     use std::time::Duration;
 
     /// Rates of 1 to 30 Hz, one that sleeps and one that breaks.

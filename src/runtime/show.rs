@@ -6,7 +6,7 @@
 use super::account::Entry;
 use super::turn::{Actor, Open};
 use super::watch::Trace;
-use metachron_agents::SimTime;
+use metachron_core::SimTime;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 impl Actor {

@@ -17,8 +17,10 @@ use super::switchboard::Switchboard;
 use super::times::Times;
 use super::turn::{Actor, Rhythm};
 use super::watch::{Trace, Watch};
-use metachron_agents::coupling::{Form, FormKind, Law, Link};
-use metachron_agents::{Agent, AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
+use metachron_contact::Agent;
+use metachron_contact::{Law, Link};
+use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Form, FormKind};
 use std::sync::{Arc, Mutex};
 
 /// An agent on its way into a run.
@@ -317,9 +319,11 @@ fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<
 mod tests {
     use super::*;
     use glam::DVec3;
-    use metachron_agents::rigid::{RigidBody, RigidSpec};
-    use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
-    use metachron_agents::shape::Solid;
+    use metachron_geometry::Solid;
+    use metachron_models::rigid::RigidBody;
+    use metachron_models::rigid::RigidSpec;
+    use metachron_models::rod::Tube;
+    use metachron_models::rod::{Material, Section, TubeSpec};
 
     fn ball() -> AgentSpawn {
         let spec = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 1.0);

@@ -16,7 +16,7 @@ use super::sync::atomic::{
     fence,
 };
 use super::sync::thread::Thread;
-use metachron_agents::{AgentId, SimSpan, SimTime};
+use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
 
 /// How long after the last touch an agent may not rest, simulated time: longer than the period of any toucher above 10 Hz,

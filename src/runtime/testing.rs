@@ -4,12 +4,15 @@ use super::pool::Pool;
 use super::spawn::AgentSpawn;
 use super::{Clock, Drive, Priority, Run, SystemClock, Threads};
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::{Exchange, Form, FormKind, Impulse, Site, SolidForm};
-use metachron_agents::shape::Solid;
-use metachron_agents::{
-    Agent, AgentId, Body, Bounds, Companion, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime,
-    Snapshot, StepError, StepReport, Surroundings,
+use metachron_contact::Exchange;
+use metachron_contact::{Agent, Companion, Surroundings};
+use metachron_core::{
+    AgentId, Body, Bounds, N_MAX, Resolution, ResolutionRange, RigidState, SimSpan, SimTime, Snapshot, StepError,
+    StepReport,
 };
+use metachron_core::{Impulse, Site};
+use metachron_geometry::Solid;
+use metachron_geometry::{Form, FormKind, SolidForm};
 use rapier3d::geometry::SharedShape;
 use std::sync::{Arc, Mutex};
 use std::thread;

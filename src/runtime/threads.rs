@@ -16,7 +16,7 @@ use super::priority::Priority;
 use super::spawn::{AgentSpawn, Company, RunError, assemble};
 use super::switchboard::Switchboard;
 use super::turn::{Actor, Next};
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};

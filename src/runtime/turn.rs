@@ -17,10 +17,9 @@ use super::handle::Shared;
 use super::island::Company;
 use super::pace::{LAG_CAP, Pace, Start, Timeline};
 use super::slot::SlotWriter;
-use metachron_agents::coupling::Link;
-use metachron_agents::{
-    Agent, AgentId, Pull, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport, Surroundings,
-};
+use metachron_contact::Link;
+use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;

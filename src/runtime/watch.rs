@@ -4,7 +4,7 @@
 //! period, with that state's own time; while the agent rests, its state at every multiple. Never here: files, units of a report.
 
 use glam::DVec3;
-use metachron_agents::{SimSpan, SimTime, Snapshot};
+use metachron_core::{SimSpan, SimTime, Snapshot};
 
 /// A material point to be written down.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +69,7 @@ impl Trace {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use metachron_agents::{Body, RigidState};
+    use metachron_core::{Body, RigidState};
 
     fn state(ms: u64) -> Snapshot {
         let position = DVec3::X * ms as f64;

@@ -14,9 +14,9 @@ use super::figure::{Figure, figure};
 use super::overlap::{Inside, OVERLAP_MIN_M};
 use super::ties::{Coupling, CouplingKind};
 use glam::DVec3;
-use metachron_agents::AgentId;
-use metachron_agents::coupling::Touch;
-use metachron_agents::coupling::touch::{TouchRoom, touches};
+use metachron_core::AgentId;
+use metachron_geometry::Touch;
+use metachron_geometry::narrow_phase::{TouchRoom, touches};
 use std::collections::BTreeSet;
 
 /// An agent that starts elsewhere than the scene puts it, because there it would be inside another.

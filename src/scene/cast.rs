@@ -8,13 +8,14 @@ use super::format::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, S
 use super::overlap::Overlap;
 use super::ties::{Coupling, Faults};
 use glam::DVec3;
-use metachron_agents::instrument::ToolSpec;
-use metachron_agents::rigid::{Joint, RigidSpec};
-use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::{Model, Obstacle, Placement, Texture};
-use metachron_agents::soft::SoftSpec;
-use metachron_agents::synthetic::SyntheticSpec;
-use metachron_agents::{AgentId, Resolution, ResolutionRange, SimSpan};
+use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
+use metachron_geometry::{Model, Obstacle, Placement, Texture};
+use metachron_models::rigid::Joint;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::TubeSpec;
+use metachron_models::soft::SoftSpec;
+use metachron_models::synthetic::SyntheticSpec;
+use metachron_models::tool::ToolSpec;
 use std::ops::Range;
 use std::sync::Arc;
 

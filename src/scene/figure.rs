@@ -5,11 +5,12 @@
 
 use super::cast::{Member, Spec};
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::{Form, FormKind, Placed, SolidForm, View};
-use metachron_agents::rod::Tube;
-use metachron_agents::shape::{Obstacle, Solid, ToolShape};
-use metachron_agents::soft::SoftBody;
-use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
+use metachron_contact::Agent;
+use metachron_core::{AgentId, Body, CurveState, Snapshot, SoftState};
+use metachron_geometry::{Form, FormKind, Placed, SolidForm, View};
+use metachron_geometry::{Obstacle, Solid, ToolShape};
+use metachron_models::rod::Tube;
+use metachron_models::soft::SoftBody;
 
 /// How far a plane's slab reaches past a figure, in sizes of it.
 const SLAB_SHARE: f64 = 4.0;

@@ -33,7 +33,7 @@ use check::{Checker, Place};
 use document::Document;
 use format::{ExecutorKind, SceneFile, WorldFile};
 use glam::DVec3;
-use metachron_agents::rigid::Joint;
+use metachron_models::rigid::Joint;
 use problem::Problem;
 use std::sync::Arc;
 

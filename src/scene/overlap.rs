@@ -8,9 +8,10 @@ use super::cast::{Scene, Spec};
 use super::figure::{Figure, figure};
 use super::ties::{Coupling, CouplingKind};
 use glam::DVec3;
-use metachron_agents::AgentId;
-use metachron_agents::coupling::touch::{TouchRoom, touches};
-use metachron_agents::coupling::{FormKind, Law, Place, Touch};
+use metachron_contact::Law;
+use metachron_core::AgentId;
+use metachron_geometry::narrow_phase::{TouchRoom, touches};
+use metachron_geometry::{FormKind, Place, Touch};
 use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.

@@ -3,8 +3,8 @@
 //! In: built by [`super::load`], checked. Out: plain data that the frame loop hands to agents and to the runtime.
 //! Never here: the file's text, forces.
 
-use metachron_agents::coupling::Law;
-use metachron_agents::{AgentId, Anchor};
+use metachron_contact::Law;
+use metachron_core::{AgentId, Anchor};
 
 /// How two agents act on each other, where that is not contact by the ledger.
 #[derive(Debug, Clone, Copy, PartialEq)]

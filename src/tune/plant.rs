@@ -183,7 +183,7 @@ fn delayed(observed: &[Observed], frames: usize) -> Vec<(f64, f64)> {
 pub(super) mod tests {
     use super::*;
     use crate::control::{Kind, Shading};
-    use metachron_agents::{AgentId, ResolutionRange};
+    use metachron_core::{AgentId, ResolutionRange};
 
     /// A tube of 1.6 m and a ball.
     pub fn views() -> Vec<ObjectView> {

@@ -8,9 +8,10 @@ use metachron::runtime::{
     AgentHandle, AgentSpawn, AgentState, Command, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock,
     Threads, state_hash,
 };
-use metachron_agents::AgentId;
-use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::shape::Solid;
+use metachron_core::AgentId;
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
 use std::sync::Arc;
 use std::time::Duration;
 

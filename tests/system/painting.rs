@@ -8,8 +8,8 @@ use metachron::compositor::{
 };
 use metachron::scene::format::ShadingKind;
 use metachron::scene::{self, Scene, Source};
-use metachron_agents::shape::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
-use metachron_agents::{AgentId, Resolution};
+use metachron_core::{AgentId, Resolution};
+use metachron_geometry::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;

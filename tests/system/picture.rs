@@ -11,7 +11,7 @@ use image::RgbaImage;
 use metachron::compositor::{
     Camera, Colouring, DrawError, Gpu, GpuError, Hand, Level, Offscreen, RendererOptions, Size, Stage, States, Style,
 };
-use metachron_agents::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
+use metachron_core::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -3,9 +3,9 @@
 use glam::DVec3;
 use metachron::scene::ties::CouplingKind;
 use metachron::scene::{Scene, SceneError, Source, Spec, load};
-use metachron_agents::Anchor;
-use metachron_agents::coupling::Law;
-use metachron_agents::rigid::JointKind;
+use metachron_contact::Law;
+use metachron_core::Anchor;
+use metachron_models::rigid::JointKind;
 
 /// Two boxes side by side, a tube, two tools, an agent without matter and a post; the tests add ties.
 const YARD: &str = r#"format = 1

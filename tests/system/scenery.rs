@@ -7,8 +7,8 @@ use metachron::compositor::{
     Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
 };
 use metachron::scene::{self, Scene, Source};
-use metachron_agents::shape::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
-use metachron_agents::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
+use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
+use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::sync::Arc;

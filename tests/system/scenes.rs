@@ -3,12 +3,13 @@
 //! Agents are stepped in turn here, each seeing the others' states of the step before: no runtime, no picture.
 
 use metachron::scene::{Scene, Spec, builtin, load};
-use metachron_agents::instrument::Instrument;
-use metachron_agents::rigid::RigidBody;
-use metachron_agents::rod::Tube;
-use metachron_agents::soft::SoftBody;
-use metachron_agents::synthetic::Synthetic;
-use metachron_agents::{Agent, AgentId, Body, Neighbour, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rod::Tube;
+use metachron_models::soft::SoftBody;
+use metachron_models::synthetic::Synthetic;
+use metachron_models::tool::Instrument;
 use std::sync::Arc;
 
 fn scene(name: &str) -> Scene {

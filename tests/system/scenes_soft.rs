@@ -2,7 +2,8 @@
 
 use crate::play::{Folder, agent, lockstep, number, point};
 use metachron::scene::{Scene, SceneError, Source, Spec, load};
-use metachron_agents::soft::{Side, SoftShape};
+use metachron_models::soft::Side;
+use metachron_models::soft::SoftShape;
 
 fn read(text: &str) -> Result<Scene, SceneError> {
     load(&Source::memory("test.toml", format!("format = 1\n{text}").as_bytes())?, &[])

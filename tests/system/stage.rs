@@ -2,10 +2,8 @@
 
 use glam::{DQuat, DVec3};
 use metachron::compositor::{Actor, Camera, Form, Level, Look, Material, Prop, Stage, States};
-use metachron_agents::shape::{Obstacle, Solid, ToolShape};
-use metachron_agents::{
-    AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState,
-};
+use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
+use metachron_geometry::{Obstacle, Solid, ToolShape};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 

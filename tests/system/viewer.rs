@@ -11,7 +11,7 @@ use metachron::compositor::viewer::{
     Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Show, Weight, keys_text,
 };
 use metachron::compositor::{Colouring, Hit};
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::time::Duration;
 
 #[test]

@@ -5,13 +5,14 @@
 use crate::runtime::AgentSpawn;
 use anyhow::Context;
 use glam::DVec3;
-use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::rod::{Material, Section, Tube, TubeSpec};
-use metachron_agents::shape::Solid;
-use metachron_agents::synthetic::{Synthetic, SyntheticSpec};
-use metachron_agents::{
-    Agent, N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, Surroundings,
-};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport};
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Material, Section, TubeSpec};
+use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use serde::{Deserialize, Serialize};
 
 /// What an agent is.

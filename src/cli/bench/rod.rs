@@ -11,7 +11,7 @@ use super::cast::{ROD_SEGMENTS, rod};
 use super::machine::own_cpu;
 use super::subject::{Subject, Watch};
 use glam::DVec3;
-use metachron_agents::SimSpan;
+use metachron_core::SimSpan;
 use serde::{Deserialize, Serialize};
 use std::time::Duration;
 

@@ -3,8 +3,8 @@
 //! In: agents with rates. Out: a run whose turns cost nothing, and its agents' newest states. Never here: what is measured.
 
 use crate::runtime::{AgentSpawn, DrawPrice, Lockstep, Machine, Run, RunError, StepPrice};
-use metachron_agents::coupling::audit::Member;
-use metachron_agents::{AgentId, Snapshot};
+use metachron_contact::audit::Member;
+use metachron_core::{AgentId, Snapshot};
 use std::sync::Arc;
 use std::time::Duration;
 

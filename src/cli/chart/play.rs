@@ -5,12 +5,16 @@
 
 use super::stage::{Faults, Stage};
 use glam::DVec3;
-use metachron_agents::coupling::audit::{Audit, audit, on_their_way, settled};
-use metachron_agents::coupling::touch::{TouchRoom, gap};
-use metachron_agents::coupling::{Law, Link, Placed, View};
-use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::rod::{Tube, TubeSpec};
-use metachron_agents::{AgentId, Anchor, Body, Pull, RigidState, SimTime, Snapshot};
+use metachron_contact::Pull;
+use metachron_contact::audit::{Audit, audit, on_their_way, settled};
+use metachron_contact::{Law, Link};
+use metachron_core::{AgentId, Anchor, Body, RigidState, SimTime, Snapshot};
+use metachron_geometry::narrow_phase::{TouchRoom, gap};
+use metachron_geometry::{Placed, View};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
 
 /// Agents, and what is needed to sum over them.
 pub(super) struct Play {

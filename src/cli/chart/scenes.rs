@@ -6,11 +6,12 @@ use super::play::Play;
 use super::stability::common::{GRAVITY, plain_body, plain_tube};
 use super::stage::Faults;
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::Law;
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{AgentId, Anchor, Pull};
+use metachron_contact::Law;
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Anchor};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::TubeSpec;
 
 /// A scene of two kinds of agents: the first keep one rate, the others the second.
 pub(super) struct Scene {

@@ -4,9 +4,11 @@
 //! is earliest steps next, of equals the lower number; what it publishes is seen at once, stamped with the end of its step, as
 //! in a run whose turns cost nothing, or when that time has come. Never here: what is measured of it.
 
-use metachron_agents::coupling::audit::Member;
-use metachron_agents::coupling::{Form, Law, Link, Standing, keep_step, owns};
-use metachron_agents::{Agent, AgentId, Neighbour, Pull, SimSpan, SimTime, Snapshot, StepError, Surroundings};
+use metachron_contact::audit::Member;
+use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Law, Link, Standing, keep_step, owns};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
+use metachron_geometry::Form;
 use std::sync::Arc;
 
 /// What goes wrong on purpose.

@@ -3,7 +3,7 @@
 //! In: a scene and its text. Out: every object that moves, with its agents. Never here: what may be chosen for one.
 
 use crate::scene::Scene;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use toml_edit::{DocumentMut, Item, Table};
 
 /// An object of the file that moves.

@@ -4,7 +4,8 @@
 
 use super::written::{set, tidy};
 use crate::scene::{Member, Spec};
-use metachron_agents::soft::{Side, SoftShape};
+use metachron_models::soft::Side;
+use metachron_models::soft::SoftShape;
 use toml_edit::{Array, Table, Value};
 
 /// Keys that only tubes have.

@@ -11,8 +11,8 @@ use super::objects::Object;
 use crate::fit::{Choice, Path, Setting, Trial, farthest_m};
 use crate::frame::{Played, Point, SessionError, apply, method_of, play_points, setting_of, slacken, solve_prices};
 use crate::scene::{Member, Scene, Spec};
-use metachron_agents::AgentId;
-use metachron_agents::rod::Integrator;
+use metachron_core::AgentId;
+use metachron_models::rod::Integrator;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 

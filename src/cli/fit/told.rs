@@ -7,7 +7,7 @@ use super::super::chart::table::{Cell, Table};
 use super::task::Task;
 use super::{Fitted, Simpler, length};
 use crate::fit::Setting;
-use metachron_agents::rod::Integrator;
+use metachron_models::rod::Integrator;
 use serde_json::{Value, json};
 
 /// The table, and what it was found on.

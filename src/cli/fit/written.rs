@@ -10,7 +10,7 @@ use crate::fit::Setting;
 use crate::frame::cells_of;
 use crate::scene::{Member, Source, Spec, load};
 use anyhow::Context;
-use metachron_agents::rod::Integrator;
+use metachron_models::rod::Integrator;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
 

@@ -5,7 +5,7 @@
 //! appended; when the buffer is full, what the picture does not use is forgotten, and the rest is written anew.
 
 use super::super::picture::{MeshCorner, MeshKey, Picture};
-use metachron_agents::shape::{Cut, Model, Tom};
+use metachron_geometry::{Cut, Model, Tom};
 use std::collections::HashMap;
 use std::hash::Hash;
 use std::ops::Range;

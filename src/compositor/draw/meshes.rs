@@ -4,8 +4,8 @@
 
 use super::super::picture::{MeshCorner, MeshKey, Picture};
 use glam::Vec3;
-use metachron_agents::N_MAX;
-use metachron_agents::shape::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
+use metachron_core::N_MAX;
+use metachron_geometry::{Model, PrimitiveMesh, PrimitiveVertex, Rung, Stroke, patch};
 use std::collections::{BTreeSet, HashMap};
 use std::sync::Arc;
 use wgpu::util::DeviceExt;

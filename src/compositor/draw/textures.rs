@@ -3,7 +3,7 @@
 //! In: the textures of a picture. Out: what the painted pipeline is bound to. Never here: how they lie on a mesh.
 
 use super::super::picture::Picture;
-use metachron_agents::shape::Texture;
+use metachron_geometry::Texture;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 

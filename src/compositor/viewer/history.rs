@@ -183,7 +183,7 @@ mod tests {
     fn rings_are_bounded_and_sampling_keeps_its_distance() {
         let mut history = History::default();
         let status =
-            Status { agents: vec![AgentRow::new(metachron_agents::AgentId(0), "a", "rigid"); 2], ..Status::default() };
+            Status { agents: vec![AgentRow::new(metachron_core::AgentId(0), "a", "rigid"); 2], ..Status::default() };
         for tick in 0..100_000 {
             history.push_frame(&frame(1, 1));
             history.sample(f64::from(tick) * 0.01, &status);

@@ -308,7 +308,7 @@ impl Viewer {
         }
     }
 
-    fn frame_object(&mut self, show: &dyn Show, object: Option<metachron_agents::AgentId>) {
+    fn frame_object(&mut self, show: &dyn Show, object: Option<metachron_core::AgentId>) {
         if let Some(bounds) = show.bounds(object) {
             self.hand.frame(show, &bounds, self.size);
         }

@@ -5,8 +5,8 @@
 
 use super::super::{Camera, Hit, Picture, Ray, Size, Style};
 use glam::DVec3;
-use metachron_agents::{AgentId, Resolution, SimTime};
 use metachron_budget::cost::benefit::Sliders;
+use metachron_core::{AgentId, Resolution, SimTime};
 use std::path::PathBuf;
 use std::time::Duration;
 

@@ -6,7 +6,7 @@ use super::show::{AgentRow, AgentState, Status};
 use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align2, Color32, FontId, Rect, Role, Sense, Ui, WidgetInfo, pos2, vec2};
-use metachron_agents::{AgentId, Resolution};
+use metachron_core::{AgentId, Resolution};
 
 const ROW: f32 = 22.0;
 /// The least width of the table, points.

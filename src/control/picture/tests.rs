@@ -6,8 +6,8 @@ mod policies;
 
 use super::super::view::{Kind, Shading};
 use super::*;
-use metachron_agents::ResolutionRange;
 use metachron_budget::Bound;
+use metachron_core::ResolutionRange;
 use proptest::prelude::*;
 use std::time::Duration;
 

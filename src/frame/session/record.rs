@@ -73,7 +73,7 @@ pub(super) fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome
 mod tests {
     use super::*;
     use crate::scene::{self, Source};
-    use metachron_agents::SimTime;
+    use metachron_core::SimTime;
 
     #[test]
     fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {

@@ -6,7 +6,7 @@
 
 use super::super::seqlock::{Glance, Seqlock};
 use glam::DVec3;
-use metachron_agents::{Bounds, SimTime};
+use metachron_core::{Bounds, SimTime};
 
 /// A box around an agent's matter at one moment, and how fast it may grow in every direction since and before.
 #[derive(Debug, Clone, Copy, PartialEq)]

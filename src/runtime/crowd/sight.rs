@@ -9,7 +9,7 @@
 use super::super::fellows::{Fellows, World};
 use super::berth::{Reach, Seen};
 use super::{Crowd, SPEED_LEAST_M_S};
-use metachron_agents::{AgentId, Bounds, SimSpan, SimTime};
+use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 
 /// What one agent knows of where the others are.
 #[derive(Debug)]

@@ -3,7 +3,7 @@
 use super::super::fellows::Fellows;
 use super::*;
 use glam::DVec3;
-use metachron_agents::SimSpan;
+use metachron_core::SimSpan;
 use proptest::prelude::*;
 
 /// A ball that flies straight through each of its steps.

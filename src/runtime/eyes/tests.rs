@@ -6,8 +6,8 @@ use super::super::spawn::{AgentSpawn, assemble};
 use super::super::testing::{Dummy, Log, Made, eventually, on_every_executor, system};
 use super::super::{AgentState, Machine, Run};
 use super::*;
-use metachron_agents::Anchor;
-use metachron_agents::coupling::Link;
+use metachron_contact::Link;
+use metachron_core::Anchor;
 use std::time::Duration;
 
 const fn ms(n: u64) -> Duration {

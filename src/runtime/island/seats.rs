@@ -10,7 +10,8 @@ use super::super::handle::{AgentHandle, Shared};
 use super::super::pace::Timeline;
 use super::super::turn::Actor;
 use crossbeam::atomic::AtomicCell;
-use metachron_agents::{AgentId, Companion, SimTime};
+use metachron_contact::Companion;
+use metachron_core::{AgentId, SimTime};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 

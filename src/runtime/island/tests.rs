@@ -3,7 +3,7 @@
 use super::super::lockstep::Lockstep;
 use super::super::testing::{Bond, Dummy, Fault, Log, Made, eventually, on_every_executor, system};
 use super::super::{AgentHandle, AgentSpawn, AgentState, AgentStats, Command, Machine, Run, Watch, state_hash};
-use metachron_agents::{AgentId, Resolution, SimSpan, SimTime};
+use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
 use std::cell::{Cell, RefCell};
 use std::sync::{Arc, PoisonError};
 use std::time::Duration;

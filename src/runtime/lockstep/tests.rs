@@ -4,7 +4,8 @@ use super::super::testing::{Dummy, Fault};
 use super::super::{AgentState, Command, Demand, Governor, SendError, TurnMeasure, state_hash};
 use super::*;
 use glam::DVec3;
-use metachron_agents::{AgentId, Anchor, Pull, Resolution, SimSpan, SimTime};
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Anchor, Resolution, SimSpan, SimTime};
 
 const fn ms(n: u64) -> Duration {
     Duration::from_millis(n)

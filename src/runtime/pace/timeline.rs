@@ -4,7 +4,7 @@
 //! Never here: an agent's own time ([`super::Pace`] keeps it), sleeping.
 
 use arc_swap::ArcSwap;
-use metachron_agents::{SimSpan, SimTime};
+use metachron_core::{SimSpan, SimTime};
 use std::sync::Arc;
 use std::sync::atomic::{
     AtomicU64,

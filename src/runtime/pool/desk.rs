@@ -4,7 +4,7 @@
 //! first, the worker with its step or the watch with its patience, decides, and the other one finds it decided.
 //! Never here: threads, what becomes of the agent.
 
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 
 /// One worker's place; a worker that is replaced leaves its desk behind.

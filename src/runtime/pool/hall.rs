@@ -14,7 +14,7 @@ use super::super::turn::Actor;
 use super::queue::{NEVER, Queue};
 use crossbeam::atomic::AtomicCell;
 use crossbeam::utils::CachePadded;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;

@@ -10,7 +10,7 @@
 
 use super::super::pace::Timeline;
 use super::super::turn::Actor;
-use metachron_agents::{SimSpan, SimTime};
+use metachron_core::{SimSpan, SimTime};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::time::Duration;

@@ -8,7 +8,7 @@ use super::super::priority::Priority;
 use super::desk::{Desk, Sitting};
 use super::hall::Hall;
 use super::worker::Worker;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::io;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, Sender, channel};

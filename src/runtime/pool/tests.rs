@@ -3,7 +3,7 @@
 use super::super::testing::{Dummy, Fault, Log, eventually, running, system};
 use super::super::{AgentHandle, AgentState, Command};
 use super::*;
-use metachron_agents::{AgentId, SimTime};
+use metachron_core::{AgentId, SimTime};
 use std::collections::BTreeSet;
 
 fn pool(spawns: Vec<AgentSpawn>, workers: usize, patience: Duration) -> Box<Pool> {

@@ -9,7 +9,7 @@ use super::super::pace::Timeline;
 use super::super::turn::{Actor, Next};
 use super::desk::Desk;
 use super::hall::Hall;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
@@ -199,7 +199,7 @@ mod tests {
             let dummy = |k: u32| Dummy { ball: radius_m.map(|r| (r, 0.0)), z: f64::from(k), ..Dummy::new(1.0) };
             let (_physics, own) = held(|| (0..COUNT).map(|k| Box::new(dummy(k))).collect::<Vec<_>>());
             let (_states, state) =
-                held(|| (0..COUNT).map(|_| Arc::new(metachron_agents::Snapshot::default())).collect::<Vec<_>>());
+                held(|| (0..COUNT).map(|_| Arc::new(metachron_core::Snapshot::default())).collect::<Vec<_>>());
             let (_worker, all) = held(|| {
                 let mut worker = worker((0..COUNT).map(|k| dummy(k).at(100.0)).collect(), &clock);
                 for _ in 0..5 * COUNT {

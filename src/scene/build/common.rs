@@ -4,7 +4,7 @@ use crate::scene::cast::{Look, PaceWish};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CommonFile, FaultsFile, HoldKind, Material, OneOrRange, ShadingKind};
 use crate::scene::ties::Faults;
-use metachron_agents::{N_MAX, ResolutionRange, SimSpan};
+use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 
 /// Wanted rate where a scene says neither rate nor step, hertz.
 const RATE_DEFAULT_HZ: f64 = 240.0;

@@ -11,10 +11,10 @@ use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
 use crate::scene::ties::{Coupling, CouplingKind};
 use glam::DVec3;
-use metachron_agents::coupling::Law;
-use metachron_agents::rigid::RigidBody;
-use metachron_agents::soft::SoftShape;
-use metachron_agents::{AgentId, Anchor};
+use metachron_contact::Law;
+use metachron_core::{AgentId, Anchor};
+use metachron_models::rigid::RigidBody;
+use metachron_models::soft::SoftShape;
 use std::collections::BTreeMap;
 
 /// Most couplings of a scene.
@@ -208,7 +208,7 @@ fn spec_of(objects: &Objects, id: AgentId) -> Option<&Spec> {
 /// Rest length of a tube's skeleton; none where the tube cannot be built, which is told elsewhere.
 fn tube_length_m(objects: &Objects, id: AgentId) -> Option<f64> {
     let Spec::Tube(spec) = spec_of(objects, id)? else { return None };
-    metachron_agents::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
+    metachron_models::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
 }
 
 /// The centre of mass of a rigid object in its shape's axes; zero where there is none, as at an instrument's tip.

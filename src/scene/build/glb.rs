@@ -9,7 +9,7 @@ mod tables;
 
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DMat4, DQuat, DVec3, DVec4, Vec2};
-use metachron_agents::shape::branch;
+use metachron_geometry::branch;
 use tables::{Node, Tables};
 
 /// What such a file begins with.

@@ -7,7 +7,7 @@ use crate::scene::cast::{Member, Spec};
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{CommonFile, OneOrEach};
 use glam::DVec3;
-use metachron_agents::AgentId;
+use metachron_core::AgentId;
 
 /// Most objects along one side of a grid.
 const SIDE_MAX: u32 = 1000;

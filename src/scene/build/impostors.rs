@@ -9,7 +9,7 @@ use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::GroupFile;
 use crate::scene::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_agents::shape::{Model, Placement, Tom, proxy};
+use metachron_geometry::{Model, Placement, Tom, proxy};
 use std::sync::Arc;
 
 /// The finest impostor has this share of its members' triangles where a scene does not say, within these bounds.

@@ -6,8 +6,8 @@ use super::rigid::rotation;
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{InstrumentFile, KeyframeFile};
 use glam::{DQuat, DVec3};
-use metachron_agents::AgentId;
-use metachron_agents::instrument::{Keyframe, ToolSpec};
+use metachron_core::AgentId;
+use metachron_models::tool::{Keyframe, ToolSpec};
 use std::ops::RangeInclusive;
 
 /// Most keyframes of a script.

@@ -11,8 +11,8 @@ use crate::scene::cast::Spec;
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{JointFile, JointKind as Kind, Point};
 use glam::{DQuat, DVec3};
-use metachron_agents::AgentId;
-use metachron_agents::rigid::{Joint, JointKind};
+use metachron_core::AgentId;
+use metachron_models::rigid::{Joint, JointKind};
 
 /// Most joints of a scene.
 const JOINTS_MAX: usize = 10_000;

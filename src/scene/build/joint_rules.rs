@@ -4,8 +4,8 @@ use super::joint::End;
 use super::joint_keys::Leaves;
 use crate::scene::check::{Checker, Place};
 use glam::DVec3;
-use metachron_agents::AgentId;
-use metachron_agents::rigid::JOINT_GAP_MAX_M as GAP_MAX_M;
+use metachron_core::AgentId;
+use metachron_models::rigid::JOINT_GAP_MAX_M as GAP_MAX_M;
 use std::collections::BTreeMap;
 
 /// Directions that differ by less than this are one direction: sine of the angle.

@@ -10,7 +10,7 @@
 
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DVec3, Vec2};
-use metachron_agents::shape::branch;
+use metachron_geometry::branch;
 use std::collections::HashMap;
 
 /// What editors of texts put before UTF-8; it says nothing.

@@ -7,8 +7,8 @@ use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{Point, RigidFile, Shape};
 use crate::scene::source::Source;
 use glam::{DQuat, DVec3, EulerRot};
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::shape::{Obstacle, Solid};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidSpec;
 use std::sync::Arc;
 
 /// Density where a scene gives neither mass nor density: water's, kg/m³.

@@ -12,9 +12,7 @@ use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{GeneratorKind, Material, MeshFile, Point, TreeFile, TreeLod};
 use crate::scene::source::Source;
 use glam::{DQuat, DVec3};
-use metachron_agents::shape::{
-    Generator, Model, Placement, Tom, TreeSpec, generate, geodesic_edges, painted_mesh, tree,
-};
+use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, geodesic_edges, painted_mesh, tree};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

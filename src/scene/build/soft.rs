@@ -6,8 +6,10 @@ use super::rigid::rotation;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{Point, RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 use glam::{DQuat, DVec3};
-use metachron_agents::soft::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
-use metachron_agents::{Anchor, Body};
+use metachron_core::{Anchor, Body};
+use metachron_models::soft::Side;
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use std::sync::Arc;
 
 const LENGTH: Allowed = allowed(1e-6..=1e4, "m");

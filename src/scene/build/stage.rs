@@ -6,7 +6,7 @@ use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile};
 use crate::scene::problem::{Problem, did_you_mean};
 use glam::DVec3;
-use metachron_agents::SimSpan;
+use metachron_core::SimSpan;
 
 /// The part of the lag that is kept for choosing where a scene does not say: what (GB99) needed at most.
 const OPTIMISER_SHARE: f64 = 0.05;

@@ -3,8 +3,8 @@
 use super::object::Given;
 use crate::scene::check::{Checker, allowed};
 use crate::scene::format::SyntheticFile;
-use metachron_agents::ResolutionRange;
-use metachron_agents::synthetic::SyntheticSpec;
+use metachron_core::ResolutionRange;
+use metachron_models::synthetic::SyntheticSpec;
 
 /// Spacing where a scene does not say, metres.
 const EPS_DEFAULT_M: f64 = 0.01;

@@ -11,7 +11,7 @@ use crate::scene::format::{MeshFile, ShadingKind};
 use crate::scene::source::Source;
 use glam::Vec2;
 use image::{ImageFormat, ImageReader, Limits};
-use metachron_agents::shape::{Model, Pattern, Texture, Wrap};
+use metachron_geometry::{Model, Pattern, Texture, Wrap};
 use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;

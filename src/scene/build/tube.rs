@@ -5,8 +5,11 @@ use super::object::Given;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
 use glam::DVec3;
-use metachron_agents::rod::{Attachment, Integrator, Material, Peristalsis, SUBSTEPS_MAX, Section, Tube, TubeSpec};
-use metachron_agents::{Resolution, ResolutionRange};
+use metachron_core::{Resolution, ResolutionRange};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::SUBSTEPS_MAX;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec};
 use std::sync::Arc;
 
 /// Most points of a path.

@@ -1,6 +1,6 @@
 //! Values that a scene writes in more than one way.
 
-use metachron_agents::N_MAX;
+use metachron_core::N_MAX;
 use schemars::JsonSchema;
 use serde::Deserialize;
 use serde::de::{Deserializer, Error, SeqAccess, Visitor};

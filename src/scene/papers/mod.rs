@@ -86,7 +86,7 @@ const FLOOR: &str = "\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = 
 mod tests {
     use super::*;
     use crate::scene::{Scene, Source, builtin, load};
-    use metachron_agents::shape::Model;
+    use metachron_geometry::Model;
 
     fn scene(paper: Paper, choices: &Choices) -> Scene {
         let text = paper.text(choices);

@@ -9,7 +9,7 @@ use metachron::compositor::viewer::{
     Wishes,
 };
 use metachron::compositor::{Camera, Hit, Picture, Ray, Size};
-use metachron_agents::{AgentId, Anchor, Resolution, SimTime};
+use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 
 /// A show of three agents around the origin that writes down what it is asked for.
 pub struct Fake {

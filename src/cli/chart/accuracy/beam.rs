@@ -5,8 +5,9 @@ use super::diagram::{Benchmark, Case};
 use super::play::Play;
 use super::sheet::soft;
 use glam::DVec3;
-use metachron_agents::rod::Integrator;
-use metachron_agents::soft::{Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::soft::Side;
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct SolidBeam;

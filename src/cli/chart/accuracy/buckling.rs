@@ -8,8 +8,9 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case, Goal};
 use super::play::{Play, metre, reference_tube, slender_tube};
 use glam::DVec3;
-use metachron_agents::CurveState;
-use metachron_agents::rod::{Integrator, TubeSpec};
+use metachron_core::CurveState;
+use metachron_models::rod::Integrator;
+use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
 
 /// The benchmark of the straight tube.

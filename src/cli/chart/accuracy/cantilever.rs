@@ -5,7 +5,8 @@ use super::super::stability::hanging::Hanging;
 use super::diagram::{Benchmark, Case, Goal};
 use super::play::{Play, metre, reference_tube};
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, Section, TubeSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::{Section, TubeSpec};
 
 /// The benchmark.
 pub(in super::super) struct Cantilever;

@@ -4,7 +4,8 @@ use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, reference_tube};
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, TubeSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::TubeSpec;
 
 /// The benchmark.
 pub(in super::super) struct Catenary;

@@ -10,7 +10,7 @@ use super::super::timing::{calibration_us, pace_for_goals};
 use super::front::front;
 use super::peers;
 use super::play::Play;
-use metachron_agents::rod::Integrator;
+use metachron_models::rod::Integrator;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 

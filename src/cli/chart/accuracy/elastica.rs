@@ -4,7 +4,7 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, metre, slender_tube};
 use glam::DVec3;
-use metachron_agents::rod::TubeSpec;
+use metachron_models::rod::TubeSpec;
 
 /// The benchmark.
 pub(in super::super) struct Elastica;

@@ -7,8 +7,8 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, slender_tube};
 use glam::DVec3;
-use metachron_agents::Pull;
-use metachron_agents::rod::TubeSpec;
+use metachron_contact::Pull;
+use metachron_models::rod::TubeSpec;
 use std::f64::consts::TAU;
 
 /// The benchmark.

@@ -7,8 +7,10 @@ use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, metre, reference_tube, slender_tube};
 use glam::{DQuat, DVec3};
-use metachron_agents::rod::{Integrator, TubeSpec};
-use metachron_agents::{CurveState, Pull};
+use metachron_contact::Pull;
+use metachron_core::CurveState;
+use metachron_models::rod::Integrator;
+use metachron_models::rod::TubeSpec;
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 /// The benchmark.

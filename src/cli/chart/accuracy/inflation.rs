@@ -4,7 +4,8 @@
 
 use super::diagram::{Benchmark, Case};
 use super::play::{Play, metre};
-use metachron_agents::rod::{Integrator, Material, Section, TubeSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::{Material, Section, TubeSpec};
 
 /// The benchmark.
 pub(in super::super) struct Inflation;

@@ -7,9 +7,13 @@ use super::super::stability::common::plain_tube;
 use super::diagram::Case;
 use cpu_time::ThreadTime;
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
-use metachron_agents::soft::{SoftBody, SoftSpec};
-use metachron_agents::{Agent, AgentId, Body, CurveState, Pull, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_core::{AgentId, Body, CurveState, SimSpan, SimTime, Snapshot};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Material, Section, TubeSpec};
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::SoftSpec;
 
 /// Stretch and shear of a [`slender_tube`] are this much stiffer than those of the tube of the references.
 const STIFFER: f64 = 1e3;

@@ -4,8 +4,9 @@ use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case};
 use super::play::Play;
 use glam::{DQuat, DVec3};
-use metachron_agents::rod::Integrator;
-use metachron_agents::soft::{Side, SoftMatter, SoftShape, SoftSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::soft::Side;
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 
 /// The benchmark.
 pub(in super::super) struct Sheet;

@@ -5,7 +5,8 @@ use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case, Goal};
 use super::play::{Play, metre, slender_tube};
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, TubeSpec};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::TubeSpec;
 use serde::Deserialize;
 
 /// The benchmark.

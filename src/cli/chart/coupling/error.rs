@@ -11,9 +11,9 @@ use super::super::scenes::{Scene, scene};
 use super::super::stage::Faults;
 use super::super::table::Table;
 use glam::DVec3;
-use metachron_agents::coupling::Site;
-use metachron_agents::coupling::audit::{Member, on_their_way, settled};
-use metachron_agents::{AgentId, Anchor, Body, Inertia, SimTime};
+use metachron_contact::audit::{Member, on_their_way, settled};
+use metachron_core::Site;
+use metachron_core::{AgentId, Anchor, Body, SimTime};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.

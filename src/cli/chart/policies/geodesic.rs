@@ -6,7 +6,7 @@
 use super::scene::SCREEN;
 use crate::compositor::Camera;
 use glam::{DQuat, DVec3};
-use metachron_agents::shape::geodesic_edges;
+use metachron_geometry::geodesic_edges;
 
 /// Domes, and struts of each.
 pub(super) const DOMES: usize = 8;

@@ -4,7 +4,7 @@ use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace};
 use super::tubes::{folded, holding, step};
-use metachron_agents::SimSpan;
+use metachron_core::SimSpan;
 use std::time::Duration;
 
 /// The question.

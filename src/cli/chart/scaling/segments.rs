@@ -5,7 +5,7 @@ use super::super::experiment::{Finding, worst};
 use super::super::timing::{floor_us, least_us};
 use super::growth::{Case, Cost, Growth, Row, pace, power};
 use super::tubes::{holding, step, straight};
-use metachron_agents::SimSpan;
+use metachron_core::SimSpan;
 use std::time::Duration;
 
 /// The question.

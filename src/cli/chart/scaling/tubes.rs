@@ -4,11 +4,11 @@
 
 use super::super::stability::common::{GRAVITY, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_agents::rod::{Tube, TubeSpec};
-use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{
-    Agent, AgentId, Anchor, Body, Grasp, Neighbour, SimSpan, SimTime, Snapshot, Surroundings, ToolState,
-};
+use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_core::{AgentId, Anchor, Body, Grasp, SimSpan, SimTime, Snapshot, ToolState};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
 use std::sync::Arc;
 
 /// Segments of one strand of a folded tube.

@@ -9,9 +9,11 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::table::Table;
 use super::common::{dead_load, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_agents::rod::{Tube, TubeSpec};
-use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 

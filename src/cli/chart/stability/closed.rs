@@ -11,8 +11,8 @@ use super::super::play::Play;
 use super::super::table::Table;
 use super::five::{ROOM_M, SYSTEMS, system};
 use glam::DVec3;
-use metachron_agents::coupling::audit::{Audit, audit};
-use metachron_agents::{AgentId, SimTime};
+use metachron_contact::audit::{Audit, audit};
+use metachron_core::{AgentId, SimTime};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 

@@ -1,10 +1,11 @@
 //! What the experiments of this room share: bodies without surprises, and loads.
 
 use glam::DVec3;
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::rod::{Material, Section, TubeSpec};
-use metachron_agents::shape::Solid;
-use metachron_agents::{Anchor, Pull};
+use metachron_contact::Pull;
+use metachron_core::Anchor;
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::{Material, Section, TubeSpec};
 
 /// The pull of the Earth, m/s².
 pub(in super::super) const GRAVITY: f64 = 9.81;

@@ -10,11 +10,12 @@ use super::super::stage::Faults;
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use glam::{DQuat, DVec3};
-use metachron_agents::coupling::Law;
-use metachron_agents::coupling::touch::TouchRoom;
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::shape::Solid;
-use metachron_agents::{AgentId, Anchor, Pull};
+use metachron_contact::Law;
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Anchor};
+use metachron_geometry::Solid;
+use metachron_geometry::narrow_phase::TouchRoom;
+use metachron_models::rigid::RigidSpec;
 use serde::{Deserialize, Serialize};
 
 /// The experiment.

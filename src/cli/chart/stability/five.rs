@@ -6,11 +6,11 @@ use super::super::play::Play;
 use super::super::stage::Faults;
 use super::common::{plain_body, plain_tube};
 use glam::DVec3;
-use metachron_agents::coupling::{Law, Link};
-use metachron_agents::rigid::RigidSpec;
-use metachron_agents::rod::TubeSpec;
-use metachron_agents::shape::Solid;
-use metachron_agents::{AgentId, Anchor};
+use metachron_contact::{Law, Link};
+use metachron_core::{AgentId, Anchor};
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::TubeSpec;
 
 /// The systems: two heavy plates that close in on a ball and two tubes, and three balls and two tubes in a ring of springs.
 pub(super) const SYSTEMS: [&str; 2] = ["plates", "ring"];

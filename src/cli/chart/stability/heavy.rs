@@ -10,9 +10,11 @@ use super::super::table::Table;
 use super::common::{GRAVITY, plain_body};
 use crate::runtime::AgentSpawn;
 use glam::{DQuat, DVec3};
-use metachron_agents::rigid::{Joint, JointKind, RigidBody, RigidSpec};
-use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{AgentId, Body, RigidState, Snapshot};
+use metachron_core::{AgentId, Body, RigidState, Snapshot};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rigid::{Joint, JointKind};
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 

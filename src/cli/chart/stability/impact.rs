@@ -7,11 +7,12 @@ use super::super::table::Table;
 use super::common::plain_body;
 use crate::runtime::AgentSpawn;
 use glam::DVec3;
-use metachron_agents::coupling::PairKind;
-use metachron_agents::coupling::audit::settled;
-use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::shape::Solid;
-use metachron_agents::{SimSpan, SimTime};
+use metachron_contact::audit::settled;
+use metachron_core::PairKind;
+use metachron_core::{SimSpan, SimTime};
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
 use serde::{Deserialize, Serialize};
 
 /// The experiment.

@@ -5,10 +5,13 @@ use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::table::Table;
 use super::common::{GRAVITY, plain_body, plain_tube};
 use glam::{DQuat, DVec3};
-use metachron_agents::rigid::{RigidBody, RigidSpec};
-use metachron_agents::rod::{Tube, TubeSpec};
-use metachron_agents::shape::{Obstacle, Solid};
-use metachron_agents::{Agent, AgentId, Body, SimSpan, SimTime, Snapshot, Surroundings};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
 use serde::{Deserialize, Serialize};
 
 /// The experiment.

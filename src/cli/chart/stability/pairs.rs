@@ -6,7 +6,7 @@ use super::super::scenes::{Scene, WITH_TUBES, scene};
 use super::super::stage::Faults;
 use super::super::table::Table;
 use glam::DVec3;
-use metachron_agents::{AgentId, Anchor};
+use metachron_core::{AgentId, Anchor};
 use serde::{Deserialize, Serialize};
 
 /// The experiment.

@@ -10,8 +10,11 @@ use super::super::table::Table;
 use super::common::{GRAVITY, plain_tube};
 use super::hanging::Hanging;
 use glam::DVec3;
-use metachron_agents::rod::{Integrator, Material, Section, Tube, TubeSpec};
-use metachron_agents::{Agent, AgentId, SimSpan, SimTime, Snapshot, StepError, Surroundings};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Material, Section, TubeSpec};
 use serde::{Deserialize, Serialize};
 
 /// The map.

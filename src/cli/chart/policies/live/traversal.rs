@@ -6,7 +6,7 @@
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::super::table::Table;
-use metachron_agents::shape::{Generator, Tom, generate};
+use metachron_geometry::{Generator, Tom, generate};
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
 use std::time::Instant;

@@ -1,0 +1,74 @@
+//! What owners have given a body on springs by a certain time, as it takes it: evenly, through each owner's whole step.
+//!
+//! In: what everybody published last. Out: dJ, and how far it has carried by the body's own time. Never here: how the body answers.
+//! Theory: docs/theory/coupling.md, eq. 4c.
+
+use super::Member;
+use metachron_core::SimTime;
+use metachron_core::{Ahead, Impulse, Ledger, Site};
+
+/// dJ and t dJ − dS, at the body's own time, of all that acts by `at` and is not yet in its state.
+pub(super) fn acted(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> [Impulse; 2] {
+    let now = member.snapshot.time;
+    let mut all = [Impulse::ZERO; 2];
+    for giver in members {
+        let taken = member.snapshot.taken.iter().find(|ledger| ledger.with == giver.id);
+        let ahead = taken.and_then(|taken| taken.ahead).filter(|ahead| ahead.middle_s != 0.0);
+        let given = giver.snapshot.given.iter().find(|ledger| ledger.with == member.id);
+        let given = given.filter(|given| taken.is_none_or(|taken| given.is_beyond(taken)));
+        let back = ahead.map(|ahead| taken_back(&ahead, now, at));
+        let new = given.map(|given| match ahead {
+            Some(ahead) => evenly((given, taken), (ahead.from, giver.snapshot.time), now, at),
+            None => due((given, taken), now, at),
+        });
+        for [sum, carried] in [back, new].into_iter().flatten() {
+            all = [all[0] + sum, all[1] + carried];
+        }
+    }
+    all
+}
+
+/// What it took evenly since the owner's last known time, or since `at` where that comes first, with the opposite sign.
+fn taken_back(ahead: &Ahead, now: SimTime, at: SimTime) -> [Impulse; 2] {
+    let since_s = now.secs_after(ahead.from.min(at));
+    let sum = ahead.sum * (-since_s / (2.0 * ahead.middle_s));
+    [sum, sum * (0.5 * since_s)]
+}
+
+/// The part by `at` of what an owner gave evenly between two of its times.
+fn evenly(
+    (given, taken): (&Ledger, Option<&Ledger>),
+    (from, until): (SimTime, SimTime),
+    now: SimTime,
+    at: SimTime,
+) -> [Impulse; 2] {
+    let [sum, carried] = new(given, taken, now);
+    if until <= at || until <= from {
+        return [sum, carried];
+    }
+    let acting_s = at.secs_after(from).max(0.0);
+    let sum = sum * (acting_s / until.secs_after(from));
+    [sum, sum * (now.secs_after(from) - 0.5 * acting_s)]
+}
+
+/// What of a ledger is due by `at`.
+fn due((given, taken): (&Ledger, Option<&Ledger>), now: SimTime, at: SimTime) -> [Impulse; 2] {
+    let [mut sum, mut carried] = new(given, taken, now);
+    for coming in given.coming.iter().filter(|coming| coming.acts > at) {
+        let Some(page) = given.pages.iter().find(|page| page.number == coming.page) else { continue };
+        sum += -coming.entry.sum;
+        carried += coming.entry.moment - coming.entry.sum * now.secs_after(page.origin);
+    }
+    [sum, carried]
+}
+
+/// All of `given` that is not in `taken`.
+fn new(given: &Ledger, taken: Option<&Ledger>, now: SimTime) -> [Impulse; 2] {
+    let mut all = [Impulse::ZERO; 2];
+    given.beyond(taken, now, |site, sum, carried| {
+        if site == Site::Whole {
+            all = [all[0] + sum, all[1] + carried];
+        }
+    });
+    all
+}

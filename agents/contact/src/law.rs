@@ -1,0 +1,217 @@
+//! Who owns a pair of agents, and by which law the two act on each other.
+
+use super::beside::PART_MAX_S;
+use super::crowd::PART_S;
+use metachron_core::{AgentId, Anchor};
+use metachron_geometry::Form;
+use std::cmp::Ordering;
+
+/// How two agents act on each other where they touch.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Law {
+    /// Impulses by the owner, booked in a ledger: the default.
+    #[default]
+    Ledger,
+    /// Each side pushes itself off the other's last known state, as most engines do: for comparison.
+    Penalty {
+        /// Stiffness of the contact, N/m, > 0; stable below 0.55 μ/τ² (docs/theory/coupling.md).
+        stiffness_n_m: f64,
+        /// Damping of the contact, N·s/m, ≥ 0.
+        damping_n_s_m: f64,
+        /// Whether the other's state is brought forward to one's own time.
+        extrapolate: bool,
+    },
+    /// Wave variables on a line between the two: passive whatever the delay, at the price of a mass k T².
+    Tlm {
+        /// Stiffness of the line, N/m, > 0.
+        stiffness_n_m: f64,
+        /// Damping beside it, N·s/m, ≥ 0.
+        damping_n_s_m: f64,
+    },
+    /// They pass through each other.
+    Off,
+}
+
+/// A lasting bilateral coupling between a point of this agent and one of another.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Link {
+    /// The agent on the other side.
+    pub other: AgentId,
+    /// The point of this agent.
+    pub here: Anchor,
+    /// The point of the other.
+    pub there: Anchor,
+    /// Stiffness, N/m, > 0.
+    pub stiffness_n_m: f64,
+    /// Damping, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+    /// The distance at which it pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// [`Law::Ledger`] or [`Law::Tlm`].
+    pub law: Law,
+}
+
+/// What decides who owns a pair.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Standing {
+    /// Its number.
+    pub id: AgentId,
+    /// Its model's name.
+    pub model: &'static str,
+    /// The rate its scene wants, Hz.
+    pub rate_hz: f64,
+    /// How many ends of a tube are held in place.
+    pub held_ends: u8,
+    /// How high it starts, J/kg: see [`Form::height_j_kg`].
+    pub height_j_kg: f32,
+}
+
+impl Standing {
+    /// That of the agent `id` of a `model`, whose scene wants `rate_hz`.
+    #[must_use]
+    pub fn new(id: AgentId, model: &'static str, rate_hz: f64, form: Option<&Form>) -> Self {
+        let held_ends = form.map_or(0, Form::held_ends);
+        Self { id, model, rate_hz, held_ends, height_j_kg: 0.0 + form.map_or(0.0, Form::height_j_kg) }
+    }
+
+    fn is_led(self) -> bool {
+        self.model == "instrument"
+    }
+
+    fn is_tube(self) -> bool {
+        self.model == "tube"
+    }
+
+    fn bends(self) -> bool {
+        self.is_tube() || matches!(self.model, "sheet" | "solid" | "rope")
+    }
+
+    /// Below which rate the two keep the same one beside each other, Hz.
+    fn common_hz(self, other: Self, linked: bool) -> f64 {
+        match (keep_step(self, other, linked), self.is_tube() && other.is_tube()) {
+            (true, _) => PART_S.recip(),
+            (false, true) => PART_MAX_S.recip(),
+            (false, false) => 0.0,
+        }
+    }
+}
+
+/// Whether two, whom a link by the ledger may have `linked`, keep step beside each other: who owns makes no longer steps than the other, down
+/// to those of a crowd (docs/theory/coupling.md, eq. 7o). They do where both bend, but for two tubes of whom one lies on its hold; links have
+/// clocks of their own.
+#[must_use]
+pub fn keep_step(a: Standing, b: Standing, linked: bool) -> bool {
+    let held = a.held_ends > 0 || b.held_ends > 0;
+    a.bends() && b.bends() && !linked && !(a.is_tube() && b.is_tube() && held)
+}
+
+/// Whether `me` owns the pair with `other`, to whom a link by the ledger may have it `linked`.
+///
+/// A tool is led and owns nothing. What bends owns before a rigid body: how that answers impulses is known exactly, however long the step
+/// (docs/decisions/0012, 0013).
+/// Of two that bend the faster owns, and of two that can keep step the higher: it solves what it bears in one problem with their contact
+/// (docs/decisions/0019). But a soft body owns before a tube to which it is linked, or which does not lie on it; and of two tubes of whom
+/// one is held, and lies on its hold, the one with fewer held ends does before the faster. Who are alike in all this leave it to the
+/// rates that their scene wants, then to the lower number.
+#[must_use]
+pub fn owns(me: Standing, other: Standing, linked: bool) -> bool {
+    if me.is_led() || other.is_led() {
+        return other.is_led() && !me.is_led();
+    }
+    if me.bends() != other.bends() {
+        return me.bends();
+    }
+    let common_hz = me.common_hz(other, linked);
+    let rate = |s: Standing| s.rate_hz.max(common_hz);
+    let lies_on =
+        |tube: Standing, soft: Standing| !linked && tube.height_j_kg > soft.height_j_kg && rate(tube) >= rate(soft);
+    if me.is_tube() != other.is_tube() {
+        return if me.is_tube() { lies_on(me, other) } else { !lies_on(other, me) };
+    }
+    let faster = rate(me).total_cmp(&rate(other));
+    let order = if me.held_ends > 0 || other.held_ends > 0 {
+        let freer = if faster.is_eq() { other.held_ends.cmp(&me.held_ends) } else { Ordering::Equal };
+        freer.then(faster)
+    } else {
+        faster.then(me.height_j_kg.total_cmp(&other.height_j_kg)).then(me.rate_hz.total_cmp(&other.rate_hz))
+    };
+    order.then(other.id.cmp(&me.id)).is_gt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn standing(id: u32, model: &'static str, rate_hz: f64) -> Standing {
+        Standing::new(AgentId(id), model, rate_hz, None)
+    }
+
+    fn above(s: Standing) -> Standing {
+        Standing { id: AgentId(9), height_j_kg: 1.0, ..s }
+    }
+
+    #[test]
+    fn of_every_pair_exactly_one_owns_unless_both_are_led() {
+        let mut all = vec![];
+        for model in ["tube", "rigid", "instrument", "sheet"] {
+            for (rate_hz, held_ends, height_j_kg) in
+                [(60.0, 0, 0.0), (100.0, 0, 1.0), (1000.0, 0, 2.0), (1000.0, 1, 1.0)]
+            {
+                all.push(Standing { held_ends, height_j_kg, ..standing(all.len() as u32, model, rate_hz) });
+            }
+        }
+        for a in &all {
+            for b in all.iter().filter(|b| b.id != a.id) {
+                let both_led = a.model == "instrument" && b.model == "instrument";
+                for linked in [false, true] {
+                    let owners = u32::from(owns(*a, *b, linked)) + u32::from(owns(*b, *a, linked));
+                    assert_eq!(owners, u32::from(!both_led), "{a:?} {b:?}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn what_bends_owns_before_a_rigid_body_and_nothing_before_it_is_led() {
+        let [slow, fast] = [60.0, 1000.0];
+        for model in ["tube", "sheet"] {
+            assert!(owns(standing(1, model, slow), standing(0, "rigid", fast), false));
+        }
+        assert!(owns(standing(1, "rigid", fast), standing(0, "rigid", slow), false), "the faster");
+        assert!(owns(standing(1, "rigid", slow), standing(0, "instrument", fast), false));
+    }
+
+    #[test]
+    fn of_two_that_bend_the_upper_one_owns_where_they_can_keep_step() {
+        for (upper, lower) in [("sheet", "sheet"), ("tube", "tube"), ("tube", "sheet"), ("sheet", "tube")] {
+            for (upper_hz, lower_hz) in [(60.0, 60.0), (60.0, 240.0), (240.0, 60.0), (1000.0, 240.0)] {
+                let [upper, lower] = [above(standing(0, upper, upper_hz)), standing(1, lower, lower_hz)];
+                assert!(owns(upper, lower, false), "{upper:?} on {lower:?}");
+            }
+        }
+        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "sheet", 60.0)), false), "the faster");
+        assert!(owns(standing(1, "sheet", 1000.0), above(standing(0, "tube", 60.0)), false), "the soft one");
+        assert!(
+            owns(above(standing(0, "sheet", 60.0)), standing(1, "tube", 1000.0), false),
+            "the soft one, however slow"
+        );
+        assert!(owns(standing(2, "sheet", 240.0), standing(1, "sheet", 60.0), false), "as high, the faster");
+        assert!(owns(standing(0, "sheet", 60.0), standing(1, "sheet", 60.0), false), "of equals the lower number");
+    }
+
+    #[test]
+    fn links_and_holds_ask_for_no_height() {
+        let (sheet, tube) = (standing(1, "sheet", 60.0), standing(2, "tube", 60.0));
+        assert!(owns(sheet, above(tube), true), "the soft one");
+        assert!(owns(Standing { rate_hz: 61.0, ..sheet }, above(standing(0, "sheet", 60.0)), true), "the faster");
+        let held = |held_ends, s| Standing { held_ends, ..s };
+        assert!(owns(tube, held(1, above(tube)), false), "the one that falls");
+        assert!(owns(standing(2, "tube", 5.0), held(1, above(tube)), false), "beside each other both keep 60 Hz");
+        assert!(owns(held(2, standing(2, "tube", 1000.0)), above(tube), false), "the faster");
+        assert!(owns(held(2, tube), held(2, above(tube)), false), "the lower number of those that are held alike");
+        assert!(!keep_step(tube, held(1, above(tube)), false), "a held tube lies on its hold");
+        assert!(keep_step(sheet, held(1, above(tube)), false) && keep_step(tube, above(tube), false));
+        assert!(!keep_step(sheet, above(tube), true), "links have clocks of their own");
+        assert!(!keep_step(sheet, above(standing(0, "rigid", 60.0)), false), "what does not bend too");
+    }
+}

@@ -1,0 +1,236 @@
+//! Wave variables: an elastic line between two agents whose ends hear each other late, passive whatever the delay.
+//!
+//! In: what the other end has sent. Out: what arrives during a step, and what this end sends. Never here: where the line is
+//! fixed. Theory: docs/theory/coupling.md.
+//!
+//! An end that pushes into the line by f and moves with v sends w = f + Z v; after the delay T the other end hears c = −w and
+//! has f = Z v + c. Z = k T, so the line has the mass k T² of its own. What was sent is published as its integral over time:
+//! readings that are lost or made twice take and repeat nothing, and means over a step only dissipate.
+
+use crate::beside::MEETS_S;
+use glam::{DMat3, DVec3};
+use metachron_core::Wave;
+use metachron_core::{SimSpan, SimTime};
+use std::collections::VecDeque;
+
+/// One end of a link during a step.
+#[derive(Debug, Clone, Copy)]
+pub struct End {
+    /// When the step begins, and how long it lasts, seconds.
+    pub step: (SimTime, f64),
+    /// Its own velocity at the end of the step without the link, m/s.
+    pub own: DVec3,
+    /// How the other end moves as far as is known, m/s.
+    pub far: DVec3,
+    /// From here to the other end, metres.
+    pub way: DVec3,
+    /// What arrives, N.
+    pub arriving: DVec3,
+    /// The velocity that a force on this end causes by the end of the step, m/s a newton.
+    pub yields: DMat3,
+    /// The distance at which the link pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// Damping beside the line, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// What a link does at one end.
+#[derive(Debug, Clone, Copy)]
+pub struct Drawn {
+    /// The force on this end, N.
+    pub force: DVec3,
+    /// What of the wave that arrived the line answers, N: its part along the link where that has a length at rest.
+    pub arriving: DVec3,
+    /// The force into the line, N.
+    pub into_line: DVec3,
+}
+
+/// One end of a line.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Line {
+    stiffness_n_m: f64,
+    delay_s: f64,
+    /// (time, ∫ w dt) of the other end, by rising times.
+    heard: VecDeque<(SimTime, DVec3)>,
+    /// How much of the other's integral has arrived here.
+    arrived: DVec3,
+    sent: DVec3,
+    start: DVec3,
+    since: SimTime,
+}
+
+/// The most states of the other end that are kept: those of one delay, at a hundred times this end's rate.
+const HEARD_MAX: usize = 256;
+/// The delay is this many of the longer of both sides' steps: one to be published, one to be lost or late.
+const DELAY_STEPS: f64 = 2.0;
+
+impl Line {
+    /// An end of a line of `stiffness_n_m`, N/m, > 0, that has no delay yet.
+    #[must_use]
+    pub fn new(stiffness_n_m: f64) -> Self {
+        Self { stiffness_n_m, ..Self::default() }
+    }
+
+    /// Takes in what the other end published at its time `at`. The end that `decides` chooses the delay, from its own step of
+    /// `dt_s` and the other's; the other end takes it over.
+    pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
+        let wave = wave.unwrap_or_default();
+        let sane = wave.sent.is_finite() && wave.start.is_finite();
+        let back_s = self.heard.back().map_or(-1.0, |&(last, _)| last.secs_after(at));
+        if (0.0..=MEETS_S).contains(&back_s) || !sane {
+            return;
+        }
+        if back_s > MEETS_S {
+            // no old message: the other end calls its time another now
+            self.heard.clear();
+        }
+        if self.delay_s == 0.0 {
+            let theirs = self.heard.back().map(|&(last, _)| at.secs_after(last));
+            self.delay_s = match theirs {
+                Some(theirs) if decides => DELAY_STEPS * theirs.max(dt_s),
+                _ if decides => 0.0,
+                _ => wave.delay_s,
+            };
+            if decides {
+                // by then the other end has heard of it
+                self.since += SimSpan::from_secs_f64(2.0 * self.delay_s).unwrap_or(SimSpan::ZERO);
+            } else {
+                (self.start, self.since) = (-wave.start, wave.since);
+            }
+            self.heard.clear();
+            self.arrived = wave.sent;
+        }
+        if self.heard.len() == HEARD_MAX {
+            self.heard.pop_front();
+        }
+        self.heard.push_back((at, wave.sent));
+    }
+
+    /// The end that decides notes where the other end is, `way` metres from it, when the line is made: in its step from `at` on.
+    pub fn begin(&mut self, way: DVec3, at: SimTime) {
+        if self.delay_s == 0.0 {
+            (self.start, self.since) = (way, at);
+        }
+    }
+
+    /// What a link on this line does at one end, implicit in its own motion.
+    ///
+    /// The line carries what has changed since it was made; what it was stretched by then pulls as it is. Without a length at
+    /// rest the link is the same in all directions, else it acts along itself.
+    #[must_use]
+    pub fn draw(&self, end: &End) -> Drawn {
+        let along = end.way.normalize_or_zero();
+        let here = if end.rest_m > 0.0 {
+            DMat3::from_cols(along * along.x, along * along.y, along * along.z)
+        } else {
+            DMat3::IDENTITY
+        };
+        let (at, h) = end.step;
+        let felt = (1.0 - self.since.secs_after(at) / h).clamp(0.0, 1.0);
+        let taut = if self.delay_s > 0.0 { felt * self.stiffness_n_m } else { 0.0 };
+        let start = if end.rest_m > 0.0 { along * (self.start.length() - end.rest_m) } else { self.start };
+        let (z, c) = (self.impedance(), end.damping_n_s_m);
+        let arriving = here * end.arriving;
+        let drive = start * taut - arriving + here * ((end.far - end.own) * c - end.own * z);
+        let force = (DMat3::IDENTITY + here * end.yields * (z + c)).inverse() * drive;
+        let into_line = here * (end.own + end.yields * force) * z + arriving;
+        Drawn { force, arriving, into_line }
+    }
+
+    /// What arrives on the average of the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
+    ///
+    /// Where nothing that late is known yet the last of it goes on; the integral makes up for it later.
+    pub fn arriving(&mut self, at: SimTime, h: f64) -> DVec3 {
+        if self.delay_s == 0.0 {
+            return DVec3::ZERO;
+        }
+        let now = self.integral(at, h - self.delay_s);
+        let mean = (self.arrived - now) / h;
+        self.arrived = now;
+        mean
+    }
+
+    /// Sends the answer to `arriving`, where this end pushed into the line by `force` (N) for `h` seconds.
+    pub fn send(&mut self, arriving: DVec3, force: DVec3, h: f64) {
+        self.sent += (force * 2.0 - arriving) * h;
+    }
+
+    /// What this end publishes.
+    #[must_use]
+    pub const fn wave(&self) -> Wave {
+        Wave { sent: self.sent, delay_s: self.delay_s, start: self.start, since: self.since }
+    }
+
+    /// Z = k T, N·s/m.
+    #[must_use]
+    pub const fn impedance(&self) -> f64 {
+        self.stiffness_n_m * self.delay_s
+    }
+
+    /// The mass that the line has of its own, kg: k T².
+    #[must_use]
+    pub const fn parasitic_kg(&self) -> f64 {
+        self.stiffness_n_m * self.delay_s * self.delay_s
+    }
+
+    /// The other's ∫ w dt at `after_s` seconds after `at`, between what was heard.
+    fn integral(&self, at: SimTime, after_s: f64) -> DVec3 {
+        let Some(&(first, start)) = self.heard.front() else { return self.arrived };
+        let when = |t: SimTime| t.secs_after(at) - after_s; // seconds past the wanted moment
+        if when(first) >= 0.0 || self.heard.len() == 1 {
+            return start;
+        }
+        let after = self.heard.partition_point(|&(t, _)| when(t) < 0.0).min(self.heard.len() - 1);
+        let ((t0, w0), (t1, w1)) = (self.heard[after - 1], self.heard[after]);
+        w0 + (w1 - w0) * (-when(t0) / t1.secs_after(t0))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two bodies of 1 kg on a line, stepped at the same clock or at different ones: the stretch over time.
+    fn swing(stiffness: f64, steps: [f64; 2], seconds: f64) -> Vec<(f64, f64, f64)> {
+        let mut lines = [Line::new(stiffness), Line::new(stiffness)];
+        let (mut x, mut v, mut t) = ([0.0, 0.0], [0.0, 0.1], [SimTime::ZERO; 2]);
+        let mut shown = [(SimTime::ZERO, None); 2];
+        let mut path = vec![];
+        while t[0].as_secs_f64() < seconds {
+            let i = usize::from(t[1] < t[0]);
+            let (h, other) = (steps[i], 1 - i);
+            lines[i].hear(shown[other].0, shown[other].1, (i == 0, h));
+            let c = lines[i].arriving(t[i], h);
+            let z = lines[i].impedance();
+            let force = (c.x + z * v[i]) / (1.0 + z * h); // of 1 kg
+            lines[i].send(c, DVec3::X * force, h);
+            v[i] -= force * h;
+            x[i] += v[i] * h;
+            t[i] += SimSpan::from_secs_f64(h).unwrap();
+            shown[i] = (t[i], Some(lines[i].wave()));
+            if i == 1 {
+                path.push((t[1].as_secs_f64(), x[1] - x[0], 0.5 * (v[0] * v[0] + v[1] * v[1])));
+            }
+        }
+        path
+    }
+
+    #[test]
+    fn a_line_swings_at_the_frequency_of_its_spring_and_mass() {
+        // k T² = 0.004² · 100 = 1.6e-3 kg beside 1 kg
+        let path = swing(100.0, [0.002, 0.002], 1.0);
+        let turned = path.windows(2).find(|w| w[1].1 < w[0].1).unwrap()[0].0;
+        let quarter = std::f64::consts::FRAC_PI_2 / (2.0_f64 * 100.0).sqrt();
+        assert!((turned / quarter - 1.0).abs() < 0.1, "{turned} s for {quarter} s"); // the delay enters at first order
+    }
+
+    #[test]
+    fn a_line_never_gains_energy_whatever_the_steps() {
+        for steps in [[0.001, 0.001], [0.001, 0.016], [0.016, 0.001], [0.003, 0.1], [0.1, 0.003]] {
+            for stiffness in [1.0, 1e3, 1e6] {
+                let most = swing(stiffness, steps, 5.0).iter().map(|p| p.2).fold(0.0, f64::max);
+                assert!(most < 0.005 * 1.01, "{steps:?}, {stiffness} N/m: {most} J of 0.005");
+            }
+        }
+    }
+}

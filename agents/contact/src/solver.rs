@@ -1,0 +1,332 @@
+//! The impulses of many contacts at once: accelerated projected gradient (MHNT15) on Signorini's and Coulomb's laws.
+//!
+//! In: contacts, the free velocities, and a body's answer to impulses. Out: the impulses, and the velocities after them.
+//! Each iteration costs one answer, however many contacts there are, or none where W is formed. Theory: docs/theory/contact.md, eq. 5–11.
+
+use super::Contact;
+use super::delassus::Formed;
+use glam::DVec3;
+
+/// How a body answers impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
+pub trait Response {
+    /// Turns impulses, one a slot, into the changes of velocity they cause. Linear.
+    fn respond(&mut self, impulses: &mut [DVec3]);
+}
+
+impl<F: FnMut(&mut [DVec3])> Response for F {
+    fn respond(&mut self, impulses: &mut [DVec3]) {
+        self(impulses);
+    }
+}
+
+/// When the iteration stops.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The most answers a solve may ask for, ≥ 1. Fewer leave friction creeping and piles sinking.
+    pub iterations: u32,
+    /// The error of velocity at which a solve is done, m/s, > 0. A millionth of a metre a step is far below any drawing.
+    pub tolerance_m_s: f64,
+}
+
+/// One solve: all contacts of a body at one moment.
+#[derive(Debug, Clone, Copy)]
+pub struct Problem<'a> {
+    /// The contacts, by rising keys.
+    pub contacts: &'a [Contact],
+    /// How far, in keys, the names lie that a contact may have had in the last solve: a place that passes from one
+    /// segment to the next takes its impulse along.
+    pub kin: &'a [i64],
+    /// The step, seconds, > 0.
+    pub h_s: f64,
+    /// A scale of each slot's inverse mass, 1/kg, or 1/(kg·m²) for a spin; ≥ 0. Only the speed of convergence depends on it.
+    pub mobilities: &'a [f64],
+    /// When the iteration stops.
+    pub settings: Settings,
+}
+
+/// How a solve went.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct SolverReport {
+    /// Products with W, each an answer of the body where W is not formed.
+    pub iterations: u32,
+    /// The largest velocity by which a contact still fails its law, m/s.
+    pub residual_m_s: f64,
+}
+
+/// The memory of the solve: warm starts by key, and room to work in (nothing is allocated once the sizes settle).
+#[derive(Debug, Clone, Default)]
+pub struct Solver {
+    known: Vec<Known>,
+    known_h: f64,
+    stiffness: f64,
+    /// The same three as the last solve found them.
+    before: (Vec<Known>, f64, f64),
+    scale: Vec<f64>,
+    free: Vec<DVec3>,
+    now: Iterate,
+    ahead: Iterate,
+    next: Iterate,
+    answer: Vec<DVec3>,
+    /// Whether W may be formed: an answer is dear beside a product with the W of as many contacts.
+    forms: bool,
+    formed: Formed,
+    /// Products that the last solve took.
+    products: u32,
+}
+
+/// The impulse of a contact of the last solve.
+#[derive(Debug, Clone, Copy)]
+struct Known {
+    key: u64,
+    lambda: DVec3,
+    /// Whether a contact of this solve has taken it up.
+    taken: bool,
+}
+
+/// Impulses λ, and the velocities W λ they cause at the contacts.
+#[derive(Debug, Clone, Default)]
+struct Iterate {
+    lambda: Vec<DVec3>,
+    caused: Vec<DVec3>,
+}
+
+/// How far past the measured need the step bound is raised: a little, so that rounding does not ask for it again.
+const BOUND_MARGIN: f64 = 1.02;
+/// The share of the step bound that a new solve starts from: contacts come and go, a bound that only rises slows all later ones.
+const BOUND_DECAY: f64 = 0.9;
+/// The least mobility, 1/kg: a contact between held matter only has none, and any number will do.
+const MOBILITY_MIN: f64 = 1e-12;
+/// Where the last solve ended before its tolerance W is formed for up to so many times the answers that it may take.
+const DEAR: usize = 3;
+/// The most products with a W that is formed.
+const FORMED_PRODUCTS: u32 = 2_000;
+
+impl Solver {
+    /// A solver that forms W where the last solve took more answers than that costs.
+    #[must_use]
+    pub fn forming() -> Self {
+        Self { forms: true, ..Self::default() }
+    }
+
+    /// Forgets every warm start: keys have lost their meaning (the body was divided anew).
+    pub fn forget(&mut self) {
+        self.known.clear();
+    }
+
+    /// Forgets all of the solves before, the bound of eq. 11 with them.
+    pub fn start_afresh(&mut self) {
+        self.forget();
+        self.stiffness = 1.0;
+    }
+
+    /// Forgets the last solve alone: it was asked with what turned out to be wrong.
+    pub fn take_back(&mut self) {
+        std::mem::swap(&mut self.known, &mut self.before.0);
+        self.known.iter_mut().for_each(|known| known.taken = false);
+        (self.known_h, self.stiffness) = (self.before.1, self.before.2);
+    }
+
+    /// The impulse of each contact of the last solve, N·s, in the order the contacts were given.
+    #[must_use]
+    pub fn impulses(&self) -> &[DVec3] {
+        &self.now.lambda
+    }
+
+    /// Finds the impulses and adds what they do to `velocities`, one entry a slot (eq. 5–8).
+    pub fn solve(&mut self, problem: &Problem<'_>, velocities: &mut [DVec3], body: &mut impl Response) -> SolverReport {
+        if problem.contacts.is_empty() {
+            self.now.lambda.clear();
+            self.forget();
+            return SolverReport::default();
+        }
+        self.prepare(problem, velocities);
+        let report = self.iterate(problem, body, velocities.len());
+        velocities.iter_mut().zip(&self.answer).for_each(|(v, dv)| *v += *dv);
+        self.remember(problem);
+        report
+    }
+
+    /// Free velocities b (eq. 6), scales (eq. 9) and warm starts of all contacts.
+    fn prepare(&mut self, problem: &Problem<'_>, velocities: &[DVec3]) {
+        let Problem { contacts, h_s: h, mobilities, .. } = *problem;
+        self.free.clear();
+        self.free.extend(contacts.iter().map(|c| c.slots.velocity(velocities) + c.normal * c.bias_m_s(h) + c.back_m_s));
+        self.scale.clear();
+        self.scale.extend(contacts.iter().map(|c| c.slots.mobility(mobilities).max(MOBILITY_MIN)));
+        (self.before.1, self.before.2) = (self.known_h, self.stiffness);
+        self.start(problem);
+        self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
+    }
+
+    /// Starts from the impulses of the last solve: those of the same name, then those of kin that no longer are.
+    fn start(&mut self, problem: &Problem<'_>) {
+        let Self { known, known_h, now, .. } = self;
+        let longer = if *known_h > 0.0 { problem.h_s / *known_h } else { 0.0 };
+        let mut at = 0;
+        now.lambda.clear();
+        now.lambda.extend(problem.contacts.iter().map(|c| {
+            at += known[at..].iter().take_while(|k| k.key < c.key).count();
+            let same = known.get_mut(at).filter(|k| k.key == c.key);
+            same.map_or(DVec3::NAN, |k| {
+                k.taken = true;
+                k.lambda
+            })
+        }));
+        for (contact, lambda) in problem.contacts.iter().zip(&mut now.lambda) {
+            if lambda.is_nan() {
+                *lambda = DVec3::ZERO;
+                for offset in problem.kin {
+                    let key = contact.key.wrapping_add_signed(*offset);
+                    let Ok(found) = known.binary_search_by_key(&key, |k| k.key) else { continue };
+                    if !known[found].taken {
+                        known[found].taken = true;
+                        *lambda += known[found].lambda;
+                    }
+                }
+            }
+            *lambda = contact.project(*lambda * longer);
+        }
+    }
+
+    fn remember(&mut self, problem: &Problem<'_>) {
+        let Self { known, now, .. } = self;
+        std::mem::swap(known, &mut self.before.0);
+        let named = problem.contacts.iter().zip(&now.lambda);
+        known.clear();
+        known.extend(named.map(|(c, &lambda)| Known { key: c.key, lambda, taken: false }));
+        self.known_h = problem.h_s;
+    }
+
+    /// The iteration (eq. 10, 11). Leaves λ in `now` and A⁻¹ Jᵀ λ in `answer`.
+    fn iterate(&mut self, problem: &Problem<'_>, body: &mut impl Response, slots: usize) -> SolverReport {
+        let Problem { contacts, settings, .. } = *problem;
+        self.answer.clear();
+        self.answer.resize(slots, DVec3::ZERO);
+        let most = self.form(problem, body);
+        let mut report = SolverReport::default();
+        if self.now.lambda.iter().any(|l| *l != DVec3::ZERO) {
+            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+            report.iterations += 1;
+        } else {
+            self.now.caused.clear();
+            self.now.caused.resize(contacts.len(), DVec3::ZERO);
+        }
+        self.ahead.clone_from(&self.now);
+        let (mut momentum, mut taken) = (1.0, true);
+        loop {
+            self.descend(contacts);
+            report.residual_m_s = self.residual();
+            // `answer` must belong to `now`: no stop between a refused move and the next one
+            if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= most) {
+                break;
+            }
+            self.next.cause(contacts, (&self.formed, body), &mut self.answer);
+            report.iterations += 1;
+            taken = self.bound_holds() || report.iterations >= most;
+            if taken {
+                momentum = self.advance(momentum);
+            }
+        }
+        if self.formed.is_known() {
+            self.formed.forget();
+            self.now.cause(contacts, (&self.formed, body), &mut self.answer);
+        }
+        self.products = report.iterations;
+        report
+    }
+
+    /// Forms W where that costs less than the last solve did; the most products that may be taken.
+    fn form(&mut self, problem: &Problem<'_>, body: &mut impl Response) -> u32 {
+        let Problem { contacts, settings, .. } = *problem;
+        let (columns, taken) = (3 * contacts.len(), self.products as usize);
+        let gave_up = self.products >= settings.iterations && columns <= DEAR * settings.iterations as usize;
+        if !self.forms || !(taken > columns || gave_up) {
+            return settings.iterations;
+        }
+        self.formed.form(contacts, body, &mut self.answer);
+        FORMED_PRODUCTS
+    }
+
+    /// next ← P(ahead − (W ahead + b) / (L d)) (eq. 10).
+    fn descend(&mut self, contacts: &[Contact]) {
+        let Self { ahead, next, free, scale, stiffness, .. } = self;
+        next.lambda.clear();
+        next.lambda.extend(contacts.iter().enumerate().map(|(i, c)| {
+            let slope = ahead.caused[i] + free[i];
+            c.project(ahead.lambda[i] - slope / (*stiffness * scale[i]))
+        }));
+    }
+
+    /// The largest move of a contact in velocity: zero exactly where every law holds.
+    fn residual(&self) -> f64 {
+        let moves = self.next.lambda.iter().zip(&self.ahead.lambda).zip(&self.scale);
+        moves.map(|((next, ahead), d)| (*next - *ahead).length() * d * self.stiffness).fold(0.0, f64::max)
+    }
+
+    /// Whether L is an upper bound along the move just made; if not it is raised to one (eq. 11).
+    fn bound_holds(&mut self) -> bool {
+        let (mut curve, mut size) = (0.0, 0.0);
+        for i in 0..self.next.lambda.len() {
+            let step = self.next.lambda[i] - self.ahead.lambda[i];
+            curve += step.dot(self.next.caused[i] - self.ahead.caused[i]);
+            size += self.scale[i] * step.length_squared();
+        }
+        let holds = curve <= self.stiffness * size * (1.0 + 1e-9);
+        if !holds {
+            self.stiffness = BOUND_MARGIN * curve / size;
+        }
+        holds
+    }
+
+    /// Takes the move and looks ahead of it; starts afresh where looking ahead went uphill.
+    fn advance(&mut self, momentum: f64) -> f64 {
+        let uphill: f64 = (0..self.next.lambda.len())
+            .map(|i| {
+                let (ahead, next, now) = (self.ahead.lambda[i], self.next.lambda[i], self.now.lambda[i]);
+                (ahead - next).dot(next - now) * self.scale[i]
+            })
+            .sum();
+        let momentum = if uphill > 0.0 { 1.0 } else { momentum };
+        let grown = 0.5 * (1.0 + (1.0 + 4.0 * momentum * momentum).sqrt());
+        let beta = if uphill > 0.0 { 0.0 } else { (momentum - 1.0) / grown };
+        for i in 0..self.next.lambda.len() {
+            self.ahead.lambda[i] = self.next.lambda[i] + (self.next.lambda[i] - self.now.lambda[i]) * beta;
+            self.ahead.caused[i] = self.next.caused[i] + (self.next.caused[i] - self.now.caused[i]) * beta;
+        }
+        std::mem::swap(&mut self.now, &mut self.next);
+        grown
+    }
+}
+
+/// The inverse mass of both sides of a contact along its normal, 1/kg: n·J A⁻¹ Jᵀ n over the slots before `own`, and over those from
+/// there on, of `slots` in all. One answer; nothing is allocated once `room` has its size.
+pub fn inverse_mass(
+    contact: &Contact,
+    (own, slots): (usize, usize),
+    body: &mut impl Response,
+    room: &mut Vec<DVec3>,
+) -> [f64; 2] {
+    let Contact { slots: at, normal, .. } = contact;
+    room.clear();
+    room.resize(slots, DVec3::ZERO);
+    at.scatter(*normal, room);
+    body.respond(room);
+    let both = at.velocity(room).dot(*normal);
+    room[..own].fill(DVec3::ZERO);
+    let other = at.velocity(room).dot(*normal);
+    [both - other, other]
+}
+
+impl Iterate {
+    /// The velocities W λ at the contacts; `answer` holds A⁻¹ Jᵀ λ afterwards, where W is not formed.
+    fn cause(&mut self, contacts: &[Contact], (formed, body): (&Formed, &mut impl Response), answer: &mut [DVec3]) {
+        if formed.is_known() {
+            return formed.times(&self.lambda, &mut self.caused);
+        }
+        answer.fill(DVec3::ZERO);
+        contacts.iter().zip(&self.lambda).for_each(|(c, lambda)| c.slots.scatter(*lambda, answer));
+        body.respond(answer);
+        self.caused.clear();
+        self.caused.extend(contacts.iter().map(|c| c.slots.velocity(answer)));
+    }
+}

@@ -1,0 +1,251 @@
+//! Where an agent's matter is and how it moves: the bodies that snapshots hold, and material points of them.
+//!
+//! In: a model writes its state. Out: points, probes, bounds. Never here: how anything moves.
+
+use crate::AgentId;
+use glam::{DQuat, DVec3};
+
+/// Where matter is and how fast it may leave.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// The lowest coordinates, metres.
+    pub low: DVec3,
+    /// The highest coordinates, metres.
+    pub high: DVec3,
+    /// No point moves faster, m/s.
+    pub speed_m_s: f64,
+}
+
+/// The state of an agent's matter; which one is fixed for an agent's life.
+#[derive(Debug, Clone, Default)]
+pub enum Body {
+    /// Nothing to see (a synthetic agent).
+    #[default]
+    Nothing,
+    /// A tube or cable: a framed curve with a radius.
+    Curve(CurveState),
+    /// A rigid body.
+    Rigid(RigidState),
+    /// A driven tool with jaws.
+    Tool(ToolState),
+    /// A sheet, solid or rope: vertices.
+    Soft(SoftState),
+}
+
+/// The vertices of a soft body. What joins them never changes ([`metachron_geometry::SurfaceForm`]).
+#[derive(Debug, Clone, Default)]
+pub struct SoftState {
+    /// Where they are, metres, world axes.
+    pub positions: Vec<DVec3>,
+    /// Their velocities, m/s.
+    pub velocities: Vec<DVec3>,
+}
+
+/// A framed curve of N segments between N + 1 nodes. Positions are in metres, world axes.
+#[derive(Debug, Clone, Default)]
+pub struct CurveState {
+    /// Rest arc length of each node in metres, rising from 0 to the rest length; N + 1 entries.
+    pub arc_m: Vec<f64>,
+    /// Node positions; N + 1 entries.
+    pub positions: Vec<DVec3>,
+    /// Node velocities in m/s; N + 1 entries.
+    pub velocities: Vec<DVec3>,
+    /// Section frames, one a segment: the third axis (z) is the axial director; N entries.
+    pub frames: Vec<DQuat>,
+    /// Outer radius at each node in metres; N + 1 entries.
+    pub radii_m: Vec<f64>,
+}
+
+/// The pose and motion of a rigid body, about its centre of mass.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RigidState {
+    /// Centre of mass, metres.
+    pub position: DVec3,
+    /// Rotation from the body's axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of the centre of mass, m/s.
+    pub velocity: DVec3,
+    /// Angular velocity in world axes, rad/s.
+    pub spin: DVec3,
+}
+
+/// Jaws that pass below this opening grasp.
+pub const GRASP_BELOW: f64 = 0.2;
+
+/// A driven tool: the tip between its jaws, the shaft along the tool's own −z.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct ToolState {
+    /// The point between the jaws, metres.
+    pub tip: DVec3,
+    /// Rotation from the tool's axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of the tip, m/s.
+    pub velocity: DVec3,
+    /// Angular velocity in world axes, rad/s.
+    pub spin: DVec3,
+    /// Opening of the jaws: 0 shut … 1 wide open.
+    pub jaw: f64,
+    /// What the jaws hold.
+    pub grasp: Option<Grasp>,
+    /// The rigid body that the open jaws are about to take, or have just let go: it may come between them.
+    pub lets_in: Option<AgentId>,
+    /// Magnitude of the force that what is held exerts on the tool, newtons.
+    pub force_n: f64,
+    /// Whether nothing leads it on: it has come to the end of its script, which nothing holds it back from, and no hand has it.
+    pub is_left: bool,
+}
+
+/// A tool's hold on a material point of another agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grasp {
+    /// Who is held.
+    pub target: AgentId,
+    /// Which material point of it.
+    pub anchor: Anchor,
+    /// How it is kept from turning between the jaws; `None` where it may.
+    pub clasp: Option<Clasp>,
+    /// Stiffness of the hold, N/m, > 0.
+    pub stiffness_n_m: f64,
+    /// Damping of the hold, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+}
+
+/// How jaws keep a rigid body from turning: they are as long as `arm_m`, and bear on all of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Clasp {
+    /// Rotation from the body's axes to the tool's in which the hold turns nothing.
+    pub rotation: DQuat,
+    /// The hold resists turning about every axis as springs and dampers of its own strength do at this distance, metres, ≥ 0.
+    pub arm_m: f64,
+}
+
+/// A material point of a body: it moves with the matter, whatever the resolution.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Anchor {
+    /// The point of a curve's axis at this rest arc length in metres.
+    Arc(f64),
+    /// A point of a rigid body in its own axes, metres from the centre of mass.
+    Local(DVec3),
+    /// A vertex of a soft body.
+    Vertex(u32),
+}
+
+/// The force by which `by` holds this agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Grip {
+    /// Who holds; `None` is the user's hand.
+    pub by: Option<AgentId>,
+    /// The force on this agent, newtons, world axes.
+    pub force_n: DVec3,
+}
+
+impl Default for RigidState {
+    fn default() -> Self {
+        Self { position: DVec3::ZERO, rotation: DQuat::IDENTITY, velocity: DVec3::ZERO, spin: DVec3::ZERO }
+    }
+}
+
+impl CurveState {
+    /// Position and velocity of the material point at rest arc length `arc_m`, clamped to the curve's ends;
+    /// `None` for a curve without nodes.
+    #[must_use]
+    pub fn point_at(&self, arc_m: f64) -> Option<(DVec3, DVec3)> {
+        let (left, w) = self.locate(arc_m).or_else(|| (!self.positions.is_empty()).then_some((0, 0.0)))?;
+        let right = (left + 1).min(self.positions.len() - 1);
+        Some((
+            self.positions[left].lerp(self.positions[right], w),
+            self.velocities[left].lerp(self.velocities[right], w),
+        ))
+    }
+}
+
+impl CurveState {
+    /// The segment that holds the material point at rest arc length `arc_m`, and how far along it the point lies, 0 … 1;
+    /// clamped to the curve's ends. `None` for a curve without segments.
+    #[must_use]
+    pub fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
+        let last = self.arc_m.len().checked_sub(2)?;
+        let segment = self.arc_m.partition_point(|&s| s < arc_m).saturating_sub(1).min(last);
+        let length = self.arc_m[segment + 1] - self.arc_m[segment];
+        let share = if length > 0.0 { ((arc_m - self.arc_m[segment]) / length).clamp(0.0, 1.0) } else { 0.0 };
+        Some((segment, share))
+    }
+}
+
+impl Body {
+    /// Position and velocity of a material point; `None` where the body has no such point.
+    #[must_use]
+    pub fn point(&self, anchor: Anchor) -> Option<(DVec3, DVec3)> {
+        match (self, anchor) {
+            (Self::Curve(curve), Anchor::Arc(arc_m)) => curve.point_at(arc_m),
+            (Self::Rigid(body), Anchor::Local(local)) => {
+                let arm = body.rotation * local;
+                Some((body.position + arm, body.velocity + body.spin.cross(arm)))
+            }
+            (Self::Tool(tool), Anchor::Local(local)) => Some((tool.tip + tool.rotation * local, tool.velocity)),
+            (Self::Soft(soft), Anchor::Vertex(vertex)) => {
+                Some((*soft.positions.get(vertex as usize)?, *soft.velocities.get(vertex as usize)?))
+            }
+            _ => None,
+        }
+    }
+
+    /// The point a probe at `at` (0 start … 1 end of a curve's rest length) reports: position and velocity.
+    /// A soft body reports the vertex at that share of their numbers: of its first corner at 0, of the opposite one at 1.
+    /// Any other body reports its centre of mass or tip.
+    #[must_use]
+    pub fn probe(&self, at: f64) -> Option<(DVec3, DVec3)> {
+        match self {
+            Self::Curve(curve) => curve.point_at(at * curve.arc_m.last()?),
+            Self::Soft(soft) => {
+                let last = soft.positions.len().checked_sub(1)?;
+                self.point(Anchor::Vertex((at.clamp(0.0, 1.0) * last as f64).round() as u32))
+            }
+            Self::Nothing => None,
+            _ => self.point(Anchor::Local(DVec3::ZERO)),
+        }
+    }
+
+    /// Whether every number is finite. A body that is not is never published.
+    #[must_use]
+    pub fn is_finite(&self) -> bool {
+        match self {
+            Self::Nothing => true,
+            Self::Curve(c) => {
+                c.positions.iter().all(|p| p.is_finite())
+                    && c.velocities.iter().all(|v| v.is_finite())
+                    && c.frames.iter().all(|q| q.is_finite())
+                    && c.radii_m.iter().all(|r| r.is_finite())
+            }
+            Self::Rigid(b) => {
+                b.position.is_finite() && b.rotation.is_finite() && b.velocity.is_finite() && b.spin.is_finite()
+            }
+            Self::Tool(t) => {
+                [t.tip, t.velocity, t.spin].iter().all(|v| v.is_finite()) && t.rotation.is_finite() && t.jaw.is_finite()
+            }
+            Self::Soft(s) => s.positions.iter().chain(&s.velocities).all(|p| p.is_finite()),
+        }
+    }
+
+    /// The soft body to write into, keeping its storage when this is one already.
+    pub fn soft_mut(&mut self) -> &mut SoftState {
+        if !matches!(self, Self::Soft(_)) {
+            *self = Self::Soft(SoftState::default());
+        }
+        match self {
+            Self::Soft(soft) => soft,
+            _ => unreachable!("made a soft body above"),
+        }
+    }
+
+    /// The curve to write into, keeping its storage when this is a curve already.
+    pub fn curve_mut(&mut self) -> &mut CurveState {
+        if !matches!(self, Self::Curve(_)) {
+            *self = Self::Curve(CurveState::default());
+        }
+        match self {
+            Self::Curve(curve) => curve,
+            _ => unreachable!("made a curve above"),
+        }
+    }
+}

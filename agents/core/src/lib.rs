@@ -1,0 +1,41 @@
+//! What every part of metachron shares: time, numbers of agents, published states, linear algebra.
+//!
+//! In: plain values. Out: types that models write and that contact, drawing and reports read.
+//! Never here: a clock, a thread, a file, the GPU, a model of physics, a shape.
+
+pub mod body;
+pub mod foot;
+pub mod id;
+pub mod impulse_response;
+pub mod jacobian;
+pub mod ledger;
+pub mod pair;
+pub mod rebound;
+pub mod resolution;
+pub mod reusable_option;
+pub mod skyline_cholesky;
+pub mod snapshot;
+pub mod spatial;
+pub mod sprung;
+pub mod step;
+pub mod step_doubling;
+pub mod time;
+pub mod wave;
+
+pub use body::{Anchor, Body, Bounds, Clasp, CurveState, GRASP_BELOW, Grasp, Grip, RigidState, SoftState, ToolState};
+pub use foot::{Carried, Foot, Lies, Stance};
+pub use id::AgentId;
+pub use impulse_response::{CurveResponse, ImpulseResponse};
+pub use jacobian::Slots;
+pub use ledger::{Ahead, Coming, Entry, Impulse, Ledger, Page, Site};
+pub use pair::{PairKind, PairState};
+pub use rebound::Rebound;
+pub use resolution::{N_MAX, Resolution, ResolutionRange};
+pub use reusable_option::Rare;
+pub use snapshot::{HASH_START, Inertia, LiesOn, Snapshot, Stand, Tips, Upheld};
+pub use spatial::{Six, Twist};
+pub use sprung::Sprung;
+pub use step::{DT_MAX_S, StepError, StepReport, check_span};
+pub use step_doubling::DRIFT_S;
+pub use time::{SimSpan, SimTime};
+pub use wave::Wave;

@@ -1,0 +1,100 @@
+//! What a coupling between two agents does now, as its owner publishes it.
+
+use super::wave::Wave;
+use crate::{AgentId, Upheld};
+
+/// How an agent's couplings act.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum PairKind {
+    /// Contact by impulse ledger.
+    #[default]
+    Ledger,
+    /// Contact by penalty forces from stale states.
+    Penalty,
+    /// Contact by penalty forces from states that are brought forward.
+    PenaltyExtrapolated,
+    /// Contact or link by wave variables.
+    Tlm,
+    /// A tool's hold.
+    Grasp,
+    /// A bilateral link of the scene.
+    Attachment,
+}
+
+impl PairKind {
+    /// Contact by penalty forces, whose two sides each push themselves.
+    #[must_use]
+    pub const fn of_penalty(extrapolate: bool) -> Self {
+        if extrapolate { Self::PenaltyExtrapolated } else { Self::Penalty }
+    }
+
+    /// Whether it is a contact by penalty forces.
+    #[must_use]
+    pub const fn is_penalty(self) -> bool {
+        matches!(self, Self::Penalty | Self::PenaltyExtrapolated)
+    }
+
+    /// The word of reports.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Ledger => "ledger",
+            Self::Penalty => "penalty",
+            Self::PenaltyExtrapolated => "penalty-extrapolated",
+            Self::Tlm => "tlm",
+            Self::Grasp => "grasp",
+            Self::Attachment => "attach",
+        }
+    }
+}
+
+/// What a coupling does now, published by its owner.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PairState {
+    /// The agent on the other side.
+    pub with: AgentId,
+    /// By which law.
+    pub kind: PairKind,
+    /// Places that touch or are held.
+    pub contacts: u32,
+    /// Mean force of the last step, newtons.
+    pub force_n: f64,
+    /// The deepest overlap seen in the last step, metres, ≥ 0.
+    pub penetration_m: f64,
+    /// The impulses given to the other side so far, magnitudes summed, N·s.
+    pub impulse_n_s: f64,
+    /// The impulse that the other side has not yet acknowledged, N·s.
+    pub in_flight_n_s: f64,
+    /// How easily the owner and the other side give way along the normal at the contact that bears most, 1/kg, ≥ 0, when they last
+    /// pressed on each other (a few steps ago at most); the sum is W of that contact. `None` where no contact was solved between the two.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
+    /// What is left in the energy tank, joules; `None` where the law keeps none.
+    pub tank_j: Option<f64>,
+    /// How the other side lies on the owner, where something fixed holds the owner up there.
+    pub bears: Option<Upheld>,
+    /// The mass that the law adds to the other side, kg: k T² of wave variables, else zero.
+    pub parasitic_kg: f64,
+    /// What this end of a line sends; with wave variables both sides publish the pair.
+    pub wave: Option<Wave>,
+}
+
+impl PairState {
+    /// A coupling that has done nothing yet.
+    #[must_use]
+    pub const fn new(with: AgentId, kind: PairKind) -> Self {
+        Self {
+            with,
+            kind,
+            contacts: 0,
+            force_n: 0.0,
+            penetration_m: 0.0,
+            impulse_n_s: 0.0,
+            in_flight_n_s: 0.0,
+            inverse_mass_per_kg: None,
+            tank_j: None,
+            bears: None,
+            parasitic_kg: 0.0,
+            wave: None,
+        }
+    }
+}

@@ -1,0 +1,265 @@
+//! Cholesky's factor of a symmetric positive matrix in double precision, each row stored from its first entry on.
+//!
+//! In: the first body that each body is joined to, and blocks of B rows. Out: the solution. Never here: where the matrix comes from.
+//! A chain's factor has a constant width, so it costs as much as the chain is long.
+
+use glam::DVec3;
+
+/// A matrix of B rows a body, its lower half.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Envelope<const B: usize> {
+    /// First column of each row.
+    first: Vec<usize>,
+    /// Where each row starts in `values`.
+    start: Vec<usize>,
+    values: Vec<f64>,
+}
+
+impl<const B: usize> Envelope<B> {
+    /// Makes room, all zero: body i is joined to none lower than `first_body[i]` ≤ i.
+    pub fn shape(&mut self, first_body: &[u32]) {
+        self.first.clear();
+        self.start.clear();
+        let mut size = 0;
+        for (body, &first) in first_body.iter().enumerate() {
+            for row in B * body..B * body + B {
+                self.first.push(B * first as usize);
+                self.start.push(size);
+                size += row + 1 - B * first as usize;
+            }
+        }
+        self.values.clear();
+        self.values.resize(size, 0.0);
+    }
+
+    /// What a factorisation costs: the sum of squares of the widths.
+    pub fn work(first_body: &[u32]) -> usize {
+        first_body.iter().enumerate().map(|(body, &first)| B * (B * (body + 1 - first as usize)).pow(2)).sum()
+    }
+
+    /// Adds `weight` · left rightᵀ to the block of the bodies `row` ≥ `column`; on the diagonal only the lower half counts.
+    pub fn add(&mut self, (row, column): (usize, usize), weight: f64, left: [f64; B], right: [f64; B]) {
+        for (i, &l) in left.iter().enumerate() {
+            let at = B * row + i;
+            let columns = if row == column { i + 1 } else { B };
+            let from = self.start[at] + B * column - self.first[at];
+            let scaled = weight * l;
+            self.values[from..from + columns].iter_mut().zip(right).for_each(|(value, r)| *value += scaled * r);
+        }
+    }
+
+    /// Adds a whole block to that of the bodies `row` ≥ `column`, given by rows; on the diagonal only the lower half counts.
+    pub fn add_block(&mut self, (row, column): (usize, usize), block: [[f64; B]; B]) {
+        for (i, values) in block.iter().enumerate() {
+            let at = B * row + i;
+            let columns = if row == column { i + 1 } else { B };
+            let from = self.start[at] + B * column - self.first[at];
+            self.values[from..from + columns].iter_mut().zip(values).for_each(|(value, add)| *value += add);
+        }
+    }
+
+    /// Makes it zero again, as it was shaped.
+    pub fn clear(&mut self) {
+        self.values.fill(0.0);
+    }
+
+    /// The diagonal, one number a row.
+    pub fn diagonal(&self, row: usize) -> f64 {
+        self.values[self.start[row] + row - self.first[row]]
+    }
+
+    /// Takes over `other` into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.first.clone_from(&other.first);
+        self.start.clone_from(&other.start);
+        self.values.clone_from(&other.values);
+    }
+
+    /// How many rows there are.
+    pub fn rows(&self) -> usize {
+        self.first.len()
+    }
+
+    /// Replaces the matrix by its factor; `false` where it is not positive.
+    pub fn factor(&mut self) -> bool {
+        (0..self.rows() / B).all(|body| self.factor_body(B * body))
+    }
+
+    /// Finds the rows of a body, which begin with row `i`: side by side as far as the bodies before it go, which takes each number of
+    /// those once for B of its own.
+    fn factor_body(&mut self, i: usize) -> bool {
+        let Self { first, start, values } = self;
+        let (done, mut rest) = values.split_at_mut(start[i]);
+        let (first_i, width) = (first[i], i - first[i]);
+        let mut rows: [&mut [f64]; B] = std::array::from_fn(|k| {
+            let (row, after) = std::mem::take(&mut rest).split_at_mut(width + k + 1);
+            rest = after;
+            row
+        });
+        for j in first_i..i {
+            let (first_j, at) = (first[j], j - first_i);
+            let from = first_i.max(first_j);
+            let row_j = &done[start[j]..=start[j] + j - first_j];
+            let sums = dots(rows.each_ref().map(|row| &row[from - first_i..at]), &row_j[from - first_j..j - first_j]);
+            rows.iter_mut().zip(sums).for_each(|(row, sum)| row[at] = (row[at] - sum) / row_j[j - first_j]);
+        }
+        for k in 0..B {
+            let (above, below) = rows.split_at_mut(k);
+            let row = &mut *below[0];
+            for (l, upper) in above.iter().enumerate() {
+                let at = width + l;
+                row[at] = (row[at] - dot(&row[..at], &upper[..at])) / upper[at];
+            }
+            let own = &row[..width + k];
+            let left = row[width + k] - dot(own, own);
+            if left.is_nan() || left <= 0.0 {
+                return false;
+            }
+            row[width + k] = left.sqrt();
+        }
+        true
+    }
+
+    /// Solves for `x` with the factor.
+    pub fn solve(&self, x: &mut [f64]) {
+        let count = self.first.len();
+        for i in 0..count {
+            let row = &self.values[self.start[i]..=self.start[i] + i - self.first[i]];
+            let (diagonal, row) = (row[row.len() - 1], &row[..row.len() - 1]);
+            x[i] = (x[i] - dot(row, &x[self.first[i]..i])) / diagonal;
+        }
+        for i in (0..count).rev() {
+            let row = &self.values[self.start[i]..=self.start[i] + i - self.first[i]];
+            let value = x[i] / row[row.len() - 1];
+            x[i] = value;
+            let columns = &mut x[self.first[i]..i];
+            columns.iter_mut().zip(row).for_each(|(below, l)| *below -= l * value);
+        }
+    }
+}
+
+impl Envelope<3> {
+    /// Solves for `x`, one vector a body, with the factor.
+    pub fn solve_vectors(&self, x: &mut [DVec3]) {
+        for (body, row) in (0..x.len()).flat_map(|body| (0..3).map(move |axis| (body, 3 * body + axis))) {
+            let (first, values) = (self.first[row] / 3, self.row(row));
+            let (before, own) = values.split_at(3 * (body - first));
+            let left = x[body][row % 3] - dot_vectors(before, &x[first..body]);
+            let (axis, done) = (row % 3, x[body]);
+            let inner: f64 = (0..axis).map(|k| own[k] * done[k]).sum();
+            x[body][axis] = (left - inner) / own[axis];
+        }
+        for (body, row) in (0..x.len()).rev().flat_map(|body| (0..3).rev().map(move |axis| (body, 3 * body + axis))) {
+            let (first, values) = (self.first[row] / 3, self.row(row));
+            let (before, own) = values.split_at(3 * (body - first));
+            let axis = row % 3;
+            let value = x[body][axis] / own[axis];
+            x[body][axis] = value;
+            (0..axis).for_each(|k| x[body][k] -= own[k] * value);
+            let below = x[first..body].iter_mut().zip(before.chunks_exact(3));
+            below.for_each(|(below, l)| *below -= DVec3::from_slice(l) * value);
+        }
+    }
+
+    fn row(&self, row: usize) -> &[f64] {
+        &self.values[self.start[row]..=self.start[row] + row - self.first[row]]
+    }
+}
+
+/// A sum of products in six lanes: a fixed order, so the same bits everywhere.
+fn dot_vectors(a: &[f64], b: &[DVec3]) -> f64 {
+    let mut lanes = [DVec3::ZERO; 2];
+    for (k, (a, b)) in a.chunks_exact(3).zip(b).enumerate() {
+        lanes[k % 2] += DVec3::from_slice(a) * *b;
+    }
+    (lanes[0] + lanes[1]).element_sum()
+}
+
+/// A sum of products in four lanes: a fixed order, so the same bits everywhere.
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    dots([a], b)[0]
+}
+
+/// The same of several with one: the bits of each are those of [`dot`].
+fn dots<const N: usize>(all: [&[f64]; N], b: &[f64]) -> [f64; N] {
+    let (b4, rest) = b.as_chunks::<4>();
+    let all = all.map(|a| (&a.as_chunks::<4>().0[..b4.len()], &a[4 * b4.len()..b.len()]));
+    let mut lanes = [[0.0; 4]; N];
+    for (at, b) in b4.iter().enumerate() {
+        for (lanes, (a, _)) in lanes.iter_mut().zip(&all) {
+            (0..4).for_each(|k| lanes[k] += a[at][k] * b[k]);
+        }
+    }
+    std::array::from_fn(|n| {
+        let [a, b, c, d] = lanes[n];
+        let last: f64 = all[n].1.iter().zip(rest).map(|(x, y)| x * y).sum();
+        (a + b) + (c + d) + last
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn vectors_are_solved_as_numbers_are() {
+        let first_body = [0, 0, 1, 0, 3];
+        let mut matrix = Envelope::<3>::default();
+        matrix.shape(&first_body);
+        for (row, &first) in first_body.iter().enumerate() {
+            for column in first as usize..=row {
+                let value = |k: usize| 0.1 * libm::sin((7 * row + 3 * column + k) as f64);
+                let own = if row == column { 3.0 } else { 0.0 };
+                let block: [[f64; 3]; 3] =
+                    std::array::from_fn(|i| std::array::from_fn(|j| value(3 * i + j) + if i == j { own } else { 0.0 }));
+                matrix.add_block((row, column), block);
+            }
+        }
+        assert!(matrix.factor());
+        let mut flat: Vec<f64> = (0..15).map(|i| libm::cos(f64::from(i))).collect();
+        let mut vectors: Vec<DVec3> = flat.chunks_exact(3).map(DVec3::from_slice).collect();
+        matrix.solve(&mut flat);
+        matrix.solve_vectors(&mut vectors);
+        for (vector, numbers) in vectors.iter().zip(flat.chunks_exact(3)) {
+            assert!(vector.distance(DVec3::from_slice(numbers)) < 1e-14); // rounding in another order
+        }
+    }
+
+    #[test]
+    fn the_factor_solves_its_system() {
+        let first_body = [0, 0, 1, 0, 3];
+        let mut matrix = Envelope::<6>::default();
+        matrix.shape(&first_body);
+        let mut full = vec![vec![0.0; 30]; 30];
+        let unit = |i: usize| std::array::from_fn(|k| f64::from(u8::from(k == i)));
+        for body in 0..5 {
+            for i in 0..6 {
+                matrix.add((body, body), 3.0, unit(i), unit(i));
+                full[6 * body + i][6 * body + i] += 3.0;
+            }
+        }
+        for (seed, (a, b)) in [(1, 0), (2, 1), (3, 0), (4, 3), (3, 2)].into_iter().enumerate() {
+            let row = |k: usize| std::array::from_fn::<f64, 6, _>(|i| libm::sin((seed * 13 + k * 7 + i) as f64));
+            let (left, right) = (row(0), row(1));
+            matrix.add((a, a), 10.0, left, left);
+            matrix.add((b, b), 10.0, right, right);
+            matrix.add((a, b), 10.0, left, right);
+            for i in 0..6 {
+                for j in 0..6 {
+                    full[6 * a + i][6 * a + j] += 10.0 * left[i] * left[j];
+                    full[6 * b + i][6 * b + j] += 10.0 * right[i] * right[j];
+                    full[6 * a + i][6 * b + j] += 10.0 * left[i] * right[j];
+                    full[6 * b + j][6 * a + i] += 10.0 * left[i] * right[j];
+                }
+            }
+        }
+        let right: Vec<f64> = (0..30).map(|i| libm::cos(f64::from(i))).collect();
+        let mut x = right.clone();
+        assert!(matrix.factor());
+        matrix.solve(&mut x);
+        for (row, wanted) in full.iter().zip(&right) {
+            let got: f64 = row.iter().zip(&x).map(|(a, x)| a * x).sum();
+            assert!((got - wanted).abs() < 1e-12, "{got} is not {wanted}"); // rounding of a sum of 30 numbers near 10
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Strands: balls along a line, joined by spans, and where two of them face each other.
+//!
+//! In: nodes with radii. Out: feet of nodes, facing points, gaps. Never here: which pairs are worth a look, motion.
+//! Theory: `docs/theory/contact.md`, eq. 18.
+
+use super::signed_distance::{Ball, Touch};
+use glam::DVec3;
+
+/// Axes nearer than this cross: no way leads from one to the other, metres.
+const CROSSING_M: f64 = 1e-9;
+
+/// The share of `segment` at which `point` has its foot on a chain of nodes, at least two. Each foot is told by one segment: at
+/// a joint that sticks out by the later one, past an end of the chain by the last one there. A segment without length has it at
+/// its start.
+pub fn foot(point: DVec3, chain: &[DVec3], segment: usize) -> Option<f64> {
+    let share = |k: usize| {
+        let way = chain[k + 1] - chain[k];
+        let length2 = way.length_squared();
+        if length2 > 0.0 { (point - chain[k]).dot(way) / length2 } else { 0.0 }
+    };
+    let here = share(segment);
+    if here >= 1.0 {
+        return (segment + 2 == chain.len()).then_some(1.0);
+    }
+    let ours = here >= 0.0 || segment == 0 || share(segment - 1) >= 1.0;
+    ours.then_some(here.max(0.0))
+}
+
+/// How two points of two spans face each other: the normal from the second to the first and the distance of the surfaces, and
+/// the radii there.
+pub fn facing(first: [Ball; 2], second: [Ball; 2], shares: [f64; 2]) -> (Touch, [f64; 2]) {
+    let (a, b) = (first[0].toward(first[1], shares[0]), second[0].toward(second[1], shares[1]));
+    let way = a.centre - b.centre;
+    let distance = way.length();
+    // axes that cross have no way between them: across both is as good as any
+    let across = || {
+        let [u, v] = [first, second].map(|ends| ends[1].centre - ends[0].centre);
+        let along = if u == DVec3::ZERO { v } else { u };
+        u.cross(v).try_normalize().unwrap_or_else(|| along.normalize_or(DVec3::Z).any_orthonormal_vector())
+    };
+    let normal = if distance > CROSSING_M { way / distance } else { across() };
+    (Touch { normal, distance_m: distance - a.radius_m - b.radius_m }, [a.radius_m, b.radius_m])
+}

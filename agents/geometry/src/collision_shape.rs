@@ -1,0 +1,238 @@
+//! What others must know of an agent's shape to touch it, and where it is.
+//!
+//! In: solids, tubes, tools, soft surfaces. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
+//! Never here: how the nearest points are found ([`crate::narrow_phase`]).
+
+use super::narrow_phase::Fans;
+use crate::{ShapeError, Solid, ToolShape};
+use glam::{DQuat, DVec3};
+use metachron_core::Slots;
+use rapier3d::parry::shape::SharedShape;
+use std::sync::Arc;
+
+/// An agent's shape and skin.
+#[derive(Debug, Clone)]
+pub struct Form {
+    /// Its shape.
+    pub kind: FormKind,
+    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
+    pub friction: f64,
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger.
+    pub restitution: f64,
+}
+
+impl Form {
+    /// How many ends of a tube are held in place; none of anything else.
+    #[must_use]
+    pub const fn held_ends(&self) -> u8 {
+        if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
+    }
+
+    /// Whether it is thin and held somewhere: a sheet or rope that hangs, or is stretched.
+    #[must_use]
+    pub const fn is_hung(&self) -> bool {
+        matches!(&self.kind, FormKind::Surface(SurfaceForm { held: true, closed: false, .. }))
+    }
+
+    /// Whether it bends and is held somewhere.
+    #[must_use]
+    pub const fn is_held(&self) -> bool {
+        match &self.kind {
+            FormKind::Chain { held_ends, .. } => *held_ends > 0,
+            FormKind::Surface(surface) => surface.held,
+            FormKind::Solid(_) | FormKind::Tool(_) => false,
+        }
+    }
+
+    /// How high the middle of what bends is at the start, of what is held its lowest point, −g·x, J/kg; zero of what does not bend.
+    /// Of two that keep the same rate the higher owns (docs/decisions/0019).
+    #[must_use]
+    pub const fn height_j_kg(&self) -> f32 {
+        match &self.kind {
+            FormKind::Chain { height_j_kg, .. } => *height_j_kg,
+            FormKind::Surface(surface) => surface.height_j_kg,
+            FormKind::Solid(_) | FormKind::Tool(_) => 0.0,
+        }
+    }
+}
+
+/// How high what bends is at its start, J/kg ([`Form::height_j_kg`]): what hangs from where it is `held` is as high as what it would bear lies.
+pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
+    let heights = || positions.iter().map(|position| -gravity.dot(*position));
+    let height =
+        if held { heights().fold(f64::INFINITY, f64::min) } else { heights().sum::<f64>() / positions.len() as f64 };
+    height as f32
+}
+
+/// The kinds of shapes.
+#[derive(Debug, Clone)]
+pub enum FormKind {
+    /// A rigid solid.
+    Solid(SolidForm),
+    /// A tube: cone-capsules between nodes, at its own radius.
+    Chain {
+        /// How many of its ends are held in place, 0 … 2.
+        held_ends: u8,
+        /// See [`Form::height_j_kg`].
+        height_j_kg: f32,
+    },
+    /// A tool: its parts depend on how far its jaws are open.
+    Tool(ToolShape),
+    /// The skin of a soft body: triangles and edges between vertices that move.
+    Surface(SurfaceForm),
+}
+
+/// What holds the skin of a soft body together; it never changes.
+#[derive(Debug, Clone)]
+pub struct SurfaceForm {
+    /// The vertices that lie on the skin, by rising numbers.
+    pub vertices: Arc<[u32]>,
+    /// Pairs of vertices of the skin.
+    pub edges: Arc<[[u32; 2]]>,
+    /// Vertices of each triangle, counter-clockwise seen from outside where the skin is closed; none for a rope.
+    pub triangles: Arc<[[u32; 3]]>,
+    /// How thick the skin is about its vertices, metres, ≥ 0: half a sheet's thickness, a rope's radius.
+    pub radius_m: f64,
+    /// Mean length of its edges at rest, metres.
+    pub edge_m: f64,
+    /// See [`Form::height_j_kg`].
+    pub height_j_kg: f32,
+    /// Whether it encloses a volume: then nothing may be behind a triangle.
+    pub closed: bool,
+    /// Whether it is held somewhere.
+    pub held: bool,
+    /// What lies around each vertex and edge.
+    pub fans: Arc<Fans>,
+}
+
+/// A solid as others touch it.
+#[derive(Clone)]
+pub struct SolidForm {
+    /// The solid.
+    pub solid: Solid,
+    /// The same for collision queries.
+    pub shape: SharedShape,
+    /// Its centre of mass in its own axes, metres.
+    pub com_local: DVec3,
+    /// No point is farther from the centre of mass, metres.
+    pub radius_m: f64,
+}
+
+/// Where a form is.
+#[derive(Debug, Clone, Copy)]
+pub enum View<'a> {
+    /// A solid: its centre of mass and its rotation.
+    Solid {
+        /// Centre of mass, metres.
+        position: DVec3,
+        /// From the shape's axes to the world's.
+        rotation: DQuat,
+    },
+    /// A tube: N + 1 nodes.
+    Chain {
+        /// Node positions, metres.
+        positions: &'a [DVec3],
+        /// Outer radius at each node, metres.
+        radii_m: &'a [f64],
+    },
+    /// A tool.
+    Tool {
+        /// The point between the jaws, metres.
+        tip: DVec3,
+        /// From the tool's axes to the world's.
+        rotation: DQuat,
+        /// Opening, 0 … 1.
+        jaw: f64,
+    },
+    /// A soft body: where its vertices are, metres.
+    Surface(&'a [DVec3]),
+}
+
+/// A form at its place.
+#[derive(Debug, Clone, Copy)]
+pub struct Placed<'a> {
+    /// What.
+    pub form: &'a Form,
+    /// Where.
+    pub view: View<'a>,
+}
+
+/// A point of a body's skin.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Place {
+    /// A point in space, fixed to a solid or a tool.
+    Point(DVec3),
+    /// A point of a tube's skin.
+    Chain {
+        /// The segment.
+        segment: u32,
+        /// How far along it, 0 … 1.
+        share: f64,
+        /// The radius there, metres.
+        radius_m: f64,
+    },
+    /// A point of a soft body's skin, in the surface between its vertices: its thickness turns nothing.
+    Surface {
+        /// Three vertices.
+        vertices: [u32; 3],
+        /// What each counts, in sum one; vertices of share zero do not matter.
+        shares: [f64; 3],
+    },
+}
+
+/// A place where two forms touch, or may touch soon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Its name from step to step, unique among the places of the pair.
+    pub key: u64,
+    /// Unit normal, from b towards a.
+    pub normal: DVec3,
+    /// Distance of the skins, metres; below zero they overlap.
+    pub gap_m: f64,
+    /// The point of a.
+    pub on_a: Place,
+    /// The point of b.
+    pub on_b: Place,
+}
+
+impl std::fmt::Debug for SolidForm {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("SolidForm").field("solid", &self.solid).finish_non_exhaustive()
+    }
+}
+
+impl SolidForm {
+    /// The form of a solid with its centre of mass at `com_local`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for a solid that is no shape.
+    pub fn new(solid: Solid, com_local: DVec3) -> Result<Self, ShapeError> {
+        let shape = solid.to_shared_shape()?;
+        let ball = shape.compute_local_bounding_sphere();
+        let radius_m = f64::from(ball.radius) + ball.center.as_dvec3().distance(com_local);
+        Ok(Self { solid, shape, com_local, radius_m })
+    }
+}
+
+impl Place {
+    /// Adds `sign` times the velocity of this point to what `slots` gather. The body's slots begin at `base`: its centre's
+    /// velocity and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
+    pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
+        match *self {
+            Self::Point(point) => {
+                slots.add_linear(base, sign);
+                slots.add_angular(base + 1, (point - centre) * sign);
+            }
+            Self::Chain { segment, share, radius_m } => {
+                slots.add_linear(base + 2 * segment, sign * (1.0 - share));
+                slots.add_linear(base + 2 * segment + 2, sign * share);
+                slots.add_angular(base + 2 * segment + 1, towards * (radius_m * sign));
+            }
+            Self::Surface { vertices, shares } => {
+                for (vertex, share) in vertices.into_iter().zip(shares).filter(|(_, share)| *share != 0.0) {
+                    slots.add_linear(base + vertex, sign * share);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,289 @@
+//! Meshes from a formula and a seed, so that scenes for experiments need no files.
+//!
+//! In: what kind, a seed, how many triangles. Out: a mesh of a size of about one metre. Never here: levels, files.
+
+use super::PrimitiveMesh;
+use super::furniture;
+use super::furniture::Part;
+use super::mesh::creased_mesh;
+use glam::{DVec2, DVec3};
+
+/// What a generated mesh looks like.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Generator {
+    /// A ball of radius 1.
+    Sphere,
+    /// A ring about z of radius 1, as thick as a third of it.
+    Torus,
+    /// A ball whose radius varies by a fifth: smooth bumps.
+    Blob,
+    /// Hills on a square of side 2 about the origin, a quarter high; open at its border.
+    Terrain,
+    /// A theatre seat that faces +y: cushion, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
+    Seat,
+    /// A rod along z from −1 to 1, of radius a twentieth.
+    Strut,
+    /// A rod along z from −1 to 1, of radius a sixth.
+    Bar,
+    /// A table on four legs, 1.6 long along x, 0.8 wide and 0.75 high, standing on z = 0.
+    Table,
+    /// A shelf that faces −y: two sides and three boards, 1 wide and 2 high, standing on z = 0.
+    Shelf,
+    /// A door in its frame that faces −y, 1 wide and 2.1 high, standing on z = 0.
+    Door,
+    /// Five books side by side along x, their backs to −y, 0.3 wide and high, standing on z = 0.
+    Books,
+}
+
+impl Generator {
+    /// All of them, in the order of their names' list.
+    pub const ALL: [Self; 11] = [
+        Self::Sphere,
+        Self::Torus,
+        Self::Blob,
+        Self::Terrain,
+        Self::Seat,
+        Self::Strut,
+        Self::Bar,
+        Self::Table,
+        Self::Shelf,
+        Self::Door,
+        Self::Books,
+    ];
+
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Sphere => "sphere",
+            Self::Torus => "torus",
+            Self::Blob => "blob",
+            Self::Terrain => "terrain",
+            Self::Seat => "seat",
+            Self::Strut => "strut",
+            Self::Bar => "bar",
+            Self::Table => "table",
+            Self::Shelf => "shelf",
+            Self::Door => "door",
+            Self::Books => "books",
+        }
+    }
+}
+
+/// A mesh of at least `triangles` triangles, and as few more as the grids it is made of allow.
+/// Equal arguments give equal bits.
+#[must_use]
+pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
+    let mut sheet = Sheet::default();
+    match kind {
+        Generator::Sphere => sheet.ball(side(triangles, 12), |way| way),
+        Generator::Blob => sheet.ball(side(triangles, 12), |way| way * (1.0 + 0.2 * layers(seed, way * 1.5, 2))),
+        Generator::Torus => sheet.ring(triangles),
+        Generator::Terrain => sheet.hills(side(triangles, 2), seed),
+        Generator::Strut => sheet.rod(triangles, 1.0 / 20.0),
+        Generator::Bar => sheet.rod(triangles, 1.0 / 6.0),
+        Generator::Seat => sheet.boxes(triangles, &furniture::SEAT),
+        Generator::Table => sheet.boxes(triangles, &furniture::TABLE),
+        Generator::Shelf => sheet.boxes(triangles, &furniture::SHELF),
+        Generator::Door => sheet.boxes(triangles, &furniture::DOOR),
+        Generator::Books => sheet.boxes(triangles, &furniture::BOOKS),
+    }
+    creased_mesh(&sheet.points, &sheet.triangles)
+}
+
+/// Cells along a grid so that `per` triangles a squared cell make at least `triangles`.
+fn side(triangles: u32, per: u32) -> u32 {
+    (f64::from(triangles) / f64::from(per)).sqrt().ceil().max(1.0) as u32
+}
+
+#[derive(Default)]
+struct Sheet {
+    points: Vec<DVec3>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Sheet {
+    /// A grid of `columns` × `rows` cells, whose corners are where `place` says for (0 … columns, 0 … rows).
+    fn grid(&mut self, (columns, rows): (u32, u32), place: impl Fn(u32, u32) -> DVec3) {
+        let first = self.points.len() as u32;
+        self.points.extend((0..=rows).flat_map(|r| (0..=columns).map(move |c| (c, r))).map(|(c, r)| place(c, r)));
+        for (row, column) in (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column))) {
+            let a = first + row * (columns + 1) + column;
+            let (b, c, d) = (a + 1, a + columns + 2, a + columns + 1);
+            self.triangles.extend([[a, b, c], [a, c, d]]);
+        }
+    }
+
+    /// Six faces of a cube of `cells`² each, put where `place` says for the unit way to each corner.
+    fn ball(&mut self, cells: u32, place: impl Fn(DVec3) -> DVec3) {
+        let first = self.points.len();
+        self.cube(cells);
+        for point in &mut self.points[first..] {
+            // an equal angle a cell: nearly equal triangles
+            let lean =
+                point.to_array().map(|x| if x.abs() == 1.0 { x } else { libm::tan(x * std::f64::consts::FRAC_PI_4) });
+            *point = place(DVec3::from(lean).normalize());
+        }
+        self.weld(first);
+    }
+
+    /// The surface of the cube −1 … 1.
+    fn cube(&mut self, cells: u32) {
+        let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                self.grid((cells, cells), |c, r| {
+                    let (u, v) = if side > 0.0 { (at(c), at(r)) } else { (at(r), at(c)) };
+                    let mut point = DVec3::ZERO;
+                    (point[axis], point[(axis + 1) % 3], point[(axis + 2) % 3]) = (side, u, v);
+                    point
+                });
+            }
+        }
+    }
+
+    fn ring(&mut self, triangles: u32) {
+        let around = ((f64::from(triangles) / 6.0).sqrt().round() as u32).max(3);
+        let along = triangles.div_ceil(2 * around).max(3);
+        let angle = |i: u32, of: u32| std::f64::consts::TAU * f64::from(i % of) / f64::from(of);
+        self.grid((along, around), |c, r| {
+            let (turn, tilt) = (angle(c, along), angle(r, around));
+            let out = 1.0 + libm::cos(tilt) / 3.0;
+            DVec3::new(libm::cos(turn) * out, libm::sin(turn) * out, libm::sin(tilt) / 3.0)
+        });
+        self.weld(0);
+    }
+
+    /// A wall of quads and a fan at each end.
+    fn rod(&mut self, triangles: u32, radius: f64) {
+        let around = (libm::sqrt(0.5 * f64::from(triangles)) as u32).clamp(4, 96);
+        let rows = (triangles.saturating_sub(2 * around)).div_ceil(2 * around).max(1);
+        self.grid((around, rows), |c, r| {
+            let turn = std::f64::consts::TAU * f64::from(c % around) / f64::from(around);
+            let along = 2.0 * f64::from(r) / f64::from(rows) - 1.0;
+            DVec3::new(radius * libm::cos(turn), radius * libm::sin(turn), along)
+        });
+        for (side, row) in [(-1.0, 0), (1.0, rows)] {
+            let middle = self.points.len() as u32;
+            self.points.push(DVec3::Z * side);
+            let corner = |c: u32| row * (around + 1) + c;
+            let fan = (0..around).map(|c| [middle, corner(c), corner(c + 1)]);
+            self.triangles.extend(fan.map(|t| if side > 0.0 { t } else { [t[0], t[2], t[1]] }));
+        }
+        self.weld(0);
+    }
+
+    fn hills(&mut self, cells: u32, seed: u64) {
+        let at = |i: u32| 2.0 * f64::from(i) / f64::from(cells) - 1.0;
+        self.grid((cells, cells), |c, r| {
+            let flat = DVec2::new(at(c), at(r));
+            flat.extend(0.125 * layers(seed, flat.extend(0.5) * 2.0, 3))
+        });
+    }
+
+    /// Boxes with edges more or less round, each of as many cells.
+    fn boxes(&mut self, triangles: u32, parts: &[Part]) {
+        let cells = side(triangles, 12 * parts.len() as u32);
+        for (centre, half, round) in parts {
+            let first = self.points.len();
+            self.cube(cells);
+            for point in &mut self.points[first..] {
+                let bulged = point.lerp(point.normalize() * 1.2, round * 0.5);
+                *point = DVec3::from(*centre) + bulged * DVec3::from(*half);
+            }
+            self.weld(first);
+        }
+    }
+
+    /// Makes one of all points after `first` that are at the same place: the faces of a cube become one surface.
+    fn weld(&mut self, first: usize) {
+        let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
+        let mut known = std::collections::BTreeMap::new();
+        let mut kept: Vec<DVec3> = Vec::new();
+        let number: Vec<u32> = self.points[first..]
+            .iter()
+            .map(|&p| {
+                *known.entry(key(p)).or_insert_with(|| {
+                    kept.push(p);
+                    (first + kept.len() - 1) as u32
+                })
+            })
+            .collect();
+        self.points.truncate(first);
+        self.points.extend(kept);
+        let renamed = |i: u32| if (i as usize) < first { i } else { number[i as usize - first] };
+        self.triangles.iter_mut().for_each(|t| *t = t.map(renamed));
+    }
+}
+
+/// Smooth noise of about −1 … 1: `octaves` layers, each half as high and wide as the one before.
+fn layers(seed: u64, at: DVec3, octaves: u32) -> f64 {
+    (0..octaves)
+        .map(|o| noise(seed.wrapping_add(u64::from(o)), at * f64::from(1_u32 << o)) / f64::from(1_u32 << o))
+        .sum()
+}
+
+/// Values at whole coordinates, smoothly between.
+fn noise(seed: u64, at: DVec3) -> f64 {
+    let cell = at.floor();
+    let ease = |t: f64| t * t * (3.0 - 2.0 * t);
+    let w = (at - cell).to_array().map(ease);
+    let mut sum = 0.0;
+    for corner in 0..8_u32 {
+        let bit = |axis: u32| f64::from(corner >> axis & 1);
+        let place = cell + DVec3::new(bit(0), bit(1), bit(2));
+        let share: f64 =
+            (0..3).map(|axis| if bit(axis) > 0.0 { w[axis as usize] } else { 1.0 - w[axis as usize] }).product();
+        sum += share * value(seed, place);
+    }
+    sum
+}
+
+/// A number in −1 … 1 for whole coordinates: splitmix's finaliser.
+fn value(seed: u64, at: DVec3) -> f64 {
+    let mut h = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    for x in at.to_array() {
+        h = (h ^ (x as i64 as u64)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        h = (h ^ (h >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        h ^= h >> 31;
+    }
+    (h >> 11) as f64 / (1_u64 << 52) as f64 - 1.0
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_kind_has_at_least_the_triangles_asked_for_and_few_more() {
+        for kind in Generator::ALL {
+            for wanted in [2000, 20_000] {
+                let count = generate(kind, 7, wanted).triangles.len() as f64;
+                // grids are square: one more row of 6 cells a face is a third more, less the half that chance gives
+                let more = count / f64::from(wanted) - 1.0;
+                assert!((0.0..0.2).contains(&more), "{kind:?}: {count} of {wanted}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_sphere_has_the_area_of_its_radius_and_faces_outward() {
+        let mesh = generate(Generator::Sphere, 0, 5000);
+        let mut area = 0.0;
+        for t in &mesh.triangles {
+            let [a, b, c] = t.map(|i| mesh.vertices[i as usize].core.as_dvec3());
+            let face = (b - a).cross(c - a);
+            assert!(face.dot(a) > 0.0);
+            area += 0.5 * face.length();
+        }
+        // chords of a grid of 20 cells a quarter turn: a thousandth below the sphere's
+        assert!((area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "{area}");
+    }
+
+    #[test]
+    fn equal_seeds_give_equal_bits_and_others_do_not() {
+        let of = |seed| generate(Generator::Terrain, seed, 200).vertices;
+        assert_eq!(of(3), of(3));
+        assert_ne!(of(3), of(4));
+    }
+}

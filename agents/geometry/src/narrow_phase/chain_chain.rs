@@ -1,0 +1,244 @@
+//! Strands against strands: tubes, capsules and balls, in double precision.
+//!
+//! In: two strands. Out: the places where their spans face each other. Which spans are worth a look is found in linear time by a
+//! grid. Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
+
+use super::primitives::Strand;
+use crate::Touch;
+use crate::capsule_chain::facing;
+use crate::signed_distance;
+use crate::signed_distance::Ball;
+use crate::{Grid, near_segments};
+use glam::DVec3;
+
+/// Up to this many spans of the shorter strand every pair is looked at: a capsule against a tube needs no grid.
+const FEW: usize = 4;
+/// Between tubes a crossing counts beside the feet of nodes if it is nearer by this share of the radii: strands side by side
+/// are told by their nodes, which stay where they are while a crossing jumps from end to end.
+const CROSSING_SHARE: f64 = 1e-3;
+/// The place of a crossing in keys, after those of nodes.
+const CROSSING: u64 = 4;
+/// Rounds of the search for the nearest places of spans that taper, at most: of spans that are nearly parallel each brings them only a
+/// little nearer.
+const TAPER_ROUNDS: usize = 200;
+/// It ends where a round moves them by less than this share.
+const TAPER_SHARE: f64 = 1e-9;
+/// The search for a gap looks first this many times the radii around, and then this many times farther each time.
+const WIDENING: f64 = 4.0;
+
+/// Storage for the pairs that are worth a look.
+#[derive(Default)]
+pub(super) struct ChainRoom {
+    grid: Grid,
+    spots: Vec<Spot>,
+    /// Span of the first strand above, of the second below.
+    pairs: Vec<u64>,
+    /// How many pairs were looked at in the last search.
+    #[cfg(test)]
+    pub tried: usize,
+}
+
+/// A span as the grid sees it.
+struct Spot {
+    middle: DVec3,
+    /// Radius of the ball that holds it.
+    ball_m: f64,
+    span: u32,
+    second: bool,
+}
+
+impl ChainRoom {
+    /// Every place within `reach_m`.
+    pub fn touches(&mut self, a: &Strand<'_>, b: &Strand<'_>, reach_m: f64, into: &mut Vec<Touch>) {
+        self.find(a, b, reach_m);
+        for pair in &self.pairs {
+            let spans = [(pair >> 32) as usize, *pair as u32 as usize];
+            Meeting { strands: [a, b], spans, reach_m }.visit(into);
+        }
+    }
+
+    /// The nearest place: its normal from b towards a, and a lower bound of the gap.
+    pub fn gap(&mut self, a: &Strand<'_>, b: &Strand<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
+        let mut look_m = (WIDENING * (a.widest_m + b.widest_m)).min(reach_m);
+        loop {
+            self.find(a, b, look_m);
+            let bounds =
+                self.pairs.iter().map(|pair| bound(a.ends((pair >> 32) as usize), b.ends(*pair as u32 as usize)));
+            let least = bounds.min_by(|p, q| p.distance_m.total_cmp(&q.distance_m));
+            let least = least.filter(|least| least.distance_m <= look_m);
+            if least.is_some() || look_m >= reach_m || look_m.is_nan() {
+                return least.map(|least| (least.normal, least.distance_m));
+            }
+            look_m = (WIDENING * look_m).min(reach_m);
+        }
+    }
+
+    /// Lists the pairs of spans whose balls come within `reach_m` of each other, by rising numbers.
+    fn find(&mut self, a: &Strand<'_>, b: &Strand<'_>, reach_m: f64) {
+        let Self { grid, spots, pairs, .. } = self;
+        pairs.clear();
+        spots.clear();
+        spots.extend(spots_of(a, b, reach_m, false));
+        let first = spots.len();
+        spots.extend(spots_of(b, a, reach_m, true));
+        let mut tried = 0;
+        let mut try_pair = |i: usize, j: usize| {
+            tried += 1;
+            let (p, q) = (&spots[i.min(j)], &spots[i.max(j)]);
+            let within = p.ball_m + q.ball_m + reach_m;
+            if p.second != q.second && p.middle.distance_squared(q.middle) <= within * within {
+                pairs.push(u64::from(p.span) << 32 | u64::from(q.span));
+            }
+        };
+        if first.min(spots.len() - first) <= FEW {
+            (0..first).for_each(|i| (first..spots.len()).for_each(|j| try_pair(i, j)));
+        } else {
+            let widest = spots.iter().map(|spot| spot.ball_m).fold(0.0, f64::max);
+            grid.fill(spots.iter().map(|spot| spot.middle), 2.0 * widest + reach_m);
+            grid.near_pairs(|i, j| try_pair(i as usize, j as usize));
+        }
+        pairs.sort_unstable();
+        #[cfg(test)]
+        {
+            self.tried = tried;
+        }
+    }
+}
+
+/// The spans of `strand` that come near the bounds of `other`.
+fn spots_of(strand: &Strand<'_>, other: &Strand<'_>, reach_m: f64, second: bool) -> impl Iterator<Item = Spot> {
+    let ((low, high), widest_m) = (other.bounds, other.widest_m);
+    let spot = move |span: usize| {
+        let [a, b] = strand.ends(span);
+        let ball_m = 0.5 * a.centre.distance(b.centre) + a.radius_m.max(b.radius_m);
+        Spot { middle: (a.centre + b.centre) * 0.5, ball_m, span: span as u32, second }
+    };
+    let near = move |spot: &Spot| {
+        let apart = (low - spot.middle).max(spot.middle - high).max(DVec3::ZERO).length();
+        apart <= spot.ball_m + widest_m + reach_m
+    };
+    (0..strand.spans()).map(spot).filter(near)
+}
+
+/// Two spans that are near each other.
+struct Meeting<'a> {
+    strands: [&'a Strand<'a>; 2],
+    spans: [usize; 2],
+    reach_m: f64,
+}
+
+/// The places of one pair of spans, so that none is told twice: the first and last node of either, and a crossing.
+#[derive(Default)]
+struct Told {
+    shares: [[f64; 2]; 5],
+    count: usize,
+    least_m: f64,
+}
+
+impl Meeting<'_> {
+    /// Visits the places of the pair (eq. 18): nodes over the other's span, and the crossing where it is nearer.
+    fn visit(&self, into: &mut Vec<Touch>) {
+        let ([a, b], [i, j]) = (self.strands, self.spans);
+        let (ends_a, ends_b) = (a.ends(i), b.ends(j));
+        let (s, t) = near_segments(ends_a.map(|e| e.centre), ends_b.map(|e| e.centre));
+        let taper = |ends: [Ball; 2]| (ends[0].radius_m - ends[1].radius_m).abs();
+        let (nearest, _) = facing(ends_a, ends_b, [s, t]);
+        if nearest.distance_m > self.reach_m + taper(ends_a) + taper(ends_b) {
+            return;
+        }
+        let mut told = Told { least_m: f64::INFINITY, ..Told::default() };
+        for (place, node) in own_nodes(a, i) {
+            if let Some(t) = b.foot(a.ball(node).centre, j).filter(|&t| speaks(a, node, b, (j, t))) {
+                self.tell(place, [(node - i) as f64, t], &mut told, into);
+            }
+        }
+        for (place, node) in own_nodes(b, j) {
+            if let Some(s) = a.foot(b.ball(node).centre, i).filter(|&s| speaks(b, node, a, (i, s))) {
+                self.tell(place + 1, [s, (node - j) as f64], &mut told, into);
+            }
+        }
+        let inside = [s, t].iter().all(|&share| share > 0.0 && share < 1.0);
+        let rigid = a.spans().min(b.spans()) == 1;
+        let margin_m = if rigid { 0.0 } else { CROSSING_SHARE * (a.widest_m + b.widest_m) };
+        if inside && nearest.distance_m < told.least_m - margin_m {
+            self.tell(CROSSING, [s, t], &mut told, into);
+        }
+    }
+
+    /// Adds a place, unless it is too far or was told already.
+    fn tell(&self, place: u64, shares: [f64; 2], told: &mut Told, into: &mut Vec<Touch>) {
+        let ([a, b], [i, j], [s, t]) = (self.strands, self.spans, shares);
+        if told.shares[..told.count].contains(&shares) {
+            return;
+        }
+        told.shares[told.count] = shares;
+        told.count += 1;
+        let (ends_a, ends_b) = (a.ends(i), b.ends(j));
+        let (meeting, _) = facing(ends_a, ends_b, shares);
+        told.least_m = told.least_m.min(meeting.distance_m);
+        if meeting.distance_m <= self.reach_m {
+            into.push(Touch {
+                key: (i as u64) << 28 | (j as u64) << 4 | place,
+                normal: meeting.normal,
+                gap_m: meeting.distance_m,
+                on_a: a.place(i, s, ends_a[0].toward(ends_a[1], s), meeting.normal),
+                on_b: b.place(j, t, ends_b[0].toward(ends_b[1], t), -meeting.normal),
+            });
+        }
+    }
+}
+
+/// The nodes that a span tells: its first, and the last of the strand, with the even one of their two places.
+fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u64, usize)> {
+    let is_last = strand.count() > 1 && span + 1 == strand.spans();
+    [(0, span), (2, span + 1)].into_iter().take(1 + usize::from(is_last))
+}
+
+/// Whether a node over a span tells of a place of its own: past an end of the other strand that end tells it, if its own foot
+/// is beside the node.
+fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, (span, share): (usize, f64)) -> bool {
+    let end = match share {
+        0.0 if span == 0 => 0,
+        1.0 => other.count() - 1,
+        _ => return true,
+    };
+    let (here, point) = (strand.ball(node).centre, other.ball(end).centre);
+    let beside = [node.checked_sub(1), Some(node + 1).filter(|&next| next < strand.count())];
+    beside.into_iter().flatten().all(|next| (point - here).dot(strand.ball(next).centre - here) <= 0.0)
+}
+
+/// A lower bound of the gap between two spans that taper: the gap is a convex function of both shares, so it lies nowhere below
+/// its tangent plane at the nearest places.
+fn bound(a: [Ball; 2], b: [Ball; 2]) -> signed_distance::Touch {
+    let (mut s, mut t) = near_segments(a.map(|e| e.centre), b.map(|e| e.centre));
+    if a[0].radius_m != a[1].radius_m || b[0].radius_m != b[1].radius_m {
+        for _ in 0..TAPER_ROUNDS {
+            let before = (s, t);
+            s = nearest_share(b[0].toward(b[1], t).centre, a);
+            t = nearest_share(a[0].toward(a[1], s).centre, b);
+            if (s - before.0).abs().max((t - before.1).abs()) < TAPER_SHARE {
+                break;
+            }
+        }
+    }
+    let (near, _) = facing(a, b, [s, t]);
+    let slope = |ends: [Ball; 2], normal: DVec3| {
+        normal.dot(ends[1].centre - ends[0].centre) - (ends[1].radius_m - ends[0].radius_m)
+    };
+    let fall = |slope: f64, share: f64| (-slope * share).min(slope * (1.0 - share));
+    let fall_m = fall(slope(a, near.normal), s) + fall(slope(b, -near.normal), t);
+    signed_distance::Touch { distance_m: near.distance_m + fall_m, ..near }
+}
+
+/// The share of a span at which its surface is nearest to a point: the foot, moved towards the wider end.
+fn nearest_share(point: DVec3, ends: [Ball; 2]) -> f64 {
+    let way = ends[1].centre - ends[0].centre;
+    let length = way.length();
+    let widening = (ends[1].radius_m - ends[0].radius_m) / length;
+    if length == 0.0 || widening.abs() >= 1.0 {
+        return if ends[1].radius_m > ends[0].radius_m { 1.0 } else { 0.0 };
+    }
+    let along = (point - ends[0].centre).dot(way) / length;
+    let across = (point - ends[0].centre - way * (along / length)).length();
+    ((along + across * widening / (1.0 - widening * widening).sqrt()) / length).clamp(0.0, 1.0)
+}

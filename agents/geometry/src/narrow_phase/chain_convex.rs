@@ -1,0 +1,158 @@
+//! Strands against blocks: nodes and spans in the block's field of distances, in double precision.
+//!
+//! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the edges of where a span lies flat.
+//! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
+
+use super::primitives::{Block, Strand};
+use crate::Touch;
+use crate::signed_distance;
+use crate::signed_distance::{Ball, Field};
+use glam::DVec3;
+
+/// A span lies on a block wherever its gap is above the lowest by at most this share of its radius.
+const FLAT_SHARE: f64 = 2e-3;
+/// The edges of a flat stretch count if they are at least this many radii from other places.
+const APART_RADII: f64 = 0.25;
+/// Halvings of the search for such an edge: a thousandth of a span.
+const EDGE_HALVINGS: usize = 10;
+/// The places of a span in keys, after those of nodes: the lowest, and the edges before and after it.
+const LOWEST: u64 = 8;
+
+/// Every place within `reach_m`, with normals from the block towards the strand.
+pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
+    let Some(field) = block.field else { return };
+    let meeting = Meeting { strand, block, field, reach_m };
+    let mut last = None;
+    for span in 0..strand.spans() {
+        if block.misses(strand.ends(span), reach_m) {
+            continue;
+        }
+        let left = last.filter(|&(node, _)| node == span).map_or_else(|| meeting.node(span, into), |(_, near)| near);
+        if strand.count() > 1 {
+            let right = meeting.node(span + 1, into);
+            last = Some((span + 1, right));
+            if field.feels_spans() {
+                meeting.span(span, [left, right], into);
+            }
+        }
+    }
+}
+
+/// The nearest place: its normal from the block towards the strand, and a lower bound of the gap.
+pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
+    let field = block.field?;
+    // a hull or mesh is searched as deep as it may be
+    let look_m = reach_m.max(2.0 * block.around.radius_m);
+    let mut nearest: Option<signed_distance::Touch> = None;
+    for span in 0..strand.spans() {
+        let within_m = nearest.map_or(reach_m, |near| near.distance_m.min(reach_m));
+        if block.misses(strand.ends(span), within_m) {
+            continue;
+        }
+        let found = field.gap_of_span(strand.ends(span).map(|end| block.inward(end)), look_m);
+        nearest = found.filter(|f| nearest.is_none_or(|n| f.distance_m < n.distance_m)).or(nearest);
+    }
+    nearest.map(|near| (block.rotation * near.normal, near.distance_m))
+}
+
+/// A strand in front of a block.
+struct Meeting<'a> {
+    strand: &'a Strand<'a>,
+    block: &'a Block<'a>,
+    field: &'a Field,
+    reach_m: f64,
+}
+
+impl Meeting<'_> {
+    /// Visits the places of a node; returns the nearest.
+    fn node(&self, node: usize, into: &mut Vec<Touch>) -> Option<signed_distance::Touch> {
+        let ball = self.block.inward(self.strand.ball(node));
+        let mut places = self.field.touches(ball.centre, ball.radius_m + self.reach_m);
+        if places.iter().next().is_none() {
+            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
+            let deep = self.field.touches(ball.centre, 2.0 * self.block.around.radius_m).iter().next();
+            deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
+        }
+        let span = node.min(self.strand.spans() - 1);
+        let share = (node - span) as f64;
+        for (place, touch) in (0..).zip(places.iter()) {
+            let key = (node as u64) << 28 | place;
+            self.tell(key, (span, share), touch, into);
+        }
+        places.iter().next()
+    }
+
+    /// Visits the lowest place of a span and the edges of its flat stretch.
+    fn span(&self, span: usize, near: [Option<signed_distance::Touch>; 2], into: &mut Vec<Touch>) {
+        let ends = self.strand.ends(span).map(|end| self.block.inward(end));
+        let lowest = self.field.touches_span(ends, self.reach_m).filter(|(share, touch)| {
+            let ball = ends[0].toward(ends[1], *share);
+            !near.iter().zip(ends).any(|(near, end)| {
+                let lower_m =
+                    |near: &signed_distance::Touch| near.distance_m - end.radius_m - (touch.distance_m - ball.radius_m);
+                let beside = end.centre.distance(ball.centre) < ball.radius_m;
+                beside
+                    && near.is_some_and(|near| {
+                        near.hides(end, ball, *touch) && lower_m(&near) < FLAT_SHARE * ball.radius_m
+                    })
+            })
+        });
+        let key = (span as u64) << 28 | LOWEST;
+        if let Some((share, touch)) = lowest {
+            self.tell(key, (span, share), touch, into);
+        }
+        let end_gap = |side: usize| near[side].map_or(f64::INFINITY, |near| near.distance_m - ends[side].radius_m);
+        let (from, least_m) = match lowest {
+            Some((share, touch)) => (share, touch.distance_m - ends[0].toward(ends[1], share).radius_m),
+            None if end_gap(0) <= end_gap(1) => (0.0, end_gap(0)),
+            None => (1.0, end_gap(1)),
+        };
+        for (place, to) in [(1, 0.0), (2, 1.0)] {
+            if let Some((share, touch)) = self.edge(ends, (from, to), least_m) {
+                self.tell(key + place, (span, share), touch, into);
+            }
+        }
+    }
+
+    /// Where a span that lies flat at the share `from` leaves the block on its way to `to`: its place there, if that is apart
+    /// from both.
+    fn edge(&self, ends: [Ball; 2], (from, to): (f64, f64), least_m: f64) -> Option<(f64, signed_distance::Touch)> {
+        let length_m = ends[0].centre.distance(ends[1].centre);
+        let radius_m = ends[0].radius_m.max(ends[1].radius_m);
+        let apart = APART_RADII * radius_m / length_m;
+        let level_m = least_m + FLAT_SHARE * radius_m;
+        if level_m > self.reach_m || (to - from).abs() <= 2.0 * apart {
+            return None;
+        }
+        let at = |share: f64| {
+            let ball = ends[0].toward(ends[1], share);
+            let touch = self.field.touches(ball.centre, ball.radius_m + self.reach_m).iter().next();
+            touch.filter(|touch| touch.distance_m - ball.radius_m <= level_m).map(|touch| (share, touch))
+        };
+        let toward = (to - from).signum();
+        let mut flat = at(from + toward * apart)?;
+        if at(to).is_some() {
+            return None;
+        }
+        let mut off = to;
+        for _ in 0..EDGE_HALVINGS {
+            match at(0.5 * (flat.0 + off)) {
+                Some(next) => flat = next,
+                None => off = 0.5 * (flat.0 + off),
+            }
+        }
+        ((to - flat.0).abs() > apart).then_some(flat)
+    }
+
+    /// Adds a place, unless it is too far.
+    fn tell(&self, key: u64, (span, share): (usize, f64), touch: signed_distance::Touch, into: &mut Vec<Touch>) {
+        let [a, b] = self.strand.ends(span);
+        let ball = if share == 1.0 { b } else { a.toward(b, share) };
+        let gap_m = touch.distance_m - ball.radius_m;
+        if gap_m <= self.reach_m {
+            let normal = self.block.rotation * touch.normal;
+            let on_b = crate::Place::Point(ball.centre - normal * touch.distance_m);
+            into.push(Touch { key, normal, gap_m, on_a: self.strand.place(span, share, ball, normal), on_b });
+        }
+    }
+}

@@ -1,0 +1,166 @@
+//! Blocks against blocks: the gap of convex parts in double precision, and the corners and edges on which they rest.
+//!
+//! In: two blocks. Out: contacts, the nearest gap. Never here: strands.
+//! The normal and the gap are [`crate::narrow_phase::gjk`]'s; parry clips the features that face each other along that normal, in single
+//! precision and relative to each other.
+
+use super::epa::Hull;
+use super::gjk::{Apart, Difference, Part};
+use super::primitives::Block;
+use crate::{Place, Touch};
+use glam::{DQuat, DVec3};
+use rapier3d::parry::bounding_volume::BoundingVolume;
+use rapier3d::parry::math::{Pose, Rotation};
+use rapier3d::parry::query::{ContactManifold, TrackedContact};
+use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature};
+
+/// What single precision may get wrong of a place, as a share of the sizes: ten roundings.
+const SINGLE_SHARE: f64 = 1e-6;
+/// Points of a manifold nearer to each other than this share of the sizes are one.
+const SAME_SHARE: f64 = 1e-4;
+/// Bits of a feature and of a part in keys.
+const FEATURE_BITS: u32 = 24;
+/// See [`FEATURE_BITS`].
+const PART_BITS: u32 = 5;
+
+/// Storage for the search.
+#[derive(Default)]
+pub(super) struct BlockRoom {
+    hull: Hull,
+    manifold: ContactManifold<(), ()>,
+}
+
+impl BlockRoom {
+    /// Every place within `reach_m`.
+    pub fn touches(&mut self, a: &Block<'_>, b: &Block<'_>, reach_m: f64, into: &mut Vec<Touch>) {
+        let Self { hull, manifold } = self;
+        let size_m = a.around.radius_m + b.around.radius_m;
+        each_pair(a, b, reach_m, |first, second| {
+            let Some(apart) = Difference::new(first, second).apart(reach_m, hull) else { return };
+            clip(manifold, first, second, &apart);
+            let facing = Facing { first, second, apart, reach_m, size_m };
+            facing.tell(manifold, into);
+        });
+    }
+
+    /// The nearest place: its normal from b towards a, and a gap that is never more than the true one.
+    pub fn gap(&mut self, a: &Block<'_>, b: &Block<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
+        let mut nearest: Option<(DVec3, f64)> = None;
+        each_pair(a, b, reach_m, |first, second| {
+            let reach_m = nearest.map_or(reach_m, |(_, gap_m)| gap_m.min(reach_m));
+            let apart = Difference::new(first, second).apart(reach_m, &mut self.hull);
+            let Some(apart) = apart.filter(|apart| apart.gap_m <= reach_m) else { return };
+            nearest = Some((apart.normal, apart.gap_m));
+        });
+        // the corners are known in single precision only
+        let rounding_m = 0.5 * f64::from(f32::EPSILON) * (a.around.radius_m + b.around.radius_m);
+        nearest.map(|(normal, gap_m)| (normal, if gap_m > 0.0 { (gap_m - rounding_m).max(0.0) } else { gap_m }))
+    }
+}
+
+/// Visits the pairs of convex parts whose boxes come within `reach_m`.
+fn each_pair(a: &Block<'_>, b: &Block<'_>, reach_m: f64, mut visit: impl FnMut(&Part<'_>, &Part<'_>)) {
+    let loose_m = reach_m.max(0.0) + SINGLE_SHARE * (a.around.radius_m + b.around.radius_m);
+    for first in parts(a) {
+        let own = first.shape.compute_local_aabb().loosened(loose_m as f32);
+        for second in parts(b) {
+            if own.intersects(&second.shape.compute_aabb(&relative(&first, &second))) {
+                visit(&first, &second);
+            }
+        }
+    }
+}
+
+/// The convex parts of a block; a half space has none.
+fn parts<'a>(block: &'a Block<'a>) -> impl Iterator<Item = Part<'a>> {
+    let whole = Part { number: 0, shape: block.shape.as_ref(), origin: block.origin, rotation: block.rotation };
+    let compound = block.shape.as_compound();
+    let within = compound.into_iter().flat_map(|compound| (0..).zip(compound.shapes())).map(|(number, (at, shape))| {
+        let turn = at.rotation;
+        let turn = DQuat::from_xyzw(turn.x.into(), turn.y.into(), turn.z.into(), turn.w.into()).normalize();
+        let origin = block.origin + block.rotation * at.translation.as_dvec3();
+        Part { number, shape: shape.as_ref(), origin, rotation: block.rotation * turn }
+    });
+    let whole = Some(whole).filter(|whole| compound.is_none() && whole.shape.as_support_map().is_some());
+    whole.into_iter().chain(within)
+}
+
+/// The second part's pose in the first's axes: relative in double precision first.
+fn relative(first: &Part<'_>, second: &Part<'_>) -> Pose {
+    let back = first.rotation.conjugate();
+    let (position, q) = (back * (second.origin - first.origin), (back * second.rotation).as_quat());
+    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(q.x, q.y, q.z, q.w).normalize())
+}
+
+/// The points where the features that face each other along the normal meet.
+fn clip(manifold: &mut ContactManifold<(), ()>, first: &Part<'_>, second: &Part<'_>, apart: &Apart) {
+    manifold.points.clear();
+    let maps = first.shape.as_polygonal_feature_map().zip(second.shape.as_polygonal_feature_map());
+    let Some(((one, one_rim), (two, two_rim))) = maps else { return };
+    let (back, there) = (first.rotation.conjugate(), second.rotation.conjugate());
+    let (out, inward) = ((back * -apart.normal).as_vec3(), (there * apart.normal).as_vec3());
+    let (mut face, mut other) = (PolygonalFeature::default(), PolygonalFeature::default());
+    one.local_support_feature_toward(out, (back * apart.on[0]).as_vec3(), &mut face);
+    let hint = there * (apart.on[1] + first.origin - second.origin);
+    two.local_support_feature_toward(inward, hint.as_vec3(), &mut other);
+    let pose = relative(first, second);
+    PolygonalFeature::contacts(&pose, &pose.inverse(), out, inward, &face, &other, manifold, false);
+    for point in &mut manifold.points {
+        point.local_p1 += out * one_rim;
+        point.dist -= one_rim + two_rim;
+    }
+}
+
+/// Two parts that face each other.
+struct Facing<'a> {
+    first: &'a Part<'a>,
+    second: &'a Part<'a>,
+    apart: Apart,
+    reach_m: f64,
+    size_m: f64,
+}
+
+impl Facing<'_> {
+    /// Adds the points of a manifold, the lowest of which gets the gap of double precision, and the nearest place if none
+    /// is there.
+    fn tell(&self, manifold: &ContactManifold<(), ()>, into: &mut Vec<Touch>) {
+        let least_m = manifold.points.iter().map(|point| f64::from(point.dist)).fold(f64::INFINITY, f64::min);
+        let shift_m = self.apart.gap_m - least_m;
+        let is_there = shift_m.abs() < SAME_SHARE * self.size_m;
+        let from = into.len();
+        if !is_there {
+            let key = self.key(PackedFeatureId::UNKNOWN, PackedFeatureId::UNKNOWN);
+            self.add((key, self.apart.gap_m), self.apart.on[0], from, into);
+        }
+        for point in &manifold.points {
+            let gap_m = f64::from(point.dist) + if is_there { shift_m } else { 0.0 };
+            let TrackedContact { fid1, fid2, local_p1, .. } = *point;
+            let place = self.first.rotation * local_p1.as_dvec3();
+            self.add((self.key(fid1, fid2), gap_m.max(self.apart.gap_m)), place, from, into);
+        }
+    }
+
+    /// Adds a place of the first part, unless it is too far or told already.
+    fn add(&self, (key, gap_m): (u64, f64), place: DVec3, from: usize, into: &mut Vec<Touch>) {
+        let on_a = self.first.origin + place;
+        let within_m = SAME_SHARE * self.size_m;
+        let is_same = |told: Place| matches!(told, Place::Point(told) if told.distance(on_a) < within_m);
+        if gap_m <= self.reach_m && !into[from..].iter().any(|told| is_same(told.on_a)) {
+            let normal = self.apart.normal;
+            let on_b = Place::Point(on_a - normal * gap_m);
+            into.push(Touch { key, normal, gap_m, on_a: Place::Point(on_a), on_b });
+        }
+    }
+
+    /// The name of a point: the parts, and the corners, edges or faces that meet in it.
+    fn key(&self, one: PackedFeatureId, two: PackedFeatureId) -> u64 {
+        let part = |part: &Part<'_>| part.number & ((1 << PART_BITS) - 1);
+        // parry keeps the kind of a feature in the two highest bits
+        let feature = |PackedFeatureId(id): PackedFeatureId| {
+            let (kind, number) = (u64::from(id >> 30), u64::from(id) & ((1 << (FEATURE_BITS - 2)) - 1));
+            kind << (FEATURE_BITS - 2) | number
+        };
+        let parts = part(self.first) << PART_BITS | part(self.second);
+        parts << (2 * FEATURE_BITS) | feature(one) << FEATURE_BITS | feature(two)
+    }
+}

@@ -1,0 +1,132 @@
+//! Where two agents touch: the contacts between the shapes of any two forms.
+//!
+//! In: two forms where they stand. Out: contacts with normals, gaps and places, each with a name that lasts; the nearest gap.
+//! Never here: velocities, forces, whose contact it is. Theory: `docs/theory/contact.md`, eq. 12–18.
+//!
+//! Everything is taken apart into strands (balls joined by spans: a ball, a capsule, a tube), the surfaces of soft bodies, and
+//! blocks (all the rest).
+//! All gaps are found in double precision; where blocks rest on blocks the corners and edges are clipped by parry.
+//! A half space belongs to the fixed solids: a block does not feel it, a strand does.
+
+mod chain_chain;
+mod chain_convex;
+mod convex_convex;
+mod epa;
+mod gjk;
+mod primitives;
+mod shape_cache;
+mod surface;
+#[cfg(test)]
+mod tests;
+mod voronoi_regions;
+
+#[cfg(test)]
+use super::collision_shape::{Form, FormKind, View};
+use super::collision_shape::{Placed, Touch};
+use crate::signed_distance::Ball;
+use chain_chain::ChainRoom;
+use convex_convex::BlockRoom;
+use glam::DVec3;
+use primitives::{Piece, Pieces};
+use shape_cache::Known;
+use surface::SurfaceRoom;
+pub use voronoi_regions::Fans;
+
+/// What a step of a segment's number is in the key of a contact between chains: of the second chain, and of the first.
+pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
+
+/// Storage that a search for contacts uses again and again: one an agent.
+#[derive(Default)]
+pub struct TouchRoom {
+    known: Known,
+    chains: ChainRoom,
+    blocks: BlockRoom,
+    surfaces: SurfaceRoom,
+}
+
+/// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; what `into` held before is gone.
+///
+/// Nothing is allocated once the numbers of nodes and contacts settle.
+/// Forms without a shape and places that are not finite touch nothing.
+pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
+    into.clear();
+    let TouchRoom { known, chains, blocks, surfaces } = room;
+    known.learn(a.form, b.form);
+    let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
+    for (i, piece) in first.iter() {
+        for (j, other) in second.iter().filter(|(_, other)| piece.may_touch(other, reach_m)) {
+            let from = into.len();
+            match (piece, other) {
+                (Piece::Strand(a), Piece::Strand(b)) => chains.touches(a, b, reach_m, into),
+                (Piece::Strand(a), Piece::Block(b)) => chain_convex::touches(a, b, reach_m, into),
+                (Piece::Block(a), Piece::Strand(b)) => {
+                    chain_convex::touches(b, a, reach_m, into);
+                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+                }
+                // what is clipped depends on who is first: the larger, whoever asks
+                (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
+                    blocks.touches(b, a, reach_m, into);
+                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+                }
+                (Piece::Block(a), Piece::Block(b)) => blocks.touches(a, b, reach_m, into),
+                (Piece::Surface(a), other) => surfaces.touches(a, other, reach_m, into),
+                (other, Piece::Surface(b)) => {
+                    surfaces.touches(b, other, reach_m, into);
+                    into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
+                }
+            }
+            let pair = (i as u64 * shape_cache::PARTS as u64 + j as u64) << PAIR_SHIFT;
+            into[from..].iter_mut().for_each(|touch| touch.key |= pair);
+        }
+    }
+    into.retain(|touch| touch.gap_m.is_finite() && touch.normal.is_finite());
+    name(into);
+}
+
+/// The same contact seen from the other side.
+fn flipped(touch: Touch) -> Touch {
+    Touch { normal: -touch.normal, on_a: touch.on_b, on_b: touch.on_a, ..touch }
+}
+
+/// Keys inside a pair of pieces stay below this bit.
+const PAIR_SHIFT: u32 = 58;
+
+/// Sorts contacts by their keys and makes equal ones differ.
+fn name(touches: &mut [Touch]) {
+    touches.sort_unstable_by_key(|touch| touch.key);
+    for i in 1..touches.len() {
+        touches[i].key = touches[i].key.max(touches[i - 1].key + 1);
+    }
+}
+
+/// The normal from b towards a where they are nearest, and a gap that is never larger than the true one there, metres;
+/// `None` beyond `reach_m`. For conservative advancement: near its end the bound is within a millionth of the sizes.
+pub fn gap(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom) -> Option<(DVec3, f64)> {
+    let TouchRoom { known, chains, blocks, .. } = room;
+    known.learn(a.form, b.form);
+    let (first, second) = (Pieces::of(a, known), Pieces::of(b, known));
+    let mut nearest: Option<(DVec3, f64)> = None;
+    for (_, piece) in first.iter() {
+        for (_, other) in second.iter() {
+            let reach_m = nearest.map_or(reach_m, |(_, gap_m)| gap_m.min(reach_m));
+            if !piece.may_touch(other, reach_m) {
+                continue;
+            }
+            let found = match (piece, other) {
+                (Piece::Strand(a), Piece::Strand(b)) => chains.gap(a, b, reach_m),
+                (Piece::Strand(a), Piece::Block(b)) => chain_convex::gap(a, b, reach_m),
+                (Piece::Block(a), Piece::Strand(b)) => chain_convex::gap(b, a, reach_m).map(|(n, gap_m)| (-n, gap_m)),
+                (Piece::Block(a), Piece::Block(b)) => blocks.gap(a, b, reach_m),
+                (Piece::Surface(a), other) => Some(surface::gap(a, other)),
+                (other, Piece::Surface(b)) => Some(surface::gap(b, other)).map(|(n, gap_m)| (-n, gap_m)),
+            };
+            nearest = found.filter(|&(_, gap_m)| nearest.is_none_or(|(_, least)| gap_m < least)).or(nearest);
+        }
+    }
+    nearest.filter(|&(_, gap_m)| gap_m <= reach_m)
+}
+
+/// The point of a ball's surface that lies against `normal`'s way.
+fn skin(ball: Ball, normal: DVec3) -> DVec3 {
+    ball.centre - normal * ball.radius_m
+}

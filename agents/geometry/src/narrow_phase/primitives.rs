@@ -1,0 +1,227 @@
+//! What a form is made of when it touches: strands and blocks where they stand.
+//!
+//! In: a form and its place. Out: at most [`PARTS`] pieces with bounds. Never here: contacts.
+
+use super::shape_cache::{Known, PARTS};
+use super::skin;
+use crate::Solid;
+use crate::capsule_chain::foot;
+use crate::signed_distance::{Ball, Field};
+use crate::{FormKind, Place, Placed, SolidForm, SurfaceForm, View};
+use glam::{DQuat, DVec3};
+use rapier3d::parry::shape::SharedShape;
+
+/// The pieces of a form.
+#[derive(Default)]
+pub(super) struct Pieces<'a>([Option<Piece<'a>>; PARTS]);
+
+/// One of them.
+pub(super) enum Piece<'a> {
+    Strand(Strand<'a>),
+    Block(Block<'a>),
+    Surface(Surface<'a>),
+}
+
+/// The skin of a soft body.
+pub(super) struct Surface<'a> {
+    pub form: &'a SurfaceForm,
+    /// Where its vertices are, metres.
+    pub positions: &'a [DVec3],
+    /// Lowest and highest coordinates of the vertices.
+    pub bounds: (DVec3, DVec3),
+}
+
+/// Balls joined by spans.
+pub(super) struct Strand<'a> {
+    nodes: Nodes<'a>,
+    /// Lowest and highest coordinates of the nodes.
+    pub bounds: (DVec3, DVec3),
+    /// The largest radius, metres.
+    pub widest_m: f64,
+}
+
+enum Nodes<'a> {
+    /// A ball or capsule: one or two nodes, and the radius.
+    Solid([DVec3; 2], usize, f64),
+    Tube(&'a [DVec3], &'a [f64]),
+}
+
+/// A solid that is no strand.
+pub(super) struct Block<'a> {
+    /// Its distances, in its own axes; `None` where no strand is near.
+    pub field: Option<&'a Field>,
+    /// What parry knows of it, in its own axes.
+    pub shape: &'a SharedShape,
+    /// Where its axes' origin is.
+    pub origin: DVec3,
+    /// From its axes to the world's.
+    pub rotation: DQuat,
+    /// A ball around it.
+    pub around: Ball,
+    /// Whether it is a part of a tool: thin, and led with force.
+    pub pierces: bool,
+}
+
+impl<'a> Pieces<'a> {
+    /// Takes a form apart.
+    pub fn of(placed: &Placed<'a>, known: &'a Known) -> Self {
+        let mut pieces = Self::default();
+        match (&placed.form.kind, placed.view) {
+            (FormKind::Chain { .. }, View::Chain { positions, radii_m }) => pieces.0[0] = tube(positions, radii_m),
+            (FormKind::Solid(form), View::Solid { position, rotation }) => {
+                let SolidForm { solid, com_local, radius_m, .. } = form;
+                let origin = position - rotation * *com_local;
+                let along = |half: f64| rotation * (DVec3::Z * half);
+                pieces.0[0] = Some(match solid {
+                    Solid::Ball { radius_m } => strand(Nodes::Solid([origin, origin], 1, *radius_m)),
+                    Solid::Capsule { radius_m, half_height_m: half } => {
+                        strand(Nodes::Solid([origin - along(*half), origin + along(*half)], 2, *radius_m))
+                    }
+                    _ => {
+                        let radius_m = if matches!(solid, Solid::Plane) { f64::INFINITY } else { *radius_m };
+                        let around = Ball { centre: position, radius_m };
+                        let (field, shape) = (known.field(solid), known.shape(form));
+                        Piece::Block(Block { field, shape, origin, rotation, around, pierces: false })
+                    }
+                });
+            }
+            (FormKind::Tool(shape), View::Tool { tip, rotation, jaw }) => {
+                let solids = known.tool(shape).into_iter().flatten();
+                for ((piece, part), solid) in pieces.0.iter_mut().zip(shape.parts(jaw)).zip(solids) {
+                    let origin = tip + rotation * part.position;
+                    let rotation = rotation * part.rotation;
+                    let around = Ball { centre: origin + rotation * solid.around.centre, ..solid.around };
+                    let field = Some(&solid.field);
+                    let shape = &solid.shape;
+                    *piece = Some(Piece::Block(Block { field, shape, origin, rotation, around, pierces: true }));
+                }
+            }
+            (FormKind::Surface(form), View::Surface(positions)) if !positions.is_empty() => {
+                let bounds = crate::bounds(positions);
+                pieces.0[0] = Some(Piece::Surface(Surface { form, positions, bounds }));
+            }
+            _ => {}
+        }
+        pieces
+    }
+
+    /// The pieces with their numbers.
+    pub fn iter(&self) -> impl Iterator<Item = (usize, &Piece<'a>)> {
+        self.0.iter().enumerate().filter_map(|(i, piece)| Some((i, piece.as_ref()?)))
+    }
+}
+
+fn tube<'a>(positions: &'a [DVec3], radii_m: &'a [f64]) -> Option<Piece<'a>> {
+    let whole = !positions.is_empty() && positions.len() == radii_m.len();
+    whole.then(|| strand(Nodes::Tube(positions, radii_m)))
+}
+
+fn strand(nodes: Nodes<'_>) -> Piece<'_> {
+    let mut strand = Strand { nodes, bounds: (DVec3::ZERO, DVec3::ZERO), widest_m: 0.0 };
+    strand.bounds = crate::bounds(strand.positions());
+    strand.widest_m = match &strand.nodes {
+        Nodes::Solid(_, _, radius_m) => *radius_m,
+        Nodes::Tube(_, radii_m) => radii_m.iter().copied().fold(0.0, f64::max),
+    };
+    Piece::Strand(strand)
+}
+
+impl Piece<'_> {
+    /// Whether the bounds of both come within `reach_m` of each other.
+    pub fn may_touch(&self, other: &Self, reach_m: f64) -> bool {
+        match (self, other) {
+            (Self::Strand(a), Self::Strand(b)) => {
+                let apart = (b.bounds.0 - a.bounds.1).max(a.bounds.0 - b.bounds.1).max(DVec3::ZERO).length();
+                apart <= a.widest_m + b.widest_m + reach_m
+            }
+            (Self::Strand(strand), Self::Block(block)) | (Self::Block(block), Self::Strand(strand)) => {
+                let (low, high) = strand.bounds;
+                let apart = (low - block.around.centre).max(block.around.centre - high).max(DVec3::ZERO).length();
+                apart <= strand.widest_m + block.around.radius_m + reach_m
+            }
+            (Self::Block(a), Self::Block(b)) => {
+                let apart = a.around.centre.distance(b.around.centre);
+                apart <= a.around.radius_m + b.around.radius_m + reach_m
+            }
+            (Self::Surface(surface), other) | (other, Self::Surface(surface)) => {
+                let ((low, high), (there_low, there_high)) = (surface.bounds, other.bounds());
+                let apart = (there_low - high).max(low - there_high).max(DVec3::ZERO).length();
+                apart <= surface.form.radius_m + reach_m
+            }
+        }
+    }
+
+    /// The box around it; a surface's and a strand's own thickness counted.
+    pub fn bounds(&self) -> (DVec3, DVec3) {
+        let (low, high, radius_m) = match self {
+            Self::Strand(strand) => (strand.bounds.0, strand.bounds.1, strand.widest_m),
+            Self::Block(block) => (block.around.centre, block.around.centre, block.around.radius_m),
+            Self::Surface(surface) => (surface.bounds.0, surface.bounds.1, surface.form.radius_m),
+        };
+        (low - radius_m, high + radius_m)
+    }
+}
+
+impl Strand<'_> {
+    /// The nodes, metres.
+    pub fn positions(&self) -> &[DVec3] {
+        match &self.nodes {
+            Nodes::Solid(nodes, count, _) => &nodes[..*count],
+            Nodes::Tube(positions, _) => positions,
+        }
+    }
+
+    /// How many nodes there are, ≥ 1.
+    pub fn count(&self) -> usize {
+        self.positions().len()
+    }
+
+    /// How many spans there are; a ball alone counts as one without length.
+    pub fn spans(&self) -> usize {
+        (self.count() - 1).max(1)
+    }
+
+    /// A node with its radius.
+    pub fn ball(&self, node: usize) -> Ball {
+        let radius_m = match &self.nodes {
+            Nodes::Solid(_, _, radius_m) => *radius_m,
+            Nodes::Tube(_, radii_m) => radii_m[node],
+        };
+        Ball { centre: self.positions()[node], radius_m }
+    }
+
+    /// Both ends of a span.
+    pub fn ends(&self, span: usize) -> [Ball; 2] {
+        [self.ball(span), self.ball((span + 1).min(self.count() - 1))]
+    }
+
+    /// Where a point has its foot on a span, if this span tells it ([`foot`]).
+    pub fn foot(&self, point: DVec3, span: usize) -> Option<f64> {
+        if self.count() == 1 { Some(0.0) } else { foot(point, self.positions(), span) }
+    }
+
+    /// The place of a ball inside a span; `normal` leads from its far side to it.
+    pub fn place(&self, span: usize, share: f64, ball: Ball, normal: DVec3) -> Place {
+        match self.nodes {
+            Nodes::Solid(..) => Place::Point(skin(ball, normal)),
+            Nodes::Tube(..) => Place::Chain { segment: span as u32, share, radius_m: ball.radius_m },
+        }
+    }
+}
+
+impl Block<'_> {
+    /// Whether a span stays farther than `reach_m` from the ball around this block.
+    pub fn misses(&self, ends: [Ball; 2], reach_m: f64) -> bool {
+        let [a, b] = ends.map(|ball| ball.centre);
+        let way = b - a;
+        let share = ((self.around.centre - a).dot(way) / way.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let widest_m = ends[0].radius_m.max(ends[1].radius_m);
+        let apart = self.around.centre.distance(a.lerp(b, share));
+        apart > self.around.radius_m + widest_m + reach_m || apart.is_nan()
+    }
+
+    /// A ball in this block's axes.
+    pub fn inward(&self, ball: Ball) -> Ball {
+        Ball { centre: self.rotation.conjugate() * (ball.centre - self.origin), ..ball }
+    }
+}

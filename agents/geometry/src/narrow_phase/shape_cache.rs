@@ -1,0 +1,144 @@
+//! What was worked out once of the forms that were met: fields of solids, and the solids that a tool is made of.
+//!
+//! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
+
+use crate::signed_distance::{Ball, Field};
+use crate::{Form, FormKind, SolidForm};
+use crate::{Primitive, ShapeError, Solid, ToolPart, ToolShape, is_closed, mesh_triangles};
+use glam::DVec3;
+use rapier3d::parry::shape::SharedShape;
+use std::sync::Arc;
+
+/// How many parts a tool has; no form has more.
+pub(super) const PARTS: usize = 6;
+/// The level of the jaw's mesh whose hull touches: past it the hull grows by less than a hundredth of the jaw's thickness.
+const JAW_LEVEL: u8 = 2;
+
+/// What is known of forms; it grows with the number of different ones.
+#[derive(Default)]
+pub(super) struct Known {
+    fields: Vec<(Solid, Option<Field>)>,
+    hulls: Vec<(Solid, Option<SharedShape>)>,
+    tools: Vec<(ToolShape, Option<[ToolSolid; PARTS]>)>,
+}
+
+/// A part of a tool as a solid.
+pub(super) struct ToolSolid {
+    pub field: Field,
+    pub shape: SharedShape,
+    /// A ball around it, in its axes.
+    pub around: Ball,
+}
+
+impl Known {
+    /// Takes up what a search between `a` and `b` needs.
+    pub fn learn(&mut self, a: &Form, b: &Form) {
+        for (form, other) in [(a, b), (b, a)] {
+            match &form.kind {
+                FormKind::Solid(SolidForm { solid, .. }) if is_strand(&other.kind) => self.learn_solid(solid),
+                FormKind::Solid(SolidForm { solid, shape, .. }) if shape.as_trimesh().is_some() => {
+                    self.learn_hull(solid)
+                }
+                FormKind::Tool(shape) => self.learn_tool(shape),
+                _ => {}
+            }
+        }
+    }
+
+    fn learn_solid(&mut self, solid: &Solid) {
+        let is_new = !self.fields.iter().any(|(known, _)| is_same(known, solid));
+        if is_new && !matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. }) {
+            self.fields.push((solid.clone(), field(solid).ok()));
+        }
+    }
+
+    fn learn_hull(&mut self, solid: &Solid) {
+        if let Solid::Mesh { points_m, .. } = solid
+            && !self.hulls.iter().any(|(known, _)| is_same(known, solid))
+        {
+            let hull = Solid::Hull { points_m: points_m.clone() }.to_shared_shape().ok();
+            self.hulls.push((solid.clone(), hull));
+        }
+    }
+
+    fn learn_tool(&mut self, shape: &ToolShape) {
+        if !self.tools.iter().any(|(known, _)| known == shape) {
+            let solids: Result<Vec<_>, _> = shape.parts(0.0).iter().map(ToolSolid::new).collect();
+            self.tools.push((*shape, solids.ok().and_then(|solids| solids.try_into().ok())));
+        }
+    }
+
+    /// The field of a solid that was learnt.
+    pub fn field(&self, solid: &Solid) -> Option<&Field> {
+        self.fields.iter().find(|(known, _)| is_same(known, solid))?.1.as_ref()
+    }
+
+    /// What a solid collides with: its shape, or the hull of a mesh that was not divided into convex parts.
+    pub fn shape<'a>(&'a self, SolidForm { solid, shape, .. }: &'a SolidForm) -> &'a SharedShape {
+        let hull = self.hulls.iter().find(|(known, _)| shape.as_trimesh().is_some() && is_same(known, solid));
+        hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
+    }
+
+    /// The solids of a tool that was learnt.
+    pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid; PARTS]> {
+        self.tools.iter().find(|(known, _)| known == shape)?.1.as_ref()
+    }
+}
+
+/// Whether a form is made of points and spans that are looked for in the fields of others.
+fn is_strand(kind: &FormKind) -> bool {
+    let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
+    matches!(kind, FormKind::Chain { .. } | FormKind::Surface(_))
+        || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
+}
+
+/// The field of a body: an open mesh counts as its hull, as its mass does.
+fn field(solid: &Solid) -> Result<Field, ShapeError> {
+    if let Solid::Mesh { points_m, triangles } = solid
+        && !is_closed(&mesh_triangles(points_m, triangles)?)
+    {
+        return Field::of(&Solid::Hull { points_m: points_m.clone() });
+    }
+    Field::of(solid)
+}
+
+/// Whether two solids are one: meshes and hulls by where their points are kept, which costs the same for every size.
+fn is_same(a: &Solid, b: &Solid) -> bool {
+    match (a, b) {
+        (Solid::Hull { points_m: a }, Solid::Hull { points_m: b }) => Arc::ptr_eq(a, b),
+        (Solid::Mesh { points_m: a, triangles: s }, Solid::Mesh { points_m: b, triangles: t }) => {
+            Arc::ptr_eq(a, b) && Arc::ptr_eq(s, t)
+        }
+        _ => a == b,
+    }
+}
+
+impl ToolSolid {
+    fn new(part: &ToolPart) -> Result<Self, ShapeError> {
+        let size = part.size;
+        let rim_m = f64::from(size.radius_m);
+        let solid = if part.primitive == Primitive::Jaw {
+            let mesh = part.primitive.mesh(JAW_LEVEL);
+            Solid::Hull { points_m: mesh.vertices.iter().map(|v| (v.core * size.extents).as_dvec3()).collect() }
+        } else {
+            let (across, along) = (f64::from(size.extents.x), f64::from(size.extents.z));
+            Solid::Cylinder { radius_m: across + rim_m, half_height_m: along + rim_m }
+        };
+        Ok(Self { field: Field::of(&solid)?, shape: solid.to_shared_shape()?, around: around(&solid) })
+    }
+}
+
+/// A ball around a part of a tool.
+fn around(solid: &Solid) -> Ball {
+    match solid {
+        Solid::Hull { points_m } => {
+            let (low, high) = crate::bounds(points_m);
+            let centre = (low + high) * 0.5;
+            Ball { centre, radius_m: points_m.iter().map(|p| p.distance(centre)).fold(0.0, f64::max) }
+        }
+        Solid::Cylinder { radius_m, half_height_m } => {
+            Ball { centre: DVec3::ZERO, radius_m: radius_m.hypot(*half_height_m) }
+        }
+        _ => Ball { centre: DVec3::ZERO, radius_m: f64::INFINITY },
+    }
+}

@@ -1,0 +1,191 @@
+//! The skins of soft bodies against blocks: which of their places are nearest, and which way that pushes.
+//!
+//! In: a surface in front of a block. Out: touching places. Never here: what is round, other surfaces.
+//! Theory: docs/theory/soft.md, eq. 15a.
+
+use super::super::primitives::Block;
+use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
+use super::{DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
+use crate::Place;
+use crate::Touch;
+use crate::near_triangle;
+use crate::signed_distance;
+use crate::signed_distance::{Ball, Field};
+use glam::DVec3;
+
+/// Deeper than this share of an edge a place comes out of the block the nearest way.
+const BETTER_SHARE: f64 = 0.02;
+/// What tells a place from the corners beside it: rounding, as a share of the size.
+const ROUNDING_SHARE: f64 = 1e-6;
+/// The normal of a face is the same this share of an edge farther on; that of an edge, a corner or a round side is not.
+const BESIDE_SHARE: f64 = 0.1;
+/// Normals whose cosine is above this are the same: a side with a radius of 100 m turns by more in 5 mm.
+const FLAT: f64 = 1.0 - 1e-9;
+/// Projections to and fro between a triangle and a block: both are convex, so the two points approach each other.
+const PROJECTIONS: usize = 8;
+/// What touches a skin from outside pushes it inwards. A tool that would push it aside or outwards is through it, and touches it no more
+/// until it is out again: the cosine of its normal with the skin's. At the edge of a box it is 0.7, at a corner 0.6.
+const PIERCED: f64 = -0.5;
+
+impl Meeting<'_> {
+    pub(super) fn block(&self, block: &Block<'_>, field: &Field, into: &mut Vec<Touch>) {
+        let radius_m = self.surface.form.radius_m;
+        let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
+        let nearest = |at: DVec3| {
+            let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
+            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
+            near.or_else(|| {
+                field
+                    .touches(inward(at).centre, 2.0 * block.around.radius_m)
+                    .iter()
+                    .next()
+                    .filter(|t| t.distance_m < 0.0)
+            })
+        };
+        for (vertex, at) in self.surface.vertices_in(self.region) {
+            let touch = nearest(at).and_then(|touch| self.out(Ridge::Vertex(vertex), block, touch));
+            if let Some(touch) = touch {
+                self.tell_block(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), (block, touch), into);
+            }
+        }
+        if !field.feels_spans() {
+            return;
+        }
+        let apart = |at: DVec3| nearest(at).map_or(f64::INFINITY, |touch| touch.distance_m);
+        for (number, edge, ends) in self.surface.edges_in(self.region) {
+            let Some((share, touch)) = field.lowest_of_span(ends.map(inward), self.reach_m) else { continue };
+            let better_m = ROUNDING_SHARE * ends[0].distance(ends[1]);
+            let inner = (LEAN_SHARE..=1.0 - LEAN_SHARE).contains(&share)
+                && ends.into_iter().all(|end| touch.distance_m + better_m < apart(end));
+            if let Some(touch) = inner.then(|| self.out(Ridge::Edge(number, ends), block, touch)).flatten() {
+                let key = KINDS[1] | number << PART_SHIFT;
+                let point = ends[0].lerp(ends[1], share);
+                self.tell_block(key, (Spot::edge(edge, share), point), (block, touch), into);
+            }
+        }
+        for (number, triangle, corners) in self.surface.triangles_in(self.region) {
+            if self.corners((number, triangle, corners), (block, field), into) {
+                continue;
+            }
+            let Some((spot, point, touch, size)) = self.project((triangle, corners), (block, field)) else { continue };
+            let share = if field.corners(DVec3::Z).is_some() { BETTER_SHARE } else { ROUNDING_SHARE };
+            if corners.into_iter().all(|corner| touch.distance_m + share * size < apart(corner)) {
+                self.tell_block(KINDS[2] | number << PART_SHIFT, (spot, point), (block, touch), into);
+            }
+        }
+    }
+
+    /// The place as a vertex or an edge of the skin has it, which it pushes out of the skin and not along it; `None` where what lies
+    /// around is nearer. What is deep in the block comes out as it can.
+    fn out(&self, ridge: Ridge, block: &Block<'_>, touch: signed_distance::Touch) -> Option<signed_distance::Touch> {
+        if touch.distance_m < -BETTER_SHARE * self.surface.form.edge_m {
+            return Some(touch);
+        }
+        let way = -(block.rotation * touch.normal);
+        let out = ridge.out(self.surface, way)?;
+        let local = block.rotation.conjugate() * -out;
+        if ridge.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
+            return Some(signed_distance::Touch { normal: local, ..touch });
+        }
+        // a face goes on beside: the vertex may be what comes to it, wherever that is nearer now
+        let Ridge::Vertex(vertex) = ridge else { return None };
+        let field = block.field?;
+        let here = block.inward(Ball { centre: self.surface.at(vertex), radius_m: 0.0 }).centre;
+        let beside = here + (local - touch.normal).normalize_or_zero() * (BESIDE_SHARE * self.surface.form.edge_m);
+        let there = field.touches(beside, self.surface.form.radius_m + self.reach_m).iter().next()?;
+        (there.normal.dot(touch.normal) > FLAT).then_some(touch)
+    }
+
+    /// The corners of a block over a triangle; whether there are any.
+    fn corners(
+        &self,
+        (number, triangle, corners): (u64, [u32; 3], [DVec3; 3]),
+        (block, field): (&Block<'_>, &Field),
+        into: &mut Vec<Touch>,
+    ) -> bool {
+        let (a, Some(out)) = (corners[0], self.facing(corners, block)) else { return false };
+        let local = block.rotation.conjugate() * out;
+        // of a thin body its far side is not meant
+        let ahead = out.dot(block.around.centre - a) > 0.0;
+        let deep_m =
+            self.surface.form.radius_m + if ahead { DEEP_SHARE } else { BETTER_SHARE } * self.surface.form.edge_m;
+        let mut any = false;
+        for (corner, name) in field.corners(local).into_iter().flatten().zip(1_u64..) {
+            let at = block.rotation * corner + block.origin;
+            let distance_m = out.dot(at - a);
+            if distance_m < -deep_m || distance_m - self.surface.form.radius_m > self.reach_m {
+                continue;
+            }
+            let foot = at - out * distance_m;
+            let Some(shares) =
+                shares(foot, corners).filter(|shares| shares.iter().all(|share| *share > -ROUNDING_SHARE))
+            else {
+                continue;
+            };
+            let touch = signed_distance::Touch { normal: -local, distance_m };
+            let spot = Spot { vertices: triangle, shares };
+            self.tell_block(KINDS[2] | number << PART_SHIFT | name, (spot, foot), (block, touch), into);
+            any = true;
+        }
+        any
+    }
+
+    /// The normal of a triangle towards a block: out of a closed skin, and of an open one on the side of the block's middle.
+    fn facing(&self, [a, b, c]: [DVec3; 3], block: &Block<'_>) -> Option<DVec3> {
+        let across = (b - a).cross(c - a).try_normalize()?;
+        let turned = !self.surface.form.closed && across.dot(block.around.centre - a) < 0.0;
+        Some(if turned { -across } else { across })
+    }
+
+    /// Where a triangle is nearest to a block, inside it, and the size of the triangle.
+    fn project(
+        &self,
+        (triangle, corners): ([u32; 3], [DVec3; 3]),
+        (block, field): (&Block<'_>, &Field),
+    ) -> Option<(Spot, DVec3, signed_distance::Touch, f64)> {
+        let radius_m = self.surface.form.radius_m;
+        let mut point = (corners[0] + corners[1] + corners[2]) / 3.0;
+        let size = corners.iter().map(|corner| corner.distance(point)).fold(0.0, f64::max);
+        let look_m = radius_m + self.reach_m + 2.0 * size;
+        let mut found = None;
+        for _ in 0..PROJECTIONS {
+            found = Some(field.touches(block.inward(Ball { centre: point, radius_m }).centre, look_m).iter().next()?);
+            let touch = found?;
+            let foot = point - block.rotation * touch.normal * touch.distance_m;
+            point = near_triangle(foot, corners);
+        }
+        let (spot, point) = self.surface.inside(triangle, corners, point)?;
+        let mut touch = found?;
+        if touch.distance_m >= -BETTER_SHARE * self.surface.form.edge_m {
+            touch.normal = block.rotation.conjugate() * -self.facing(corners, block)?;
+        }
+        Some((spot, point, touch, size))
+    }
+
+    fn tell_block(
+        &self,
+        key: u64,
+        (spot, point): (Spot, DVec3),
+        (block, touch): (&Block<'_>, signed_distance::Touch),
+        into: &mut Vec<Touch>,
+    ) {
+        let gap_m = touch.distance_m - self.surface.form.radius_m;
+        let normal = block.rotation * touch.normal;
+        if gap_m <= self.reach_m && !(block.pierces && self.is_pierced(spot, normal)) {
+            into.push(Touch {
+                key,
+                normal,
+                gap_m,
+                on_a: spot.place(),
+                on_b: Place::Point(point - normal * (0.5 * gap_m)),
+            });
+        }
+    }
+
+    /// Whether a part of a tool that would push a spot of a closed surface along `normal` has gone through its skin there.
+    fn is_pierced(&self, spot: Spot, normal: DVec3) -> bool {
+        let inside = spot.shares[2] > 0.0;
+        let out = if inside { self.out_of(spot) } else { spot.out(self.normals).and_then(DVec3::try_normalize) };
+        self.surface.form.closed && out.is_some_and(|out| out.dot(normal) > PIERCED)
+    }
+}

@@ -1,0 +1,218 @@
+//! The skins of two soft bodies: which of their places are nearest, and which way that pushes.
+//!
+//! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, what is round.
+//! Theory: docs/theory/soft.md, eq. 15a, 15b.
+
+use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
+use super::{CROSSING_M, DEEP_SHARE, KINDS, Meeting, PART_SHIFT, Spot, shares};
+use crate::Touch;
+use crate::{near_segments, near_triangle};
+use glam::DVec3;
+use std::ops::RangeInclusive;
+
+/// A way whose cosine with the normal of a triangle is above this comes from its face.
+const FACE: f64 = 0.999;
+/// What a vertex came in by faced it by this cosine at least.
+const FACING: f64 = 0.1;
+/// Edges between whose directions the sine is below this have no one place where they are nearest.
+const PARALLEL: f64 = 1e-4;
+/// What has gone through a skin comes out as it went in, unless some face is nearer than this share of that way: beside the edge of a
+/// box it is 0.7.
+const HALF: f64 = 0.5;
+
+/// The place of a skin that is nearest to a point.
+#[derive(Clone, Copy)]
+struct Near {
+    spot: Spot,
+    at: DVec3,
+    /// The normal of its triangle, out of a closed skin; a rope has none.
+    face: Option<DVec3>,
+}
+
+/// Where a place of one skin touches another one: the spot there, the normal from there, and how far the two are apart, metres.
+struct Met {
+    spot: Spot,
+    normal: DVec3,
+    distance_m: f64,
+}
+
+/// Two skins in front of each other.
+pub(super) struct Skins<'a> {
+    here: &'a Meeting<'a>,
+    there: &'a Meeting<'a>,
+    /// Both half thicknesses, and how deep they may be in each other, metres.
+    thick_m: f64,
+    deep_m: f64,
+}
+
+impl<'a> Skins<'a> {
+    pub fn new(here: &'a Meeting<'a>, there: &'a Meeting<'a>) -> Self {
+        let (a, b) = (here.surface.form, there.surface.form);
+        Self { here, there, thick_m: a.radius_m + b.radius_m, deep_m: DEEP_SHARE * a.edge_m.min(b.edge_m) }
+    }
+
+    /// Every place within reach.
+    pub fn touches(&self, into: &mut Vec<Touch>) {
+        self.vertices_here(into);
+        self.vertices_there(into);
+        self.edges(into);
+        into.retain(|touch| touch.gap_m <= self.here.reach_m);
+    }
+
+    fn vertices_here(&self, into: &mut Vec<Touch>) {
+        let Self { here, there, thick_m, .. } = *self;
+        for (vertex, at) in here.surface.vertices_in(here.region) {
+            let Some(Met { spot, normal, distance_m }) = self.vertex(here, there, (vertex, at)) else { continue };
+            let (on_a, on_b) = (Spot::vertex(vertex).place(), spot.place());
+            into.push(Touch { key: KINDS[0] | u64::from(vertex), normal, gap_m: distance_m - thick_m, on_a, on_b });
+        }
+    }
+
+    fn vertices_there(&self, into: &mut Vec<Touch>) {
+        let Self { here, there, thick_m, .. } = *self;
+        for (vertex, at) in there.surface.vertices_in(there.region) {
+            let Some(Met { spot, normal, distance_m }) = self.vertex(there, here, (vertex, at)) else { continue };
+            let (on_a, on_b, gap_m) = (spot.place(), Spot::vertex(vertex).place(), distance_m - thick_m);
+            into.push(Touch { key: KINDS[3] | u64::from(vertex), normal: -normal, gap_m, on_a, on_b });
+        }
+    }
+
+    fn edges(&self, into: &mut Vec<Touch>) {
+        let Self { here, there, thick_m, .. } = *self;
+        let inner = LEAN_SHARE..=1.0 - LEAN_SHARE;
+        for (number, edge, ends) in here.surface.edges_in(here.region) {
+            let around = (ends[0].min(ends[1]) - self.within_m(), ends[0].max(ends[1]) + self.within_m());
+            for (other, edge_b, ends_b) in there.surface.edges_in(around) {
+                let (s, t) = near_segments(ends, ends_b);
+                if !(inner.contains(&s) && inner.contains(&t)) {
+                    continue;
+                }
+                let (a, b) = (Spot::edge(edge, s), Spot::edge(edge_b, t));
+                let ridges = [Ridge::Edge(number, ends), Ridge::Edge(other, ends_b)];
+                let points = [ends[0].lerp(ends[1], s), ends_b[0].lerp(ends_b[1], t)];
+                if let Some((normal, distance_m)) = self.crossing([a, b], points, ridges) {
+                    let key = KINDS[1] | number << PART_SHIFT | other;
+                    into.push(Touch { key, normal, gap_m: distance_m - thick_m, on_a: a.place(), on_b: b.place() });
+                }
+            }
+        }
+    }
+
+    /// Nothing farther from a place is looked at, metres.
+    fn within_m(&self) -> f64 {
+        let closed = self.here.surface.form.closed || self.there.surface.form.closed;
+        self.here.reach_m.max(if closed { self.deep_m } else { 0.0 }) + self.thick_m
+    }
+
+    /// Where a vertex of the skin `a` touches the skin `b`.
+    fn vertex(&self, a: &Meeting<'_>, b: &Meeting<'_>, (vertex, at): (u32, DVec3)) -> Option<Met> {
+        let out = Spot::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
+        let near = b.nearest(at, self.within_m(), None)?;
+        if b.is_behind(near, at) {
+            // it comes out by a face that it can have come in by
+            let Near { spot, at: foot, face } = b.nearest(at, self.deep_m, out)?;
+            let distance_m = at.distance(foot);
+            let normal = if distance_m > CROSSING_M { (foot - at) / distance_m } else { face? };
+            return Some(Met { spot, normal, distance_m: -distance_m });
+        }
+        let Near { spot, at: foot, face } = near;
+        let distance_m = at.distance(foot);
+        if distance_m <= CROSSING_M {
+            let Near { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
+            let away = out.map(|out| -out);
+            // of an open skin either side may be meant
+            let normal = face.map(|face| if away.is_some_and(|away| face.dot(away) < 0.0) { -face } else { face });
+            return Some(Met { spot, normal: normal.or(away)?, distance_m: 0.0 });
+        }
+        let normal = (at - foot) / distance_m;
+        let is_face = face.is_some_and(|face| face.dot(normal).abs() > FACE);
+        if out.is_some_and(|out| out.dot(normal) > 0.0) {
+            // it turns away: an open skin has gone into it, or it is on the far side
+            let least_m = if is_face { 0.0 } else { HALF * distance_m };
+            let passed = !b.surface.form.closed
+                && distance_m <= self.deep_m
+                && Ridge::Vertex(vertex).out(a.surface, normal).is_some()
+                && a.holds(foot, least_m..=distance_m)
+                && a.nearest(foot, distance_m, Some(normal)).is_none();
+            return passed.then_some(Met { spot, normal: -normal, distance_m: -distance_m });
+        }
+        let out_here = Ridge::Vertex(vertex).out(a.surface, -normal)?;
+        if let Some(face) = face.filter(|_| is_face) {
+            let normal = face * face.dot(normal).signum();
+            return Some(Met { spot, normal, distance_m: normal.dot(at - foot) });
+        }
+        let nearest = Ridge::Vertex(vertex).is_nearest(a.surface, -normal * distance_m);
+        nearest.then_some(Met { spot, normal: -out_here, distance_m: -out_here.dot(normal) * distance_m })
+    }
+
+    /// The normal where two edges cross, towards the first, and how far they are apart; `None` where what lies around is nearer, and for
+    /// edges in one direction, whose ends tell the same.
+    fn crossing(&self, spots: [Spot; 2], [a, b]: [DVec3; 2], ridges: [Ridge; 2]) -> Option<(DVec3, f64)> {
+        let [here, there] = [self.here, self.there];
+        let out = [spots[0].out(here.normals), spots[1].out(there.normals)];
+        let across = along(ridges[0]).cross(along(ridges[1]));
+        if across.length() < PARALLEL {
+            return None;
+        }
+        let (across, way) = (across.normalize(), a - b);
+        let distance_m = way.length();
+        let toward = if distance_m > CROSSING_M { way } else { out[1].or(out[0].map(|out| -out))? };
+        let normal = across * across.dot(toward).signum();
+        let fronts = [out[0].map(|out| out.dot(normal) < 0.0), out[1].map(|out| out.dot(normal) > 0.0)];
+        let mut fronts = fronts.into_iter().flatten();
+        let [first, second] = ridges;
+        if fronts.clone().all(|front| front) {
+            let nearest = first.is_nearest(here.surface, -way) && second.is_nearest(there.surface, way);
+            return nearest.then_some((normal, distance_m));
+        }
+        let passed = distance_m <= self.deep_m
+            && fronts.all(|front| !front)
+            && first.is_nearest(here.surface, way)
+            && second.is_nearest(there.surface, -way)
+            && here.holds(b, HALF * distance_m..=distance_m)
+            && there.holds(a, HALF * distance_m..=distance_m);
+        passed.then_some((-normal, -distance_m))
+    }
+}
+
+/// The direction of an edge.
+fn along(ridge: Ridge) -> DVec3 {
+    if let Ridge::Edge(_, [a, b]) = ridge { (b - a).normalize_or_zero() } else { DVec3::ZERO }
+}
+
+impl Meeting<'_> {
+    /// The place of the skin that is nearest to a point within `within_m`; `facing` a normal, if one is given.
+    fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<Near> {
+        let region = (point - within_m, point + within_m);
+        let faces = self.surface.triangles_in(region).filter_map(|(_, triangle, corners)| {
+            let face = (corners[1] - corners[0]).cross(corners[2] - corners[0]).try_normalize()?;
+            if self.surface.form.closed && facing.is_some_and(|facing| facing.dot(face) > -FACING) {
+                return None;
+            }
+            let at = near_triangle(point, corners);
+            Some(Near { spot: Spot { vertices: triangle, shares: shares(at, corners)? }, at, face: Some(face) })
+        });
+        let is_rope = self.surface.form.triangles.is_empty();
+        let lines = self.surface.edges_in(region).filter(|_| is_rope).map(|(_, edge, ends)| {
+            let along = ends[1] - ends[0];
+            let share = ((point - ends[0]).dot(along) / along.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+            Near { spot: Spot::edge(edge, share), at: ends[0].lerp(ends[1], share), face: None }
+        });
+        let distance2 = |near: &Near| near.at.distance_squared(point);
+        faces
+            .chain(lines)
+            .filter(|near| distance2(near) <= within_m * within_m)
+            .min_by(|a, b| distance2(a).total_cmp(&distance2(b)))
+    }
+
+    /// Whether a point is inside the closed skin whose nearest place this is.
+    fn is_behind(&self, near: Near, point: DVec3) -> bool {
+        near.spot.out(self.normals).is_some_and(|out| out.dot(point - near.at) < 0.0)
+    }
+
+    /// Whether a point is inside the skin, and so far from it, metres; any is in an open one.
+    fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
+        let deep = |near: Near| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
+        !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
+    }
+}

@@ -1,0 +1,237 @@
+//! Solids as parry shapes: what rapier3d and the contact queries of a mesh or a hull work on.
+//!
+//! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: where the solid is, what it weighs.
+
+use super::Solid;
+use super::topology::is_closed;
+use glam::{DVec3, Vec3};
+use rapier3d::parry::math::{Pose, Rotation};
+use rapier3d::parry::shape::{SharedShape, TriMeshFlags};
+use rapier3d::parry::transformation::try_convex_hull;
+use std::f32::consts::FRAC_PI_2;
+
+/// Why a solid is no shape.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ShapeError {
+    /// A length that must be above zero is not, or is not finite.
+    #[error("{what} is {value_m} m; it must be finite and above zero")]
+    BadLength {
+        /// Which length.
+        what: &'static str,
+        /// The value given, metres.
+        value_m: f64,
+    },
+    /// A corner of a hull or mesh is not finite.
+    #[error("point {index} is not finite")]
+    BadPoint {
+        /// Number of the point, from 0.
+        index: usize,
+    },
+    /// The points of a hull enclose no volume.
+    #[error("the hull of {points} points encloses no volume: {why}")]
+    FlatHull {
+        /// How many points there are.
+        points: usize,
+        /// What was found.
+        why: String,
+    },
+    /// A mesh has no triangle with an area.
+    #[error("none of the {triangles} triangles of the mesh has an area")]
+    EmptyMesh {
+        /// How many triangles were given.
+        triangles: usize,
+    },
+    /// A triangle names a corner that does not exist.
+    #[error("triangle {triangle} names corner {corner}, but there are only {points}")]
+    BadCorner {
+        /// Number of the triangle, from 0.
+        triangle: usize,
+        /// The corner it names.
+        corner: u32,
+        /// How many corners there are.
+        points: usize,
+    },
+}
+
+/// Triangles over points: counter-clockwise seen from outside.
+#[derive(Debug, Clone)]
+pub struct Triangles {
+    /// Corners, metres.
+    pub points: Vec<DVec3>,
+    /// Corner numbers of each triangle; none is degenerate.
+    pub triangles: Vec<[u32; 3]>,
+}
+
+/// Below this share of its longest edge's square a triangle's area is nothing (single precision holds 1e-7).
+const AREA_SHARE_MIN: f64 = 1e-9;
+/// Below this share of its size cubed a hull's volume is nothing.
+const VOLUME_SHARE_MIN: f64 = 1e-6;
+
+impl Solid {
+    /// The same solid as a parry shape, in the solid's own axes (single precision).
+    ///
+    /// A plane is a half space with its normal along +z; a cylinder is a compound of one turned part, because parry's lies
+    /// along y. A closed mesh is oriented (it has an inside), an open one is a sheet.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for a length that is not above zero, a point that is not finite, a hull without volume, a mesh without
+    /// area and a triangle that names a corner that is not there.
+    pub fn to_shared_shape(&self) -> Result<SharedShape, ShapeError> {
+        self.check()?;
+        Ok(match self {
+            Self::Ball { radius_m } => SharedShape::ball(*radius_m as f32),
+            Self::Box { half_extents_m: half } => SharedShape::cuboid(half.x as f32, half.y as f32, half.z as f32),
+            Self::Capsule { radius_m, half_height_m } => {
+                SharedShape::capsule_z(*half_height_m as f32, *radius_m as f32)
+            }
+            Self::Cylinder { radius_m, half_height_m } => {
+                let along_y = SharedShape::cylinder(*half_height_m as f32, *radius_m as f32);
+                let turn = Pose::from_parts(Vec3::ZERO, Rotation::from_axis_angle(Vec3::X, FRAC_PI_2));
+                SharedShape::compound(vec![(turn, along_y)])
+            }
+            Self::Plane => SharedShape::halfspace(Vec3::Z),
+            Self::Hull { points_m } => {
+                let points: Vec<Vec3> = points_m.iter().map(|p| p.as_vec3()).collect();
+                hull_triangles(points_m)?;
+                SharedShape::convex_hull(&points).ok_or_else(|| flat(points_m, "its faces do not close"))?
+            }
+            Self::Mesh { points_m, triangles } => {
+                let mesh = mesh_triangles(points_m, triangles)?;
+                let flags = if is_closed(&mesh) { TriMeshFlags::ORIENTED } else { TriMeshFlags::empty() };
+                let points = mesh.points.iter().map(|p| p.as_vec3()).collect();
+                SharedShape::trimesh_with_flags(points, mesh.triangles, flags | TriMeshFlags::FIX_INTERNAL_EDGES)
+                    .map_err(|_| ShapeError::EmptyMesh { triangles: triangles.len() })?
+            }
+        })
+    }
+
+    /// Whether every length of the solid is finite and above zero, and every point finite.
+    pub fn check(&self) -> Result<(), ShapeError> {
+        let length = |what, value_m: f64| {
+            let good = value_m.is_finite() && value_m > 0.0;
+            if good { Ok(()) } else { Err(ShapeError::BadLength { what, value_m }) }
+        };
+        match self {
+            Self::Ball { radius_m } => length("the radius", *radius_m),
+            Self::Box { half_extents_m: half } => {
+                half.to_array().into_iter().try_for_each(|h| length("a half extent", h))
+            }
+            Self::Capsule { radius_m, half_height_m } | Self::Cylinder { radius_m, half_height_m } => {
+                length("the radius", *radius_m)?;
+                length("the half height", *half_height_m)
+            }
+            Self::Plane => Ok(()),
+            Self::Hull { points_m } | Self::Mesh { points_m, .. } => {
+                // single precision must hold them too
+                let bad = points_m.iter().position(|p| !p.as_vec3().is_finite());
+                bad.map_or(Ok(()), |index| Err(ShapeError::BadPoint { index }))
+            }
+        }
+    }
+}
+
+fn flat(points: &[DVec3], why: impl Into<String>) -> ShapeError {
+    ShapeError::FlatHull { points: points.len(), why: why.into() }
+}
+
+/// The faces of the convex hull of `points`.
+pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
+    if points.len() < 4 {
+        return Err(flat(points, "it takes four points"));
+    }
+    let (low, high) = bounds(points);
+    let size = (high - low).max_element();
+    let single: Vec<Vec3> = points.iter().map(|p| p.as_vec3()).collect();
+    let (corners, triangles) = try_convex_hull(&single).map_err(|e| flat(points, e.to_string()))?;
+    let corners: Vec<DVec3> = corners.iter().map(|p| p.as_dvec3()).collect();
+    let volume: f64 =
+        triangles.iter().map(|t| t.map(|i| corners[i as usize] - low)).map(|[a, b, c]| a.dot(b.cross(c)) / 6.0).sum();
+    if volume > VOLUME_SHARE_MIN * size.powi(3) {
+        mesh_triangles(&corners, &triangles)
+    } else {
+        Err(flat(points, "all lie in one plane"))
+    }
+}
+
+/// The triangles of a mesh that have an area.
+pub fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<Triangles, ShapeError> {
+    let mut kept = Vec::with_capacity(triangles.len());
+    for (triangle, &corners) in triangles.iter().enumerate() {
+        if let Some(&corner) = corners.iter().find(|&&c| c as usize >= points.len()) {
+            return Err(ShapeError::BadCorner { triangle, corner, points: points.len() });
+        }
+        let [a, b, c] = corners.map(|i| points[i as usize]);
+        let longest = (b - a).length_squared().max((c - b).length_squared()).max((a - c).length_squared());
+        if (b - a).cross(c - a).length() > AREA_SHARE_MIN * longest {
+            kept.push(corners);
+        }
+    }
+    if kept.is_empty() {
+        return Err(ShapeError::EmptyMesh { triangles: triangles.len() });
+    }
+    Ok(Triangles { points: points.to_vec(), triangles: kept })
+}
+
+/// Lowest and highest coordinates.
+pub fn bounds(points: &[DVec3]) -> (DVec3, DVec3) {
+    points.iter().fold((DVec3::INFINITY, DVec3::NEG_INFINITY), |(low, high), &p| (low.min(p), high.max(p)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn corners() -> Vec<DVec3> {
+        (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1))).collect()
+    }
+
+    fn distance(solid: &Solid, point: Vec3) -> f32 {
+        solid.to_shared_shape().unwrap().distance_to_local_point(point, false)
+    }
+
+    #[test]
+    fn every_solid_keeps_its_axes() {
+        let one = |solid: &Solid, point: Vec3, expected: f32| {
+            let got = distance(solid, point);
+            assert!((got - expected).abs() < 1e-5, "{solid:?}: {got}, not {expected}"); // f32: tens of roundings near 4
+        };
+        let up = Vec3::Z * 4.0;
+        one(&Solid::Ball { radius_m: 1.0 }, up, 3.0);
+        one(&Solid::Box { half_extents_m: DVec3::new(1.0, 2.0, 3.0) }, up, 1.0);
+        one(&Solid::Capsule { radius_m: 1.0, half_height_m: 2.0 }, up, 1.0);
+        one(&Solid::Cylinder { radius_m: 1.0, half_height_m: 2.0 }, up, 2.0);
+        one(&Solid::Cylinder { radius_m: 1.0, half_height_m: 2.0 }, Vec3::new(3.0, 0.0, 1.9), 2.0);
+        one(&Solid::Plane, up, 4.0);
+        one(&Solid::Hull { points_m: corners().into() }, up, (9.0_f32).sqrt());
+    }
+
+    #[test]
+    fn a_hull_without_volume_is_refused() {
+        let flat = corners().into_iter().map(|p| p * DVec3::new(1.0, 1.0, 0.0)).collect::<Vec<_>>();
+        for points_m in [vec![], corners()[..3].to_vec(), vec![DVec3::ONE; 9], flat] {
+            let error = Solid::Hull { points_m: points_m.into() }.to_shared_shape().unwrap_err();
+            assert!(matches!(error, ShapeError::FlatHull { .. }), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_mesh_without_area_or_with_a_missing_corner_is_refused() {
+        let mesh = |triangles: Vec<[u32; 3]>| Solid::Mesh { points_m: corners().into(), triangles: triangles.into() };
+        let refused = |triangles| mesh(triangles).to_shared_shape().unwrap_err();
+        assert_eq!(refused(vec![]), ShapeError::EmptyMesh { triangles: 0 });
+        assert_eq!(refused(vec![[0, 0, 1]]), ShapeError::EmptyMesh { triangles: 1 });
+        assert_eq!(refused(vec![[0, 1, 2], [0, 1, 8]]), ShapeError::BadCorner { triangle: 1, corner: 8, points: 8 });
+        assert!(mesh(vec![[0, 1, 2], [0, 1, 1]]).to_shared_shape().is_ok());
+    }
+
+    #[test]
+    fn a_length_or_point_that_is_no_number_is_refused() {
+        for bad in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let error = Solid::Ball { radius_m: bad }.to_shared_shape().unwrap_err();
+            assert!(matches!(error, ShapeError::BadLength { .. }), "{error}");
+        }
+        let points_m = vec![DVec3::ZERO, DVec3::splat(1e39)].into();
+        assert_eq!(Solid::Hull { points_m }.to_shared_shape().unwrap_err(), ShapeError::BadPoint { index: 1 });
+    }
+}

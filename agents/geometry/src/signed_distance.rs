@@ -1,0 +1,351 @@
+//! How far a point is from a fixed solid, and along which normal: the geometry of contact with obstacles.
+//!
+//! In: an [`Obstacle`], balls and spans between balls. Out: the places where they touch it, or nearly do.
+//! Never here: velocities, forces. Theory: `docs/theory/contact.md`, eq. 12–14.
+
+use super::mesh_distance::MeshField;
+use super::parry_shapes::{hull_triangles, mesh_triangles};
+use super::{Obstacle, ShapeError, Solid};
+use glam::{DQuat, DVec2, DVec3};
+
+/// A place of an obstacle's surface near a point.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Touch {
+    /// Unit normal of the surface there, out of the obstacle.
+    pub normal: DVec3,
+    /// Distance of the point from the surface, metres; negative inside.
+    pub distance_m: f64,
+}
+
+impl Touch {
+    /// Whether the place at which the `ball` inside a span touches lies behind this one, which the span's `end` touches already
+    /// (eq. 13).
+    pub fn hides(self, end: Ball, ball: Ball, touch: Self) -> bool {
+        let wall = end.centre - self.normal * self.distance_m;
+        let place = ball.centre - touch.normal * touch.distance_m;
+        self.distance_m <= end.radius_m
+            && (place - wall).dot(self.normal) <= 0.0
+            && self.normal.dot(touch.normal) > FLAT
+    }
+}
+
+/// The most places at which one ball touches one obstacle: a corner of a room has three.
+pub const TOUCHES_MAX: usize = 4;
+
+/// Up to [`TOUCHES_MAX`] places, nearest first.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Touches {
+    places: [Option<Touch>; TOUCHES_MAX],
+    count: usize,
+    /// No surface is nearer than this, metres, whatever the reach was.
+    pub clear_m: f64,
+}
+
+impl Touches {
+    /// Adds a place; a full list stays as it is.
+    pub fn push(&mut self, touch: Touch) {
+        if self.count < TOUCHES_MAX {
+            self.places[self.count] = Some(touch);
+            self.count += 1;
+        }
+    }
+
+    /// Whether no more fit.
+    pub fn is_full(&self) -> bool {
+        self.count == TOUCHES_MAX
+    }
+
+    /// The places, nearest first.
+    pub fn iter(&self) -> impl Iterator<Item = Touch> + '_ {
+        self.places.iter().flatten().copied()
+    }
+}
+
+/// A ball on a curve: a node with the curve's radius there.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ball {
+    /// Centre, metres.
+    pub centre: DVec3,
+    /// Radius, metres, ≥ 0.
+    pub radius_m: f64,
+}
+
+impl Ball {
+    /// The ball at the share `s` of the way to `other`.
+    pub fn toward(self, other: Self, s: f64) -> Self {
+        Self {
+            centre: self.centre.lerp(other.centre, s),
+            radius_m: self.radius_m + (other.radius_m - self.radius_m) * s,
+        }
+    }
+}
+
+/// A solid as a field of distances, where it stands.
+#[derive(Debug, Clone)]
+pub struct Field {
+    kind: Kind,
+    position: DVec3,
+    rotation: DQuat,
+}
+
+#[derive(Debug, Clone)]
+enum Kind {
+    Ball(f64),
+    Box(DVec3),
+    Capsule(f64, f64),
+    Cylinder(f64, f64),
+    Plane,
+    /// Triangles, in world axes already: an obstacle never moves.
+    Mesh(std::boxed::Box<MeshField>),
+}
+
+/// The lowest point inside a span.
+struct Lowest {
+    share: f64,
+    touch: Touch,
+    /// Where the tangents meet: the gap is nowhere below it, metres.
+    floor_m: f64,
+}
+
+/// Normals whose cosine is above this tell of the same wall: 0.8°.
+const FLAT: f64 = 0.9999;
+/// Halvings of the search for the lowest point of a span: tangents meet much faster on smooth shapes.
+const SPAN_TRIES: usize = 16;
+/// How near the floor under the tangents the lowest point must come, as a share of the span.
+const LOWEST_SHARE: f64 = 1e-6;
+/// A cylinder that leans less than this stands on its rim: no point of that is the nearest.
+const UPRIGHT: f64 = 1e-3;
+/// How close to an end of a span its lowest point belongs to that end's own ball, as a share of the span.
+const SPAN_END_SHARE: f64 = 0.02;
+
+impl Field {
+    /// The field of an obstacle.
+    ///
+    /// # Errors
+    /// [`ShapeError`] where [`Solid::to_shared_shape`] would give one.
+    pub fn new(obstacle: &Obstacle) -> Result<Self, ShapeError> {
+        Self::placed(&obstacle.solid, obstacle.position, obstacle.rotation.normalize())
+    }
+
+    /// The field of a solid in its own axes, for solids that move.
+    ///
+    /// # Errors
+    /// Like [`Field::new`].
+    pub fn of(solid: &Solid) -> Result<Self, ShapeError> {
+        Self::placed(solid, DVec3::ZERO, DQuat::IDENTITY)
+    }
+
+    fn placed(solid: &Solid, position: DVec3, rotation: DQuat) -> Result<Self, ShapeError> {
+        solid.check()?;
+        let in_world = |p: &DVec3| position + rotation * *p;
+        let kind = match solid {
+            Solid::Ball { radius_m } => Kind::Ball(*radius_m),
+            Solid::Box { half_extents_m } => Kind::Box(*half_extents_m),
+            Solid::Capsule { radius_m, half_height_m } => Kind::Capsule(*radius_m, *half_height_m),
+            Solid::Cylinder { radius_m, half_height_m } => Kind::Cylinder(*radius_m, *half_height_m),
+            Solid::Plane => Kind::Plane,
+            Solid::Hull { points_m } => {
+                let mut hull = hull_triangles(points_m)?;
+                hull.points.iter_mut().for_each(|p| *p = in_world(p));
+                Kind::Mesh(MeshField::new(hull).into())
+            }
+            Solid::Mesh { points_m, triangles } => {
+                let mut mesh = mesh_triangles(points_m, triangles)?;
+                mesh.points.iter_mut().for_each(|p| *p = in_world(p));
+                Kind::Mesh(MeshField::new(mesh).into())
+            }
+        };
+        Ok(Self { kind, position, rotation })
+    }
+
+    /// Where `point` is within `reach_m` of the surface, nearest place first.
+    ///
+    /// A convex primitive has one place, at any depth. A mesh or hull has one for each wall of a corner, and is felt only
+    /// to the depth `reach_m` behind its surface.
+    pub fn touches(&self, point: DVec3, reach_m: f64) -> Touches {
+        let mut found = Touches::default();
+        if let Kind::Mesh(mesh) = &self.kind {
+            let around_m = mesh.distance_from_bounds(point);
+            if around_m <= reach_m {
+                mesh.touches(point, reach_m, &mut found);
+            }
+            let nearest = found.iter().next();
+            found.clear_m = nearest.map_or(reach_m.max(around_m), |t| t.distance_m);
+        } else {
+            let touch = self.nearest(point);
+            found.clear_m = touch.distance_m;
+            if touch.distance_m <= reach_m {
+                found.push(touch);
+            }
+        }
+        found
+    }
+
+    /// Takes back of the `way` on which a ball of `radius_m` has just come to `centre` what led it into this solid, or deeper.
+    pub fn hold_back(&self, centre: &mut DVec3, way: DVec3, radius_m: f64) {
+        let came_to = *centre;
+        for touch in self.touches(came_to, radius_m).iter() {
+            let gap_m = touch.distance_m - radius_m;
+            let before_m = gap_m - way.dot(touch.normal);
+            // what one place has taken back another of the same way out does not again
+            let now_m = gap_m + (*centre - came_to).dot(touch.normal);
+            *centre += touch.normal * (before_m.min(0.0) - now_m).max(0.0);
+        }
+    }
+
+    /// Whether the inside of a span can come nearer than both of its ends: never to a flat floor without end.
+    pub fn feels_spans(&self) -> bool {
+        !matches!(self.kind, Kind::Plane)
+    }
+
+    /// Whether `ball` moved by `way` stays farther than `slack_m` from this solid. A mesh says no.
+    pub fn is_missed(&self, ball: Ball, way: DVec3, slack_m: f64) -> bool {
+        if matches!(self.kind, Kind::Mesh(_)) {
+            return false;
+        }
+        let end = Ball { centre: ball.centre + way, ..ball };
+        let clear = |at: Ball| self.nearest(at.centre).distance_m - at.radius_m > slack_m;
+        clear(end) && self.lowest([ball, end], slack_m).is_none()
+    }
+
+    /// The place where the inside of a span comes nearer than its ends, and its share of the span; `None` where the ends say
+    /// it all, or the span stays farther than `reach_m` beyond its own radius.
+    pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+        self.lowest_of_span(ends, reach_m).filter(|(share, _)| (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(share))
+    }
+
+    /// The same, however near to an end of the span it is.
+    pub fn lowest_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
+        match &self.kind {
+            Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m),
+            _ => self.lowest(ends, reach_m).map(|lowest| (lowest.share, lowest.touch)),
+        }
+    }
+
+    /// The corners that a flat face may come nearest to whose normal towards the solid is `way`: all of a box; of each rim of a
+    /// cylinder the nearest point and three at right angles. `None` for what has none or is a mesh.
+    pub fn corners(&self, way: DVec3) -> Option<[DVec3; 8]> {
+        let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        match &self.kind {
+            Kind::Box(half) => Some(std::array::from_fn(|i| *half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2)))),
+            Kind::Cylinder(radius_m, half_m) => {
+                let across = way.truncate();
+                let near = if across.length() > UPRIGHT { -across.normalize() } else { glam::DVec2::X } * *radius_m;
+                let quarters = [near, near.perp(), -near, -near.perp()];
+                Some(std::array::from_fn(|i| quarters[i & 3].extend(*half_m * sign(i, 2))))
+            }
+            _ => None,
+        }
+    }
+
+    /// A lower bound of the gap to a whole span, with the normal of the place that comes nearest; `None` beyond `reach_m`.
+    ///
+    /// Exact to a millionth of the span's length for a convex primitive. To a mesh the whole span has its widest radius, and
+    /// where it overlaps the bound is up to half a span deeper than need be.
+    pub fn gap_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<Touch> {
+        let at_end = |ball: Ball| {
+            let near = self.touches(ball.centre, ball.radius_m + reach_m).iter().next()?;
+            Some(Touch { distance_m: near.distance_m - ball.radius_m, ..near })
+        };
+        let inside = if let Kind::Mesh(mesh) = &self.kind {
+            let radius_m = ends[0].radius_m.max(ends[1].radius_m);
+            let near = mesh.nearest_to_span(ends.map(|e| e.centre), reach_m + radius_m);
+            near.map(|near| Touch { distance_m: near.distance_m - radius_m, ..near })
+        } else {
+            self.lowest(ends, reach_m).map(|lowest| Touch { distance_m: lowest.floor_m, ..lowest.touch })
+        };
+        let length_m = ends[0].centre.distance(ends[1].centre);
+        let near = [at_end(ends[0]), at_end(ends[1]), inside].into_iter().flatten();
+        let least = near.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))?;
+        // inside a mesh a place between the ends may be deeper than both
+        let narrow_m = ends[0].radius_m.min(ends[1].radius_m);
+        let is_deep = matches!(self.kind, Kind::Mesh(_)) && least.distance_m <= -narrow_m;
+        let slack_m = if is_deep { 0.5 * length_m } else { LOWEST_SHARE * length_m };
+        Some(Touch { distance_m: least.distance_m - slack_m, ..least })
+    }
+
+    /// The lowest point of the convex function gap(s) inside a span, where tangents meet (eq. 14).
+    fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<Lowest> {
+        let along = ends[1].centre - ends[0].centre;
+        let at = |s: f64| {
+            let ball = ends[0].toward(ends[1], s);
+            let touch = self.nearest(ball.centre);
+            let slope = touch.normal.dot(along) - (ends[1].radius_m - ends[0].radius_m);
+            (s, touch.distance_m - ball.radius_m, slope, touch)
+        };
+        let (mut left, mut right) = (at(0.0), at(1.0));
+        let tolerance = LOWEST_SHARE * along.length();
+        let mut best = None;
+        for _ in 0..SPAN_TRIES {
+            if left.2 >= -tolerance || right.2 <= tolerance {
+                break;
+            }
+            let meet = (left.1 - right.1 + right.2 * right.0 - left.2 * left.0) / (right.2 - left.2);
+            let floor = left.1 + left.2 * (meet - left.0);
+            if floor > reach_m {
+                return None;
+            }
+            let middle = at(meet.clamp(left.0, right.0));
+            // where the slope is nothing the tangents of the ends say nothing any more
+            let floor = if middle.2.abs() <= tolerance { middle.1 } else { floor };
+            let here = Lowest { share: middle.0, touch: middle.3, floor_m: floor };
+            best = Some(here).filter(|_| middle.1 <= reach_m);
+            if middle.1 - floor < tolerance {
+                break;
+            }
+            if middle.2 < 0.0 { left = middle } else { right = middle }
+        }
+        best
+    }
+
+    /// The nearest surface of a convex primitive, from outside or inside (eq. 12).
+    fn nearest(&self, point: DVec3) -> Touch {
+        let local = self.rotation.conjugate() * (point - self.position);
+        let (distance_m, normal) = match self.kind {
+            Kind::Ball(radius) => from_point(local, radius),
+            Kind::Box(half) => from_box(local, half),
+            Kind::Capsule(radius, half) => from_point(local - DVec3::Z * local.z.clamp(-half, half), radius),
+            Kind::Cylinder(radius, half) => from_cylinder(local, radius, half),
+            Kind::Plane | Kind::Mesh(_) => (local.z, DVec3::Z),
+        };
+        Touch { normal: self.rotation * normal, distance_m }
+    }
+}
+
+fn from_point(p: DVec3, radius: f64) -> (f64, DVec3) {
+    let length = p.length();
+    let normal = if length > 0.0 { p / length } else { DVec3::Z };
+    (length - radius, normal)
+}
+
+fn from_box(p: DVec3, half: DVec3) -> (f64, DVec3) {
+    let beyond = p.abs() - half;
+    let outside = beyond.max(DVec3::ZERO);
+    let distance = outside.length();
+    let sign = DVec3::ONE.copysign(p);
+    if distance > 0.0 {
+        return (distance, outside / distance * sign);
+    }
+    let depth = beyond.max_element();
+    let axis = if beyond.z == depth {
+        DVec3::Z
+    } else if beyond.y == depth {
+        DVec3::Y
+    } else {
+        DVec3::X
+    };
+    (depth, axis * sign)
+}
+
+fn from_cylinder(p: DVec3, radius: f64, half: f64) -> (f64, DVec3) {
+    let around = DVec2::new(p.x, p.y);
+    let out = around.length();
+    let radial = if out > 0.0 { (around / out).extend(0.0) } else { DVec3::X };
+    let axial = DVec3::Z.copysign(DVec3::splat(p.z)) * DVec3::Z;
+    let (beyond_side, beyond_end) = (out - radius, p.z.abs() - half);
+    if beyond_side > 0.0 && beyond_end > 0.0 {
+        let distance = beyond_side.hypot(beyond_end);
+        return (distance, (radial * beyond_side + axial * beyond_end) / distance);
+    }
+    if beyond_side >= beyond_end { (beyond_side, radial) } else { (beyond_end, axial) }
+}

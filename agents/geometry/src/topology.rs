@@ -1,0 +1,154 @@
+//! The edges of a triangle mesh: whether all of them close, and where more than two triangles meet in one.
+//!
+//! In: points and triangles. Out: a verdict. Never here: what follows from it.
+//! Points at one place are one: a seam of doubled points (for places on a texture, for normals) neither opens a surface nor hides
+//! that it branches. Triangles without an area have no say.
+
+use super::Triangles;
+use glam::DVec3;
+use std::collections::HashMap;
+
+/// An edge that more than two triangles share: there the surface branches, and has no two sides any more.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Branch {
+    /// Number of the first triangle that is one too many, from 0.
+    pub triangle: usize,
+    /// Its corners at the ends of the edge.
+    pub corners: [u32; 2],
+    /// How many triangles share the edge.
+    pub sharing: usize,
+}
+
+/// A triangle on one of its edges.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Side {
+    object: u32,
+    /// The places that the edge joins, the lesser first.
+    edge: [u32; 2],
+    triangle: u32,
+    /// Whether the triangle runs along it from the lesser to the greater.
+    forward: bool,
+}
+
+/// The first edge, in the order of the triangles, that more than two of one object share. Triangles name points that are there.
+///
+/// `object_of` says of which object a triangle is: objects that touch each other along an edge are no branch.
+/// Every triangle counts, also one that is there twice: a sheet whose faces are there once for each side branches along every edge
+/// inside it.
+#[must_use]
+pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Option<Branch> {
+    let place = places(points);
+    let sides = sides((points, &place), triangles, object_of);
+    let shared = sides.chunk_by(same_edge).filter(|sharing| sharing.len() > 2);
+    let first = shared.min_by_key(|sharing| sharing[2].triangle)?;
+    let Side { edge, triangle, .. } = first[2];
+    let corners = triangles[triangle as usize];
+    let at = |end: u32| corners.into_iter().find(|&i| place[i as usize] == end).unwrap_or(end);
+    Some(Branch { triangle: triangle as usize, corners: edge.map(at), sharing: first.len() })
+}
+
+/// Whether every edge has a triangle on both sides, running opposite ways.
+pub fn is_closed(mesh: &Triangles) -> bool {
+    let sides = sides((&mesh.points, &places(&mesh.points)), &mesh.triangles, |_| 0);
+    let balanced = |sharing: &[Side]| 2 * sharing.iter().filter(|side| side.forward).count() == sharing.len();
+    sides.chunk_by(same_edge).all(balanced)
+}
+
+fn same_edge(a: &Side, b: &Side) -> bool {
+    (a.object, a.edge) == (b.object, b.edge)
+}
+
+/// For each point the first one at its place.
+pub(super) fn places(points: &[DVec3]) -> Vec<u32> {
+    let mut first_at = HashMap::with_capacity(points.len());
+    // adding zero makes -0.0 the same place as 0.0
+    let bits = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
+    (0..).zip(points).map(|(i, p)| *first_at.entry(bits(p)).or_insert(i)).collect()
+}
+
+/// The sides of all triangles with an area, those of one edge of an object side by side in the order of their triangles.
+fn sides((points, place): (&[DVec3], &[u32]), triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Vec<Side> {
+    let mut sides = Vec::with_capacity(3 * triangles.len());
+    for (number, t) in triangles.iter().enumerate() {
+        let [a, b, c] = t.map(|i| points[i as usize]);
+        if (b - a).cross(c - a) == DVec3::ZERO {
+            continue;
+        }
+        let [a, b, c] = t.map(|i| place[i as usize]);
+        let (object, triangle) = (object_of(number), number as u32);
+        let side = |(a, b): (u32, u32)| Side { object, edge: [a.min(b), a.max(b)], triangle, forward: a < b };
+        sides.extend([(a, b), (b, c), (c, a)].map(side));
+    }
+    sides.sort_unstable();
+    sides
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Generator, generate, hull_triangles};
+
+    /// The branch of triangles that are all of one object.
+    fn branch(points: &[DVec3], triangles: &[[u32; 3]]) -> Option<Branch> {
+        super::branch(points, triangles, |_| 0)
+    }
+
+    fn corners() -> Vec<DVec3> {
+        (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2 & 1))).collect()
+    }
+
+    #[test]
+    fn a_box_of_triangles_is_closed_and_a_box_without_lid_is_not() {
+        let hull = hull_triangles(&corners()).unwrap();
+        assert!(is_closed(&hull));
+        assert_eq!(branch(&hull.points, &hull.triangles), None);
+        let mut open = hull;
+        open.triangles.pop();
+        assert!(!is_closed(&open));
+        assert_eq!(branch(&open.points, &open.triangles), None);
+    }
+
+    #[test]
+    fn a_third_triangle_on_an_edge_is_a_branch_with_its_name() {
+        let points = [DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::NEG_Y, DVec3::Z];
+        let fan = [[0, 1, 2], [1, 0, 3], [0, 1, 4], [4, 1, 0]];
+        assert_eq!(branch(&points, &fan[..2]), None);
+        assert_eq!(branch(&points, &fan), Some(Branch { triangle: 2, corners: [0, 1], sharing: 4 }));
+        // a face that is there three times shares its edges with itself
+        let again = [[0, 1, 2], [1, 2, 0], [0, 2, 1]];
+        assert_eq!(branch(&points, &again).unwrap().sharing, 3);
+        // two objects that touch along an edge have one each
+        let touching = super::branch(&points, &fan, |t| u32::from(t > 1));
+        assert_eq!(touching, None);
+        // what has no area has no say
+        assert_eq!(branch(&points, &[[0, 1, 2], [1, 0, 3], [0, 1, 1], [1, 0, 0]]), None);
+    }
+
+    #[test]
+    fn doubled_points_neither_open_a_surface_nor_hide_a_branch() {
+        let hull = hull_triangles(&corners()).unwrap();
+        let doubled = |mesh: &Triangles| Triangles {
+            points: mesh.triangles.iter().flatten().map(|&i| mesh.points[i as usize]).collect(),
+            triangles: (0..mesh.triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect(),
+        };
+        let apart = doubled(&hull);
+        assert!(is_closed(&apart) && branch(&apart.points, &apart.triangles).is_none());
+        let mut fin = hull;
+        fin.points.push(DVec3::splat(2.0));
+        fin.triangles.push([fin.triangles[0][0], fin.triangles[0][1], 8]);
+        let apart = doubled(&fin);
+        let found = branch(&apart.points, &apart.triangles).unwrap();
+        assert_eq!((found.triangle, found.corners, found.sharing), (12, [36, 37], 3));
+    }
+
+    #[test]
+    fn no_generated_mesh_branches() {
+        for kind in Generator::ALL {
+            for triangles in [12, 700, 5000] {
+                let mesh = generate(kind, 3, triangles);
+                let points: Vec<DVec3> = mesh.vertices.iter().map(|v| v.core.as_dvec3()).collect();
+                assert_eq!(branch(&points, &mesh.triangles), None, "{kind:?} {triangles}");
+            }
+        }
+    }
+}

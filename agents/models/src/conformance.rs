@@ -1,0 +1,198 @@
+//! What every agent promises, as one suite that any model can be held against.
+//!
+//! In: a [`Suite`]: how to build the agent, what to do to it. Out: every [`Breach`] of a promise, none as a rule.
+//! Never here: what one model alone promises; that is tested beside the model.
+//!
+//! ```
+//! use crate::conformance::{Suite, check};
+//! use crate::synthetic::{Synthetic, SyntheticSpec};
+//! use metachron_agents::{Agent, Resolution, ResolutionRange, SimSpan};
+//!
+//! let range = ResolutionRange { eps_m: (0.01, 0.04), n: (0, 3) };
+//! let spec = SyntheticSpec { cost_us: 5.0, cost_order: 1.0, error_m: 1e-3, error_order: 2.0 };
+//! let make = || {
+//!     let agent = Synthetic::new(spec, range, Resolution { eps_m: 0.04, n: 0 }).unwrap();
+//!     Box::new(agent) as Box<dyn Agent>
+//! };
+//! let resolutions = [0.04, 0.02, 0.01].map(|eps_m| Resolution { eps_m, n: 0 }).to_vec();
+//! let dt = SimSpan::from_nanos(4_000_000);
+//! let suite = Suite { resolutions, converging: Some((&make, 1)), ..Suite::new(&make, dt) };
+//! assert_eq!(check(&suite), []);
+//! ```
+
+use glam::DVec3;
+use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_core::{AgentId, Body, DT_MAX_S, HASH_START, Resolution, SimSpan, SimTime, Snapshot, StepError};
+
+mod bits;
+mod form;
+
+pub use form::fall_deviation;
+
+#[cfg(test)]
+mod tests;
+
+/// Builds an agent.
+pub type Make<'a> = &'a dyn Fn() -> Box<dyn Agent>;
+/// Runs what it is given and says how often that asked for memory.
+pub type CountAllocations<'a> = &'a dyn Fn(&mut dyn FnMut()) -> u64;
+/// How far an agent is from where it must be after so many seconds, as a share of what that is.
+pub type Deviation<'a> = &'a dyn Fn(&dyn Agent, f64) -> f64;
+
+/// An agent and what to do to it.
+pub struct Suite<'a> {
+    /// Builds the agent, always the same, in a state that moves.
+    pub make: Make<'a>,
+    /// The span of a usual step.
+    pub dt: SimSpan,
+    /// How many steps a run has.
+    pub steps: u32,
+    /// What the agent sees.
+    pub neighbours: Vec<Neighbour>,
+    /// A pull within reason, if the agent can be pulled.
+    pub pull: Option<Pull>,
+    /// Pulls that no state survives: the way in for what is not finite.
+    pub absurd: Vec<Pull>,
+    /// A closed form: how wrong the agent is after t seconds, and how wrong it may be.
+    pub closed_form: Option<(Deviation<'a>, f64)>,
+    /// Resolutions to retune to and fro, from coarse to fine. Where none are given, a wish for what it holds (or for
+    /// anything, where it holds none) must change no bit.
+    pub resolutions: Vec<Resolution>,
+    /// Builds the agent in a case that converges, and how many steps of `dt` that takes.
+    pub converging: Option<(Make<'a>, u32)>,
+    /// Counts allocations, and how many a step may make once warm.
+    pub allocations: Option<(CountAllocations<'a>, f64)>,
+}
+
+/// A promise of [`Agent`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Promise {
+    /// A step advances exactly `dt`.
+    ExactTime,
+    /// A refused step leaves the state bit for bit.
+    RefusedSpan,
+    /// `retune` keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
+    Retune,
+    /// At a converged state a finer ε does not leave a larger residual (within 10 %).
+    Residual,
+    /// The same calls give the same bits.
+    SameBits,
+    /// Nothing is allocated once the sizes settle.
+    Allocation,
+    /// A state that is not finite is refused, never written.
+    Finite,
+}
+
+/// A promise that was not kept.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Breach {
+    /// Which promise.
+    pub promise: Promise,
+    /// What happened.
+    pub what: String,
+}
+
+impl<'a> Suite<'a> {
+    /// A suite of 200 steps of `dt` on an agent that sees nobody, is not pulled and has no resolution.
+    #[must_use]
+    pub fn new(make: Make<'a>, dt: SimSpan) -> Self {
+        Self {
+            make,
+            dt,
+            steps: 200,
+            neighbours: vec![],
+            pull: None,
+            absurd: vec![],
+            closed_form: None,
+            resolutions: vec![],
+            converging: None,
+            allocations: None,
+        }
+    }
+
+    /// Builds the agent and its clock.
+    fn start(&self) -> Run<'_> {
+        Run { agent: (self.make)(), time: SimTime::ZERO, around: &self.neighbours }
+    }
+}
+
+/// Holds the agent of `suite` against every promise.
+#[must_use]
+pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
+    let promises = [
+        (Promise::ExactTime, form::exact_time as fn(&Suite<'_>) -> Result<(), String>),
+        (Promise::RefusedSpan, bits::refused_span),
+        (Promise::Retune, form::retune),
+        (Promise::Residual, form::residual),
+        (Promise::SameBits, bits::same_bits),
+        (Promise::Allocation, bits::allocation),
+        (Promise::Finite, bits::finite),
+    ];
+    let broken = promises.into_iter().filter_map(|(promise, kept)| Some(Breach { promise, what: kept(suite).err()? }));
+    broken.collect()
+}
+
+/// Who the agent under test is.
+const ME: AgentId = AgentId(0);
+
+/// An agent and its own time.
+struct Run<'a> {
+    agent: Box<dyn Agent>,
+    time: SimTime,
+    around: &'a [Neighbour],
+}
+
+impl Run<'_> {
+    fn step(&mut self, dt: SimSpan, hands: &[Pull]) -> Result<(), StepError> {
+        let around = Surroundings { me: ME, time: self.time, neighbours: self.around, hands, links: &[] };
+        self.agent.step(dt, &around)?;
+        self.time += dt;
+        Ok(())
+    }
+
+    /// A step that must succeed.
+    fn must_step(&mut self, dt: SimSpan, hands: &[Pull]) -> Result<(), String> {
+        self.step(dt, hands).map_err(|error| format!("a good step at {} s failed: {error}", self.time.as_secs_f64()))
+    }
+
+    fn snapshot(&self) -> Snapshot {
+        let mut into = Snapshot::default();
+        self.agent.write_snapshot(&mut into);
+        into
+    }
+
+    /// A hash of every bit that the agent shows.
+    fn hash(&self) -> u64 {
+        let snapshot = self.snapshot();
+        let (linear, angular) = self.agent.momentum();
+        let numbers = [snapshot.energy_j, snapshot.residual_m, self.agent.mass_kg()];
+        let all = numbers.into_iter().chain(linear.to_array()).chain(angular.to_array());
+        // the same folding as the snapshot's own, one word after the other
+        all.fold(snapshot.fold_hash(HASH_START), |hash, x| (hash ^ x.to_bits()).wrapping_mul(0x0100_0000_01b3))
+    }
+}
+
+/// The rest length of a curve; zero for a body that has none.
+fn rest_length_m(body: &Body) -> f64 {
+    if let Body::Curve(curve) = body { curve.arc_m.last().copied().unwrap_or(0.0) } else { 0.0 }
+}
+
+/// The fastest point of a body, m/s, and the largest distance of a point from the origin, metres.
+fn extents(body: &Body) -> (f64, f64) {
+    let longest = |vectors: &mut dyn Iterator<Item = DVec3>| vectors.map(DVec3::length).fold(0.0, f64::max);
+    match body {
+        Body::Nothing => (0.0, 0.0),
+        Body::Curve(c) => (longest(&mut c.velocities.iter().copied()), longest(&mut c.positions.iter().copied())),
+        Body::Rigid(b) => (b.velocity.length(), b.position.length()),
+        Body::Tool(t) => (t.velocity.length(), t.tip.length()),
+        Body::Soft(s) => {
+            let most = |list: &[DVec3]| list.iter().map(|v| v.length()).fold(0.0, f64::max);
+            (most(&s.velocities), most(&s.positions))
+        }
+    }
+}
+
+/// A span longer than any model takes.
+fn too_long() -> SimSpan {
+    SimSpan::from_nanos((DT_MAX_S * 1e9) as u64 + 1)
+}

@@ -1,0 +1,108 @@
+//! Promises about bits: refused steps, repeated runs, memory, what is not finite.
+//!
+//! In: a [`Suite`]. Out: what was not kept. Never here: promises about physics ([`super::form`]).
+
+use super::{Run, Suite, too_long};
+use metachron_core::{SimSpan, StepError};
+
+/// A refused step leaves the state bit for bit, and the steps after it too.
+pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
+    let (mut tried, mut spared) = (suite.start(), suite.start());
+    for i in 0..suite.steps.min(50) {
+        let before = tried.hash();
+        for bad in [SimSpan::ZERO, too_long(), SimSpan::from_nanos(u64::MAX)] {
+            match tried.step(bad, &[]) {
+                Err(StepError::BadSpan { .. }) => {}
+                other => return Err(format!("a step of {} s gave {other:?}", bad.as_secs_f64())),
+            }
+            if tried.hash() != before {
+                return Err(format!("a refused step of {} s changed the state", bad.as_secs_f64()));
+            }
+        }
+        tried.must_step(suite.dt, &[])?;
+        spared.must_step(suite.dt, &[])?;
+        if tried.hash() != spared.hash() {
+            return Err(format!("step {i} differs after steps were refused"));
+        }
+    }
+    Ok(())
+}
+
+/// Two agents that are told the same do the same.
+pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
+    let (mut one, mut other) = (suite.start(), suite.start());
+    for i in 0..suite.steps {
+        let pulled = (suite.steps / 3..suite.steps / 2).contains(&i);
+        let hands = suite.pull.filter(|_| pulled);
+        for run in [&mut one, &mut other] {
+            if let Some(wanted) = suite.resolutions.get(i as usize / 20 % suite.resolutions.len().max(1)) {
+                run.agent.retune(*wanted);
+            }
+            run.must_step(suite.dt, hands.as_slice())?;
+        }
+        if one.hash() != other.hash() {
+            return Err(format!("two equal runs differ after step {i}"));
+        }
+    }
+    Ok(())
+}
+
+/// Steps and snapshots ask for no memory once the sizes have settled.
+pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
+    let Some((count, allowed)) = suite.allocations else { return Ok(()) };
+    let mut run = suite.start();
+    let mut snapshot = run.snapshot();
+    for _ in 0..suite.steps {
+        run.must_step(suite.dt, suite.pull.as_slice())?;
+        run.agent.write_snapshot(&mut snapshot);
+    }
+    let mut failed = None;
+    let counted = count(&mut || {
+        for _ in 0..suite.steps {
+            failed = failed.take().or(run.step(suite.dt, suite.pull.as_slice()).err());
+            run.agent.write_snapshot(&mut snapshot);
+        }
+    });
+    if let Some(error) = failed {
+        return Err(error.to_string());
+    }
+    let each = counted as f64 / f64::from(suite.steps);
+    if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; {allowed} are allowed")) }
+}
+
+/// Whatever pulls, no state is written that is not finite: the agent says that it is lost, or leaves the pull aside.
+pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
+    let mut run = suite.start();
+    for i in 0..suite.steps {
+        shows_finite(&run).map_err(|what| format!("before step {i}: {what}"))?;
+        run.must_step(suite.dt, suite.pull.as_slice())?;
+    }
+    for pull in &suite.absurd {
+        let mut run = suite.start();
+        run.must_step(suite.dt, &[])?;
+        match run.step(suite.dt, &[*pull]) {
+            Ok(()) | Err(StepError::Diverged { .. }) => {}
+            Err(other) => return Err(format!("a pull to {} gave {other:?}", pull.target)),
+        }
+        shows_finite(&run).map_err(|what| format!("after a pull to {}: {what}", pull.target))?;
+    }
+    Ok(())
+}
+
+fn shows_finite(run: &Run<'_>) -> Result<(), String> {
+    let snapshot = run.snapshot();
+    let numbers = [("energy", snapshot.energy_j), ("residual", snapshot.residual_m), ("mass", run.agent.mass_kg())];
+    if let Some((what, value)) = numbers.iter().find(|(_, value)| !value.is_finite()) {
+        return Err(format!("its {what} is {value}"));
+    }
+    if snapshot.residual_m < 0.0 {
+        return Err(format!("its residual is {}", snapshot.residual_m));
+    }
+    if !snapshot.body.is_finite() {
+        return Err("its body is not finite".to_owned());
+    }
+    if let Some(grip) = snapshot.grips.iter().find(|grip| !grip.force_n.is_finite()) {
+        return Err(format!("its grip is {}", grip.force_n));
+    }
+    Ok(())
+}

@@ -1,0 +1,146 @@
+//! The suite catches who breaks a promise: an agent that can be told which.
+
+use super::{Breach, Promise, Suite, check};
+use glam::{DQuat, DVec3};
+use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_core::{Anchor, Body, CurveState, Resolution, SimSpan, Snapshot, StepError, StepReport, check_span};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// A row of points that falls freely; it keeps every promise but the one in `breaks`.
+#[derive(Clone)]
+struct Row {
+    breaks: Option<Promise>,
+    speed: f64,
+    height: f64,
+    steps: u64,
+    held: Resolution,
+}
+
+const G: f64 = 10.0;
+/// Differs from one agent to the next, as an address or a clock would.
+static BORN: AtomicU64 = AtomicU64::new(1);
+
+impl Row {
+    fn points(&self) -> usize {
+        (1.0 / self.held.eps_m).round() as usize
+    }
+
+    fn breaks(&self, promise: Promise) -> bool {
+        self.breaks == Some(promise)
+    }
+}
+
+impl Agent for Row {
+    fn model(&self) -> &'static str {
+        "row"
+    }
+
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        if self.breaks(Promise::RefusedSpan) {
+            self.height += 1e-12;
+        }
+        let dt_s = check_span(dt)?;
+        if around.hands.iter().any(|hand| !hand.target.is_finite()) {
+            if !self.breaks(Promise::Finite) {
+                return Err(StepError::Diverged { model: "row", dt_s, what: "a hand".to_owned() });
+            }
+            self.height = f64::NAN;
+        }
+        let born = BORN.fetch_add(1, Ordering::Relaxed) as f64;
+        let noise = if self.breaks(Promise::SameBits) { born * 1e-12 } else { 0.0 };
+        let lost = if self.breaks(Promise::ExactTime) { 0.99 } else { 1.0 };
+        self.height += self.speed * dt_s + noise;
+        self.speed -= G * dt_s * lost;
+        self.steps += 1;
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: false })
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        Some(self.held)
+    }
+
+    fn retune(&mut self, wanted: Resolution) {
+        if self.breaks(Promise::Retune) && wanted != self.held {
+            self.speed *= 1.0 + 1e-9;
+        }
+        self.held = wanted;
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+        let wrong = if self.breaks(Promise::Residual) { 1.0 / self.held.eps_m } else { self.held.eps_m };
+        into.residual_m = wrong;
+        let n = self.points();
+        let at = |i: usize| DVec3::new(i as f64 / n as f64, 0.0, self.height);
+        into.body = Body::Curve(CurveState {
+            arc_m: (0..=n).map(|i| i as f64 / n as f64).collect(),
+            positions: (0..=n).map(at).collect(),
+            velocities: vec![DVec3::Z * self.speed; n + 1],
+            frames: vec![DQuat::IDENTITY; n],
+            radii_m: vec![0.1; n + 1],
+        });
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        // its middle is half a metre out along x
+        (DVec3::Z * self.speed, DVec3::Y * (-0.5 * self.speed))
+    }
+
+    fn mass_kg(&self) -> f64 {
+        1.0
+    }
+}
+
+fn broken(breaks: Option<Promise>) -> Vec<Promise> {
+    let make = || {
+        let held = Resolution { eps_m: 0.1, n: 0 };
+        Box::new(Row { breaks, speed: 0.0, height: 3.0, steps: 0, held }) as Box<dyn Agent>
+    };
+    let deviation = |agent: &dyn Agent, t: f64| crate::conformance::fall_deviation(agent, DVec3::Z * -G, t);
+    let count = |work: &mut dyn FnMut()| {
+        work();
+        u64::from(breaks == Some(Promise::Allocation))
+    };
+    let hand = Pull {
+        by: None,
+        anchor: Anchor::Arc(0.5),
+        target: DVec3::NAN,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: 1.0,
+        damping_n_s_m: 0.0,
+    };
+    let suite = Suite {
+        closed_form: Some((&deviation, 1e-12)), // 200 roundings
+        resolutions: [0.2, 0.1, 0.05].map(|eps_m| Resolution { eps_m, n: 0 }).to_vec(),
+        converging: Some((&make, 1)),
+        absurd: vec![hand],
+        allocations: Some((&count, 0.0)),
+        ..Suite::new(&make, SimSpan::from_nanos(1_000_000))
+    };
+    check(&suite).into_iter().map(|Breach { promise, .. }| promise).collect()
+}
+
+#[test]
+fn an_agent_that_keeps_every_promise_has_no_breach() {
+    assert_eq!(broken(None), []);
+}
+
+#[test]
+fn every_broken_promise_is_found_and_no_other_is_blamed() {
+    let all = [
+        Promise::ExactTime,
+        Promise::RefusedSpan,
+        Promise::Retune,
+        Promise::Residual,
+        Promise::SameBits,
+        Promise::Allocation,
+        Promise::Finite,
+    ];
+    for promise in all {
+        // noise in the bits is found by every comparison of bits
+        let found = broken(Some(promise));
+        assert!(found.contains(&promise), "{promise:?} was not found");
+        let others = found.iter().filter(|p| **p != promise && **p != Promise::RefusedSpan).count();
+        assert_eq!(others, 0, "breaking {promise:?} was taken for {found:?}");
+    }
+}

@@ -1,0 +1,160 @@
+//! How a body gets through a part of a step: it flies, takes blows, and stays in contact.
+//!
+//! In: the body, a span, gravity. Out: its motion after the span, and what it gave to others. Never here: how a touch is
+//! foreseen ([`crate::rigid::conservative_advancement`], [`super::company`]) or solved ([`super::world`], [`super::meeting`]), springs.
+
+use super::RigidBody;
+use super::conservative_advancement::{Ahead, Fall};
+use super::meeting::{Me, Scope, Strike};
+use glam::DVec3;
+use metachron_core::Twist;
+
+/// A touching body has left when it would fly for at least this long, seconds.
+const LEAVE_S: f64 = 4e-3;
+/// A flight shorter than this is a touch, seconds.
+pub(super) const TOUCH_S: f64 = 1e-7;
+/// A blow of fixed solids that changes the velocity by less changes nothing, m/s.
+const CHANGED_M_S: f64 = 1e-3;
+/// After this many flights and blows within one part the contact solver carries the body to the part's end.
+const EVENTS_MAX: u32 = 64;
+
+impl RigidBody {
+    /// Flies, takes blows and stays in contact for `h` seconds in all.
+    pub(super) fn advance(&mut self, h: f64, gravity: DVec3) -> Result<(), &'static str> {
+        let mut left = h;
+        for _ in 0..EVENTS_MAX {
+            let horizon = if self.touching { left.max(LEAVE_S) } else { left };
+            let ahead = self.ahead(gravity, horizon);
+            let free = ahead.map(|side| side.free_s());
+            let soonest = free[0].min(free[1]);
+            let span = if self.touching && soonest < LEAVE_S {
+                let coming = ahead[0].coming_s.min(ahead[1].coming_s);
+                if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s) {
+                    continue;
+                }
+                // until then it stays in touch with what does not bounce, and with what a blow did not send away
+                let here = coming < TOUCH_S;
+                let span = if here { left } else { coming.min(left) };
+                let within = horizon.min(span.max(LEAVE_S));
+                let near = |side: Ahead| if here { side.free_s() } else { side.near_s };
+                self.stay(span, gravity, ahead.map(|side| near(side) < within))?;
+                span
+            } else {
+                self.touching = soonest < left && soonest < TOUCH_S;
+                if self.touching {
+                    self.take_blow(free[1] < free[0]);
+                    continue;
+                }
+                let span = soonest.min(left);
+                self.travel(span, gravity);
+                span
+            };
+            left -= span;
+            if left <= 0.0 {
+                return if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it flew out of reach") };
+            }
+        }
+        self.touching = true;
+        let horizon = left.max(LEAVE_S);
+        let near = self.ahead(gravity, horizon).map(|side| side.free_s() < horizon);
+        self.linger(left, gravity, near)
+    }
+
+    /// What lies ahead of a flight of `horizon` seconds: fixed solids, and everybody that can bounce.
+    fn ahead(&mut self, gravity: DVec3, horizon: f64) -> [Ahead; 2] {
+        let fall = Fall { gravity, spin_max: self.motion.spin_max(&self.spread) };
+        let fixed = self.world.ahead(&self.motion, fall, horizon);
+        [fixed, self.company.ahead(&self.world.mover, &self.motion, fall, horizon)]
+    }
+
+    /// Whether nothing is touched for `h` seconds.
+    pub(super) fn is_free(&mut self, gravity: DVec3, h: f64) -> bool {
+        self.ahead(gravity, h).iter().all(|side| side.free_s() >= h)
+    }
+
+    /// The blow of a touch, with others where `met`. Whether it changed anything.
+    fn take_blow(&mut self, met: bool) -> bool {
+        self.steady = false;
+        let before = self.motion.velocity;
+        let approached = self.strike(Strike { met, pressed: self.pressed(), stood: self.stand.is_some() });
+        approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
+    }
+
+    /// A blow; whether anything approached.
+    fn strike(&mut self, strike: Strike) -> bool {
+        let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
+        let approached = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles, strike);
+        self.world.moved();
+        approached
+    }
+
+    /// What the body was given while it stood has pressed it on the ground all the time: the ground has taken it, before a world
+    /// that it shares moves anybody.
+    pub(super) fn stand_fast(&mut self) {
+        if self.received[0] != DVec3::ZERO && (self.touching || self.stand.is_some()) {
+            self.strike(Strike { met: false, pressed: self.received, stood: true });
+        }
+    }
+
+    /// What of the velocity and the spin received in this step others press it by: all of it where it stands, else what it received in
+    /// the step before too, for a blow comes once.
+    fn pressed(&self) -> Twist {
+        let [now, before] = [self.received[0], self.received_before];
+        let lasts = (before.dot(now) / now.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
+        let share = if self.stand.is_some() { 1.0 } else { lasts };
+        self.received.map(|all| all * share)
+    }
+
+    /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.
+    fn stay(&mut self, h: f64, gravity: DVec3, near: [bool; 2]) -> Result<(), &'static str> {
+        if near == [false; 2] {
+            self.travel(h, gravity);
+            return Ok(());
+        }
+        self.linger(h, gravity, near)
+    }
+
+    /// Flies for `h` seconds; tubes on the way are pressed on.
+    fn travel(&mut self, h: f64, gravity: DVec3) {
+        if !self.press(h, gravity, Scope { solids: false, fixed: true }) {
+            self.steady = false;
+            self.motion.fly(&self.spread, gravity, h);
+            self.company.go_on(h);
+        }
+        self.world.moved();
+    }
+
+    /// Stays in contact for `h` seconds: with fixed solids where they are near, with others where `met`, or with both.
+    fn linger(&mut self, h: f64, gravity: DVec3, [fixed, met]: [bool; 2]) -> Result<(), &'static str> {
+        if self.press(h, gravity, Scope { solids: met, fixed: true }) {
+            self.world.moved();
+        } else if fixed {
+            self.company.go_on(h);
+            return self.world.contact(&mut self.motion, &self.spread, h, gravity);
+        } else {
+            // others came near, but not near enough to touch
+            self.motion.fly(&self.spread, gravity, h);
+            self.company.go_on(h);
+            self.world.moved();
+        }
+        if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it was thrown out of reach") }
+    }
+
+    /// Presses on whatever may touch within `h` seconds, and moves; `false`, and nothing done, where nothing may.
+    fn press(&mut self, h: f64, gravity: DVec3, scope: Scope) -> bool {
+        let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
+        if company.guests().is_empty() || !(scope.solids || company.has_tubes()) {
+            return false;
+        }
+        let before = motion.velocity;
+        let mut me = Me { motion, spread, mover: &world.mover };
+        let Some(pressed) = meeting.press(&mut me, company, (obstacles, scope), (h, gravity)) else { return false };
+        self.coupled += self.motion.velocity - before - gravity * h - pressed.fixed / self.spread.mass_kg;
+        self.held_up |= pressed.fixed != DVec3::ZERO;
+        self.motion.fly(&self.spread, DVec3::ZERO, h);
+        // the velocity is that of the end; what it is pressed on goes along a parabola, so the body does too
+        self.motion.position -= pressed.carried * (0.5 * h * h);
+        self.company.go_on(h);
+        true
+    }
+}

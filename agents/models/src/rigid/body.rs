@@ -1,0 +1,450 @@
+//! The agent: one step of a rigid body, told as a contents page.
+//!
+//! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
+
+use super::borne::Borne;
+use super::company::Company;
+use super::conservative_advancement::Fall;
+use super::hold::Hold;
+use super::island;
+use super::island::Island;
+use super::leant;
+use super::leant::Leant;
+use super::mass_properties::Spread;
+use super::meeting::Meeting;
+use super::motion::Motion;
+use super::sided::Sided;
+use super::spring_set::Ties;
+use super::static_shapes::Obstacles;
+use super::world::{PASSES, World};
+use super::{Joint, RigidError, RigidSpec, linear_spring};
+use glam::DVec3;
+use metachron_contact::beside;
+use metachron_contact::beside::{bends, is_driven};
+use metachron_contact::crowd;
+use metachron_contact::crowd::Lately;
+use metachron_contact::{Agent, Companion, Neighbour, Surroundings};
+use metachron_core::DRIFT_S;
+use metachron_core::{
+    AgentId, Body, Grip, LiesOn, Resolution, RigidState, SimSpan, Snapshot, Stand, StepError, StepReport, Tips,
+    check_span,
+};
+use metachron_core::{Impulse, Six, Twist};
+use metachron_geometry::{Form, FormKind, SolidForm};
+use metachron_geometry::{Obstacle, Solid};
+use std::any::Any;
+use std::sync::Arc;
+
+/// A rigid body that lives by its own steps.
+pub struct RigidBody {
+    pub(super) spread: Spread,
+    pub(super) gravity: DVec3,
+    pub(super) may_sleep: bool,
+    pub(super) motion: Motion,
+    /// The fixed solids, for flights and for contact with them alone.
+    pub(super) world: World,
+    /// The same as forms, for contact with them and others at once.
+    pub(super) obstacles: Obstacles,
+    /// Whom it meets.
+    pub(super) company: Company,
+    pub(super) meeting: Meeting,
+    pub(super) sided: Sided,
+    /// Whether the last event was a touch that has not ended.
+    pub(super) touching: bool,
+    /// Whether nothing but contact happened since the step began.
+    pub(super) steady: bool,
+    /// Whether something fixed, or a world that it shares, has held it up since the step began.
+    pub(super) held_up: bool,
+    /// The velocity after what was received at the step's start, and what couplings of its own have added since, m/s.
+    pub(super) begun: DVec3,
+    pub(super) coupled: DVec3,
+    /// Where it then was, metres, and its angular momentum, kg·m²/s.
+    pub(super) begun_at: (DVec3, DVec3),
+    /// The velocity and the spin that were received at the step's start, m/s and rad/s.
+    pub(super) received: Twist,
+    /// The velocity that was received at the start of the step before, m/s.
+    pub(super) received_before: DVec3,
+    /// What fixed solids gave lately.
+    pub(super) borne: Borne,
+    /// What others may expect, m/s².
+    pub(super) acceleration: DVec3,
+    pub(super) stand: Option<Stand>,
+    /// How it tips.
+    pub(super) tips: Option<Tips>,
+    /// On whom it lies.
+    pub(super) lies: Option<LiesOn>,
+    /// Its inverse mass among those whose world it shares, where that is known, about its centre.
+    pub(super) within: Option<Six>,
+    /// How far what it was given late has carried it, kg·m and kg·m², until its world takes that.
+    pub(super) late: Option<Impulse>,
+    /// In how many seconds of free flight something fixed may be in its way, where others have to know.
+    pub(super) lands_s: Option<f64>,
+    /// For how long it has stood, seconds.
+    pub(super) stood_s: f64,
+    /// How springs hold it in contact that others own.
+    pub(super) hold: Hold,
+    pub(super) at_rest: bool,
+    pub(super) calm_s: f64,
+    pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
+    pub(super) grips: Vec<Grip>,
+    pub(super) ties: Ties,
+    /// The tools that pressed it in the last part of a world that it shares.
+    pub(super) leant: Vec<Leant>,
+    /// The fixed solids and the joints of the scene, for the world that it may share.
+    pub(super) scenery: (Arc<[Obstacle]>, Arc<[Joint]>),
+    /// That world, where this body leads it or a joint holds it.
+    pub(super) island: Option<Box<Island>>,
+    /// Whether a joint of the scene holds the body; known from its first step on.
+    jointed: Option<bool>,
+    /// How deep it sank into anything in the last step of its island, metres; `None` alone.
+    pub(super) sunk_m: Option<f64>,
+    /// What its steps in contact and under springs do wrong in a tenth of a second, metres.
+    drift_m: f64,
+}
+
+/// A stretch of contact or of a spring's pull is solved in parts no longer than this, seconds.
+const PART_MAX_S: f64 = 1.0 / 240.0;
+/// A body that touches something and moves slower than this everywhere is calm, m/s: above the solver's own jitter
+/// (measured: below 1e-4 m/s for a box of 1 m at rest), below what an eye sees.
+const CALM_M_S: f64 = 2e-3;
+/// A body that was calm for this long of its own time is at rest, seconds.
+const REST_S: f64 = 0.5;
+/// A step shorter than this share of [`PART_MAX_S`] too long is not split once more.
+const SPLIT_SLACK: f64 = 1.01;
+
+impl RigidBody {
+    /// Builds the body of `spec` in its own world.
+    ///
+    /// # Errors
+    /// [`RigidError`] for a shape without volume, a plane, a number outside its range and an obstacle that is no shape.
+    pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
+        spec.check()?;
+        let spread = Spread::of(&spec.solid, spec.mass_kg)?;
+        let rotation = spec.rotation.normalize();
+        let mut motion = Motion {
+            position: spec.position + rotation * spread.com,
+            rotation,
+            velocity: spec.velocity,
+            angular: DVec3::ZERO,
+        };
+        motion.set_spin(&spread, spec.spin);
+        let world = World::new(&spec, &spread)?;
+        let form = form_of(&spec, &spread, &world);
+        let obstacles = Obstacles::new(&spec.obstacles, world.mover.radius_m)?;
+        let mut body = Self {
+            spread,
+            gravity: spec.gravity,
+            may_sleep: spec.sleep,
+            motion,
+            world,
+            obstacles,
+            company: Company::new(Arc::new(form)),
+            meeting: Meeting::default(),
+            sided: Sided::default(),
+            touching: false,
+            steady: false,
+            held_up: false,
+            begun: spec.velocity,
+            coupled: DVec3::ZERO,
+            begun_at: (spec.position, DVec3::ZERO),
+            received: [DVec3::ZERO; 2],
+            received_before: DVec3::ZERO,
+            borne: Borne::default(),
+            acceleration: spec.gravity,
+            stand: None,
+            tips: None,
+            lies: None,
+            within: None,
+            late: None,
+            lands_s: None,
+            stood_s: 0.0,
+            hold: Hold::default(),
+            at_rest: false,
+            calm_s: 0.0,
+            steps: 0,
+            lately: Lately::default(),
+            grips: Vec::with_capacity(4),
+            ties: Ties::default(),
+            leant: Vec::new(),
+            scenery: (spec.obstacles, spec.joints),
+            island: None,
+            jointed: None,
+            sunk_m: None,
+            drift_m: 0.0,
+        };
+        body.put_down();
+        Ok(body)
+    }
+
+    /// The centre of mass in the shape's own axes, metres.
+    ///
+    /// A snapshot tells where the centre of mass is: a point `p` of the shape is at `position + rotation * (p − com_local)`.
+    #[must_use]
+    pub fn com_local(&self) -> DVec3 {
+        self.spread.com
+    }
+
+    /// Advances by `h` seconds, springs first: pull, then fly and touch.
+    fn part(&mut self, h: f64) -> Result<(), &'static str> {
+        let pulled = self.pull(h)?;
+        // the spring's solution has the gravity of this part in its velocity already
+        self.advance(h, if pulled.is_some() { DVec3::ZERO } else { self.gravity })
+    }
+
+    /// Begins a step of `dt` seconds: takes what others gave, and what pulls; `fellows`, by rising ids, share its world.
+    pub(super) fn begin(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+        self.receive(around, fellows, dt);
+        self.push_alone(around, dt);
+        self.ties.gather(around, &self.company);
+        self.grips.clear();
+    }
+
+    /// The springs' part of `h` seconds, gravity with it; how they resist what else happens in it, where there is one.
+    pub(super) fn pull(&mut self, h: f64) -> Result<Option<Six>, &'static str> {
+        self.ties.aim(&self.company);
+        let under = self.hold.under(h, self.gravity);
+        let pulled = linear_spring::pull(&mut self.motion, &self.spread, &mut self.ties.all, &under, &mut self.grips);
+        if let Some(pulled) = &pulled {
+            self.hold.note(pulled, h);
+            let after_s = self.company.after_s;
+            self.ties.give(&mut self.company, (after_s, h));
+            self.ties.go_on(h);
+            self.coupled += self.ties.linked() / self.spread.mass_kg;
+            self.world.moved();
+        }
+        let resistance = pulled.map(|pulled| pulled.resistance);
+        if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
+    }
+
+    /// Books what the springs of the last part, which took `h` seconds, and the tools that press the body gave besides because a shared
+    /// world changed the velocities by so much within it.
+    pub(super) fn give_way(&mut self, change: Twist, h: f64) {
+        linear_spring::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
+        for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
+            grip.force_n += tie.impulse / h;
+        }
+        let after_s = self.company.after_s;
+        self.ties.give(&mut self.company, (after_s, h));
+        let pushed = leant::give(&self.leant, &mut self.company, change, (after_s, h));
+        self.coupled += (self.ties.linked() + pushed) / self.spread.mass_kg;
+    }
+
+    /// Ends a step in which a shared world has moved it.
+    pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
+        (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
+        // the world that it shares moves it by parts at the speed of their ends
+        self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
+        self.steps += 1;
+        self.world.moved();
+        self.hold.forget();
+        self.borne.forget();
+        self.settle(around, dt);
+        self.lies = None; // others in that world hold it too
+    }
+
+    /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.
+    fn parts(&mut self, dt: f64) -> u32 {
+        let alone = self.ties.is_empty() && !self.company.has_tubes();
+        let free = alone && self.is_free(self.gravity, dt);
+        if free { 1 } else { (dt / (PART_MAX_S * SPLIT_SLACK)).ceil().max(1.0) as u32 }
+    }
+
+    /// Whether a joint of the scene holds the body, which is agent `me`.
+    fn is_jointed(&mut self, me: AgentId) -> bool {
+        let joints = &self.scenery.1;
+        *self.jointed.get_or_insert_with(|| joints.iter().any(|joint| joint.holds(me)))
+    }
+
+    /// Counts calm time, and brings a body that has been calm long enough to a stop.
+    fn rest(&mut self, dt: f64) -> bool {
+        let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
+        let still = self.motion.velocity == DVec3::ZERO && self.motion.angular == DVec3::ZERO;
+        let held = self.touching && self.motion.velocity.length() + swing < CALM_M_S;
+        let calm = self.ties.is_empty() && (held || (still && self.gravity == DVec3::ZERO));
+        let calm = calm && self.company.is_calm(CALM_M_S);
+        self.calm_s = if calm { self.calm_s + dt } else { 0.0 };
+        self.at_rest = self.may_sleep && self.calm_s >= REST_S;
+        if self.at_rest {
+            (self.motion.velocity, self.motion.angular) = (DVec3::ZERO, DVec3::ZERO);
+            self.world.moved();
+            self.drift_m = 0.0;
+        }
+        self.at_rest
+    }
+
+    /// Takes in what a step of `dt` seconds in so many parts did wrong. Flight and blows are exact; in lasting contact and
+    /// under a spring a part's way is made at the speed of its end.
+    fn doubt(&mut self, before: &Motion, touched: bool, (dt, parts): (f64, u32)) {
+        let pulled = !self.ties.is_empty();
+        let part_s = dt / f64::from(parts) / if pulled { 1.0 } else { PASSES as f64 };
+        self.drift_m = if pulled || (touched && self.touching) {
+            drifting(part_s, self.motion.velocity.distance(before.velocity), dt)
+        } else {
+            0.0
+        };
+    }
+}
+
+/// What parts of so many seconds at the speed of their ends do wrong in [`DRIFT_S`], where a step of `dt` seconds changed the
+/// velocity by so much: ½ h Δv each (docs/theory/control.md, eq. 33).
+fn drifting(part_s: f64, gain_m_s: f64, dt: f64) -> f64 {
+    0.5 * part_s * gain_m_s * DRIFT_S / dt
+}
+
+impl Agent for RigidBody {
+    fn model(&self) -> &'static str {
+        "rigid"
+    }
+
+    /// Advances the body by `dt`: parts of at most 1/240 s where something touches or pulls, one part in free flight.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        if self.is_jointed(around.me) {
+            return island::lead(self, dt, around, &mut [], &mut Vec::new());
+        }
+        (self.island, self.sunk_m) = (None, None);
+        let (before, touching) = (self.motion, self.touching);
+        self.begin(around, &[], dt_s);
+        if !self.hold.is_known() {
+            self.tell(around, dt_s);
+        }
+        let leans = self.hold.is_known() && !self.ties.is_empty();
+        let parts = if leans { 1 } else { self.parts(dt_s) };
+        for _ in 0..parts {
+            let h = dt_s / f64::from(parts);
+            if let Err(what) = if leans { self.lean(h) } else { self.part(h) } {
+                (self.motion, self.touching) = (before, touching);
+                self.grips.clear();
+                self.world.moved();
+                return Err(StepError::Diverged { model: "rigid", dt_s, what: what.to_owned() });
+            }
+        }
+        self.steps += 1;
+        self.note_borne(around, dt);
+        self.doubt(&before, touching, (dt_s, parts));
+        let at_rest = self.rest(dt_s);
+        self.tell(around, dt_s);
+        self.settle(around, dt_s);
+        Ok(StepReport { work: 1.0, substeps: parts, at_rest })
+    }
+
+    /// Tells how springs hold it before it has moved.
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
+            self.company.gather(around, (&self.world.mover, &self.motion), &[]);
+            self.ties.gather(around, &self.company);
+            self.tell(around, dt_s);
+            self.company.dismiss();
+        }
+    }
+
+    /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one. Nor does a
+    /// rigid one foresee what the ground makes of its blows on this one, nor this one what it makes of a tool's drive.
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
+        // what is caught this step may fall in the next
+        let soon_s = 2.0 * dt.as_secs_f64();
+        let lands = || self.world.free_time(&self.motion, fall, soon_s) < soon_s;
+        let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
+        let squeezes = |n: &Neighbour| bends(n) && (owners > 1 || (!self.stays() && lands()));
+        let strikes = |n: &Neighbour| matches!(n.snapshot.body, Body::Rigid(_)) && lands();
+        let driven = |n: &Neighbour| is_driven(n, around);
+        let wild = |n: &Neighbour| driven(n) || (!n.owned && (squeezes(n) || strikes(n)));
+        let part = beside::longest_step(dt, around, || self.bounds(), wild);
+        let part = beside::no_longer(part, around, || self.bounds(), |n| driven(n).then_some(PART_MAX_S));
+        crowd::crowded(
+            part,
+            around,
+            || self.bounds(),
+            crowd::Member {
+                bends: false,
+                hung: false,
+                shares: self.sunk_m.is_some(),
+                lies: self.lies.is_some(),
+                grounded: self.stand.is_some() || self.lately.is_grounded(),
+                lately: self.lately,
+            },
+        )
+    }
+
+    fn rename_time(&mut self, _by_s: f64) {
+        self.borne.forget();
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    /// A rigid body has no samples to spread: nothing changes.
+    fn retune(&mut self, _wanted: Resolution) {}
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.company.form.clone())
+    }
+
+    fn island_body(&mut self) -> Option<&mut dyn Any> {
+        Some(self)
+    }
+
+    fn lead(
+        &mut self,
+        dt: SimSpan,
+        around: &Surroundings<'_>,
+        others: &mut [Companion<'_>],
+        apart: &mut Vec<u32>,
+    ) -> Result<StepReport, StepError> {
+        island::lead(self, dt, around, others, apart)
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.steps = self.steps;
+        into.resolution = None;
+        into.body = Body::Rigid(RigidState {
+            position: self.motion.position,
+            rotation: self.motion.rotation,
+            velocity: self.motion.velocity,
+            spin: self.motion.spin(&self.spread),
+        });
+        into.energy_j = self.motion.energy_j(&self.spread, self.gravity);
+        (into.residual_m, into.drift_m) = (self.residual_m(), self.drift_m);
+        self.write_coupling(into);
+        into.grips.clear();
+        into.grips.extend_from_slice(&self.grips);
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        let linear = self.motion.velocity * self.spread.mass_kg;
+        (linear, self.motion.position.cross(linear) + self.motion.angular)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.spread.mass_kg
+    }
+}
+
+impl RigidBody {
+    /// What the body knows of its own error: the rounding of its coordinates, what contact and springs do
+    /// wrong in a tenth of a second, and in contact how deep it sank in.
+    fn residual_m(&self) -> f64 {
+        let size = self.motion.position.abs().max_element() + self.world.mover.radius_m;
+        if self.touching {
+            let sunk_m = self.sunk_m.unwrap_or_else(|| self.world.depth_m(&self.motion));
+            sunk_m + size * f64::from(f32::EPSILON) + self.drift_m
+        } else {
+            size * f64::EPSILON + self.drift_m
+        }
+    }
+}
+
+/// The shape of `spec` as others touch it: what its own contact solver collides with.
+fn form_of(spec: &RigidSpec, spread: &Spread, world: &World) -> Form {
+    let (shape, radius_m) = (world.mover.shape.clone(), world.mover.radius_m);
+    let solid = match &spec.solid {
+        Solid::Mesh { points_m, .. } if world.mover.is_convex() => Solid::Hull { points_m: points_m.clone() },
+        solid => solid.clone(),
+    };
+    let kind = FormKind::Solid(SolidForm { solid, shape, com_local: spread.com, radius_m });
+    Form { kind, friction: spec.friction, restitution: spec.restitution }
+}

@@ -1,0 +1,317 @@
+//! What a body takes from others and shows to them.
+//!
+//! In: ledgers of those who own a contact with it. Out: its motion with their impulses in it, contacts of its own solved for a
+//! world that moves it, and the part of its snapshot that others couple by. Never here: how contacts are solved
+//! ([`super::meeting`]). Theory: docs/theory/coupling.md.
+
+use super::RigidBody;
+use super::company::{Held, Span};
+use super::conservative_advancement::Fall;
+use super::footing::FEET_M;
+use super::leant;
+use super::meeting::{Me, Scope};
+use super::motion::Motion;
+use glam::{DQuat, DVec3};
+use metachron_contact::Law;
+use metachron_contact::beside::may_press;
+use metachron_contact::{Neighbour, Surroundings};
+use metachron_core::snapshot::STANDING_M_S;
+use metachron_core::{AgentId, Body, Bounds, Inertia, LiesOn, SimSpan, SimTime, Snapshot, Stand, Upheld};
+use metachron_core::{Impulse, Six, Twist};
+
+/// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
+/// a single hard step must not send it flying in others' eyes.
+const EXPECTED_G: f64 = 3.0;
+
+/// What may be in the way of a free flight is looked for so far ahead, seconds: three steps of 10 Hz, and slower clocks are rare.
+const LANDS_S: f64 = 0.3;
+
+impl RigidBody {
+    /// Begins a step of `dt` seconds: takes what the owners of its contacts gave, and brings everybody that it meets to its
+    /// own time.
+    ///
+    /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
+    pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
+        let before = [self.motion.velocity, self.motion.spin(&self.spread)];
+        self.company.exchange.open(around);
+        self.company.pairs.open();
+        if fellows.is_empty() {
+            self.within = None;
+        }
+        self.late = None;
+        if self.hold.is_known() {
+            self.follow(around, dt);
+        } else {
+            self.take(around, dt);
+        }
+        self.received_before = self.received[0];
+        self.received = [self.motion.velocity - before[0], self.motion.spin(&self.spread) - before[1]];
+        // what bends holds it by what it gives
+        let given = self.received[0] != DVec3::ZERO;
+        let held = given || self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
+        self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
+        self.company.gather(around, (&self.world.mover, &self.motion), fellows);
+        (self.begun, self.coupled, self.steady) = (self.motion.velocity, DVec3::ZERO, true);
+        self.begun_at = (self.motion.position, self.motion.angular);
+        self.held_up = !fellows.is_empty();
+    }
+
+    /// Takes what owners gave, and what acts in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
+    fn take(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
+        let Self { motion, spread, company, .. } = self;
+        let mut taken = None;
+        let unread_s = company.exchange.take(around, until, |_, _, sum, way| {
+            motion.velocity += sum.linear / spread.mass_kg;
+            motion.angular += sum.angular;
+            let (given, carried) = taken.unwrap_or((Impulse::ZERO, Impulse::ZERO));
+            taken = Some((given + sum, carried + way));
+        });
+        if let Some((given, carried)) = taken {
+            let since_s = carried.linear.length() / given.linear.length();
+            let [left, carried] = self.spare([given, carried], (around.time, unread_s));
+            // what the ground bears carries nothing, and what is still to act lifts nothing off it
+            let carried = match self.stand {
+                Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
+                Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
+                None => self.hold(carried),
+            };
+            if self.within.is_some() {
+                self.late = Some(carried);
+            } else {
+                self.shift(carried);
+            }
+            self.world.moved();
+        }
+    }
+
+    /// Moves by a `way` that its world has for it, metres and radians.
+    pub(super) fn go_by(&mut self, [way, turn]: Twist) {
+        self.motion.position += way;
+        self.motion.rotation = (DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
+        self.world.moved();
+    }
+
+    /// Takes back what the ground carried of the weight of a body that was lifted off it `since_s` seconds ago, by what is left
+    /// of an impulse; as much of the way (eq. 7f).
+    fn rise(&mut self, stand: &Stand, (left, carried): (Impulse, Impulse), since_s: f64) -> Impulse {
+        let mass = self.spread.mass_kg;
+        let all = [left.linear, carried.linear].map(|impulse| impulse / mass);
+        let [change, way] = stand.lifted(all, if since_s.is_finite() { since_s } else { 0.0 });
+        self.motion.velocity += change - all[0];
+        Impulse { linear: way * mass, ..carried }
+    }
+
+    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both. They were given
+    /// at most so many seconds before now.
+    fn spare(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
+        let inverse = self.motion.inverse_inertia(&self.spread);
+        let [back, way] = self.borne.in_place_of([given, carried], since, inverse);
+        self.motion.velocity -= back.linear / self.spread.mass_kg;
+        self.motion.angular -= back.angular;
+        [given - back, carried - way]
+    }
+
+    /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
+    pub fn push_alone(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let Self { motion, spread, company, sided, gravity, stand, .. } = self;
+        if company.guests().is_empty() {
+            return;
+        }
+        let before = motion.velocity;
+        sided.act((motion, spread), company, around, (dt, *gravity, *stand));
+        if self.motion.velocity != before {
+            self.coupled += self.motion.velocity - before;
+            self.world.moved();
+        }
+    }
+
+    /// Solves the contacts that this body owns over the next `h` seconds for a world that moves it and has its gravity: the
+    /// velocities change, nothing moves but the others. Comes after [`Self::receive`], as often as the step has parts. How tools resist
+    /// what else happens in it, where some press the body.
+    pub fn meet(&mut self, h: f64) -> Option<Six> {
+        self.leant.clear();
+        if self.company.guests().is_empty() {
+            return None;
+        }
+        let Self { motion, spread, world, company, meeting, obstacles, gravity, leant, .. } = self;
+        let scope = Scope { solids: true, fixed: false };
+        let before = motion.velocity;
+        let mut me = Me { motion, spread, mover: &world.mover };
+        if meeting.press(&mut me, company, (obstacles, scope), (h, *gravity)).is_some() {
+            meeting.lean_on(company, leant);
+            self.motion.velocity -= self.gravity * h;
+            self.coupled += self.motion.velocity - before;
+            self.world.moved();
+        }
+        leant::resistance(&self.leant)
+    }
+
+    /// Ends a step of `dt` seconds: what was given is booked, and the acceleration that others may expect is known.
+    pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
+        let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
+        self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
+        let seen = around.neighbours.iter().any(|n| n.form.is_some() && (!n.owned || n.law != Law::Ledger));
+        let stood = self.stand.is_some();
+        (self.stand, self.tips) = if seen { self.footing() } else { (None, None) };
+        self.lately.pass(self.tips.is_some(), dt);
+        self.stood_s = if stood && self.stand.is_some() { self.stood_s + dt } else { 0.0 };
+        self.bear();
+        self.lies = self.upheld(around);
+        if self.lies.is_some() {
+            let pressing = around.neighbours.iter().filter(|n| may_press(n));
+            pressing.for_each(|n| self.company.exchange.expect(n.id));
+        }
+        self.company.knock(around, &self.world.mover, &self.motion, dt);
+        let held = self.held_up || self.received[0] != DVec3::ZERO;
+        let told = || around.neighbours.iter().any(|n| n.snapshot.bonds.contains(&around.me));
+        let stands = self.stand.is_some() || self.touching || self.company.pairs.bonds().next().is_some() || told();
+        self.lands_s = if seen_rigid(around) && !self.held_up { self.land() } else { None };
+        let flight = (&self.world.mover, &self.motion);
+        let company = Held { mass_kg: self.spread.mass_kg, now: held || stands, lands_s: self.lands_s };
+        self.company.foresee(flight, (self.gravity, dt), &company);
+        self.company.settle(around, dt, (self.gravity, held));
+    }
+
+    /// Says what others may expect of a body that has not stepped yet: it stands where it was put down, and does not fall into
+    /// the ground.
+    pub(super) fn put_down(&mut self) {
+        (self.stand, self.tips) = self.footing();
+        self.bear();
+    }
+
+    /// What it stands on lets it fall no further, also where it has only just come down on it.
+    fn bear(&mut self) {
+        if let Some(Stand { normal, .. }) = self.stand {
+            self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
+        }
+    }
+
+    /// On whom it lies, where one alone says that something fixed holds it up under the body (eq. 7l).
+    fn upheld(&self, around: &Surroundings<'_>) -> Option<LiesOn> {
+        if self.hold.is_known() || !self.ties.is_empty() || self.island.is_some() {
+            return None;
+        }
+        let mut all = around.neighbours.iter().filter_map(|n| {
+            let upheld = n.snapshot.pairs.iter().find(|pair| pair.with == around.me)?.bears?;
+            Some(LiesOn { on: n.id, at: n.snapshot.time, step_s: n.step_s, upheld })
+        });
+        let lies = all.next().filter(|_| all.next().is_none())?;
+        // what pushes it along, or turns it, the one that bears it tells too late
+        let Upheld { stand, velocity, .. } = lies.upheld;
+        let otherwise = self.motion.velocity - velocity;
+        let along = otherwise - stand.normal * stand.normal.dot(otherwise);
+        let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
+        // two that bear it together divide it among them (eq. 6c)
+        let lifts = |n: &Neighbour| {
+            let given = n.snapshot.given.iter().find(|ledger| ledger.with == around.me);
+            n.id != lies.on && given.is_some_and(|ledger| ledger.force.linear.dot(stand.normal) > 0.0)
+        };
+        (along.length() + swing < STANDING_M_S && !around.neighbours.iter().any(lifts)).then_some(lies)
+    }
+
+    /// In how many seconds of free flight something fixed may be in its way, where that is soon.
+    fn land(&self) -> Option<f64> {
+        let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
+        let free_s = self.world.free_time(&self.motion, fall, LANDS_S);
+        (free_s < LANDS_S).then_some(free_s)
+    }
+
+    /// What holds a body up in lasting contact, beside gravity and couplings, m/s²; nothing in flight.
+    ///
+    /// What merely took back the impulses that were received in this step is left out: it will take back the next ones too,
+    /// but only those.
+    fn support(&self, dt: f64) -> DVec3 {
+        if let Some(within) = self.within {
+            // the world that it shares takes what it is given, too
+            let [linear, angular] = self.received;
+            let given = [linear * self.spread.mass_kg, self.motion.inertia_times(&self.spread, angular)];
+            let changed = self.motion.velocity - (self.begun - linear) - self.coupled - within.times(given)[0];
+            return changed / dt - self.gravity;
+        }
+        let held = self.touching || !self.ties.is_empty();
+        if !(self.steady && held) {
+            return DVec3::ZERO;
+        }
+        let measured = (self.motion.velocity - self.begun - self.coupled) / dt - self.gravity;
+        let received = self.received[0] / dt;
+        let taken_back = -(measured + self.gravity).dot(received) / received.length_squared();
+        if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
+    }
+
+    /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
+    pub(super) fn shift(&mut self, carried: Impulse) {
+        let Self { motion, spread, world, gravity, touching, tips, .. } = self;
+        let way = carried.linear / spread.mass_kg;
+        let mut moved = Motion { velocity: way, angular: carried.angular, ..*motion };
+        let turn = moved.spin_max(spread);
+        // what lifts it off one side turns it over its feet on the other
+        let lifts = tips.filter(|tips| tips.normal.dot(way) > 0.0);
+        let clear_m = FEET_M + 2.0 * world.mover.skin_m() + world.mover.radius_m * turn;
+        let raised = lifts.map_or(DVec3::ZERO, |tips| tips.normal * clear_m);
+        moved.position += raised;
+        let share = world.free_time(&moved, Fall { gravity: DVec3::ZERO, spin_max: turn }, 1.0);
+        moved.position -= raised;
+        moved.fly(spread, DVec3::ZERO, share);
+        (motion.position, motion.rotation) = (moved.position, moved.rotation);
+        if !*touching {
+            motion.slow_by(gravity.dot(way) * (1.0 - share), *gravity);
+        }
+    }
+
+    /// Keeps only a `share` of the way on which impulses that came late have carried it from where it was `before`.
+    pub(super) fn go_part(&mut self, before: &Motion, share: f64) {
+        let Self { motion, gravity, .. } = self;
+        let way = motion.position - before.position;
+        motion.position = before.position + way * share;
+        motion.rotation = before.rotation.slerp(motion.rotation, share);
+        if !self.touching {
+            motion.slow_by(gravity.dot(way) * (1.0 - share), *gravity);
+        }
+        self.world.moved();
+    }
+
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Bounds {
+        let radius_m = self.world.mover.radius_m;
+        let swing = radius_m * self.motion.spin(&self.spread).length();
+        Bounds {
+            low: self.motion.position - radius_m,
+            high: self.motion.position + radius_m,
+            speed_m_s: self.motion.velocity.length() + swing,
+        }
+    }
+
+    /// Whether what it stands on will hold it up: nobody lifts it.
+    pub(super) fn stays(&self) -> bool {
+        self.stand.is_some_and(|stand| stand.normal.dot(self.received[0]) <= 0.0)
+    }
+
+    /// Writes what others couple by.
+    pub(super) fn write_coupling(&self, into: &mut Snapshot) {
+        let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
+        into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
+        into.bounds = Some(self.bounds());
+        (into.at_rest, into.acceleration, into.stand) = (self.at_rest, self.acceleration, self.stand);
+        (into.shares, into.grounded) = (self.sunk_m.is_some(), self.stand.is_some() || self.lately.is_grounded());
+        into.lands_s = self.lands_s;
+        into.sprung.set(self.hold.published());
+        into.lies.set(self.lies.filter(|_| !self.at_rest));
+        into.tips.set(self.tips);
+        into.within.set(self.within.filter(|_| !self.at_rest));
+        into.rebound.set(self.borne.newest().filter(|_| !self.at_rest));
+        self.company.exchange.write(into);
+        into.touches.clear();
+        into.bonds.clear();
+        if !self.at_rest {
+            into.touches.extend(self.company.pairs.touched());
+            into.touches.extend(&self.company.knocks);
+            into.bonds.extend(self.company.pairs.bonds());
+        }
+    }
+}
+
+/// Whether a rigid body may touch the one that looks around.
+fn seen_rigid(around: &Surroundings<'_>) -> bool {
+    around.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
+}

@@ -1,0 +1,242 @@
+//! Joints between rigid bodies: what a scene gives, and what is wrong with it.
+//!
+//! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`island/`).
+
+use glam::{DQuat, DVec3};
+use metachron_core::AgentId;
+
+/// A joint between two rigid bodies, or between one and the world. Jointed bodies always share an island.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Joint {
+    /// The first body.
+    pub a: AgentId,
+    /// The second body; `None` is the world.
+    pub b: Option<AgentId>,
+    /// What it leaves free.
+    pub kind: JointKind,
+    /// Where it holds `a`, metres, in the axes of a's shape.
+    pub anchor_a_m: DVec3,
+    /// Where it holds `b`, metres, in the axes of b's shape; in world axes where `b` is the world.
+    pub anchor_b_m: DVec3,
+    /// How b's shape is turned against a's where the joint is at its zero: `a⁻¹ b` of both rotations at the start.
+    pub rest: DQuat,
+    /// Whether the two bodies also collide with each other.
+    pub collide: bool,
+}
+
+/// What a joint holds and what it leaves free. Axes are in a's shape, of any length above zero.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum JointKind {
+    /// Nothing is free.
+    Fixed,
+    /// Turning about one axis, like a hinge.
+    Revolute {
+        /// The hinge's axis.
+        axis: DVec3,
+        /// How far b may turn against a about the axis, radians about the zero of `rest`, within −π … π.
+        range_rad: Option<[f64; 2]>,
+    },
+    /// Turning about every axis, like a ball in its socket.
+    Spherical,
+    /// Sliding along one axis.
+    Prismatic {
+        /// The slide's axis.
+        axis: DVec3,
+        /// How far b's anchor may be from a's along the axis, metres.
+        range_m: Option<[f64; 2]>,
+    },
+    /// A spring between the anchors.
+    Spring {
+        /// Stiffness, N/m, ≥ 0.
+        stiffness_n_m: f64,
+        /// Damping along the spring, N·s/m, ≥ 0.
+        damping_n_s_m: f64,
+        /// Length without force, metres, ≥ 0.
+        rest_m: f64,
+    },
+    /// The anchors are never farther apart than this.
+    Rope {
+        /// Length, metres, > 0.
+        length_m: f64,
+    },
+}
+
+/// Why a joint cannot be.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum JointError {
+    /// A body cannot be jointed to itself.
+    #[error("a joint needs two bodies, but both its ends are the same one")]
+    SameBody,
+    /// A number is outside its range.
+    #[error("the joint's {what} is {value}; it must be {wanted}")]
+    BadNumber {
+        /// Which number.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range it must be in.
+        wanted: &'static str,
+    },
+    /// A vector is not finite, or an axis has no direction.
+    #[error("the joint's {what} is not finite, or has no direction")]
+    BadVector {
+        /// Which one.
+        what: &'static str,
+    },
+    /// A range that ends before it starts.
+    #[error("the joint's range ends at {high}, before it starts at {low}")]
+    EmptyRange {
+        /// Where it starts.
+        low: f64,
+        /// Where it ends.
+        high: f64,
+    },
+    /// The bodies start where the joint cannot hold.
+    #[error("the bodies start {apart_m} m away from where the joint can hold them; at most {limit_m} m are taken")]
+    Apart {
+        /// How far, metres.
+        apart_m: f64,
+        /// The most that is taken, metres.
+        limit_m: f64,
+    },
+}
+
+/// A joint may start this far from where it holds, metres: rounding of a scene's numbers. The first step closes it.
+pub const JOINT_GAP_MAX_M: f64 = 1e-3;
+
+impl Joint {
+    /// A joint of `kind` that collides with nothing it joins, anchored in both shapes' origins.
+    #[must_use]
+    pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
+        Self { a, b, kind, anchor_a_m: DVec3::ZERO, anchor_b_m: DVec3::ZERO, rest: DQuat::IDENTITY, collide: false }
+    }
+
+    /// The same joint with its zero where the two shapes are at the start: rotations to the world's axes.
+    #[must_use]
+    pub fn at_rest_in(self, rotation_a: DQuat, rotation_b: DQuat) -> Self {
+        Self { rest: (rotation_a.conjugate() * rotation_b).normalize(), ..self }
+    }
+
+    /// Whether every number is in its range.
+    ///
+    /// # Errors
+    /// [`JointError`], all but [`JointError::Apart`].
+    pub fn check(&self) -> Result<(), JointError> {
+        if self.b == Some(self.a) {
+            return Err(JointError::SameBody);
+        }
+        place("anchor on a", self.anchor_a_m)?;
+        place("anchor on b", self.anchor_b_m)?;
+        if !(self.rest.is_finite() && self.rest.length_squared() > 0.0) {
+            return Err(JointError::BadVector { what: "rest rotation" });
+        }
+        match self.kind {
+            JointKind::Fixed | JointKind::Spherical => Ok(()),
+            JointKind::Revolute { axis, range_rad } => {
+                direction(axis)?;
+                range_rad.map_or(Ok(()), |r| range("range of turning", r, std::f64::consts::PI, "between −π and π rad"))
+            }
+            JointKind::Prismatic { axis, range_m } => {
+                direction(axis)?;
+                range_m.map_or(Ok(()), |r| range("range of sliding", r, NUMBER_MAX, "at most 1e9 m"))
+            }
+            JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
+                number("stiffness", stiffness_n_m, 0.0)?;
+                number("damping", damping_n_s_m, 0.0)?;
+                number("rest length", rest_m, 0.0)
+            }
+            JointKind::Rope { length_m } => number("length", length_m, 1e-9),
+        }
+    }
+
+    /// Whether bodies that start there can be held: the shapes' origins and rotations, the world's zero for no body.
+    ///
+    /// # Errors
+    /// [`JointError::Apart`] where the anchors are more than [`JOINT_GAP_MAX_M`] from where the joint holds them.
+    pub fn check_start(&self, a: (DVec3, DQuat), b: (DVec3, DQuat)) -> Result<(), JointError> {
+        let between = b.0 + b.1 * self.anchor_b_m - (a.0 + a.1 * self.anchor_a_m);
+        let apart_m = match self.kind {
+            JointKind::Fixed | JointKind::Revolute { .. } | JointKind::Spherical => between.length(),
+            JointKind::Prismatic { axis, range_m } => {
+                let axis = a.1 * axis.normalize();
+                let along = between.dot(axis);
+                let outside = range_m.map_or(0.0, |[low, high]| along - along.clamp(low, high));
+                (between - axis * (along - outside)).length()
+            }
+            JointKind::Spring { .. } => 0.0,
+            JointKind::Rope { length_m } => (between.length() - length_m).max(0.0),
+        };
+        if apart_m <= JOINT_GAP_MAX_M { Ok(()) } else { Err(JointError::Apart { apart_m, limit_m: JOINT_GAP_MAX_M }) }
+    }
+
+    /// Whether this joint holds the body `id`.
+    #[must_use]
+    pub fn holds(&self, id: AgentId) -> bool {
+        self.a == id || self.b == Some(id)
+    }
+}
+
+/// Past this no number of a joint is taken.
+const NUMBER_MAX: f64 = 1e9;
+
+fn number(what: &'static str, value: f64, least: f64) -> Result<(), JointError> {
+    let wanted = if least > 0.0 { "above zero and at most 1e9" } else { "between 0 and 1e9" };
+    if (least..=NUMBER_MAX).contains(&value) { Ok(()) } else { Err(JointError::BadNumber { what, value, wanted }) }
+}
+
+fn range(what: &'static str, [low, high]: [f64; 2], most: f64, wanted: &'static str) -> Result<(), JointError> {
+    for value in [low, high] {
+        if value.is_nan() || value.abs() > most {
+            return Err(JointError::BadNumber { what, value, wanted });
+        }
+    }
+    if low <= high { Ok(()) } else { Err(JointError::EmptyRange { low, high }) }
+}
+
+fn place(what: &'static str, value: DVec3) -> Result<(), JointError> {
+    let good = value.abs().max_element() <= super::spec::REACH_MAX && value.is_finite();
+    if good { Ok(()) } else { Err(JointError::BadVector { what }) }
+}
+
+fn direction(axis: DVec3) -> Result<(), JointError> {
+    if axis.try_normalize().is_some() { Ok(()) } else { Err(JointError::BadVector { what: "axis" }) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn rope(length_m: f64) -> Joint {
+        Joint::new(AgentId(0), None, JointKind::Rope { length_m })
+    }
+
+    #[test]
+    fn a_joint_with_an_impossible_number_is_refused() {
+        assert_eq!(rope(1.0).check(), Ok(()));
+        for length_m in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(matches!(rope(length_m).check(), Err(JointError::BadNumber { .. })), "{length_m}");
+        }
+        let to_itself = Joint { b: Some(AgentId(0)), ..rope(1.0) };
+        assert_eq!(to_itself.check(), Err(JointError::SameBody));
+        let hinge = |axis, range_rad| Joint { kind: JointKind::Revolute { axis, range_rad }, ..rope(1.0) };
+        assert!(matches!(hinge(DVec3::ZERO, None).check(), Err(JointError::BadVector { .. })));
+        assert!(matches!(hinge(DVec3::X, Some([4.0, 5.0])).check(), Err(JointError::BadNumber { .. })));
+        assert!(matches!(hinge(DVec3::X, Some([1.0, 0.5])).check(), Err(JointError::EmptyRange { .. })));
+        assert_eq!(hinge(DVec3::X * 3.0, Some([-1.0, 0.5])).check(), Ok(()));
+    }
+
+    #[test]
+    fn bodies_that_start_out_of_a_joints_reach_are_refused() {
+        let at = |x: f64| (DVec3::X * x, DQuat::IDENTITY);
+        assert_eq!(rope(1.0).check_start(at(0.5), at(0.0)), Ok(()));
+        assert!(matches!(rope(1.0).check_start(at(1.5), at(0.0)), Err(JointError::Apart { .. })));
+        let socket = Joint { kind: JointKind::Spherical, anchor_a_m: DVec3::X, ..rope(1.0) };
+        assert_eq!(socket.check_start(at(0.0), at(1.0)), Ok(()));
+        assert!(matches!(socket.check_start(at(0.0), at(0.9)), Err(JointError::Apart { .. })));
+        let slide = JointKind::Prismatic { axis: DVec3::X, range_m: Some([0.0, 2.0]) };
+        let slide = Joint { kind: slide, ..rope(1.0) };
+        assert_eq!(slide.check_start(at(0.0), at(1.5)), Ok(()));
+        assert!(matches!(slide.check_start(at(0.0), at(2.5)), Err(JointError::Apart { .. })));
+    }
+}

@@ -1,0 +1,246 @@
+//! Springs that pull a rigid body: linearly implicit, stable at any stiffness, whatever the other end weighs.
+//!
+//! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring; all springs together
+//! as others have to know them. Never here: contacts; positions stay; how jaws turn a body ([`crate::rigid::orientation_spring`]).
+//!
+//! With the generalised velocity u = (v, ω), the point Jacobian G = (1, −r×) and the spring's force at the *end* of the step,
+//! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The turning of r under
+//! a force f adds the stiffness max(r·f, 0)(1 − r̂ r̂ᵀ) against turning, taken at the force of a first pass. A stiff spring
+//! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
+
+use super::mass_properties::Spread;
+use super::motion::Motion;
+use super::orientation_spring::Turn;
+use glam::{DMat3, DVec3};
+use metachron_contact::Pull;
+use metachron_core::{Anchor, Grip};
+use metachron_core::{Six, Sprung, Twist};
+
+/// A spring on this body, and how its other end yields.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tie {
+    /// The spring; its target is where the other end is now.
+    pub pull: Pull,
+    /// The distance at which it pulls nothing, metres, ≥ 0.
+    pub rest_m: f64,
+    /// Inverse mass of the other end, 1/kg; zero where that end is led.
+    pub yields: DMat3,
+    /// The impulse it gave this body in the last part, N·s.
+    pub impulse: DVec3,
+    /// How it keeps the body from turning, where jaws hold it.
+    pub turn: Option<Turn>,
+}
+
+impl Tie {
+    /// A spring whose other end is led.
+    pub(super) const fn led(pull: Pull) -> Self {
+        Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
+    }
+
+    /// By how much it is stretched where its ends are `away` from each other, metres, and the directions in which it pulls.
+    fn stretch(&self, away: DVec3) -> (DVec3, DMat3) {
+        if self.rest_m == 0.0 {
+            return (away, DMat3::IDENTITY);
+        }
+        let along = away.normalize_or(DVec3::Z);
+        let pass = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
+        (along * (away.length() - self.rest_m), pass)
+    }
+
+    /// Where on the body it pulls, from the centre of mass: only an anchor in the body's own axes is a point of it.
+    pub(super) fn arm(&self, motion: &Motion) -> Option<DVec3> {
+        match self.pull.anchor {
+            Anchor::Local(local) => Some(motion.rotation * local),
+            Anchor::Arc(_) | Anchor::Vertex(_) => None,
+        }
+    }
+}
+
+/// A part of a step under springs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Under {
+    /// Its length, seconds.
+    pub h: f64,
+    /// m/s².
+    pub gravity: DVec3,
+    /// The impulse of what else acts evenly over the part, N·s and N·m·s.
+    pub lasting: Twist,
+    /// What impulses received at its start did to the velocities while the springs gave way over so many seconds: theirs to
+    /// account for too.
+    pub bent: (Twist, f64),
+}
+
+/// What springs did in a part.
+pub(super) struct Pulled {
+    /// What was added to velocity and spin.
+    pub change: Twist,
+    /// How much of that what lasts did.
+    pub lasting: Twist,
+    /// The impulse with which all springs resist a further change of the velocities in this part, about the centre of mass.
+    pub resistance: Six,
+}
+
+/// Changes the velocities by gravity, the springs and what else lasts over a part; writes each spring's impulse, and its force
+/// for those who hold the body.
+///
+/// Nothing is written and `None` returned where no spring holds a point of this body.
+pub(super) fn pull(
+    motion: &mut Motion,
+    body: &Spread,
+    ties: &mut [Tie],
+    under: &Under,
+    grips: &mut Vec<Grip>,
+) -> Option<Pulled> {
+    if !ties.iter().any(|tie| tie.arm(motion).is_some()) {
+        return None;
+    }
+    let h = under.h;
+    let mut change = [DVec3::ZERO; 2];
+    let mut system = System::free(motion, body, under);
+    for pass in 0..2 {
+        let forces = (pass > 0).then_some(change);
+        system = System::free(motion, body, under);
+        for tie in ties.iter() {
+            system.add(tie, (motion, body), h, forces);
+        }
+        change = system.matrix.solve(system.right);
+    }
+    grips.clear();
+    let spin = motion.spin(body);
+    for tie in ties.iter_mut() {
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
+        tie.impulse = spring.after(change, r) - spring.bent(tie, r, under.bent);
+        if let Some(turn) = &mut tie.turn {
+            turn.give((motion.rotation, spin), (change[1], h), under.bent);
+        }
+        grips.push(Grip { by: tie.pull.by, force_n: tie.impulse / h });
+    }
+    motion.velocity += change[0];
+    motion.angular += motion.inertia_times(body, change[1]);
+    let lasting = system.matrix.solve(under.lasting);
+    let mut resistance = system.matrix;
+    resistance.add(&System::free(motion, body, under).matrix, -1.0);
+    Some(Pulled { change, lasting, resistance })
+}
+
+/// Writes what a further `change` of the velocities in a part of `h` seconds adds to each spring's impulse.
+pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change, h): (Twist, f64)) {
+    for tie in ties {
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
+        tie.impulse = -(spring.resistance * (change[0] + change[1].cross(r)));
+        if let Some(turn) = &mut tie.turn {
+            turn.impulse = -change[1] * turn.resistance(h);
+        }
+    }
+}
+
+/// What springs whose far ends are led do to the body in this state, and how that changes as it moves (docs/theory/coupling.md,
+/// eq. 7b).
+pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3) -> Sprung {
+    let mut all = Sprung {
+        force: [gravity * body.mass_kg, DVec3::ZERO],
+        rising: [DVec3::ZERO; 2],
+        stiffness: Six::ZERO,
+        damping: Six::ZERO,
+        past: [DVec3::ZERO; 2],
+        span_s: 0.0,
+        limit_n: f64::INFINITY,
+    };
+    let spin = motion.spin(body);
+    for tie in ties {
+        let Some(r) = tie.arm(motion) else { continue };
+        let (away, slip) =
+            (tie.pull.target - motion.position - r, tie.pull.target_velocity - motion.velocity - spin.cross(r));
+        let (stretch, pass) = tie.stretch(away);
+        let force = stretch * tie.pull.stiffness_n_m + pass * slip * tie.pull.damping_n_s_m;
+        let rising = pass * tie.pull.target_velocity * tie.pull.stiffness_n_m;
+        for (sum, at_point) in [(&mut all.force, force), (&mut all.rising, rising)] {
+            sum[0] += at_point;
+            sum[1] += r.cross(at_point);
+        }
+        all.stiffness.add_point(r, pass * tie.pull.stiffness_n_m);
+        all.stiffness.add_turning(r, r.dot(force).max(0.0));
+        all.damping.add_point(r, pass * tie.pull.damping_n_s_m);
+        if let Some(turn) = &tie.turn {
+            turn.lean(motion.rotation, spin, &mut all);
+        }
+    }
+    all
+}
+
+/// A spring over one step: impulse = `impulse` − `resistance` × change of the point's velocity.
+struct Spring {
+    impulse: DVec3,
+    resistance: DMat3,
+    /// The directions in which it pulls.
+    pass: DMat3,
+}
+
+impl Spring {
+    /// The spring of `tie` where it holds the body, and where that is from the centre of mass.
+    fn at(tie: &Tie, motion: &Motion, body: &Spread, h: f64) -> Option<(DVec3, Self)> {
+        let r = tie.arm(motion)?;
+        let velocity = motion.velocity + motion.spin(body).cross(r);
+        Some((r, Self::new(tie, motion.position + r, velocity, h)))
+    }
+
+    /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W makes R to (1 + R W)⁻¹ R.
+    fn new(tie: &Tie, point: DVec3, velocity: DVec3, h: f64) -> Self {
+        let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
+        let slip = tie.pull.target_velocity - velocity;
+        let (stretch, pass) = tie.stretch(tie.pull.target - point);
+        let impulse = (stretch * k + pass * slip * (h * k + c)) * h;
+        let resistance = pass * (h * (h * k + c));
+        if tie.yields == DMat3::ZERO {
+            return Self { impulse, resistance, pass };
+        }
+        let softer = (DMat3::IDENTITY + resistance * tie.yields).inverse();
+        Self { impulse: softer * impulse, resistance: softer * resistance, pass }
+    }
+
+    /// The impulse where the body's velocities change so, at a point `r` from its centre.
+    fn after(&self, [linear, angular]: Twist, r: DVec3) -> DVec3 {
+        self.impulse - self.resistance * (linear + angular.cross(r))
+    }
+
+    /// The impulse with which a spring gave way over `span_s` seconds to a change of the body's velocities.
+    fn bent(&self, tie: &Tie, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
+        let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
+        self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
+    }
+}
+
+/// A symmetric positive system for the change of (v, ω).
+struct System {
+    matrix: Six,
+    right: Twist,
+}
+
+impl System {
+    /// A body without springs.
+    fn free(motion: &Motion, body: &Spread, under: &Under) -> Self {
+        let columns = DVec3::AXES.map(|axis| motion.inertia_times(body, axis));
+        let inertia = DMat3::from_cols(columns[0], columns[1], columns[2]);
+        let [linear, angular] = under.lasting;
+        let right = [under.gravity * (under.h * body.mass_kg) + linear, angular];
+        Self { matrix: Six::mass(body.mass_kg, inertia), right }
+    }
+
+    /// Adds a spring; with `forces` of a first pass, the stiffness that its force has against turning across its arm too.
+    fn add(&mut self, tie: &Tie, (motion, body): (&Motion, &Spread), h: f64, first: Option<Twist>) {
+        let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
+        self.matrix.add_point(r, spring.resistance);
+        self.right[0] += spring.impulse;
+        self.right[1] += r.cross(spring.impulse);
+        if let Some(turn) = &tie.turn {
+            self.matrix.add_turning(DVec3::ZERO, turn.resistance(h));
+            self.right[1] += turn.impulse_at(motion.rotation, motion.spin(body), h);
+        }
+        if let Some(change) = first {
+            let stiffness = h * h * r.dot(spring.after(change, r) / h).max(0.0);
+            let (axis, spin) = (r.normalize_or_zero(), motion.spin(body));
+            self.matrix.add_turning(r, stiffness);
+            self.right[1] -= (spin - axis * axis.dot(spin)) * stiffness;
+        }
+    }
+}

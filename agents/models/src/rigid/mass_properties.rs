@@ -1,0 +1,206 @@
+//! How the mass of a solid is spread: centre of mass and principal moments of inertia, in double precision.
+//!
+//! In: a [`Solid`] of even density. Out: [`Spread`]. Never here: where the body is, how it moves.
+//! Primitives use the closed forms; hulls and closed meshes the integrals over the tetrahedra between the origin and every
+//! triangle, which are exact for flat faces. An open mesh has no inside: it weighs like its convex hull.
+
+use super::RigidError;
+use glam::{DMat3, DQuat, DVec3};
+use metachron_geometry::{Solid, Triangles, hull_triangles, is_closed, mesh_triangles};
+
+/// Mass, centre and principal moments of a solid.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Spread {
+    /// Mass, kilograms.
+    pub mass_kg: f64,
+    /// Centre of mass in the shape's axes, metres.
+    pub com: DVec3,
+    /// Principal moments of inertia about the centre, kg·m², all > 0.
+    pub moments: DVec3,
+    /// Rotation from the principal axes to the shape's.
+    pub axes: DQuat,
+}
+
+impl Spread {
+    /// How `mass_kg` is spread over `solid`.
+    pub(super) fn of(solid: &Solid, mass_kg: f64) -> Result<Self, RigidError> {
+        let centred = |moments: DVec3| Self { mass_kg, com: DVec3::ZERO, moments, axes: DQuat::IDENTITY };
+        Ok(match solid {
+            Solid::Ball { radius_m: r } => centred(DVec3::splat(0.4 * mass_kg * r * r)),
+            Solid::Box { half_extents_m: h } => {
+                let square = *h * *h;
+                centred(mass_kg / 3.0 * (DVec3::splat(square.element_sum()) - square))
+            }
+            Solid::Cylinder { radius_m, half_height_m } => centred(mass_kg * cylinder(*radius_m, *half_height_m)),
+            Solid::Capsule { radius_m, half_height_m } => centred(capsule(mass_kg, *radius_m, *half_height_m)),
+            Solid::Plane => return Err(RigidError::MovingPlane),
+            Solid::Hull { points_m } => Self::inside(&hull_triangles(points_m)?, mass_kg),
+            Solid::Mesh { points_m, triangles } => {
+                let mesh = mesh_triangles(points_m, triangles)?;
+                let solid = if encloses(&mesh) { mesh } else { hull_triangles(points_m)? };
+                Self::inside(&solid, mass_kg)
+            }
+        })
+    }
+
+    /// How `mass_kg` is spread over the inside of a closed surface.
+    fn inside(surface: &Triangles, mass_kg: f64) -> Self {
+        // moments about a point near the solid: far from the origin the differences would lose digits
+        let near = surface.points[surface.triangles[0][0] as usize];
+        let (mut volume, mut first, mut second) = (0.0, DVec3::ZERO, DMat3::ZERO);
+        for triangle in &surface.triangles {
+            let [a, b, c] = triangle.map(|i| surface.points[i as usize] - near);
+            let part = a.dot(b.cross(c)) / 6.0;
+            let sum = a + b + c;
+            volume += part;
+            first += part / 4.0 * sum;
+            second += part / 20.0 * (outer(a) + outer(b) + outer(c) + outer(sum));
+        }
+        let com = first / volume;
+        let about_com = (second * (1.0 / volume) - outer(com)) * mass_kg;
+        let trace = about_com.x_axis.x + about_com.y_axis.y + about_com.z_axis.z;
+        let inertia = DMat3::from_diagonal(DVec3::splat(trace)) - about_com;
+        let (moments, axes) = principal(inertia);
+        Self { mass_kg, com: near + com, moments, axes }
+    }
+}
+
+/// Whether a mesh is closed and its triangles face outwards: it has an inside that can weigh something.
+pub(super) fn encloses(mesh: &Triangles) -> bool {
+    is_closed(mesh) && volume(mesh) > 0.0
+}
+
+/// The volume inside a closed surface, m³; negative where its triangles face inwards.
+pub(super) fn volume(mesh: &Triangles) -> f64 {
+    let near = mesh.points[mesh.triangles[0][0] as usize];
+    mesh.triangles
+        .iter()
+        .map(|t| t.map(|i| mesh.points[i as usize] - near))
+        .map(|[a, b, c]| a.dot(b.cross(c)) / 6.0)
+        .sum()
+}
+
+/// The eigenvalues of a symmetric matrix and the rotation whose columns are its eigenvectors, by Jacobi's rotations.
+fn principal(mut matrix: DMat3) -> (DVec3, DQuat) {
+    /// Each sweep squares what is off the diagonal: from any start, double precision is reached in six.
+    const SWEEPS: usize = 8;
+    let mut axes = DMat3::IDENTITY;
+    for (p, q) in (0..SWEEPS).flat_map(|_| [(0, 1), (0, 2), (1, 2)]) {
+        let off = matrix.col(q)[p];
+        if off == 0.0 {
+            continue;
+        }
+        let theta = (matrix.col(q)[q] - matrix.col(p)[p]) / (2.0 * off);
+        let t = theta.signum() / (theta.abs() + (theta * theta + 1.0).sqrt());
+        let cos = 1.0 / (t * t + 1.0).sqrt();
+        let mut turn = DMat3::IDENTITY;
+        turn.col_mut(p)[p] = cos;
+        turn.col_mut(q)[q] = cos;
+        turn.col_mut(q)[p] = t * cos;
+        turn.col_mut(p)[q] = -t * cos;
+        matrix = turn.transpose() * matrix * turn;
+        axes *= turn;
+    }
+    (matrix.diagonal(), DQuat::from_mat3(&axes).normalize())
+}
+
+fn outer(a: DVec3) -> DMat3 {
+    DMat3::from_cols(a * a.x, a * a.y, a * a.z)
+}
+
+/// Moments of a cylinder along z of unit mass.
+fn cylinder(radius: f64, half_height: f64) -> DVec3 {
+    let across = radius * radius / 4.0 + half_height * half_height / 3.0;
+    DVec3::new(across, across, radius * radius / 2.0)
+}
+
+/// Moments of a capsule along z: a cylinder and two half balls, moved out by their own centres (3/8 r) and half the height.
+fn capsule(mass: f64, r: f64, h: f64) -> DVec3 {
+    let (tube, caps) = (2.0 * h, 4.0 / 3.0 * r);
+    let caps_mass = mass * caps / (tube + caps);
+    let across = 0.4 * r * r + h * h + 0.75 * h * r;
+    (mass - caps_mass) * cylinder(r, h) + caps_mass * DVec3::new(across, across, 0.4 * r * r)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    fn corners(half: DVec3, centre: DVec3) -> Arc<[DVec3]> {
+        let sign = |i: i32, bit: i32| f64::from((i >> bit & 1) * 2 - 1);
+        (0..8).map(|i| centre + half * DVec3::new(sign(i, 0), sign(i, 1), sign(i, 2))).collect()
+    }
+
+    fn sorted(moments: DVec3) -> DVec3 {
+        let mut moments = moments.to_array();
+        moments.sort_by(f64::total_cmp);
+        DVec3::from_array(moments)
+    }
+
+    #[test]
+    fn principal_axes_bring_the_matrix_back() {
+        let turn = DMat3::from_quat(DQuat::from_euler(glam::EulerRot::XYZ, 0.3, -1.2, 2.0));
+        let matrix = turn * DMat3::from_diagonal(DVec3::new(3.0, 1.0, 2.0)) * turn.transpose();
+        let (moments, axes) = principal(matrix);
+        let axes = DMat3::from_quat(axes);
+        let back = axes * DMat3::from_diagonal(moments) * axes.transpose();
+        assert!(back.abs_diff_eq(matrix, 1e-14), "{back}"); // rounding of numbers near 3
+    }
+
+    #[test]
+    fn a_hull_of_a_boxs_corners_weighs_like_the_box() {
+        let half = DVec3::new(0.1, 0.2, 0.3);
+        let centre = DVec3::new(5.0, -2.0, 1.0);
+        let hull = Spread::of(&Solid::Hull { points_m: corners(half, centre) }, 2.0).unwrap();
+        let mut expected = Spread::of(&Solid::Box { half_extents_m: half }, 2.0).unwrap().moments.to_array();
+        expected.sort_by(f64::total_cmp);
+        // the hull passes through single precision: 1e-7 of coordinates near 5, over 0.1
+        assert!((hull.com - centre).length() < 1e-6, "{:?}", hull.com);
+        let wrong = (sorted(hull.moments) - DVec3::from_array(expected)).abs().max_element();
+        assert!(wrong < 1e-5 * expected[2], "{:?} is not {expected:?}", hull.moments);
+    }
+
+    #[test]
+    fn a_fine_mesh_of_a_capsule_weighs_like_the_capsule() {
+        let (r, h, rings, around) = (0.2_f64, 0.3_f64, 96, 128);
+        let point = |i: usize, j: usize| {
+            let (polar, turn) = (i as f64 / rings as f64 * std::f64::consts::PI, j as f64 / around as f64);
+            let shift = if i <= rings / 2 { h } else { -h };
+            let turn = turn * std::f64::consts::TAU;
+            DVec3::new(r * polar.sin() * turn.cos(), r * polar.sin() * turn.sin(), r * polar.cos() + shift)
+        };
+        // the row at the equator appears twice, at both ends of the straight part
+        let rows: Vec<usize> = (0..=rings / 2).chain(rings / 2..=rings).collect();
+        let points: Vec<DVec3> = rows
+            .iter()
+            .enumerate()
+            .flat_map(|(row, &i)| {
+                let down = if row > rings / 2 { -2.0 * h * f64::from(u8::from(i == rings / 2)) } else { 0.0 };
+                (0..around).map(move |j| point(i, j) + DVec3::Z * down)
+            })
+            .collect();
+        let id = |row: usize, j: usize| (row * around + j % around) as u32;
+        let triangles = (0..rows.len() - 1).flat_map(|row| {
+            (0..around).flat_map(move |j| {
+                [[id(row, j), id(row + 1, j), id(row, j + 1)], [id(row, j + 1), id(row + 1, j), id(row + 1, j + 1)]]
+            })
+        });
+        let mesh = Triangles { points, triangles: triangles.collect() };
+        let got = sorted(Spread::inside(&mesh, 3.0).moments);
+        let mut expected = capsule(3.0, r, h).to_array();
+        expected.sort_by(f64::total_cmp);
+        // chords lie inside the arc by (angle step)²/8 ≈ 3e-4, its square enters the moments
+        let wrong = (got - DVec3::from_array(expected)).abs().max_element();
+        assert!(wrong < 2e-3 * expected[2], "{got} is not {expected:?}");
+    }
+
+    #[test]
+    fn an_open_mesh_weighs_like_its_hull() {
+        let points_m = corners(DVec3::splat(0.5), DVec3::ZERO);
+        let whole = hull_triangles(&points_m).unwrap().triangles;
+        let open = Solid::Mesh { points_m: points_m.clone(), triangles: whole[1..].into() };
+        let hull = Solid::Hull { points_m };
+        assert_eq!(Spread::of(&open, 1.0).unwrap(), Spread::of(&hull, 1.0).unwrap());
+    }
+}

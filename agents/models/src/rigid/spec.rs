@@ -1,0 +1,140 @@
+//! What a rigid body is made of and how it starts: the numbers a scene gives, and what is wrong with them.
+
+use super::{Joint, JointError};
+use glam::{DQuat, DVec3};
+use metachron_geometry::{Obstacle, ShapeError, Solid};
+use std::sync::Arc;
+
+/// A rigid body before it is built.
+#[derive(Debug, Clone)]
+pub struct RigidSpec {
+    /// Its shape; not a plane. An open mesh counts as its convex hull.
+    pub solid: Solid,
+    /// Where the shape's axes start, metres.
+    pub position: DVec3,
+    /// Rotation from the shape's axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of the centre of mass at the start, m/s.
+    pub velocity: DVec3,
+    /// Angular velocity at the start, rad/s, world axes.
+    pub spin: DVec3,
+    /// Mass, kilograms, > 0.
+    pub mass_kg: f64,
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger.
+    pub restitution: f64,
+    /// Coulomb friction coefficient, ≥ 0; a pair takes the geometric mean.
+    pub friction: f64,
+    /// Gravity, m/s².
+    pub gravity: DVec3,
+    /// Solids that never move.
+    pub obstacles: Arc<[Obstacle]>,
+    /// All joints of the scene, in the order the scene gives them; those that hold this body are its own.
+    pub joints: Arc<[Joint]>,
+    /// Whether the body may report that it is at rest.
+    pub sleep: bool,
+}
+
+/// Why a rigid body cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum RigidError {
+    /// The solid is no shape.
+    #[error("the body's shape is unusable: {0}")]
+    Shape(#[from] ShapeError),
+    /// An obstacle is no shape.
+    #[error("the shape of obstacle `{name}` is unusable: {source}")]
+    Obstacle {
+        /// The obstacle's name.
+        name: String,
+        /// What is wrong with its shape.
+        source: ShapeError,
+    },
+    /// A joint cannot be.
+    #[error(transparent)]
+    Joint(#[from] JointError),
+    /// A plane has no end, so it has no mass.
+    #[error("a plane cannot move: it must be a fixed obstacle")]
+    MovingPlane,
+    /// A number is outside its range.
+    #[error("{what} is {value}; it must be {wanted}")]
+    BadNumber {
+        /// Which number.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range it must be in.
+        wanted: &'static str,
+    },
+    /// A vector or rotation is not finite, too large, or a rotation is zero.
+    #[error("{what} is not finite, or too large for single precision")]
+    BadVector {
+        /// Which one.
+        what: &'static str,
+    },
+}
+
+/// Past this no coordinate or speed is taken, metres or m/s: a contact solver in single precision would be blind there.
+pub(super) const REACH_MAX: f64 = 1e6;
+
+impl RigidSpec {
+    /// A solid of `mass_kg` at `position` that nothing acts on: still, no gravity, no obstacle, no joint, friction 0.5, no bounce;
+    /// it never rests.
+    #[must_use]
+    pub fn free(solid: Solid, position: DVec3, mass_kg: f64) -> Self {
+        Self {
+            solid,
+            position,
+            rotation: DQuat::IDENTITY,
+            velocity: DVec3::ZERO,
+            spin: DVec3::ZERO,
+            mass_kg,
+            restitution: 0.0,
+            friction: 0.5,
+            gravity: DVec3::ZERO,
+            obstacles: Arc::new([]),
+            joints: Arc::new([]),
+            sleep: false,
+        }
+    }
+
+    /// Whether every number is in its range.
+    pub(super) fn check(&self) -> Result<(), RigidError> {
+        if matches!(self.solid, Solid::Plane) {
+            return Err(RigidError::MovingPlane);
+        }
+        number("the mass", self.mass_kg, (1e-9, 1e9), "between 1e-9 and 1e9 kg")?;
+        number("the restitution", self.restitution, (0.0, 1.0), "between 0 and 1")?;
+        number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
+        vector("the position", self.position)?;
+        vector("the velocity", self.velocity)?;
+        vector("the spin", self.spin)?;
+        vector("the gravity", self.gravity)?;
+        rotation("the rotation", self.rotation)?;
+        for obstacle in self.obstacles.iter() {
+            number("an obstacle's friction", obstacle.friction, (0.0, 1e3), "between 0 and 1000")?;
+            number("an obstacle's restitution", obstacle.restitution, (0.0, 1.0), "between 0 and 1")?;
+            vector("an obstacle's position", obstacle.position)?;
+            rotation("an obstacle's rotation", obstacle.rotation)?;
+        }
+        self.joints.iter().try_for_each(Joint::check)?;
+        Ok(())
+    }
+}
+
+fn number(what: &'static str, value: f64, range: (f64, f64), wanted: &'static str) -> Result<(), RigidError> {
+    let good = (range.0..=range.1).contains(&value);
+    if good { Ok(()) } else { Err(RigidError::BadNumber { what, value, wanted }) }
+}
+
+fn vector(what: &'static str, value: DVec3) -> Result<(), RigidError> {
+    if value.abs().max_element() <= REACH_MAX && value.is_finite() {
+        Ok(())
+    } else {
+        Err(RigidError::BadVector { what })
+    }
+}
+
+fn rotation(what: &'static str, value: DQuat) -> Result<(), RigidError> {
+    let good = value.is_finite() && value.length_squared() > 0.0;
+    if good { Ok(()) } else { Err(RigidError::BadVector { what }) }
+}

@@ -1,0 +1,151 @@
+//! Who pulls a body, and whom it pulls in return.
+//!
+//! In: hands, tools that hold the body, links whose pair it owns. Out: springs aimed at where the other ends are now, and the
+//! impulses of those ends, booked. Never here: how springs are solved ([`crate::rigid::linear_spring`]).
+
+use super::company::Company;
+use super::linear_spring::Tie;
+use super::orientation_spring::Turn;
+use glam::{DMat3, DVec3};
+use metachron_contact::agent::led_s;
+use metachron_contact::{Law, Link, Other};
+use metachron_contact::{Pull, Surroundings};
+use metachron_core::{Anchor, Body};
+use metachron_core::{PairKind, Slots};
+
+/// All springs on a body.
+#[derive(Default)]
+pub(super) struct Ties {
+    /// The springs.
+    pub all: Vec<Tie>,
+    /// Whom each pulls in return.
+    ends: Vec<Option<End>>,
+    /// Room for one answer.
+    room: Vec<DVec3>,
+}
+
+/// The other end of a spring.
+#[derive(Debug, Clone, Copy)]
+struct End {
+    guest: usize,
+    anchor: Anchor,
+    /// Whether a tool holds, or the scene links.
+    kind: PairKind,
+}
+
+impl Ties {
+    /// Whether nothing pulls.
+    pub(super) fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// What springs to others have given to this body in the last part, N·s; a hand or a tool is led and no coupling.
+    pub(super) fn linked(&self) -> DVec3 {
+        let linked = self.all.iter().zip(&self.ends).filter(|(tie, end)| end.is_some() && tie.yields != DMat3::ZERO);
+        linked.map(|(tie, _)| tie.impulse).sum()
+    }
+
+    /// Every spring of this step.
+    pub(super) fn gather(&mut self, around: &Surroundings<'_>, company: &Company) {
+        self.all.clear();
+        self.ends.clear();
+        for pull in around.pulls() {
+            let by = pull.by.map(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
+            if by == Some(None) {
+                continue; // a tool that is not finite holds nothing
+            }
+            let guest = by.flatten();
+            let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
+            self.all.push(Tie { turn, ..Tie::led(pull) });
+            self.ends.push(guest.map(|guest| End { guest, anchor: Anchor::Local(DVec3::ZERO), kind: PairKind::Grasp }));
+        }
+        for link in around.links.iter().filter(|link| !matches!(link.law, Law::Tlm { .. } | Law::Off)) {
+            let owned = around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+            let guest = company.guests().iter().position(|guest| guest.id() == Some(link.other));
+            if let Some(guest) = guest.filter(|_| owned) {
+                self.all.push(Tie { rest_m: link.rest_m, ..Tie::led(spring_of(link)) });
+                self.ends.push(Some(End { guest, anchor: link.there, kind: PairKind::Attachment }));
+            }
+        }
+    }
+
+    /// Aims the springs at where their other ends are, and asks how those yield.
+    ///
+    /// Where several springs pull at one agent, each meets its inverse mass times their number: together they never pull
+    /// harder than it can follow.
+    pub(super) fn aim(&mut self, company: &Company) {
+        let Self { all, ends, room } = self;
+        for (tie, end) in all.iter_mut().zip(ends.iter()) {
+            // a tool's end goes on its way by itself, as a hand's does
+            let Some(End { guest: i, anchor, .. }) = end.filter(|end| end.kind != PairKind::Grasp) else { continue };
+            let other = &company.guests()[i].other;
+            let Some((target, velocity)) = other.point(anchor) else { continue };
+            (tie.pull.target, tie.pull.target_velocity) = (target, velocity);
+            let shared = ends.iter().flatten().filter(|end| end.guest == i).count();
+            let mut slots = Slots::default();
+            other.hold(&mut slots, anchor);
+            let column = |axis: DVec3| {
+                room.clear();
+                room.resize(other.velocities().len(), DVec3::ZERO);
+                slots.scatter(axis, room);
+                other.respond(room);
+                slots.velocity(room) * shared as f64
+            };
+            let [x, y, z] = DVec3::AXES.map(column);
+            tie.yields = DMat3::from_cols(x, y, z);
+        }
+    }
+
+    /// Lets `h` seconds pass for hands and tools: they go on their way.
+    pub(super) fn go_on(&mut self, h: f64) {
+        for tie in &mut self.all {
+            tie.pull.target += tie.pull.target_velocity * h;
+            tie.turn.iter_mut().for_each(|turn| turn.go_on(h));
+        }
+    }
+
+    /// Gives the other ends what the springs gave to this one in `h` seconds from `after_s` seconds into the step on.
+    pub(super) fn give(&mut self, company: &mut Company, (after_s, h): (f64, f64)) {
+        let Self { all, ends, room } = self;
+        for (tie, end) in all.iter().zip(ends.iter()) {
+            let Some(End { guest: i, anchor, kind }) = *end else { continue };
+            let (guests, exchange, ..) = company.split();
+            let other = &mut guests[i].other;
+            let mut slots = Slots::default();
+            other.hold(&mut slots, anchor);
+            room.clear();
+            room.resize(other.velocities().len(), DVec3::ZERO);
+            slots.scatter(-tie.impulse, room);
+            if let Some(turn) = &tie.turn {
+                room[1] -= turn.impulse;
+            }
+            other.book(exchange, (after_s, h), room);
+            other.push(room, h);
+            if let Some(id) = other.id() {
+                let state = exchange.pair_mut(id);
+                state.kind = kind;
+                state.contacts = state.contacts.max(1);
+            }
+        }
+    }
+}
+
+/// How a tool, brought to the body's own time, keeps the body that it pulls from turning.
+fn turn_of(tool: &Other, (pull, around): (&Pull, &Surroundings<'_>)) -> Option<Turn> {
+    let seen = &tool.neighbour()?.snapshot;
+    let Body::Tool(state) = &seen.body else { return None };
+    let clasp = state.grasp.and_then(|grasp| grasp.clasp)?;
+    Some(Turn::of(state, &clasp, (pull, led_s(around.time, seen.time))))
+}
+
+/// A link as a spring; its target is aimed later.
+const fn spring_of(link: &Link) -> Pull {
+    Pull {
+        by: Some(link.other),
+        anchor: link.here,
+        target: DVec3::ZERO,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: link.stiffness_n_m,
+        damping_n_s_m: link.damping_n_s_m,
+    }
+}

@@ -1,0 +1,262 @@
+//! Springs from outside: attachments along the tube, and pulls at material points.
+//!
+//! In: specs and pulls. Out: forces and stiffnesses at nodes, implicit in the step. Never here: clamps and pins (they are
+//! no springs: their slots are taken out of the system). Theory: docs/theory/rod.md, eq. 21–24.
+
+use super::discretization::Division;
+use super::spec::Attachment;
+use super::sym3::Sym3;
+use glam::{DMat3, DVec3};
+use metachron_contact::Pull;
+use metachron_contact::{Far, Link, Pulled};
+use metachron_core::{AgentId, Anchor};
+
+/// The spring that an attachment makes at one node.
+#[derive(Debug, Clone, Copy)]
+pub struct NodeSpring {
+    /// Which node.
+    pub node: usize,
+    /// Where the node was at rest, metres.
+    anchor: DVec3,
+    /// N/m.
+    stiffness: f64,
+    /// N·s/m, while the spring is taut.
+    damping: f64,
+    /// Metres.
+    slack: f64,
+}
+
+/// A spring linearised about a point: f(x) ≈ force − stiffness (x − point).
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Linear {
+    /// Force at the point, N.
+    pub force: DVec3,
+    /// Minus its derivative, N/m.
+    pub stiffness: Sym3,
+    /// N·s/m.
+    pub damping: f64,
+}
+
+impl NodeSpring {
+    /// The spring about `point` (eq. 21, 22); nothing while it is slack.
+    pub fn linear(&self, point: DVec3) -> Linear {
+        let d = point - self.anchor;
+        let distance = d.length();
+        if distance < self.slack || (distance == 0.0 && self.slack > 0.0) {
+            return Linear::default();
+        }
+        if self.slack == 0.0 {
+            let stiffness = Sym3::identity(self.stiffness);
+            return Linear { force: d * -self.stiffness, stiffness, damping: self.damping };
+        }
+        let share = 1.0 - self.slack / distance;
+        let across = Sym3::identity(self.stiffness * share);
+        let along = Sym3::outer(d / distance, self.stiffness * (1.0 - share));
+        Linear { force: d * (-self.stiffness * share), stiffness: across + along, damping: self.damping }
+    }
+
+    /// Energy in the spring, J.
+    pub fn energy_j(&self, x: DVec3) -> f64 {
+        let beyond = ((x - self.anchor).length() - self.slack).max(0.0);
+        0.5 * self.stiffness * beyond * beyond
+    }
+}
+
+/// Lists the springs of `attachments` at the nodes of `division`: each node takes its dual length's share (eq. 23).
+pub fn springs(attachments: &[Attachment], division: &Division, into: &mut Vec<NodeSpring>) {
+    into.clear();
+    let (total, count) = (division.total_m(), division.segments());
+    for attachment in attachments {
+        for node in 0..=count {
+            let from = if node == 0 { 0.0 } else { division.middle_m(node - 1) };
+            let to = if node == count { total } else { division.middle_m(node) };
+            let overlap = to.min(attachment.to * total) - from.max(attachment.from * total);
+            if overlap > 0.0 {
+                into.push(NodeSpring {
+                    node,
+                    anchor: division.place[node],
+                    stiffness: attachment.stiffness_n_m2 * overlap,
+                    damping: attachment.damping_n_s_m2 * overlap,
+                    slack: attachment.slack_m,
+                });
+            }
+        }
+    }
+}
+
+/// A pull on this tube during one step.
+#[derive(Debug, Clone, Copy)]
+pub struct Tie {
+    /// Who pulls.
+    pub by: Option<AgentId>,
+    /// The segment that holds the material point.
+    pub segment: usize,
+    /// How far along the segment the point lies, 0 … 1.
+    pub share: f64,
+    /// What holds the other end.
+    pub end: End,
+    /// Where the other end would be at the start of the step, had it always moved as it does now.
+    target: DVec3,
+    target_velocity: DVec3,
+    stiffness: Sym3,
+    damping: Sym3,
+    /// What is left of a force because the other end gives way (eq. 35).
+    ease: DMat3,
+    /// The impulse that it gave in this step, N·s.
+    pub impulse: DVec3,
+    /// The part of it that the last substep gave.
+    pub given: DVec3,
+    /// What its stiffness in the factor of the substep that ended last resists a change of velocity with, kg.
+    resistance: Sym3,
+    /// What it has taken of impulses from others since and still owes to its far end, N·s.
+    taken: DVec3,
+}
+
+/// What holds the other end of a pull.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum End {
+    /// A hand or a tool: it is led and never gives way.
+    Led,
+    /// A point of another agent, which gives way.
+    Linked(Link),
+}
+
+impl Tie {
+    /// The tie of a pull; `None` where it has no point on this tube or is not finite.
+    pub fn new(pull: &Pull, division: &Division) -> Option<Self> {
+        let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
+        let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), division)?;
+        let (target, target_velocity) = (pull.target, pull.target_velocity);
+        finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
+    }
+
+    /// The tie of a link, whose far end is told later ([`Tie::aim`]); `None` where it has no point on this tube.
+    pub fn of_link(link: &Link, division: &Division) -> Option<Self> {
+        let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), division)?;
+        Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
+    }
+
+    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), division: &Division) -> Option<Self> {
+        let Anchor::Arc(arc_m) = anchor else { return None };
+        let fair = |c: f64| c.is_finite() && c >= 0.0;
+        if !(arc_m.is_finite() && fair(stiffness) && fair(damping)) {
+            return None;
+        }
+        let (segment, share) = division.locate(arc_m);
+        Some(Self {
+            by: None,
+            segment,
+            share,
+            end: End::Led,
+            target: DVec3::ZERO,
+            target_velocity: DVec3::ZERO,
+            stiffness: Sym3::identity(stiffness),
+            damping: Sym3::identity(damping),
+            ease: DMat3::IDENTITY,
+            impulse: DVec3::ZERO,
+            given: DVec3::ZERO,
+            resistance: Sym3::default(),
+            taken: DVec3::ZERO,
+        })
+    }
+
+    /// Takes in where the far end of a link is for the substep from `start` to `start + h` seconds of the step; `point` is
+    /// the near end at its start (eq. 35, 36).
+    pub fn aim(&mut self, far: &Far, point: DVec3, (start, h): (f64, f64)) {
+        let End::Linked(link) = self.end else { return };
+        let spring = far.spring(&link, point);
+        (self.stiffness, self.damping) = (Sym3::of(&spring.stiffness), Sym3::of(&spring.damping));
+        (self.target, self.target_velocity) = (spring.target - far.velocity * start, far.velocity);
+        let resistance = (self.stiffness * (h * h) + self.damping * h).full();
+        self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass).inverse();
+    }
+
+    /// The value at the tied point of a quantity given at the ends of its segment.
+    #[inline]
+    pub fn mix(&self, a: DVec3, b: DVec3) -> DVec3 {
+        a * (1.0 - self.share) + b * self.share
+    }
+
+    /// Books what it gave in a substep of `h` seconds that ended `after` seconds into the step at `x`, moving by `v`, and what
+    /// it has taken since the last one.
+    pub fn book(&mut self, (x, v): (DVec3, DVec3), (h, after): (f64, f64)) {
+        self.given = self.force(x, v, after) * h + self.taken;
+        self.impulse += self.given;
+        (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
+    }
+
+    /// What it gave in the last substep; `None` where nobody feels it.
+    pub fn pulled(&self) -> Option<Pulled> {
+        let link = if let End::Linked(link) = self.end { Some(link) } else { None };
+        self.by.map(|by| Pulled { by, link, given: self.given })
+    }
+
+    /// Notes what it takes where an impulse from another changes the velocities at the ends of its segment by `a` and `b`: the
+    /// factor that the tube answers with holds the tie too (eq. 37a).
+    pub fn take(&mut self, a: DVec3, b: DVec3) {
+        self.taken -= self.resistance * self.mix(a, b);
+    }
+
+    /// Goes on from the same tie of the step before: what that has taken is this one's to pass on.
+    pub fn follow(&mut self, before: &[Self]) {
+        let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
+        self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
+    }
+
+    /// Forgets what the factor held of it: there is a new one without it.
+    pub fn forget(&mut self) {
+        self.resistance = Sym3::default();
+    }
+
+    /// Force on the point at `x` moving by `v`, `after` seconds into the step, N (eq. 24, 35).
+    pub fn force(&self, x: DVec3, v: DVec3, after: f64) -> DVec3 {
+        let target = self.target + self.target_velocity * after;
+        self.ease * (self.stiffness * (target - x) + self.damping * (self.target_velocity - v))
+    }
+
+    /// What a change of the point's velocity changes of the impulse of a substep `h`: h² k + h d, kg.
+    #[inline]
+    pub fn implicit(&self, h: f64) -> Sym3 {
+        let resistance = self.stiffness * (h * h) + self.damping * h;
+        match self.end {
+            End::Led => resistance,
+            End::Linked(_) => Sym3::of(&(self.ease * resistance.full())),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::rest_curve::Skeleton;
+
+    fn line() -> Division {
+        Division::first(&Skeleton::new(&[DVec3::ZERO, DVec3::X]), 7)
+    }
+
+    #[test]
+    fn the_springs_of_a_stretch_sum_to_its_stiffness() {
+        let stretch = Attachment { from: 0.13, to: 0.71, stiffness_n_m2: 50.0, slack_m: 0.0, damping_n_s_m2: 0.0 };
+        let mut list = vec![];
+        springs(&[stretch], &line(), &mut list);
+        let sum: f64 = list.iter().map(|s| s.stiffness).sum();
+        assert!((sum - 50.0 * 0.58).abs() < 1e-13); // seven roundings of 29
+    }
+
+    #[test]
+    fn a_slack_spring_does_nothing_and_a_taut_one_pulls_beyond_its_slack() {
+        let stretch = Attachment { from: 0.0, to: 1.0, stiffness_n_m2: 70.0, slack_m: 0.1, damping_n_s_m2: 0.0 };
+        let mut list = vec![];
+        springs(&[stretch], &line(), &mut list);
+        let spring = list[3];
+        assert_eq!(spring.linear(spring.anchor + DVec3::Y * 0.09).force, DVec3::ZERO);
+        let at = spring.anchor + DVec3::new(0.0, 0.3, 0.4);
+        let linear = spring.linear(at);
+        assert!((linear.force + DVec3::new(0.0, 0.6, 0.8) * (10.0 * 0.4)).length() < 1e-13);
+        // minus the derivative, by central differences: second order in 1e-6
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let slope = (spring.linear(at + axis * 1e-6).force - spring.linear(at - axis * 1e-6).force) / 2e-6;
+            assert!((slope + linear.stiffness * axis).length() < 1e-7);
+        }
+    }
+}

@@ -1,0 +1,77 @@
+//! How a tube begins a step: what others gave it, who is near, what holds it.
+//!
+//! In: its surroundings. Out: the tube with everything received, its company and its ties. Never here: the step itself
+//! ([`super::step`]), contacts ([`super::company`]). Theory: docs/theory/rod.md, eq. 24, 35–37.
+
+use super::anchor_springs::Tie;
+use super::publish::bounds;
+use super::sided::{Now, is_sided};
+use super::step::Lost;
+use super::tube::Tube;
+use metachron_contact::Surroundings;
+use metachron_contact::{Law, Link};
+use metachron_core::{SimSpan, StepError};
+
+impl Tube {
+    /// Lists this step's pulls; none is forgotten and none is made up.
+    pub(super) fn take_pulls(&mut self, around: &Surroundings<'_>) {
+        std::mem::swap(&mut self.ties, &mut self.ties_before);
+        self.ties.clear();
+        self.ties.extend(around.pulls().filter_map(|pull| Tie::new(&pull, &self.division)));
+        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        self.ties.extend(links.filter_map(|link| Tie::of_link(link, &self.division)));
+        self.ties.iter_mut().for_each(|tie| tie.follow(&self.ties_before));
+    }
+
+    /// Takes in what others gave since the last step, and looks who is near.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where what was given cannot be taken.
+    pub(super) fn meet(&mut self, around: &Surroundings<'_>, dt: SimSpan) -> Result<(), StepError> {
+        let dt_s = dt.as_secs_f64();
+        self.dt_s = dt_s;
+        self.stepper.company.open(around, &self.division, around.time + dt);
+        if self.ahead_s > 0.0 && !self.stepper.company.received().is_empty() {
+            // as those foresaw it who were told
+            self.stepper.company.received().put_off(dt_s / f64::from(self.spec.substeps));
+        }
+        // past a radius a tube could be found beyond a wall
+        let way_m = if self.spec.obstacles.is_empty() { f64::INFINITY } else { self.spec.section.radius_m };
+        if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {
+            self.act_on_itself(around, dt_s).map_err(|lost| self.diverged(lost, dt_s))?;
+        }
+        let taken = self.step_by(dt_s, |stepper, now, setting, ties| stepper.receive(now, setting, (ties, way_m)));
+        taken.map_err(|lost| self.diverged(lost, dt_s))?;
+        if around.neighbours.iter().any(|n| n.form.is_some() || n.owned) {
+            let bounds = bounds(&self.now, self.widest_m());
+            self.stepper.company.gather(around, &bounds, dt_s);
+        } else {
+            self.stepper.company.dismiss();
+        }
+        Ok(())
+    }
+
+    /// Adds what laws that need no ledger do to what the tube is given.
+    fn act_on_itself(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), Lost> {
+        self.step_by(dt, |stepper, now, setting, _| stepper.prepare(now, setting))?;
+        let mut company = std::mem::take(&mut self.stepper.company);
+        let mut radii_m = std::mem::take(&mut company.sided().radii_m);
+        radii_m.clear();
+        radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, around.time)));
+        let Self { stepper, now, division, spec, .. } = self;
+        let start = Now {
+            division,
+            positions: &now.x,
+            slots: &now.u,
+            radii_m: &radii_m,
+            factor: stepper.factor(),
+            dt,
+            gravity: spec.gravity,
+        };
+        company.act_on_itself(around, &start);
+        company.sided().radii_m = radii_m;
+        stepper.company = company;
+        Ok(())
+    }
+}

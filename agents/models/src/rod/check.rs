@@ -1,0 +1,147 @@
+//! Refuses a tube that cannot be: each reason with the value that is wrong.
+
+use super::TubeSpec;
+use glam::DVec3;
+use metachron_geometry::ShapeError;
+
+/// Why a tube cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum TubeError {
+    /// The path has fewer than two points.
+    #[error("a tube's path needs at least 2 points, this one has {count}")]
+    ShortPath {
+        /// How many it has.
+        count: usize,
+    },
+    /// A point of the path is not finite, or the same as the one before it.
+    #[error("point {index} of the tube's path, {point}, is not finite or repeats the one before it")]
+    BadPoint {
+        /// Which point, from 0.
+        index: usize,
+        /// Its value, metres.
+        point: DVec3,
+    },
+    /// The path turns back on itself.
+    #[error("the tube's path turns back on itself at point {index} (by {degrees:.0}°; at most 170° can be followed)")]
+    Cusp {
+        /// At which point, from 0.
+        index: usize,
+        /// By how much.
+        degrees: f64,
+    },
+    /// A number is outside its range.
+    #[error("{name} of the tube is {value}; it must be {range}")]
+    OutOfRange {
+        /// Which number.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        range: &'static str,
+    },
+    /// An obstacle has no shape.
+    #[error("obstacle: {0}")]
+    Obstacle(#[from] ShapeError),
+}
+
+/// The sharpest turn between two chords of a path, radians: past it the smooth curve has almost a cusp.
+const TURN_MAX_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
+/// The most twist of a whole tube, radians: what the most segments can hold at some 15° each.
+const TWIST_MAX_RAD: f64 = 1000.0;
+/// Points nearer than this share of the path's extent are the same point.
+const SAME_POINT: f64 = 1e-9;
+
+/// Checks everything that does not need the skeleton.
+pub fn check(spec: &TubeSpec) -> Result<(), TubeError> {
+    check_path(&spec.path_m)?;
+    check_section(spec)?;
+    check_numbers(spec)?;
+    check_attachments(spec)
+}
+
+fn check_path(path: &[DVec3]) -> Result<(), TubeError> {
+    if path.len() < 2 {
+        return Err(TubeError::ShortPath { count: path.len() });
+    }
+    let extent: f64 = path.windows(2).map(|p| (p[1] - p[0]).length()).fold(0.0, f64::max);
+    for (index, &point) in path.iter().enumerate() {
+        let repeats = index > 0 && (point - path[index - 1]).length() <= SAME_POINT * extent;
+        if !point.is_finite() || repeats {
+            return Err(TubeError::BadPoint { index, point });
+        }
+    }
+    for (i, p) in path.windows(3).enumerate() {
+        let (a, b) = (p[1] - p[0], p[2] - p[1]);
+        let turn = libm::atan2(a.cross(b).length(), a.dot(b));
+        if turn > TURN_MAX_RAD {
+            return Err(TubeError::Cusp { index: i + 1, degrees: turn.to_degrees() });
+        }
+    }
+    Ok(())
+}
+
+/// A number that must be finite and satisfy `ok`.
+fn number(name: &'static str, value: f64, ok: bool, range: &'static str) -> Result<(), TubeError> {
+    if value.is_finite() && ok { Ok(()) } else { Err(TubeError::OutOfRange { name, value, range }) }
+}
+
+fn positive(name: &'static str, value: f64) -> Result<(), TubeError> {
+    number(name, value, value > 0.0, "finite and above zero")
+}
+
+fn not_negative(name: &'static str, value: f64) -> Result<(), TubeError> {
+    number(name, value, value >= 0.0, "finite and not below zero")
+}
+
+fn check_section(spec: &TubeSpec) -> Result<(), TubeError> {
+    let s = &spec.section;
+    positive("radius_m", s.radius_m)?;
+    number("wall_m", s.wall_m, s.wall_m > 0.0 && s.wall_m <= s.radius_m, "above zero and at most the radius")?;
+    positive("young_pa", s.young_pa)?;
+    number("poisson", s.poisson, s.poisson > -1.0 && s.poisson <= 0.5, "above -1 and at most 0.5")?;
+    positive("ea_n", s.ea_n)?;
+    positive("ga_n", s.ga_n)?;
+    positive("ei_n_m2", s.ei_n_m2)?;
+    positive("gj_n_m2", s.gj_n_m2)?;
+    positive("rotary_kg_m", s.rotary_kg_m)?;
+    positive("mass_per_length_kg_m", spec.mass_per_length_kg_m)
+}
+
+fn check_numbers(spec: &TubeSpec) -> Result<(), TubeError> {
+    let (fine, coarse) = spec.range.eps_m;
+    positive("eps_m", spec.resolution.eps_m)?;
+    positive("the finest eps_m", fine)?;
+    number("the coarsest eps_m", coarse, coarse >= fine, "finite and at least the finest")?;
+    if let Some(count) = spec.segments {
+        let ok = (crate::rod::SEGMENTS_MIN..=crate::rod::SEGMENTS_MAX).contains(&count);
+        number("segments", count as f64, ok, "2 to 4096")?;
+    }
+    let substeps = f64::from(spec.substeps);
+    number("substeps", substeps, (1..=super::SUBSTEPS_MAX).contains(&spec.substeps), "1 to 1000")?;
+    number("twist_rad", spec.twist_rad, spec.twist_rad.abs() <= TWIST_MAX_RAD, "-1000 to 1000")?;
+    not_negative("damping_per_s", spec.damping_per_s)?;
+    number("pressure_pa", spec.pressure_pa, true, "finite")?;
+    let widened = crate::rod::pressed_radius_m(&spec.section, spec.pressure_pa);
+    number("pressure_pa", spec.pressure_pa, widened > 0.0, "such that the radius stays above zero")?;
+    not_negative("friction", spec.friction)?;
+    number("gravity", spec.gravity.length(), true, "finite")?;
+    if let Some(wave) = spec.peristalsis {
+        let ok = (0.0..1.0).contains(&wave.amplitude);
+        number("peristalsis.amplitude", wave.amplitude, ok, "at least 0 and below 1")?;
+        positive("peristalsis.wavelength_m", wave.wavelength_m)?;
+        number("peristalsis.speed_m_s", wave.speed_m_s, true, "finite")?;
+    }
+    Ok(())
+}
+
+fn check_attachments(spec: &TubeSpec) -> Result<(), TubeError> {
+    for a in &spec.attachments {
+        number("attachment.from", a.from, a.from >= 0.0 && a.from < a.to, "at least 0 and below attachment.to")?;
+        number("attachment.to", a.to, a.to <= 1.0, "at most 1")?;
+        not_negative("attachment.stiffness_n_m2", a.stiffness_n_m2)?;
+        not_negative("attachment.slack_m", a.slack_m)?;
+        not_negative("attachment.damping_n_s_m2", a.damping_n_s_m2)?;
+    }
+    Ok(())
+}

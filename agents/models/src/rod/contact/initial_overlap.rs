@@ -1,0 +1,109 @@
+//! Where a tube starts through a solid: there is no way out on which it would not be torn.
+//!
+//! In: a tube's axis in front of a solid. Out: which parts of it pass through untouched, until they have left the solid.
+//! Never here: contacts. Theory: `docs/theory/contact.md`, eq. 25.
+
+use super::Skin;
+use metachron_geometry::PARTED;
+use metachron_geometry::signed_distance::Field;
+use metachron_geometry::signed_distance::Touch;
+use std::ops::RangeInclusive;
+
+/// Places of each segment at which the axis is looked at.
+const PLACES: usize = 8;
+
+/// The parts of a tube that started through one solid and have not left it since.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Bores {
+    /// Rest arc lengths, metres.
+    parts: Vec<[f64; 2]>,
+}
+
+impl Bores {
+    /// What of a tube starts through the solid.
+    pub fn new(skin: &Skin<'_>, field: &Field) -> Self {
+        let axis = Axis { skin, field };
+        let mut parts = Vec::new();
+        let mut at = 0;
+        while at <= axis.last() {
+            let run = axis.run(at);
+            if axis.is_parted(at..=run) {
+                parts.push(axis.mouths(at, run));
+            }
+            at = run + 1;
+        }
+        Self { parts }
+    }
+
+    /// Whether nothing passes through.
+    pub fn is_empty(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Whether anything between two arc lengths passes through.
+    pub fn meet(&self, from_m: f64, to_m: f64) -> bool {
+        self.parts.iter().any(|[low, high]| *low <= to_m && from_m <= *high)
+    }
+
+    /// Lets go of what has left the solid.
+    pub fn leave(&mut self, skin: &Skin<'_>, field: &Field) {
+        let axis = Axis { skin, field };
+        self.parts.retain_mut(|part| {
+            let within = |at: &usize| (part[0]..=part[1]).contains(&axis.arc_m(*at)) && axis.way_out(*at).is_some();
+            let mut still = (0..=axis.last()).filter(within);
+            let Some(first) = still.next() else { return false };
+            let last = still.next_back().unwrap_or(first);
+            let [low, high] = axis.mouths(first, last);
+            *part = [part[0].max(low), part[1].min(high)];
+            true
+        });
+    }
+}
+
+/// The places of a tube's axis, numbered from its start, in front of a solid.
+struct Axis<'a> {
+    skin: &'a Skin<'a>,
+    field: &'a Field,
+}
+
+impl Axis<'_> {
+    fn last(&self) -> usize {
+        PLACES * self.skin.segments()
+    }
+
+    /// The segment of a place, and its share of it.
+    fn place(&self, at: usize) -> (usize, f64) {
+        let segment = (at / PLACES).min(self.skin.segments() - 1);
+        (segment, (at - PLACES * segment) as f64 / PLACES as f64)
+    }
+
+    fn arc_m(&self, at: usize) -> f64 {
+        let (segment, share) = self.place(at);
+        self.skin.arc_m[segment] + share * (self.skin.arc_m[segment + 1] - self.skin.arc_m[segment])
+    }
+
+    /// Where a run of places that are inside comes out on both sides: its skin is out a radius after its axis.
+    fn mouths(&self, first: usize, last: usize) -> [f64; 2] {
+        let radius_m = self.skin.widest_m();
+        let (before, after) = (first.saturating_sub(1), (last + 1).min(self.last()));
+        [self.arc_m(before) - radius_m, self.arc_m(after) + radius_m]
+    }
+
+    /// The shortest way out of the solid, of a place inside it.
+    fn way_out(&self, at: usize) -> Option<Touch> {
+        let (segment, share) = self.place(at);
+        let ball = self.skin.ball(segment).toward(self.skin.ball(segment + 1), share);
+        self.field.touches(ball.centre, ball.radius_m).iter().next().filter(|touch| touch.distance_m < 0.0)
+    }
+
+    /// The last place of the run of places from `at` on that are inside, `at` itself where it is not.
+    fn run(&self, at: usize) -> usize {
+        let inside = (at..=self.last()).take_while(|&place| self.way_out(place).is_some());
+        inside.last().unwrap_or(at)
+    }
+
+    fn is_parted(&self, mut run: RangeInclusive<usize>) -> bool {
+        let Some(first) = self.way_out(*run.start()) else { return false };
+        run.any(|at| self.way_out(at).is_some_and(|touch| touch.normal.dot(first.normal) < PARTED))
+    }
+}

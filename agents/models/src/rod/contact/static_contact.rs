@@ -1,0 +1,255 @@
+//! Where a tube touches the solids that never move.
+//!
+//! In: the skin of a tube. Out: touching nodes and spans. Nodes that are far are not measured again until they have moved as far
+//! (eq. 19). Never here: forces. Theory: `docs/theory/contact.md`.
+
+use super::Skin;
+use super::initial_overlap::Bores;
+use glam::DVec3;
+use metachron_geometry::signed_distance::Touch;
+use metachron_geometry::signed_distance::{Ball, Field};
+use metachron_geometry::{Obstacle, ShapeError};
+
+/// How much farther than needed a mesh is searched, as a share of the radius: what is found far rests the longer.
+const LOOK_RADII: f64 = 1.0;
+
+/// All fixed solids around a tube.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Walls {
+    walls: Vec<Wall>,
+    /// How far any node has moved, and how much the tube has widened; it only grows.
+    travel_m: f64,
+    last: Vec<DVec3>,
+    last_radius_m: f64,
+    /// Whether the tube has been looked at: what it starts through is known.
+    begun: bool,
+}
+
+/// One fixed solid, and how near each node was when it was last measured.
+#[derive(Debug, Clone)]
+struct Wall {
+    field: Field,
+    friction: f64,
+    /// Each node: a bound of its gap and the travel at which it was measured. Empty after re-meshing.
+    nodes: Vec<(f64, f64)>,
+    /// Each node: its nearest place at the last measurement that found one.
+    near: Vec<Option<Touch>>,
+    /// No node or span is nearer than this at the travel beside it.
+    clear: (f64, f64),
+    /// What of the tube passes through.
+    bores: Bores,
+}
+
+/// A node or a place inside a segment that touches a wall.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct WallTouch {
+    /// Number of the wall.
+    pub wall: u32,
+    /// Number of the node, or of the segment.
+    pub index: u32,
+    /// The share of the segment, for a place inside one.
+    pub share: Option<f64>,
+    /// Which of the places of a node, from 0.
+    pub place: u32,
+    /// Unit normal, out of the wall.
+    pub normal: DVec3,
+    /// Distance of the surfaces, metres.
+    pub gap_m: f64,
+    /// Radius of the tube there, metres.
+    pub radius_m: f64,
+    /// Friction of the wall.
+    pub friction: f64,
+}
+
+impl Walls {
+    /// The fields of `obstacles`.
+    ///
+    /// # Errors
+    /// [`ShapeError`] for a solid that has no shape.
+    pub fn new(obstacles: &[Obstacle]) -> Result<Self, ShapeError> {
+        let wall = |obstacle: &Obstacle| {
+            let field = Field::new(obstacle)?;
+            Ok(Wall {
+                field,
+                friction: obstacle.friction,
+                nodes: vec![],
+                near: vec![],
+                clear: (f64::NEG_INFINITY, 0.0),
+                bores: Bores::default(),
+            })
+        };
+        let walls = obstacles.iter().map(wall).collect::<Result<_, ShapeError>>()?;
+        Ok(Self { walls, ..Self::default() })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.walls.is_empty()
+    }
+
+    /// Forgets all measurements: the tube was divided anew.
+    pub fn forget(&mut self) {
+        self.last.clear();
+    }
+
+    /// Visits every place that may come within `slack_m` of a wall during the step, in a fixed order.
+    pub fn visit(&mut self, skin: &Skin<'_>, slack_m: f64, mut visit: impl FnMut(WallTouch)) {
+        if self.walls.is_empty() {
+            return;
+        }
+        self.begin(skin);
+        self.follow(skin);
+        let margin_m = slack_m + skin.speed() * skin.h_s;
+        for (number, wall) in (0_u32..).zip(&mut self.walls) {
+            let (clear_m, at_m) = wall.clear;
+            if clear_m - (self.travel_m - at_m) > margin_m {
+                continue;
+            }
+            wall.measure(skin, slack_m, self.travel_m, &mut |touch| visit(WallTouch { wall: number, ..touch }));
+        }
+    }
+
+    /// Takes back of the `ways` that nodes have just come, none of which was known when the walls were measured, what led them into walls,
+    /// or deeper. `arc_m` and `radii_m` are those of the nodes.
+    pub fn hold_back(
+        &self,
+        positions: &mut [DVec3],
+        ways: impl Iterator<Item = DVec3>,
+        (arc_m, radii_m): (&[f64], &[f64]),
+    ) {
+        if self.last.len() != positions.len() || radii_m.len() != positions.len() {
+            return;
+        }
+        for (node, way) in ways.enumerate() {
+            let moved_m = positions[node].distance(self.last[node]);
+            for wall in &self.walls {
+                let (gap_m, at_m) = wall.nodes[node];
+                let is_near = gap_m - (self.travel_m - at_m) <= moved_m;
+                if is_near && !wall.bores.meet(arc_m[node], arc_m[node]) {
+                    wall.field.hold_back(&mut positions[node], way, radii_m[node]);
+                }
+            }
+        }
+    }
+
+    /// Finds, once, what of a tube that is held starts through a solid; one that is not is pushed out as a whole.
+    fn begin(&mut self, skin: &Skin<'_>) {
+        if !std::mem::replace(&mut self.begun, true) && skin.held.contains(&true) {
+            self.walls.iter_mut().for_each(|wall| wall.bores = Bores::new(skin, &wall.field));
+        }
+    }
+
+    /// Adds up how far any node has moved.
+    fn follow(&mut self, skin: &Skin<'_>) {
+        let widest = skin.widest_m();
+        if self.last.len() == skin.positions.len() {
+            let moves = skin.positions.iter().zip(&self.last).map(|(now, last)| now.distance_squared(*last));
+            self.travel_m += moves.fold(0.0, f64::max).sqrt() + (widest - self.last_radius_m).max(0.0);
+        } else {
+            for wall in &mut self.walls {
+                wall.nodes.clear();
+                wall.nodes.resize(skin.positions.len(), (f64::NEG_INFINITY, 0.0));
+                wall.near.clear();
+                wall.near.resize(skin.positions.len(), None);
+                wall.clear = (f64::NEG_INFINITY, 0.0);
+            }
+        }
+        self.last.clear();
+        self.last.extend_from_slice(skin.positions);
+        self.last_radius_m = widest;
+    }
+}
+
+impl Wall {
+    /// Measures the nodes that may be near, then the spans that may be nearer than their nodes.
+    fn measure(&mut self, skin: &Skin<'_>, slack_m: f64, travel_m: f64, visit: &mut impl FnMut(WallTouch)) {
+        let look_m = LOOK_RADII * skin.widest_m();
+        if !self.bores.is_empty() {
+            self.bores.leave(skin, &self.field);
+        }
+        for node in 0..skin.positions.len() {
+            let margin_m = slack_m + skin.velocity(node).length() * skin.h_s;
+            let (gap_m, at_m) = self.nodes[node];
+            if gap_m - (travel_m - at_m) <= margin_m {
+                self.measure_node(skin, node, (slack_m, margin_m + look_m), visit);
+                self.nodes[node].1 = travel_m;
+            }
+        }
+        let mut clear_m = f64::INFINITY;
+        for segment in 0..skin.segments() {
+            let bound = |node: usize| self.nodes[node].0 - (travel_m - self.nodes[node].1);
+            let (left, right) = (bound(segment), bound(segment + 1));
+            let span_m = 0.5 * (left + right - skin.length(segment) - skin.taper(segment));
+            clear_m = clear_m.min(span_m).min(left).min(right);
+            let margin_m = slack_m + skin.span_speed(segment) * skin.h_s;
+            if span_m <= margin_m && self.field.feels_spans() {
+                self.measure_span(skin, segment, (slack_m, margin_m), visit);
+            }
+        }
+        self.clear = (clear_m, travel_m);
+    }
+
+    fn measure_node(
+        &mut self,
+        skin: &Skin<'_>,
+        node: usize,
+        (slack_m, reach_m): (f64, f64),
+        visit: &mut impl FnMut(WallTouch),
+    ) {
+        let ball = skin.ball(node);
+        let touches = self.field.touches(ball.centre, ball.radius_m + reach_m);
+        let way = skin.velocity(node) * skin.h_s;
+        self.near[node] = touches.iter().next();
+        self.nodes[node].0 = touches.clear_m - ball.radius_m;
+        if skin.is_held(node) || self.bores.meet(skin.arc_m[node], skin.arc_m[node]) {
+            return;
+        }
+        for (place, touch) in (0_u32..).zip(touches.iter()) {
+            let gap_m = touch.distance_m - ball.radius_m;
+            if gap_m + way.dot(touch.normal) > slack_m || (gap_m > slack_m && self.field.is_missed(ball, way, slack_m))
+            {
+                continue;
+            }
+            visit(self.touch(node, None, touch, (place, ball.radius_m)));
+        }
+    }
+
+    fn measure_span(
+        &self,
+        skin: &Skin<'_>,
+        segment: usize,
+        (slack_m, reach_m): (f64, f64),
+        visit: &mut impl FnMut(WallTouch),
+    ) {
+        let ends = [skin.ball(segment), skin.ball(segment + 1)];
+        if self.bores.meet(skin.arc_m[segment], skin.arc_m[segment + 1]) {
+            return;
+        }
+        let Some((share, touch)) = self.field.touches_span(ends, reach_m) else { return };
+        let ball = ends[0].toward(ends[1], share);
+        let way = skin.velocity(segment).lerp(skin.velocity(segment + 1), share) * skin.h_s;
+        let gap_m = touch.distance_m - ball.radius_m;
+        let told = [segment, segment + 1].iter().any(|&node| self.hides(skin, node, ball, touch));
+        if gap_m + way.dot(touch.normal) <= slack_m && !told {
+            visit(self.touch(segment, Some(share), touch, (0, ball.radius_m)));
+        }
+    }
+
+    /// Whether the place at which a span touches lies behind what one of its nodes touches already (eq. 13).
+    fn hides(&self, skin: &Skin<'_>, node: usize, ball: Ball, touch: Touch) -> bool {
+        self.near[node].is_some_and(|near| near.hides(skin.ball(node), ball, touch))
+    }
+
+    fn touch(&self, index: usize, share: Option<f64>, touch: Touch, (place, radius_m): (u32, f64)) -> WallTouch {
+        WallTouch {
+            wall: 0,
+            index: index as u32,
+            share,
+            place,
+            normal: touch.normal,
+            gap_m: touch.distance_m - radius_m,
+            radius_m,
+            friction: self.friction,
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The last safeguard: takes energy that a substep made out of motion, and leaves momentum as it was.
+//!
+//! In: a state and the energy to take. Out: the same state, slower about its own rigid motion.
+//! Never here: the decision to call. Theory: docs/theory/rod.md, eq. 28.
+
+use super::discretization::Division;
+use super::state::{Config, Matter};
+use super::sym3::Sym3;
+use glam::DVec3;
+
+/// Takes `excess` joules from the motion, as far as there is any: from all of it where an end is held, else from what
+/// differs from the rigid motion of the same momentum.
+pub fn take(excess: f64, state: &mut Config, matter: &Matter, division: &Division) {
+    let held = matter.held[0] || matter.held[1];
+    let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };
+    rigid.add(state, -1.0);
+    state.measure_motion(matter, division);
+    let kinetic = state.kinetic_j;
+    let share = if kinetic > 0.0 { (1.0 - excess / kinetic).max(0.0).sqrt() } else { 0.0 };
+    state.u.iter_mut().for_each(|u| *u *= share);
+    rigid.add(state, 1.0);
+    state.measure_motion(matter, division);
+}
+
+/// A rigid motion: velocity at a centre, and a spin.
+#[derive(Debug, Clone, Copy, Default)]
+struct Rigid {
+    centre: DVec3,
+    velocity: DVec3,
+    spin: DVec3,
+}
+
+impl Rigid {
+    /// The rigid motion with the momentum of `state`.
+    fn of(state: &Config, matter: &Matter, division: &Division) -> Self {
+        let mass = matter.mu * division.total_m();
+        let weighted = division.length.iter().zip(state.x.windows(2)).map(|(&l, x)| (x[0] + x[1]) * (0.5 * l));
+        let centre = weighted.sum::<DVec3>() / division.total_m();
+        let (linear, angular) = state.momentum(matter, division);
+        let mut inertia = Sym3::default();
+        for (k, &l) in division.length.iter().enumerate() {
+            let (a, b) = (state.x[k] - centre, state.x[k + 1] - centre);
+            let m = matter.mu * l / 6.0;
+            let square = m * (a.length_squared() + b.length_squared() + (a + b).length_squared());
+            let spread = Sym3::outer(a, -m) + Sym3::outer(b, -m) + Sym3::outer(a + b, -m);
+            let own = matter.rotary * l;
+            inertia += Sym3::identity(square + own) + spread + Sym3::outer(state.t[k], own);
+        }
+        let about = angular - centre.cross(linear);
+        let spin = inertia.inverse().map_or(DVec3::ZERO, |inverse| inverse * about);
+        Self { centre, velocity: linear / mass, spin }
+    }
+
+    /// Adds `scale` times this motion to the velocities of `state`.
+    fn add(&self, state: &mut Config, scale: f64) {
+        for k in 0..state.x.len() {
+            state.u[2 * k] += (self.velocity + self.spin.cross(state.x[k] - self.centre)) * scale;
+        }
+        for k in 0..state.q.len() {
+            state.u[2 * k + 1] += self.spin * scale;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rod::tests::{free_tube, shake};
+
+    #[test]
+    fn energy_is_taken_and_momentum_is_kept() {
+        let tube = free_tube(12);
+        let (matter, division) = (tube.matter(), tube.division());
+        let mut state = shake(&tube, 3);
+        let (energy, momentum) = (state.kinetic_j, state.momentum(matter, division));
+        take(0.3 * energy, &mut state, matter, division);
+        let (after, kept) = (state.kinetic_j, state.momentum(matter, division));
+        // roundings of sums of a dozen terms
+        assert!((after - 0.7 * energy).abs() < 1e-12 * energy, "{after} of {energy}");
+        assert!((kept.0 - momentum.0).length() < 1e-12 * momentum.0.length());
+        assert!((kept.1 - momentum.1).length() < 1e-12 * momentum.1.length());
+    }
+}

@@ -1,0 +1,101 @@
+//! Substeps whose matrix holds no elastic stiffness: symplectic Euler and XPBD.
+//!
+//! In: a state and what acts on it. Out: velocities after the forces (symplectic Euler) or after the constraints (XPBD),
+//! contact included. Springs from outside are implicit here too: a stiff hand does not shorten the step.
+//! Never here: whether the step is short enough ([`super::method`]). Theory: docs/theory/rod.md, eq. 40–42.
+
+use super::banded_ldl::Row;
+use super::state::{Config, Matter};
+use super::step::{Lost, Stepper};
+use super::sym3::Sym3;
+use super::system::{Iterate, Scene, add_springs, add_ties, gyrate, hold_ends};
+use glam::DVec3;
+
+impl Stepper {
+    /// A substep of symplectic Euler: velocities by the forces at the start, positions by those velocities.
+    pub(super) fn push(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
+        self.assemble_light(now, scene, false);
+        self.answer()?;
+        self.touch(now, scene, true);
+        self.advance(now, scene, true);
+        self.must_be_finite()
+    }
+
+    /// A substep of XPBD: gravity and springs from outside, then the constraints, then contact.
+    pub(super) fn project(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
+        self.assemble_light(now, scene, true);
+        self.answer()?;
+        let Self { rhs, projector, .. } = self;
+        projector.project(now, rhs, (scene.matter, scene.division), scene.h);
+        self.touch(now, scene, true);
+        self.advance(now, scene, true);
+        self.must_be_finite()
+    }
+
+    /// The system of masses and springs alone; `lumped` with every node's mass by itself and no elastic forces (eq. 40).
+    pub(super) fn assemble_light(&mut self, now: &Config, scene: &Scene<'_>, lumped: bool) {
+        let Self { rows, rhs, .. } = self;
+        rows.resize(now.u.len(), Row::ZERO);
+        rhs.resize(now.u.len(), DVec3::ZERO);
+        fill_masses(scene, now, lumped, rows);
+        if lumped {
+            fill_weights(scene, now, rhs);
+        } else {
+            fill_forces(scene, now, rhs);
+        }
+        let iterate = Iterate { start: now, at: now, first: true };
+        add_springs(scene, &iterate, rows, rhs);
+        add_ties(scene, &iterate, rows, rhs);
+        hold_ends(scene.matter, rows, rhs);
+    }
+
+    fn must_be_finite(&self) -> Result<(), Lost> {
+        if self.next.is_finite() { Ok(()) } else { Err(Lost { slot: None }) }
+    }
+}
+
+/// (1 + h c) M in rows: consistent, or with the mass of every node by itself.
+fn fill_masses(scene: &Scene<'_>, at: &Config, lumped: bool, rows: &mut [Row]) {
+    let Matter { mu, rotary, damping, .. } = *scene.matter;
+    let slow = 1.0 + scene.h * damping;
+    let (own, beside) = if lumped { (0.5, 0.0) } else { (1.0 / 3.0, 1.0 / 6.0) };
+    rows[0] = Row::ZERO;
+    for (k, (&l, t)) in scene.division.length.iter().zip(&at.t).enumerate() {
+        let (mass, turn) = (slow * mu * l, slow * rotary * l);
+        rows[2 * k].diag += Sym3::identity(own * mass);
+        rows[2 * k + 1] = Row { diag: Sym3::identity(turn) + Sym3::outer(*t, turn), ..Row::ZERO };
+        rows[2 * k + 2] = Row { diag: Sym3::identity(own * mass), far: Sym3::identity(beside * mass), ..Row::ZERO };
+    }
+}
+
+/// M v_n + h f(x_n), with consistent mass.
+fn fill_forces(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
+    let Matter { mu, rotary, .. } = *scene.matter;
+    let h = scene.h;
+    rhs[0] = now.force[0] * h;
+    for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {
+        let (a, b, m) = (now.u[2 * k], now.u[2 * k + 2], mu * l / 6.0);
+        rhs[2 * k] += (a * 2.0 + b) * m;
+        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, (rotary * l, h)) + now.force[2 * k + 1] * h;
+        rhs[2 * k + 2] = now.force[2 * k + 2] * h + (b * 2.0 + a) * m;
+    }
+}
+
+/// M v_n + h · weight, with the mass of every node by itself.
+fn fill_weights(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
+    let Matter { mu, rotary, gravity, .. } = *scene.matter;
+    let h = scene.h;
+    rhs[0] = DVec3::ZERO;
+    for (k, (&l, &t)) in scene.division.length.iter().zip(&now.t).enumerate() {
+        let half = 0.5 * mu * l;
+        rhs[2 * k] += (now.u[2 * k] + gravity * h) * half;
+        rhs[2 * k + 1] = spin(now.u[2 * k + 1], t, (rotary * l, h));
+        rhs[2 * k + 2] = (now.u[2 * k + 2] + gravity * h) * half;
+    }
+}
+
+/// The angular momentum of a segment about itself, turned by its gyroscopic torque (eq. 19).
+fn spin(w: DVec3, t: DVec3, (rotary, h): (f64, f64)) -> DVec3 {
+    let w = gyrate(w, t, h);
+    (w + t * t.dot(w)) * rotary
+}

@@ -1,0 +1,83 @@
+//! What the substep before changed: methods of two steps need it, and guesses of the next state are better for it.
+//!
+//! In: the states at both ends of a substep. Out: the state from which a backward difference of second order is one step of
+//! implicit Euler. Never here: what to do when there is no past. Theory: docs/theory/rod.md, eq. 43, 44.
+
+use super::rotation::{exp, log, unit};
+use super::state::Config;
+use glam::DVec3;
+
+/// Changes over the substep that ended last, in slots.
+#[derive(Debug, Clone, Default)]
+pub struct Past {
+    /// Of nodes' places, metres, and of segments' frames, radians in world axes.
+    way: Vec<DVec3>,
+    /// Of velocities, m/s and rad/s.
+    gain: Vec<DVec3>,
+    /// The length of that substep, seconds; zero where there is none to go by.
+    span_s: f64,
+    /// Energy that backward differences lost since velocities last jumped, and may find again, J.
+    spare_j: f64,
+}
+
+impl Past {
+    /// Takes in a substep of `h` seconds.
+    pub fn learn(&mut self, from: &Config, to: &Config, h: f64) {
+        self.span_s = h;
+        self.gain.clear();
+        self.gain.extend(to.u.iter().zip(&from.u).map(|(b, a)| *b - *a));
+        self.way.clear();
+        for k in 0..to.q.len() {
+            self.way.push(to.x[k] - from.x[k]);
+            self.way.push(log(to.q[k] * from.q[k].conjugate()));
+        }
+        let last = to.x.len() - 1;
+        self.way.push(to.x[last] - from.x[last]);
+    }
+
+    /// Takes over another past, into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.way.clone_from(&other.way);
+        self.gain.clone_from(&other.gain);
+        (self.span_s, self.spare_j) = (other.span_s, other.spare_j);
+    }
+
+    /// Forgets it: velocities have jumped, or the tube was divided anew.
+    pub fn forget(&mut self) {
+        (self.span_s, self.spare_j) = (0.0, 0.0);
+    }
+
+    /// How much energy may come back in a substep, J: backward differences lose and find it in turns, and lose on the whole.
+    pub fn spare_j(&self) -> f64 {
+        self.spare_j
+    }
+
+    /// Books the rise of energy of a substep, J; what it lost is spared for later.
+    pub fn spend(&mut self, rise_j: f64) {
+        self.spare_j = (self.spare_j - rise_j).max(0.0);
+    }
+
+    /// By how much velocities will change in the next `h` seconds if they change as before.
+    pub fn expected(&self, slot: usize, h: f64) -> DVec3 {
+        if self.span_s > 0.0 { self.gain[slot] * (h / self.span_s) } else { DVec3::ZERO }
+    }
+
+    /// Writes the state from which a step of implicit Euler of the returned length, seconds, is a backward difference over
+    /// this substep of `h` seconds and the one before it (eq. 43); implicit Euler itself where there is none.
+    pub fn start(&self, now: &Config, into: &mut Config, h: f64) -> f64 {
+        let ratio = if self.span_s > 0.0 { h / self.span_s } else { 0.0 };
+        let (first, third) = ((1.0 + 2.0 * ratio) / (1.0 + ratio), ratio * ratio / (1.0 + ratio));
+        let share = third / first;
+        into.resize(now.q.len());
+        into.x.copy_from_slice(&now.x);
+        into.q.copy_from_slice(&now.q);
+        into.u.copy_from_slice(&now.u);
+        if share > 0.0 {
+            into.x.iter_mut().zip(self.way.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
+            let turns = self.way.iter().skip(1).step_by(2);
+            into.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
+            into.u.iter_mut().zip(&self.gain).for_each(|(u, gain)| *u += *gain * share);
+        }
+        h / first
+    }
+}

@@ -1,0 +1,153 @@
+//! Carries a state from one division of a tube to another.
+//!
+//! In: the old division and state, the new division. Out: the new state: same length and mass, the same linear momentum to
+//! rounding, angular momentum and shape to O(ε²). Never here: when to do it. Theory: docs/theory/rod.md, eq. 25, 30–32.
+
+use super::discretization::{Division, densities, spread};
+use super::rotation::between;
+use super::state::{Config, Matter};
+use glam::{DQuat, DVec3};
+
+/// Room to work in.
+#[derive(Debug, Clone, Default)]
+pub struct Remesher {
+    /// Rotations from rest to now, known at `at` (arc lengths).
+    turns: Vec<DQuat>,
+    at: Vec<f64>,
+    /// Strains beyond rest in the segments' own axes.
+    strains: Vec<DVec3>,
+    bend: Vec<f64>,
+    arcs: Vec<f64>,
+}
+
+impl Remesher {
+    /// The arc lengths of `count` segments spread by the present curvature; even where the tube is straight (eq. 25).
+    pub fn arcs(&mut self, state: &Config, old: &Division, count: usize) -> &[f64] {
+        let last = state.t.len() - 1;
+        let turn = |k: usize| if k == 0 || k > last { 0.0 } else { (state.t[k] - state.t[k - 1]).length() };
+        self.bend.clear();
+        self.bend.extend((0..=last).map(|k| {
+            let beside = if k == 0 { turn(1) } else { 0.5 * (turn(k) + turn(k + 1)) };
+            beside / old.length[k]
+        }));
+        densities(&mut self.bend, &old.length);
+        spread(&old.arc_m, &self.bend, count, &mut self.arcs);
+        &self.arcs
+    }
+
+    /// Writes the state `from` on `old` into `to` on `new`.
+    pub fn carry(&mut self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+        to.resize(new.segments());
+        self.learn(matter, from, old);
+        self.shape(matter, (from, old), (to, new));
+        self.motion(matter, (from, old), (to, new));
+    }
+
+    /// Rotations and strains of the old segments against rest.
+    fn learn(&mut self, matter: &Matter, from: &Config, old: &Division) {
+        self.turns.clear();
+        self.at.clear();
+        self.strains.clear();
+        if matter.clamp[0] {
+            self.turns.push(DQuat::IDENTITY); // the wall has not turned
+            self.at.push(0.0);
+        }
+        for k in 0..old.segments() {
+            self.turns.push(from.q[k] * old.frame[k].conjugate());
+            self.at.push(old.middle_m(k));
+            self.strains.push(from.q[k].conjugate() * from.e[k] - DVec3::Z * old.chord[k]);
+        }
+        if matter.clamp[1] {
+            self.turns.push(DQuat::IDENTITY);
+            self.at.push(old.total_m());
+        }
+    }
+
+    /// Frames by interpolated rotations (eq. 30), positions by summing the strained segments (eq. 31).
+    fn shape(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+        to.x[0] = from.x[0];
+        for k in 0..new.segments() {
+            let s = new.middle_m(k);
+            to.q[k] = (self.turn_at(s) * new.frame[k]).normalize();
+            let strain = self.strain_at(old, s) + DVec3::Z * new.chord[k];
+            to.x[k + 1] = to.x[k] + to.q[k] * strain * new.length[k];
+        }
+        self.place(matter, (from, old), (to, new));
+    }
+
+    /// Puts held ends back, or the centre of mass where none is held.
+    fn place(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+        let gap = from.x[old.segments()] - to.x[new.segments()];
+        match matter.held {
+            [true, false] => {}
+            [false, true] => to.x.iter_mut().for_each(|x| *x += gap),
+            [true, true] => {
+                let total = new.total_m();
+                to.x.iter_mut().zip(&new.arc_m).for_each(|(x, s)| *x += gap * (s / total));
+                to.x[new.segments()] = from.x[old.segments()];
+            }
+            [false, false] => {
+                let shift = centre(from, old) - centre(to, new);
+                to.x.iter_mut().for_each(|x| *x += shift);
+            }
+        }
+    }
+
+    /// Velocities by interpolation, then the free nodes' lack of momentum spread evenly over them (eq. 32).
+    fn motion(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
+        let count = new.segments();
+        for (k, &s) in new.arc_m.iter().enumerate() {
+            let (left, w) = old.locate(s);
+            to.u[2 * k] = from.u[2 * left].lerp(from.u[2 * left + 2], w);
+        }
+        for k in 0..count {
+            let (left, w) = bracket(old.segments(), |i| old.middle_m(i), new.middle_m(k));
+            let right = (left + 1).min(old.segments() - 1);
+            to.u[2 * k + 1] = from.u[2 * left + 1].lerp(from.u[2 * right + 1], w.clamp(0.0, 1.0));
+        }
+        let free = |k: usize| !(matter.held[0] && k == 0 || matter.held[1] && k == count);
+        let share = |k: usize| {
+            let before = if k > 0 { new.length[k - 1] } else { 0.0 };
+            0.5 * (before + if k < count { new.length[k] } else { 0.0 })
+        };
+        let mass: f64 = (0..=count).filter(|&k| free(k)).map(share).sum();
+        // twice: the second round takes back what the first left to rounding
+        for _ in 0..2 {
+            let lack = (flow(from, old) - flow(to, new)) / mass;
+            (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += lack);
+        }
+    }
+
+    fn turn_at(&self, s: f64) -> DQuat {
+        let (left, w) = bracket(self.at.len(), |i| self.at[i], s);
+        let right = (left + 1).min(self.at.len() - 1);
+        between(self.turns[left], self.turns[right], w)
+    }
+
+    fn strain_at(&self, old: &Division, s: f64) -> DVec3 {
+        let (left, w) = bracket(old.segments(), |i| old.middle_m(i), s);
+        let right = (left + 1).min(old.segments() - 1);
+        self.strains[left].lerp(self.strains[right], w.clamp(0.0, 1.0))
+    }
+}
+
+/// The interval of the `count` rising values `at` that holds or is nearest to `s`, and where in it `s` lies.
+fn bracket(count: usize, at: impl Fn(usize) -> f64, s: f64) -> (usize, f64) {
+    let (mut low, mut high) = (0, count - 1);
+    while low + 1 < high {
+        let middle = (low + high) / 2;
+        if at(middle) <= s { low = middle } else { high = middle }
+    }
+    let size = at(high) - at(low);
+    (low, if size > 0.0 { (s - at(low)) / size } else { 0.0 })
+}
+
+fn centre(state: &Config, division: &Division) -> DVec3 {
+    let sum: DVec3 = division.length.iter().zip(state.x.windows(2)).map(|(&l, x)| (x[0] + x[1]) * (0.5 * l)).sum();
+    sum / division.total_m()
+}
+
+/// Linear momentum over mass per length, m²/s.
+fn flow(state: &Config, division: &Division) -> DVec3 {
+    division.length.iter().enumerate().map(|(k, &l)| (state.u[2 * k] + state.u[2 * k + 2]) * (0.5 * l)).sum()
+}

@@ -1,0 +1,23 @@
+//! The tube's own estimate of its error in space, metres.
+//!
+//! In: a state. Out: the largest sagitta by which a chord misses the bent curve. Never here: errors in time.
+//! Theory: docs/theory/rod.md, eq. 29.
+
+use super::discretization::Division;
+use super::state::{Config, Joint, Matter};
+
+/// max over joints of |κ − κ₀| l̄²/8: second order in ε, zero in the stress-free state (eq. 29).
+pub fn estimate_m(state: &Config, matter: &Matter, division: &Division) -> f64 {
+    let count = division.segments();
+    let inner = (1..count).map(|k| (k, state.q[k - 1], state.q[k]));
+    let start = matter.clamp[0].then(|| (0, division.wall[0], state.q[0]));
+    let end = matter.clamp[1].then(|| (count, state.q[count - 1], division.wall[1]));
+    let sagitta = |(k, before, after)| {
+        let joint = Joint::between(division, k, before, after);
+        // at a wall l̄ is half a segment, whose other half the wall mirrors
+        let reach = if k == 0 || k == count { 2.0 } else { 1.0 } / division.joint[k];
+        let curvature = joint.strain.length() * division.joint[k];
+        curvature * reach * reach / 8.0
+    };
+    inner.chain(start).chain(end).map(sagitta).fold(0.0, f64::max)
+}

@@ -1,0 +1,220 @@
+//! Substeps of second order: BDF2 and the energy-momentum rule, where nothing from outside makes velocities jump.
+//!
+//! In: a state and what held before it. Out: the next state, or the wish for another way: where the tube touches, is pulled
+//! or is in company, and where the iteration does not end, the substep is one of implicit Euler.
+//! Never here: how that one goes ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
+
+use super::contact::Solved;
+use super::energy_momentum::fill_mean;
+use super::method::Integrator;
+use super::rotation::{cayley, exp, unit};
+use super::state::{Config, Matter};
+use super::step::{Lost, Stepper, TURN_MAX_RAD, Verdict};
+use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
+
+/// Newton iterations of BDF2: with one it damps like implicit Euler, and one that has not ended never comes to rest.
+const BACK_ITERATIONS: (u32, u32) = (2, 6);
+/// They have ended where the change's kinetic energy is this share of the energies at work: speeds to 1e-4.
+const BACK_SLACK: f64 = 1e-8;
+/// The most Newton iterations of the energy-momentum rule: one that needs more has stalled, and half the substep is cheaper.
+const MEAN_ITERATIONS: u32 = 12;
+/// The iteration has ended where the change's kinetic energy is this share of the energies at work: speeds to 1e-7.
+/// What it leaves is energy, and a tube whose damping cannot carry that off never rests.
+const MEAN_SLACK: f64 = 1e-14;
+
+impl Stepper {
+    /// One trial substep of second order (eq. 43–48); `bound` if turns are, `divide` if it can be smaller.
+    pub(super) fn glide(
+        &mut self,
+        now: &Config,
+        scene: &Scene<'_>,
+        (bound, divide): (bool, bool),
+    ) -> Result<Verdict, Lost> {
+        let free = scene.ties.is_empty() && self.company.is_empty() && !self.contacts.is_touching();
+        if free {
+            let ended = match scene.integrator {
+                Integrator::EnergyMomentum => self.keep(now, scene),
+                _ => self.look_back(now, scene),
+            };
+            let rise = self.energy_rise(now, scene);
+            let ended = ended && rise <= self.past.spare_j() && self.next.is_finite();
+            if bound && !(ended && self.farthest_turn(now) <= TURN_MAX_RAD) {
+                return Ok(Verdict::TooFar);
+            }
+            if ended && !self.would_touch(now, scene) {
+                self.past.spend(rise);
+                return Ok(Verdict::Good);
+            }
+        }
+        self.attempt_euler(now, scene, (bound, divide))
+    }
+
+    /// Backward differences (eq. 43): implicit Euler of another length from another state; whether the iteration ended.
+    fn look_back(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+        let mut start = std::mem::take(&mut self.ahead);
+        let h = self.past.start(now, &mut start, scene.h);
+        let scene = Scene { h, ..*scene };
+        self.guess(now, &start, (h, scene.h));
+        let mut ended = false;
+        for done in 1..=BACK_ITERATIONS.1 {
+            self.next.strain(scene.matter, scene.division);
+            let iterate = Iterate { start: &start, at: &self.next, first: false };
+            assemble(&scene, &iterate, &mut self.rows, &mut self.rhs);
+            self.solves += 1;
+            if self.factor.factor(&self.rows).is_err() {
+                break;
+            }
+            self.factor.solve(&mut self.rhs);
+            let at_work = now.kinetic_j + now.elastic_j + self.next.elastic_j;
+            ended = done >= BACK_ITERATIONS.0 && self.change_j(&scene) <= BACK_SLACK * at_work;
+            self.follow(&start, h);
+            if ended {
+                break;
+            }
+        }
+        self.next.strain(scene.matter, scene.division);
+        self.ahead = start;
+        ended
+    }
+
+    /// Velocities as they will be if they change as before, and where they lead to from `start`.
+    fn guess(&mut self, now: &Config, start: &Config, (h, whole): (f64, f64)) {
+        let Self { next, past, .. } = self;
+        let count = now.q.len();
+        next.resize(count);
+        for slot in 0..now.u.len() {
+            next.u[slot] = now.u[slot] + past.expected(slot, whole);
+        }
+        for k in 0..=count {
+            next.x[k] = start.x[k] + next.u[2 * k] * h;
+        }
+        for k in 0..count {
+            next.q[k] = unit(exp(next.u[2 * k + 1] * h) * start.q[k]);
+        }
+    }
+
+    /// Adds the change of velocities just solved, and where it leads to (eq. 20).
+    fn follow(&mut self, start: &Config, h: f64) {
+        let Self { next, rhs, .. } = self;
+        next.u.iter_mut().zip(&*rhs).for_each(|(u, change)| *u += *change);
+        for (k, x) in next.x.iter_mut().enumerate() {
+            *x = start.x[k] + next.u[2 * k] * h;
+        }
+        for (k, q) in next.q.iter_mut().enumerate() {
+            *q = unit(exp(rhs[2 * k + 1] * h) * *q);
+        }
+    }
+
+    /// Mean forces that keep energy and momentum between two halves of the damping (eq. 45–49); whether the iteration ended.
+    ///
+    /// Damping of the mean velocity would leave alone what changes its sign in every substep.
+    fn keep(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+        let slower = libm::exp(-0.5 * scene.h * scene.matter.damping);
+        let undamped = Matter { damping: 0.0, ..*scene.matter };
+        let mut start = std::mem::take(&mut self.ahead);
+        start.copy_from(now);
+        start.u.iter_mut().for_each(|u| *u *= slower);
+        let ended = self.keep_undamped(&start, &Scene { matter: &undamped, ..*scene });
+        self.ahead = start;
+        self.next.u.iter_mut().for_each(|u| *u *= slower);
+        self.next.strain(scene.matter, scene.division);
+        ended
+    }
+
+    fn keep_undamped(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+        let half = 0.5 * scene.h;
+        let tangent = Scene { h: half, ..*scene };
+        self.guess_mean(now, scene.h);
+        for _ in 0..MEAN_ITERATIONS {
+            self.next.strain(scene.matter, scene.division);
+            fill_matrix(&tangent, &self.next, &mut self.rows, &mut self.rhs);
+            fill_mean(&tangent, (now, &self.next), &mut self.rows, &mut self.rhs);
+            hold_ends(scene.matter, &mut self.rows, &mut self.rhs);
+            self.solves += 1;
+            if self.factor.factor(&self.rows).is_err() {
+                return false;
+            }
+            self.factor.solve(&mut self.rhs);
+            let change_j = self.change_j(scene);
+            self.follow_mean(now, half);
+            if change_j <= MEAN_SLACK * (now.kinetic_j + now.elastic_j + self.next.elastic_j) {
+                return true;
+            }
+            if !change_j.is_finite() {
+                return false;
+            }
+        }
+        false
+    }
+
+    /// The first iterate of the energy-momentum rule.
+    fn guess_mean(&mut self, now: &Config, h: f64) {
+        let Self { next, past, .. } = self;
+        let count = now.q.len();
+        next.resize(count);
+        for k in 0..=count {
+            next.u[2 * k] = now.u[2 * k] + past.expected(2 * k, h);
+            next.x[k] = now.x[k] + (now.u[2 * k] + next.u[2 * k]) * (0.5 * h);
+        }
+        for k in 0..count {
+            let slot = 2 * k + 1;
+            next.q[k] = unit(exp((now.u[slot] + past.expected(slot, h) * 0.5) * h) * now.q[k]);
+        }
+        self.turn_mean(now, 0.5 * h);
+    }
+
+    /// Adds the change of velocities just solved, and where the mean of old and new leads to.
+    fn follow_mean(&mut self, now: &Config, half: f64) {
+        let Self { next, rhs, .. } = self;
+        for k in 0..next.x.len() {
+            next.u[2 * k] += rhs[2 * k];
+            next.x[k] = now.x[k] + (now.u[2 * k] + next.u[2 * k]) * half;
+        }
+        for (k, q) in next.q.iter_mut().enumerate() {
+            *q = unit(exp(rhs[2 * k + 1] * half) * *q);
+        }
+        self.turn_mean(now, half);
+    }
+
+    /// The spins whose mean, in the segments' own axes, makes the turn that was made (eq. 46).
+    fn turn_mean(&mut self, now: &Config, half: f64) {
+        let Self { next, .. } = self;
+        for (k, q) in next.q.iter().enumerate() {
+            let turn = *q * now.q[k].conjugate();
+            next.u[2 * k + 1] = cayley(turn) / half - turn * now.u[2 * k + 1];
+        }
+    }
+
+    /// The kinetic energy of the change of velocities in `rhs`, J, every node's mass by itself.
+    fn change_j(&self, scene: &Scene<'_>) -> f64 {
+        let matter = scene.matter;
+        let part = |(k, l): (usize, &f64)| {
+            let (a, w, b) = (self.rhs[2 * k], self.rhs[2 * k + 1], self.rhs[2 * k + 2]);
+            let nodes = matter.mu * 0.25 * (a.length_squared() + b.length_squared());
+            l * (nodes + matter.rotary * 0.5 * w.length_squared())
+        };
+        scene.division.length.iter().enumerate().map(part).sum()
+    }
+
+    /// The widest turn of a segment from `now` to the next state, radians.
+    fn farthest_turn(&self, now: &Config) -> f64 {
+        let share = |(a, b): (&glam::DQuat, &glam::DQuat)| {
+            let turn = *b * a.conjugate();
+            turn.x * turn.x + turn.y * turn.y + turn.z * turn.z
+        };
+        2.0 * libm::asin(now.q.iter().zip(&self.next.q).map(share).fold(0.0, f64::max).sqrt().min(1.0))
+    }
+
+    /// Whether the skin comes near anything on the way to the next state.
+    fn would_touch(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
+        let Self { rhs, next, rows, factor, contacts, .. } = self;
+        for k in 0..now.x.len() {
+            rhs[2 * k] = (next.x[k] - now.x[k]) / scene.h;
+        }
+        for k in 0..now.q.len() {
+            rhs[2 * k + 1] = next.u[2 * k + 1];
+        }
+        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        contacts.would_touch(&now.x, rhs, &solved)
+    }
+}

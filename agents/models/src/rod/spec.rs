@@ -1,0 +1,194 @@
+//! What a tube is made of and how it is held: the numbers a scene gives.
+
+use super::Integrator;
+use glam::DVec3;
+use metachron_core::{Resolution, ResolutionRange};
+use metachron_geometry::Obstacle;
+use std::sync::Arc;
+
+/// A tube, cable or rod before it is divided into segments.
+#[derive(Debug, Clone)]
+pub struct TubeSpec {
+    /// Points of the centre line at the start in metres, at least two, no two neighbours alike; it is free of stress there
+    /// unless one of the next two says otherwise.
+    /// Two points make a straight line, more a smooth curve through all of them.
+    pub path_m: Vec<DVec3>,
+    /// Whether it is straight where nothing bends it: the path is then what it was bent to, not what it springs back to.
+    pub straight: bool,
+    /// How far its sections are turned about the centre line at the start, radians, evenly from 0 to this at the end;
+    /// it springs back unless both ends are clamped; −1000 … 1000.
+    pub twist_rad: f64,
+    /// The section and what it resists.
+    pub section: Section,
+    /// Density × area in kg/m, > 0.
+    pub mass_per_length_kg_m: f64,
+    /// How the simulation is divided at first, and within what range it may change.
+    pub resolution: Resolution,
+    /// The resolutions that `retune` may take.
+    pub range: ResolutionRange,
+    /// Number of segments at first where a scene fixes it; else ⌈L/ε⌉.
+    pub segments: Option<usize>,
+    /// How it is integrated in time.
+    pub integrator: Integrator,
+    /// The least number of substeps in a step, ≥ 1.
+    pub substeps: u32,
+    /// Mass-proportional damping in 1/s, ≥ 0: dv/dt = … − damping·v.
+    pub damping_per_s: f64,
+    /// Ends held in place and direction: start, end.
+    pub clamp: [bool; 2],
+    /// Ends held in place, free to turn: start, end.
+    pub pin: [bool; 2],
+    /// Springs along the length to where it was at rest (a mesentery).
+    pub attachments: Vec<Attachment>,
+    /// A travelling wave of the radius.
+    pub peristalsis: Option<Peristalsis>,
+    /// Pressure inside above that outside, Pa: widens the tube by dr = p r² (1 − ν/2) / (E t).
+    pub pressure_pa: f64,
+    /// Whether the tube collides with itself.
+    pub self_contact: bool,
+    /// Coulomb friction coefficient of its skin, ≥ 0; a pair takes the geometric mean.
+    pub friction: f64,
+    /// Gravity, m/s².
+    pub gravity: DVec3,
+    /// Solids that never move.
+    pub obstacles: Arc<[Obstacle]>,
+    /// Whether the tube may report that it is at rest.
+    pub sleep: bool,
+}
+
+/// A tube's section: stiffnesses of stretch, shear, bend and twist, and its measures.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Section {
+    /// Outer radius at rest, metres, > 0.
+    pub radius_m: f64,
+    /// Wall thickness, metres, `0 < wall <= radius`; equal to the radius for a solid rod.
+    pub wall_m: f64,
+    /// Young's modulus, Pa, > 0: for the pressure law and for warnings.
+    pub young_pa: f64,
+    /// Poisson's ratio, −1 < ν ≤ 0.5.
+    pub poisson: f64,
+    /// Stretch stiffness E·A, newtons, > 0.
+    pub ea_n: f64,
+    /// Shear stiffness κ·G·A, newtons, > 0.
+    pub ga_n: f64,
+    /// Bend stiffness E·I, N·m², > 0.
+    pub ei_n_m2: f64,
+    /// Twist stiffness G·J, N·m², > 0.
+    pub gj_n_m2: f64,
+    /// Rotary inertia ρ·I about a diameter, per length, kg·m, > 0.
+    pub rotary_kg_m: f64,
+}
+
+/// Springs between a stretch of the tube and where that stretch is at rest.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Attachment {
+    /// The stretch: shares of the rest length, `0 <= from < to <= 1`.
+    pub from: f64,
+    /// End of the stretch.
+    pub to: f64,
+    /// Stiffness per length, N/m², ≥ 0.
+    pub stiffness_n_m2: f64,
+    /// Slack in metres, ≥ 0: within it the spring does not act (a mesentery hangs loose).
+    pub slack_m: f64,
+    /// Damping per length, N·s/m², ≥ 0.
+    pub damping_n_s_m2: f64,
+}
+
+/// A wave of contraction: r(s, t) = r₀ (1 − a·(1 + cos(2π (s − c t)/λ))/2).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Peristalsis {
+    /// Deepest contraction a as a share of the radius, `0 <= a < 1`.
+    pub amplitude: f64,
+    /// Wave length λ, metres, > 0.
+    pub wavelength_m: f64,
+    /// Wave speed c, m/s.
+    pub speed_m_s: f64,
+}
+
+/// A hollow round section of one elastic material.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// Young's modulus, Pa, > 0.
+    pub young_pa: f64,
+    /// Poisson's ratio, −1 < ν ≤ 0.5.
+    pub poisson: f64,
+    /// Density, kg/m³, > 0.
+    pub density_kg_m3: f64,
+    /// Shear coefficient κ, > 0; 27/28 is used for thin walls.
+    pub shear_factor: f64,
+}
+
+impl TubeSpec {
+    /// A free tube along `path_m` of this section and mass per length, in `segments` equal parts: held nowhere, nothing pulls
+    /// at it, damps it or rubs on it, it touches neither itself nor anything that never moves, keeps its resolution, never sleeps.
+    #[must_use]
+    pub fn free(path_m: Vec<DVec3>, (section, mass_per_length_kg_m): (Section, f64), segments: usize) -> Self {
+        let length_m: f64 = path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+        let resolution = Resolution { eps_m: length_m / segments.max(1) as f64, n: 0 };
+        Self {
+            path_m,
+            straight: false,
+            twist_rad: 0.0,
+            section,
+            mass_per_length_kg_m,
+            resolution,
+            range: ResolutionRange::fixed(resolution),
+            segments: Some(segments),
+            integrator: Integrator::ImplicitEuler,
+            substeps: 1,
+            damping_per_s: 0.0,
+            clamp: [false; 2],
+            pin: [false; 2],
+            attachments: Vec::new(),
+            peristalsis: None,
+            pressure_pa: 0.0,
+            self_contact: false,
+            friction: 0.0,
+            gravity: DVec3::ZERO,
+            obstacles: [].into(),
+            sleep: false,
+        }
+    }
+}
+
+impl Section {
+    /// The section of a round tube, and its mass per length in kg/m.
+    #[must_use]
+    pub fn hollow(radius_m: f64, wall_m: f64, material: Material) -> (Self, f64) {
+        let Material { young_pa, poisson, density_kg_m3, shear_factor } = material;
+        let inner = (radius_m - wall_m).max(0.0);
+        let area = std::f64::consts::PI * (radius_m * radius_m - inner * inner);
+        let second_moment = std::f64::consts::FRAC_PI_4 * (radius_m.powi(4) - inner.powi(4));
+        let shear_pa = young_pa / (2.0 * (1.0 + poisson));
+        let section = Self {
+            radius_m,
+            wall_m,
+            young_pa,
+            poisson,
+            ea_n: young_pa * area,
+            ga_n: shear_factor * shear_pa * area,
+            ei_n_m2: young_pa * second_moment,
+            gj_n_m2: shear_pa * 2.0 * second_moment,
+            rotary_kg_m: density_kg_m3 * second_moment,
+        };
+        (section, density_kg_m3 * area)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_reference_tube_has_the_reference_stiffnesses() {
+        // computed independently from the same radius, wall and modulus (tests/reference/cosserat_tube.json, case soft)
+        let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
+        let (section, mass) = Section::hollow(0.015, 0.002, material);
+        let close = |a: f64, b: f64| assert!((a - b).abs() <= 1e-12 * b.abs(), "{a} is not {b}");
+        close(section.ea_n, 175.929_188_601_028_45);
+        close(section.ga_n, 58.498_621_825_465_13);
+        close(section.ei_n_m2, 0.017_329_025_077_201_295);
+        close(section.gj_n_m2, 0.011_951_051_777_380_206);
+        close(mass, 0.184_725_648_031_079_88);
+    }
+}

@@ -1,0 +1,400 @@
+//! One step of the tube: linearly implicit Euler, divided into substeps where that is not enough.
+//!
+//! In: a state, a span, what holds and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
+//! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
+
+use super::anchor_springs::{NodeSpring, Tie};
+use super::banded_ldl::InverseBlocks;
+use super::banded_ldl::{Factor, Row};
+use super::company::Company;
+use super::contact::{Solved, TubeContacts, respond};
+use super::discretization::Division;
+use super::energy_limiter;
+use super::footing::Footing;
+use super::history::Past;
+use super::horizon::Horizon;
+use super::method::Integrator;
+use super::rotation::{exp, unit};
+use super::state::{Config, Matter};
+use super::system::{Iterate, Scene, assemble};
+use super::xpbd::Projector;
+use glam::{DMat3, DVec3};
+use metachron_contact::Presses;
+use metachron_core::Lies;
+
+/// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
+pub const TURN_MAX_RAD: f64 = 0.25;
+/// A substep is halved at most ten times, into 1024: the last five for energy that rises, not for what merely turns fast.
+const HALVINGS: u32 = 10;
+/// Substeps of fewer ticks than this may turn further than [`TURN_MAX_RAD`]: a step is at most 32 substeps for that.
+const TURN_TICKS: u64 = 1 << (HALVINGS - 5);
+/// Newton iterations of a substep whose energy rose, beyond the first: each squares what the linear move left over.
+const ITERATIONS_MORE: u32 = 2;
+/// A rise of energy below this share of the energies at work is rounding.
+const ENERGY_SLACK: f64 = 1e-9;
+/// Strains below this are rounding (positions of 1 m over segments of 1 cm: 1e-14), whatever energy they hold.
+const STRAIN_SLACK: f64 = 1e-10;
+
+/// What a step needs besides the state.
+pub struct Setting<'a> {
+    /// The material.
+    pub matter: &'a Matter,
+    /// The division.
+    pub division: &'a Division,
+    /// Attachments.
+    pub springs: &'a [NodeSpring],
+    /// The span of the step, seconds.
+    pub dt: f64,
+    /// The least number of substeps.
+    pub substeps: u32,
+    /// How it is integrated.
+    pub integrator: Integrator,
+    /// The longest substep that the integrator carries while nothing is stretched, seconds (eq. 38, 39).
+    pub longest_s: f64,
+}
+
+/// The state stopped being finite: which slot gave out.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Lost {
+    /// The slot whose pivot failed; `None` where the state itself did.
+    pub slot: Option<usize>,
+}
+
+/// Room for the linear system and the next state; nothing is allocated once the sizes settle.
+#[derive(Debug, Clone, Default)]
+pub struct Stepper {
+    pub(super) rows: Vec<Row>,
+    /// What contacts gave in the last substep.
+    pub(super) presses: Presses,
+    pub(super) factor: Factor,
+    pub(super) rhs: Vec<DVec3>,
+    pub(super) next: Config,
+    /// What the substep before changed, and a state to start from where that is not the last one.
+    pub(super) past: Past,
+    pub(super) ahead: Config,
+    pub(super) projector: Projector,
+    /// What the skin touches.
+    pub contacts: TubeContacts,
+    /// Who else is near.
+    pub company: Company,
+    /// What slower owners have to expect.
+    pub(super) horizon: Horizon,
+    /// What it lies on, where others have to know.
+    pub(super) footing: Footing,
+    /// Work that contact does in the substep tried, J.
+    pushed_j: f64,
+    /// The length of the substep that ended last, seconds.
+    pub(super) span_s: f64,
+    /// Systems factored since the step began for the substeps that stand, iterations among them: its work.
+    pub(super) solves: u32,
+}
+
+/// What became of a trial substep.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Verdict {
+    /// The next state stands.
+    Good,
+    /// Something turned too far, or energy rose: smaller substeps are wanted.
+    TooFar,
+}
+
+impl Stepper {
+    /// Advances `now`, whose strains are up to date, by the span; returns the number of substeps.
+    ///
+    /// # Errors
+    /// [`Lost`] where the next state is not finite; `now` is then the last state that was.
+    pub fn step(&mut self, now: &mut Config, setting: &Setting<'_>, ties: &mut [Tie]) -> Result<u32, Lost> {
+        let ticks = u64::from(setting.substeps) << HALVINGS;
+        let tick = setting.dt / ticks as f64;
+        let (mut gone, mut size, mut taken) = (0, 1_u64 << HALVINGS, 0);
+        while gone < ticks {
+            let span = (tick * gone as f64, tick * size as f64);
+            self.company.aim(ties, &now.x, span);
+            let scene = Scene {
+                matter: setting.matter,
+                division: setting.division,
+                springs: setting.springs,
+                ties,
+                h: span.1,
+                until: tick * (gone + size) as f64,
+                integrator: setting.integrator,
+            };
+            let stretched = span.1 * now.stretch > setting.longest_s && size > 1;
+            let solves = self.solves;
+            if stretched || self.attempt(now, &scene, (size > TURN_TICKS, size > 1))? == Verdict::TooFar {
+                (self.solves, size) = (solves, size / 2);
+                continue;
+            }
+            self.accept(now, ties, span);
+            self.remember(now, (setting.integrator, ties.is_empty()), span.1);
+            (gone, taken) = (gone + size, taken + 1);
+            // twice as long again, where that ends on the grid of the longer substep
+            if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
+                size *= 2;
+            }
+        }
+        Ok(taken)
+    }
+
+    /// Takes what others gave into `now`: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is moved farther than `way_m`. `ties` are
+    /// those of the step before.
+    ///
+    /// # Errors
+    /// [`Lost`] where the system cannot be factored; `now` is then untouched.
+    pub fn receive(
+        &mut self,
+        now: &mut Config,
+        setting: &Setting<'_>,
+        (ties, way_m): (&mut [Tie], f64),
+    ) -> Result<(), Lost> {
+        if self.company.received().is_empty() {
+            return Ok(());
+        }
+        self.prepare(now, setting)?;
+        let Self { company, factor, footing, contacts, .. } = self;
+        let push = company.received().push();
+        let lies = Some(&*footing).filter(|footing| footing.stance.bears(push));
+        let answer = lies.and_then(Footing::factor).unwrap_or(factor);
+        let feet = lies.map_or(&[][..], |footing| footing.stance.on_others());
+        company.received().apply(now, (answer, ties), (setting.matter, setting.division), (contacts, feet, way_m));
+        Ok(())
+    }
+
+    /// Factors the system of a substep about `now` where there is no factor of this division yet.
+    ///
+    /// # Errors
+    /// [`Lost`] where it cannot be.
+    pub fn prepare(&mut self, now: &Config, setting: &Setting<'_>) -> Result<(), Lost> {
+        if self.factor.slots() == now.u.len() {
+            return Ok(());
+        }
+        let Setting { matter, division, springs, dt, substeps, integrator, .. } = *setting;
+        let h = dt / f64::from(substeps);
+        let scene = Scene { matter, division, springs, ties: &[], h, until: h, integrator };
+        match integrator {
+            Integrator::SymplecticEuler | Integrator::Xpbd => {
+                self.assemble_light(now, &scene, integrator == Integrator::Xpbd);
+            }
+            _ => assemble(&scene, &Iterate { start: now, at: now, first: true }, &mut self.rows, &mut self.rhs),
+        }
+        self.factor.factor(&self.rows).map_err(|slot| {
+            self.factor.forget();
+            Lost { slot: Some(slot) }
+        })
+    }
+
+    /// Forgets what it knows of nodes and segments: the tube was divided anew.
+    pub fn forget(&mut self) {
+        self.factor.forget();
+        self.horizon.forget();
+        self.footing.stance.forget();
+        self.presses.forget();
+        self.contacts.forget();
+        self.past.forget();
+    }
+
+    /// The factor of the substep that ended last; without slots where the division has changed since.
+    pub fn factor(&self) -> &Factor {
+        &self.factor
+    }
+
+    /// How long that substep was, seconds; zero before the first.
+    pub fn span_s(&self) -> f64 {
+        self.span_s
+    }
+
+    /// What others may know of how the tube answers impulses: its factor for the step that they foresee or the last one, the length of the
+    /// last one, and where it lies with its factor there.
+    pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
+        let Self { footing, horizon, factor, span_s, .. } = self;
+        let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
+        ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
+    }
+
+    /// Finds what the tube lies on after its last substep, where others want to know (`watched`).
+    pub fn stand(&mut self, held: [bool; 2], watched: bool) {
+        let Self { footing, rows, contacts, company, .. } = self;
+        if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
+    }
+
+    /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.
+    pub fn weigh(&mut self, held: [bool; 2]) {
+        let Self { factor, company, .. } = self;
+        company.mates_mut().weigh(factor.slots(), |impulses| respond((factor, held), impulses));
+    }
+
+    /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
+    /// it (eq. 18); `None` where the segments have changed since, or no step was taken.
+    pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &Matter, slots: usize) -> Option<DMat3> {
+        if self.factor.slots() != slots {
+            return None;
+        }
+        let last = 2 * segment + 3 == slots;
+        let (start, end) = (matter.held[0] && segment == 0, matter.held[1] && last);
+        // a held node does not move: its slot of the matrix only keeps a place
+        let (v, w) = (if start { 0.0 } else { 1.0 - w }, if end { 0.0 } else { w });
+        let mut blocks = InverseBlocks::default();
+        self.factor.inverse_blocks(&mut blocks);
+        let (a, b) = (blocks.diag[2 * segment].full(), blocks.diag[2 * segment + 2].full());
+        let across = blocks.far[2 * segment];
+        Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
+    }
+
+    /// One trial substep, from `now` into `next`; `bound` if turns are, `divide` if it can be smaller.
+    fn attempt(&mut self, now: &Config, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
+        match scene.integrator {
+            Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
+            Integrator::Xpbd => self.project(now, scene).map(|()| Verdict::Good),
+            Integrator::ImplicitEuler => self.attempt_euler(now, scene, smaller),
+            Integrator::Bdf2 | Integrator::EnergyMomentum => self.glide(now, scene, smaller),
+        }
+    }
+
+    /// The same by implicit Euler (eq. 11–20).
+    pub(super) fn attempt_euler(
+        &mut self,
+        now: &Config,
+        scene: &Scene<'_>,
+        (bound, divide): (bool, bool),
+    ) -> Result<Verdict, Lost> {
+        if let Err(lost) = self.solve(now, scene, true) {
+            return if divide { Ok(Verdict::TooFar) } else { Err(lost) };
+        }
+        if bound && self.widest_turn() * scene.h > TURN_MAX_RAD {
+            return Ok(Verdict::TooFar);
+        }
+        self.advance(now, scene, true);
+        let mut rise = self.energy_rise(now, scene);
+        for _ in 0..ITERATIONS_MORE {
+            // a state far out may have no next iterate: then the best so far is judged as it is
+            if rise <= 0.0 || !self.next.is_finite() || self.solve(now, scene, false).is_err() {
+                break;
+            }
+            self.advance(now, scene, false);
+            rise = self.energy_rise(now, scene);
+        }
+        let finite = self.next.is_finite();
+        if divide && (rise > 0.0 || !finite) {
+            return Ok(Verdict::TooFar);
+        }
+        if rise > 0.0 {
+            energy_limiter::take(rise, &mut self.next, scene.matter, scene.division);
+        }
+        if finite && self.next.is_finite() { Ok(Verdict::Good) } else { Err(Lost { slot: None }) }
+    }
+
+    /// Builds and solves the system about the iterate, contact included; leaves the change of velocities in `rhs` (eq. 11).
+    fn solve(&mut self, now: &Config, scene: &Scene<'_>, first: bool) -> Result<(), Lost> {
+        let at = if first { now } else { &self.next };
+        assemble(scene, &Iterate { start: now, at, first }, &mut self.rows, &mut self.rhs);
+        self.answer()?;
+        self.touch(now, scene, first);
+        Ok(())
+    }
+
+    /// Factors the system that was built and solves it, with what others gave that acts through the substep.
+    pub(super) fn answer(&mut self) -> Result<(), Lost> {
+        self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
+        self.solves += 1;
+        self.factor.factor(&self.rows).map_err(|slot| Lost { slot: Some(slot) })?;
+        self.factor.solve(&mut self.rhs);
+        Ok(())
+    }
+
+    /// Corrects the velocities just solved so that the skin stays apart (docs/theory/contact.md, eq. 5).
+    pub(super) fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+        let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
+        let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
+        // contact is a law of whole velocities, not of what an iteration changes of them
+        let known = if first { &[][..] } else { &next.u[..] };
+        rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
+        *pushed_j = contacts.act(&now.x, rhs, &solved, (company, first));
+        rhs.iter_mut().zip(known).for_each(|(change, u)| *change -= *u);
+    }
+
+    /// The fastest spin in `rhs`, rad/s.
+    fn widest_turn(&self) -> f64 {
+        self.rhs.iter().skip(1).step_by(2).map(|w| w.length_squared()).fold(0.0, f64::max).sqrt()
+    }
+
+    /// Moves along the solved velocities: x_n + h v, exp(h Δω) q (eq. 20); strains the new state.
+    pub(super) fn advance(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
+        let Self { next, rhs, .. } = self;
+        let (h, count) = (scene.h, now.q.len());
+        next.resize(count);
+        for k in 0..=count {
+            let v = if first { rhs[2 * k] } else { next.u[2 * k] + rhs[2 * k] };
+            next.u[2 * k] = v;
+            next.x[k] = now.x[k] + v * h;
+        }
+        for k in 0..count {
+            let turn = rhs[2 * k + 1];
+            let (spin, from) = if first { (turn, now.q[k]) } else { (next.u[2 * k + 1] + turn, next.q[k]) };
+            next.u[2 * k + 1] = spin;
+            next.q[k] = unit(exp(turn * h) * from);
+        }
+        next.strain(scene.matter, scene.division);
+    }
+
+    /// By how much the energy of `next` exceeds what `now` had and the pulls gave, less the rounding, J (eq. 27).
+    pub(super) fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
+        let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
+        // what friction takes is no licence to make as much elsewhere
+        let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
+        let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
+        work += fresh;
+        effort += fresh.abs();
+        for tie in scene.ties {
+            let (a, b) = (tie.segment, tie.segment + 1);
+            let x = tie.mix(self.next.x[a], self.next.x[b]);
+            let v = tie.mix(self.next.u[2 * a], self.next.u[2 * b]);
+            let done = tie.force(x, v, scene.until).dot(x - tie.mix(now.x[a], now.x[b]));
+            work += done;
+            effort += done.abs();
+        }
+        let lifted = (self.next.gravity_j - now.gravity_j).abs();
+        let at_work = self.next.kinetic_j + self.next.elastic_j + now.elastic_j + lifted + effort;
+        // the sums themselves round at their own size, and positions at theirs
+        let sums = f64::EPSILON * 64.0 * (before.abs() + after.abs() + now.gravity_j.abs());
+        let rounding = sums + STRAIN_SLACK * STRAIN_SLACK * scene.matter.ea * scene.division.total_m();
+        after - before - work - ENERGY_SLACK * at_work - rounding
+    }
+
+    /// Keeps what methods of second order need of the substep that ended at `now`, where nothing made velocities jump.
+    fn remember(&mut self, now: &Config, (integrator, untied): (Integrator, bool), h: f64) {
+        if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
+            return;
+        }
+        if untied && self.company.is_empty() && !self.contacts.is_touching() {
+            self.past.learn(&self.next, now, h);
+        } else {
+            self.past.forget();
+        }
+    }
+
+    /// Makes `next` the state and books what pulls and contacts gave.
+    fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
+        std::mem::swap(now, &mut self.next);
+        self.span_s = h;
+        self.company.received().spend();
+        for tie in &mut *ties {
+            let (a, b) = (tie.segment, tie.segment + 1);
+            // constraints act after the tie did: what it gave is what it was solved with
+            let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
+            let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
+            tie.book(point, (h, start + h));
+        }
+        if self.company.is_watched() {
+            self.presses.note(self.contacts.impulses(), now.u.len(), h);
+        } else {
+            self.presses.forget();
+        }
+        self.company.accept(self.contacts.impulses(), ties, (now.u.len(), start, h));
+    }
+}
+
+/// Kinetic and elastic energy, gravity's and that of the attachments, J (eq. 10).
+pub fn energy(state: &Config, springs: &[NodeSpring]) -> f64 {
+    let held: f64 = springs.iter().map(|s| s.energy_j(state.x[s.node])).sum();
+    state.kinetic_j + state.elastic_j + state.gravity_j + held
+}

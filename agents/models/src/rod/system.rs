@@ -1,0 +1,205 @@
+//! The linear system of one Newton iteration: A Δ = r with A = M + h (c M + D) + h² K.
+//!
+//! In: the state the step started from, the iterate it is linearised about. Out: rows and right side, in slots.
+//! Never here: whether to accept what comes of it ([`super::step`]). Theory: docs/theory/rod.md, eq. 11–15, 19–24.
+
+use super::anchor_springs::{NodeSpring, Tie};
+use super::banded_ldl::Row;
+use super::discretization::Division;
+use super::method::Integrator;
+use super::state::{Config, Matter};
+use super::sym3::Sym3;
+use glam::{DMat3, DVec3};
+
+/// Everything outside the state that a substep depends on.
+#[derive(Clone, Copy)]
+pub struct Scene<'a> {
+    /// The material.
+    pub matter: &'a Matter,
+    /// The division.
+    pub division: &'a Division,
+    /// Attachments.
+    pub springs: &'a [NodeSpring],
+    /// Pulls.
+    pub ties: &'a [Tie],
+    /// The substep, seconds.
+    pub h: f64,
+    /// Seconds from the start of the step to the end of this substep.
+    pub until: f64,
+    /// How it is integrated.
+    pub integrator: Integrator,
+}
+
+/// Where Newton's iteration stands: the iterate and the velocities that led to it from the start of the substep.
+#[derive(Clone, Copy)]
+pub struct Iterate<'a> {
+    /// The state at the start of the substep.
+    pub start: &'a Config,
+    /// The state linearised about: the start itself in the first iteration.
+    pub at: &'a Config,
+    /// Whether `at` is the start: its velocities then count as zero moved so far.
+    pub first: bool,
+}
+
+impl Iterate<'_> {
+    fn moved(&self, slot: usize) -> DVec3 {
+        if self.first { DVec3::ZERO } else { self.at.u[slot] }
+    }
+}
+
+/// Fills `rows` and `rhs` (eq. 11–15, 19–24).
+pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+    fill_matrix(scene, iterate.at, rows, rhs);
+    fill_right_side(scene, iterate, rhs);
+    add_springs(scene, iterate, rows, rhs);
+    add_ties(scene, iterate, rows, rhs);
+    hold_ends(scene.matter, rows, rhs);
+}
+
+/// Fills `rows` with what elasticity and mass make of them about `at`, and makes room in `rhs` (eq. 12–15).
+pub fn fill_matrix(scene: &Scene<'_>, at: &Config, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
+    rows.resize(at.u.len(), Row::ZERO);
+    rhs.resize(at.u.len(), DVec3::ZERO);
+    fill_segments(scene, at, rows);
+    fill_joints(scene, at, rows);
+}
+
+/// Mass, stretch and shear: D = (GA − b) I + (EA − GA) t tᵀ is the clamped stiffness (eq. 12, 13).
+fn fill_segments(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
+    let Matter { ea, ga, mu, rotary, damping, .. } = *scene.matter;
+    let (h2, slow) = (scene.h * scene.h, 1.0 + scene.h * damping);
+    let (sixth, turn) = (slow * mu / 6.0, slow * rotary);
+    let count = at.q.len();
+    let rows = &mut rows[..2 * count + 1];
+    let (length, t, e, b) = (&scene.division.length[..count], &at.t[..count], &at.e[..count], &at.b[..count]);
+    rows[0] = Row::ZERO;
+    for k in 0..count {
+        let (l, t, u) = (length[k], t[k], e[k]);
+        let (a, d) = (h2 * (ga - b[k]), h2 * (ea - ga));
+        let w = t.cross(u);
+        let mass = sixth * l;
+        let stiffness = (Sym3::identity(a) + Sym3::outer(t, d)) * (1.0 / l);
+        rows[2 * k].diag += stiffness + Sym3::identity(2.0 * mass);
+        let spin = Sym3::identity(turn * l + l * a * u.length_squared()) + Sym3::outer(t, turn * l);
+        let cross = cross_matrix(u * a);
+        rows[2 * k + 1] = Row {
+            diag: spin + Sym3::outer(u, -l * a) + Sym3::outer(w, l * d),
+            near: cross - product(w * d, t),
+            far: Sym3::ZERO,
+        };
+        rows[2 * k + 2] = Row {
+            diag: stiffness + Sym3::identity(2.0 * mass),
+            near: cross + product(t * d, w),
+            far: Sym3::identity(mass) + stiffness * -1.0,
+        };
+    }
+}
+
+/// Bend and twist about the joint's mean director, without their geometric terms (eq. 14).
+fn fill_joints(scene: &Scene<'_>, at: &Config, rows: &mut [Row]) {
+    let Scene { matter, division, .. } = *scene;
+    let (h2, count) = (scene.h * scene.h, at.q.len());
+    let stiffness = |k: usize, axis: DVec3| {
+        let size = axis.length_squared();
+        let scale = h2 * division.joint[k];
+        let twist = if size > 0.0 { scale * (matter.gj - matter.ei) / size } else { 0.0 };
+        Sym3::identity(scale * matter.ei) + Sym3::outer(axis, twist)
+    };
+    if matter.clamp[0] {
+        rows[1].diag += stiffness(0, at.t[0]);
+    }
+    for k in 1..count {
+        let joint = stiffness(k, at.t[k - 1] + at.t[k]);
+        rows[2 * k - 1].diag += joint;
+        rows[2 * k + 1].diag += joint;
+        rows[2 * k + 1].far = joint * -1.0;
+    }
+    if matter.clamp[1] {
+        rows[2 * count - 1].diag += stiffness(count, at.t[count - 1]);
+    }
+}
+
+/// r = M (v_n − v_i) − h c M v_i + h f (eq. 11), the spin of v_n turned by its own gyroscopic torque (eq. 19).
+fn fill_right_side(scene: &Scene<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) {
+    let Matter { mu, rotary, damping, .. } = *scene.matter;
+    let (h, slow) = (scene.h, 1.0 + scene.h * damping);
+    let (start, force) = (iterate.start, &iterate.at.force);
+    let count = start.q.len();
+    let want = |slot: usize| start.u[slot] - iterate.moved(slot) * slow;
+    let mut a = want(0);
+    rhs[0] = force[0] * h;
+    for k in 0..count {
+        let l = scene.division.length[k];
+        let b = want(2 * k + 2);
+        let m = mu * l / 6.0;
+        rhs[2 * k] += (a * 2.0 + b) * m;
+        rhs[2 * k + 2] = force[2 * k + 2] * h + (b * 2.0 + a) * m;
+        let t = iterate.at.t[k];
+        let spin = gyrate(start.u[2 * k + 1], t, h) - iterate.moved(2 * k + 1) * slow;
+        rhs[2 * k + 1] = force[2 * k + 1] * h + (spin + t * t.dot(spin)) * (rotary * l);
+        a = b;
+    }
+}
+
+/// Turns a spin as its gyroscopic torque does in `h`: about t by t·ω h, without a change of energy (eq. 19).
+#[inline]
+pub fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
+    let a = 0.5 * h * t.dot(w);
+    let side = t.cross(w);
+    w + (side + t.cross(side) * a) * (2.0 * a / (1.0 + a * a))
+}
+
+/// Attachments, linearised where the point is bound for so that a slack one is caught in time (eq. 21–23).
+pub fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+    let h = scene.h;
+    for spring in scene.springs {
+        let slot = 2 * spring.node;
+        let ahead = if iterate.first { iterate.start.u[slot] * h } else { DVec3::ZERO };
+        let linear = spring.linear(iterate.at.x[spring.node] + ahead);
+        rows[slot].diag += linear.stiffness * (h * h) + Sym3::identity(h * linear.damping);
+        let force = linear.force + linear.stiffness * ahead - iterate.moved(slot) * linear.damping;
+        rhs[slot] += force * h;
+    }
+}
+
+/// Pulls, shared between the two nodes of their segment (eq. 24).
+pub fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
+    for tie in scene.ties {
+        let (left, right) = (2 * tie.segment, 2 * tie.segment + 2);
+        let point = tie.mix(iterate.at.x[tie.segment], iterate.at.x[tie.segment + 1]);
+        let moved = tie.mix(iterate.moved(left), iterate.moved(right));
+        let impulse = tie.force(point, moved, scene.until) * scene.h;
+        let (implicit, w) = (tie.implicit(scene.h), tie.share);
+        rows[left].diag += implicit * ((1.0 - w) * (1.0 - w));
+        rows[right].diag += implicit * (w * w);
+        rows[right].far += implicit * (w * (1.0 - w));
+        rhs[left] += impulse * (1.0 - w);
+        rhs[right] += impulse * w;
+    }
+}
+
+/// Takes the positions of held ends out of the system: their velocity is zero, whatever acts.
+pub fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
+    let last = rows.len() - 1;
+    if matter.held[0] {
+        rows[0].diag = Sym3::identity(1.0);
+        rows[1].near = DMat3::ZERO;
+        rows[2].far = Sym3::ZERO;
+        rhs[0] = DVec3::ZERO;
+    }
+    if matter.held[1] {
+        rows[last] = Row { diag: Sym3::identity(1.0), ..Row::ZERO };
+        rhs[last] = DVec3::ZERO;
+    }
+}
+
+#[inline]
+fn cross_matrix(v: DVec3) -> DMat3 {
+    DMat3::from_cols(DVec3::new(0.0, v.z, -v.y), DVec3::new(-v.z, 0.0, v.x), DVec3::new(v.y, -v.x, 0.0))
+}
+
+/// a bᵀ.
+#[inline]
+fn product(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}

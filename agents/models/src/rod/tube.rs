@@ -1,0 +1,452 @@
+//! The tube as an agent: one divided rod, its holds, its radius, its rest.
+//!
+//! In: a [`TubeSpec`], steps, pulls, neighbours, wishes for a resolution. Out: snapshots ([`super::publish`]). Never here: how a
+//! step is solved ([`super::step`]), how others are met ([`super::company`]), how a state is carried to another division
+//! ([`super::remesh`]). Theory: docs/theory/rod.md.
+
+use super::anchor_springs::{NodeSpring, Tie, springs};
+use super::check::{TubeError, check};
+use super::company::Company;
+use super::contact::TubeContacts;
+use super::discretization;
+use super::discretization::Division;
+use super::horizon::owns_it;
+use super::publish::bounds;
+use super::remesh::Remesher;
+use super::rest::RestWatch;
+use super::rest_curve::Skeleton;
+use super::state::{Config, Matter};
+use super::step::{Lost, Setting, Stepper, energy};
+use super::step_doubling::Doubling;
+use super::{Section, TubeSpec};
+use glam::{DMat3, DVec3};
+use metachron_contact::beside;
+use metachron_contact::beside::has_a_say;
+use metachron_contact::crowd;
+use metachron_contact::crowd::Lately;
+use metachron_contact::smooth;
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{Grip, Resolution, SimSpan, SimTime, Snapshot, StepError, StepReport, check_span};
+use metachron_geometry::{Form, FormKind, height_j_kg};
+use std::sync::Arc;
+
+/// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
+pub const STRETCH_WARN: f64 = 1.4;
+
+/// A tube, cable or rod that lives by its own steps.
+#[derive(Debug, Clone)]
+pub struct Tube {
+    pub(super) spec: TubeSpec,
+    skeleton: Skeleton,
+    pub(super) matter: Matter,
+    pub(super) division: Division,
+    pub(super) now: Config,
+    pub(super) stepper: Stepper,
+    remesher: Remesher,
+    springs: Vec<NodeSpring>,
+    pub(super) ties: Vec<Tie>,
+    pub(super) ties_before: Vec<Tie>,
+    pub(super) grips: Vec<Grip>,
+    rest: RestWatch,
+    pub(super) doubling: Doubling,
+    pub(super) at_rest: bool,
+    /// Of the centre of mass in the last step, without what others gave at its start, m/s².
+    pub(super) acceleration: DVec3,
+    /// The same of each node; empty where nobody is near.
+    pub(super) accelerations: Vec<DVec3>,
+    /// The same where what it lies on carries it; empty where they do not foretell, or it lies on nothing.
+    pub(super) standing_accelerations: Vec<DVec3>,
+    /// The length of the step that these foretell, seconds; zero where they are those of the last one.
+    pub(super) ahead_s: f64,
+    pub(super) resolution: Resolution,
+    time: SimTime,
+    /// From which of its times on its wave counts, seconds.
+    wave_from_s: f64,
+    pub(super) dt_s: f64,
+    pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
+}
+
+/// The outer radius under `pressure_pa` inside: r + p r² (1 − ν/2)/(E t) (docs/theory/rod.md, eq. 33).
+#[must_use]
+pub fn pressed_radius_m(section: &Section, pressure_pa: f64) -> f64 {
+    let Section { radius_m: r, wall_m, young_pa, poisson, .. } = *section;
+    r + pressure_pa * r * r * (1.0 - 0.5 * poisson) / (young_pa * wall_m)
+}
+
+impl Tube {
+    /// Builds a tube that stands still on its path, stress-free but for what [`TubeSpec::straight`] and a twist make of it.
+    ///
+    /// # Errors
+    /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
+    pub fn new(spec: TubeSpec) -> Result<Self, TubeError> {
+        check(&spec)?;
+        let skeleton = Skeleton::new(&spec.path_m).strained(spec.straight, spec.twist_rad);
+        let resolution = spec.range.clamp(spec.resolution);
+        let count = match spec.segments {
+            Some(count) => discretization::limit(&skeleton, count),
+            None => discretization::segments_for(&skeleton, resolution.eps_m),
+        };
+        let division = Division::first(&skeleton, count);
+        let matter = matter_of(&spec);
+        let mut now = Config::at_rest(&division);
+        now.strain(&matter, &division);
+        let mut tube = Self {
+            resolution: held(resolution, &skeleton, count),
+            spec,
+            skeleton,
+            matter,
+            division,
+            now,
+            stepper: Stepper::default(),
+            remesher: Remesher::default(),
+            springs: vec![],
+            ties: vec![],
+            ties_before: vec![],
+            grips: vec![],
+            rest: RestWatch::default(),
+            doubling: Doubling::default(),
+            at_rest: false,
+            acceleration: DVec3::ZERO,
+            accelerations: vec![],
+            standing_accelerations: vec![],
+            ahead_s: 0.0,
+            time: SimTime::ZERO,
+            wave_from_s: 0.0,
+            dt_s: 0.0,
+            steps: 0,
+            lately: Lately::default(),
+        };
+        let held_ends = tube.matter.held.map(u8::from).iter().sum();
+        let height_j_kg = height_j_kg(&tube.now.x, tube.spec.gravity, held_ends > 0);
+        let kind = FormKind::Chain { held_ends, height_j_kg };
+        let form = Form { kind, friction: tube.spec.friction, restitution: 0.0 };
+        tube.stepper.company = Company::new(Arc::new(form), tube.mass_kg());
+        springs(&tube.spec.attachments, &tube.division, &mut tube.springs);
+        tube.stepper.contacts = TubeContacts::new(&tube.spec.obstacles, tube.spec.self_contact, tube.spec.friction)?;
+        tube.prepare();
+        Ok(tube)
+    }
+
+    /// Sees to it that others can be told how this tube answers impulses, before its first step too.
+    /// A matrix that has no factor is the next step's to report.
+    fn prepare(&mut self) {
+        let _ = self.step_by(self.dt_s, |stepper, now, setting, _| stepper.prepare(now, setting));
+    }
+
+    /// Lends the stepper all it works on, for a step of `dt` seconds.
+    pub(super) fn step_by<T>(
+        &mut self,
+        dt: f64,
+        act: impl FnOnce(&mut Stepper, &mut Config, &Setting<'_>, &mut [Tie]) -> T,
+    ) -> T {
+        let Self { stepper, now, ties, matter, division, springs, .. } = self;
+        let substeps = self.spec.substeps.max(stepper.company.parts(dt));
+        let integrator = self.spec.integrator;
+        let longest_s = integrator.longest_substep_s(matter, division).unwrap_or(f64::INFINITY);
+        act(stepper, now, &Setting { matter, division, springs, dt, substeps, integrator, longest_s }, ties)
+    }
+
+    /// The numbers it was built from.
+    #[must_use]
+    pub fn spec(&self) -> &TubeSpec {
+        &self.spec
+    }
+
+    /// Rest length of the centre line, metres.
+    #[must_use]
+    pub fn length_m(&self) -> f64 {
+        self.skeleton.length_m()
+    }
+
+    /// How many segments the simulation has now: 2 … 4096.
+    #[must_use]
+    pub fn segments(&self) -> usize {
+        self.division.segments()
+    }
+
+    /// The largest stretch of any segment along its director, 1 at rest.
+    #[must_use]
+    pub fn stretch(&self) -> f64 {
+        self.now.stretch
+    }
+
+    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravity's, zero at the origin.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        energy(&self.now, &self.springs)
+    }
+
+    /// What a user should know of the present state: one sentence each, none as a rule.
+    #[must_use]
+    pub fn warnings(&self) -> Vec<String> {
+        let mut list = vec![];
+        if self.now.stretch > STRETCH_WARN {
+            let Matter { ea, ga, .. } = self.matter;
+            let limit = if ea > ga { ea / (ea - ga) } else { f64::INFINITY };
+            list.push(format!(
+                "the tube is stretched {:.2} times (warned of above {STRETCH_WARN}): past {limit:.2} its sections tilt and the answer is no longer that of a tube; use a stiffer or lighter one",
+                self.now.stretch
+            ));
+        }
+        list
+    }
+
+    /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
+    /// impulse (N·s) on it causes, within the substep that ended last (docs/theory/rod.md, eq. 18).
+    ///
+    /// One O(N) sweep. `None` before the first step, and after a change of resolution until the next where nobody else is near.
+    #[must_use]
+    pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
+        let stepped = (self.steps > 0).then_some(&self.stepper)?;
+        stepped.inverse_mass(self.division.locate(arc_m), &self.matter, self.now.u.len())
+    }
+
+    /// Outer radius at a rest arc length in metres at the tube's own time (docs/theory/rod.md, eq. 33, 34).
+    #[must_use]
+    pub fn radius_at_m(&self, arc_m: f64) -> f64 {
+        self.radius_then_m(arc_m, self.time)
+    }
+
+    /// The same at another time.
+    pub(super) fn radius_then_m(&self, arc_m: f64, time: SimTime) -> f64 {
+        let radius = pressed_radius_m(&self.spec.section, self.spec.pressure_pa);
+        let Some(wave) = self.spec.peristalsis else { return radius };
+        let phase = (arc_m - wave.speed_m_s * (time.as_secs_f64() - self.wave_from_s)) / wave.wavelength_m;
+        let lift = 0.5 * (1.0 + libm::cos(std::f64::consts::TAU * phase));
+        radius * (1.0 - wave.amplitude * lift)
+    }
+
+    /// The widest its skin can be, metres.
+    pub(super) fn widest_m(&self) -> f64 {
+        pressed_radius_m(&self.spec.section, self.spec.pressure_pa)
+    }
+
+    /// Tells the contacts how wide the tube will be at the end of the step.
+    fn widen(&mut self, then: SimTime) {
+        let mut contacts = std::mem::take(&mut self.stepper.contacts);
+        let met = !self.stepper.company.is_empty();
+        contacts.widen(self.division.arc_m.iter().map(|&s| self.radius_then_m(s, then)), met);
+        self.stepper.contacts = contacts;
+    }
+
+    /// Makes a step of `dt` seconds in so many substeps again where it is its turn.
+    fn double(&mut self, (dt, substeps): (f64, u32)) {
+        if !self.doubling.is_on() {
+            return;
+        }
+        let mut doubling = std::mem::take(&mut self.doubling);
+        self.step_by(dt, |stepper, now, setting, _| doubling.end(stepper, now, &Setting { substeps, ..*setting }));
+        self.doubling = doubling;
+    }
+
+    fn write_grips(&mut self, dt: f64) {
+        self.grips.clear();
+        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
+    }
+
+    pub(super) fn diverged(&self, lost: Lost, dt_s: f64) -> StepError {
+        let what = match lost.slot {
+            Some(slot) if slot % 2 == 0 => format!("the system's pivot at node {}", slot / 2),
+            Some(slot) => format!("the system's pivot at segment {}", slot / 2),
+            None => "positions or velocities".to_owned(),
+        };
+        StepError::Diverged { model: self.model(), dt_s, what }
+    }
+
+    /// Notes how the tube moves before its step, for [`Self::end_watch`]: its momentum, where anybody wants to know.
+    fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
+        self.accelerations.clear();
+        self.standing_accelerations.clear();
+        self.accelerations.extend(self.now.u.iter().filter(|_| watched));
+        watched.then(|| self.momentum().0)
+    }
+
+    /// Works out what others may expect after a step of `dt` seconds.
+    fn end_watch(&mut self, before: Option<DVec3>, around: &Surroundings<'_>, dt: f64) {
+        let Some(before) = before else { return };
+        let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
+        self.acceleration = smooth(gained / (self.mass_kg() * dt), gravity);
+        if self.is_foretold(around, dt) {
+            self.foretell(dt);
+            return;
+        }
+        // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
+        let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
+        for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {
+            let gained = (*u - *a) / dt;
+            *a = match slot % 2 {
+                1 => DVec3::ZERO,
+                _ if lasts => gained,
+                _ => smooth(gained, gravity),
+            };
+        }
+    }
+
+    /// Whether the tube is at rest after a step of `dt` seconds; it then stands still exactly.
+    fn watch_rest(&mut self, dt: f64) -> bool {
+        let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
+        if !self.spec.sleep || wave || !self.ties.is_empty() || !self.stepper.company.is_calm() {
+            self.rest.wake();
+            return false;
+        }
+        let at_rest = self.rest.observe(&self.now, dt);
+        if at_rest {
+            self.doubling.rest();
+            self.now.u.fill(DVec3::ZERO); // what is drawn of a sleeping tube must not drift
+            self.now.kinetic_j = 0.0;
+        }
+        at_rest
+    }
+}
+
+/// What tests look into.
+#[cfg(test)]
+impl Tube {
+    pub(super) fn matter(&self) -> &Matter {
+        &self.matter
+    }
+
+    pub(super) fn division(&self) -> &Division {
+        &self.division
+    }
+
+    pub(super) fn state(&self) -> &Config {
+        &self.now
+    }
+
+    /// Replaces the state, as violent starts do; its strains are brought up to date.
+    pub(super) fn set_state(&mut self, mut state: Config) {
+        state.strain(&self.matter, &self.division);
+        self.now = state;
+    }
+}
+
+impl Agent for Tube {
+    fn model(&self) -> &'static str {
+        "tube"
+    }
+
+    /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
+    ///
+    /// meet     what others gave, and who is near
+    /// pulls    the springs of hands and tools on this tube, and its links
+    /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
+    /// doubling what the step did wrong, now and then
+    /// grips    the mean force of each pull
+    /// rest     whether it could sleep
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        self.check_substep(dt_s)?;
+        self.meet(around, dt)?;
+        self.take_pulls(around);
+        self.widen(around.time + dt);
+        let watched = self.stepper.company.is_watched();
+        let before = self.begin_watch(watched);
+        self.stepper.solves = 0;
+        self.doubling.begin((self.steps, around.me), (&self.now, &self.ties), &self.stepper);
+        let taken = self.step_by(dt_s, Stepper::step);
+        let substeps = taken.map_err(|lost| self.diverged(lost, dt_s))?;
+        self.stepper.weigh(self.matter.held);
+        self.stepper.stand(self.matter.held, watched);
+        self.double((dt_s, substeps));
+        self.write_grips(dt_s);
+        self.stepper.company.close(around, dt_s);
+        self.end_watch(before, around, dt_s);
+        self.foresee(around, dt_s);
+        self.time = around.time + dt;
+        self.lately.pass(self.stepper.contacts.is_grounded(), dt_s);
+        self.steps += 1;
+        self.at_rest = self.watch_rest(dt_s);
+        let work = self.segments() as f64 * f64::from(self.stepper.solves);
+        Ok(StepReport { work, substeps, at_rest: self.at_rest })
+    }
+
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        self.foresee(around, dt.as_secs_f64());
+    }
+
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let bounds = || bounds(&self.now, self.widest_m());
+        let dt = beside::longest_step(dt, around, bounds, |n| has_a_say(n, around));
+        let Some(form) = self.stepper.company.form() else { return dt };
+        crowd::crowded(dt, around, bounds, crowd::Member::bent(self.lately, form))
+    }
+
+    fn rename_time(&mut self, by_s: f64) {
+        self.wave_from_s += by_s;
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        Some(self.resolution)
+    }
+
+    fn retune(&mut self, wanted: Resolution) {
+        let wanted = self.spec.range.clamp(wanted);
+        let (fine, coarse) = self.spec.range.eps_m;
+        self.resolution.n = wanted.n;
+        if fine == coarse {
+            return; // a fixed spacing: the division is the scene's
+        }
+        let count = discretization::segments_for(&self.skeleton, wanted.eps_m);
+        self.resolution = held(wanted, &self.skeleton, count);
+        if count == self.segments() {
+            return;
+        }
+        let old = self.division.clone();
+        let arcs = self.remesher.arcs(&self.now, &old, count);
+        self.division.rebuild(&self.skeleton, arcs);
+        let mut next = Config::default();
+        self.remesher.carry(&self.matter, (&self.now, &old), (&mut next, &self.division));
+        next.strain(&self.matter, &self.division);
+        self.now = next;
+        springs(&self.spec.attachments, &self.division, &mut self.springs);
+        self.stepper.forget();
+        self.ties.iter_mut().for_each(Tie::forget);
+        self.rest.wake();
+        self.at_rest = false;
+        if self.stepper.company.is_watched() {
+            self.prepare();
+        }
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        self.publish(into);
+    }
+
+    fn form(&self) -> Option<Arc<Form>> {
+        self.stepper.company.form().cloned()
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        self.now.momentum(&self.matter, &self.division)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.matter.mu * self.length_m()
+    }
+}
+
+fn matter_of(spec: &TubeSpec) -> Matter {
+    let s = &spec.section;
+    Matter {
+        ea: s.ea_n,
+        ga: s.ga_n,
+        ei: s.ei_n_m2,
+        gj: s.gj_n_m2,
+        mu: spec.mass_per_length_kg_m,
+        rotary: s.rotary_kg_m,
+        damping: spec.damping_per_s,
+        gravity: spec.gravity,
+        clamp: spec.clamp,
+        held: [0, 1].map(|end| spec.clamp[end] || spec.pin[end]),
+    }
+}
+
+/// The resolution that `count` segments are: the wish where it gave that count, else the mean spacing.
+fn held(wanted: Resolution, skeleton: &Skeleton, count: usize) -> Resolution {
+    let kept = discretization::segments_for(skeleton, wanted.eps_m) == count;
+    let exact = libm::ceil(skeleton.length_m() / wanted.eps_m - 1e-9) == count as f64;
+    if kept && exact { wanted } else { Resolution { eps_m: skeleton.length_m() / count as f64, n: wanted.n } }
+}

@@ -1,0 +1,145 @@
+//! The tube as compliant constraints (XPBD, MMC16), projected one by one from one end to the other and back.
+//!
+//! In: a state and the velocities without elasticity. Out: the velocities that lead to where the constraints put nodes and
+//! frames. Never here: gravity, springs from outside, contact. Theory: docs/theory/rod.md, eq. 41, 42.
+
+use super::discretization::Division;
+use super::rotation::{bend_share, exp, log, unit};
+use super::state::{Config, Matter};
+use super::sym3::Sym3;
+use glam::{DQuat, DVec3};
+
+/// Room to work in.
+#[derive(Debug, Clone, Default)]
+pub struct Projector {
+    x: Vec<DVec3>,
+    q: Vec<DQuat>,
+    /// What stretch and shear have given so far, in each segment's own axes.
+    pull: Vec<DVec3>,
+    /// What bend and twist have given so far, in the axes of what lies before each joint.
+    turn: Vec<DVec3>,
+    /// What the last projection made of velocities, in slots.
+    gain: Vec<DVec3>,
+}
+
+/// What a constraint needs besides the state.
+struct Law<'a> {
+    matter: &'a Matter,
+    division: &'a Division,
+    /// 1/h².
+    rate2: f64,
+}
+
+impl Projector {
+    /// Projects what `velocities` lead to from `now` in `h` seconds, and makes them lead there.
+    pub fn project(&mut self, now: &Config, velocities: &mut [DVec3], of: (&Matter, &Division), h: f64) {
+        let law = Law { matter: of.0, division: of.1, rate2: 1.0 / (h * h) };
+        let count = now.q.len();
+        self.predict(now, velocities, h);
+        for k in 0..count {
+            self.joint(k, &law);
+            self.segment(k, &law);
+        }
+        self.joint(count, &law);
+        for k in (0..count).rev() {
+            self.segment(k, &law);
+            self.joint(k, &law);
+        }
+        self.gain.iter_mut().step_by(2).for_each(|way| *way /= h);
+        for k in 0..count {
+            self.gain[2 * k + 1] = log(self.q[k] * now.q[k].conjugate()) / h - velocities[2 * k + 1];
+        }
+        velocities.iter_mut().zip(&self.gain).for_each(|(v, gain)| *v += *gain);
+    }
+
+    /// What the last projection changed of the velocity of a slot; nothing where there was none.
+    pub fn gain(&self, slot: usize) -> DVec3 {
+        self.gain.get(slot).copied().unwrap_or(DVec3::ZERO)
+    }
+
+    fn predict(&mut self, now: &Config, velocities: &[DVec3], h: f64) {
+        let count = now.q.len();
+        self.x.clear();
+        self.x.extend(now.x.iter().zip(velocities.iter().step_by(2)).map(|(x, v)| *x + *v * h));
+        self.q.clear();
+        self.q.extend(now.q.iter().zip(velocities.iter().skip(1).step_by(2)).map(|(q, w)| unit(exp(*w * h) * *q)));
+        self.pull.clear();
+        self.pull.resize(count, DVec3::ZERO);
+        self.turn.clear();
+        self.turn.resize(count + 1, DVec3::ZERO);
+        self.gain.clear();
+        self.gain.resize(2 * count + 1, DVec3::ZERO);
+    }
+
+    /// Moves a node, and sums up how far: differences of places would round its momentum.
+    fn shift(&mut self, node: usize, way: DVec3) {
+        self.x[node] += way;
+        self.gain[2 * node] += way;
+    }
+
+    /// C = Rᵀ u − s₀ ẑ with compliance K⁻¹/l (eq. 41).
+    fn segment(&mut self, k: usize, law: &Law<'_>) {
+        let Matter { ea, ga, rotary, .. } = *law.matter;
+        let (l, q) = (law.division.length[k], self.q[k]);
+        let u = q.conjugate() * ((self.x[k + 1] - self.x[k]) / l);
+        let (wa, wb) = (law.lightness(k), law.lightness(k + 1));
+        let compliance = DVec3::new(1.0 / ga, 1.0 / ga, 1.0 / ea) * (law.rate2 / l);
+        let own = 1.0 / (rotary * l);
+        let turned = Sym3::outer(DVec3::new(0.0, u.z, -u.y), own)
+            + Sym3::outer(DVec3::new(-u.z, 0.0, u.x), own)
+            + Sym3::outer(DVec3::new(u.y, -u.x, 0.0), 0.5 * own);
+        let whole = turned + Sym3::identity((wa + wb) / (l * l)) + Sym3::diagonal(compliance);
+        let Some(inverse) = whole.inverse() else { return };
+        let wrong = u - DVec3::Z * law.division.chord[k] + compliance * self.pull[k];
+        let given = inverse * -wrong;
+        self.pull[k] += given;
+        let way = q * given / l;
+        self.shift(k, way * -wa);
+        self.shift(k + 1, way * wb);
+        let about = given.cross(u) * DVec3::new(own, own, 0.5 * own);
+        self.q[k] = unit(exp(q * about) * q);
+    }
+
+    /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall holds it (eq. 42).
+    fn joint(&mut self, k: usize, law: &Law<'_>) {
+        let Matter { ei, gj, rotary, clamp, .. } = *law.matter;
+        let count = self.q.len();
+        if (k == 0 && !clamp[0]) || (k == count && !clamp[1]) {
+            return;
+        }
+        let Division { wall, joint, bend, length, .. } = law.division;
+        let before = if k == 0 { wall[0] } else { self.q[k - 1] };
+        let after = if k == count { wall[1] } else { self.q[k] };
+        let theta = log(before.conjugate() * after);
+        let compliance = DVec3::new(1.0 / ei, 1.0 / ei, 1.0 / gj) * (law.rate2 / joint[k]);
+        let own = |segment: usize, moves: bool| if moves { 1.0 / (rotary * length[segment]) } else { 0.0 };
+        let (wa, wb) = (own(k.saturating_sub(1), k > 0), own(k.min(count - 1), k < count));
+        let shape = DVec3::new(1.0, 1.0, 0.5);
+        let wrong = theta - bend[k] + compliance * self.turn[k];
+        let given = -wrong / (shape * (wa + wb) + compliance);
+        self.turn[k] += given;
+        // the gradient of the rotation vector (eq. 6)
+        let across = theta.cross(given);
+        let moment = given + across * 0.5 + theta.cross(across) * bend_share(theta.length_squared());
+        if k > 0 {
+            let turn = before * (moment * shape * -wa);
+            self.q[k - 1] = unit(exp(turn) * before);
+        }
+        if k < count {
+            let own_axes = after.conjugate() * (before * moment);
+            self.q[k] = unit(exp(after * (own_axes * shape * wb)) * after);
+        }
+    }
+}
+
+impl Law<'_> {
+    /// One over the mass of a node; zero where it is held.
+    fn lightness(&self, node: usize) -> f64 {
+        let (length, held) = (&self.division.length, self.matter.held);
+        if (node == 0 && held[0]) || (node == length.len() && held[1]) {
+            return 0.0;
+        }
+        let beside = [node.checked_sub(1), Some(node)].into_iter().flatten();
+        2.0 / (self.matter.mu * beside.filter_map(|k| length.get(k)).sum::<f64>())
+    }
+}

@@ -1,0 +1,139 @@
+//! Springs from outside at vertices of a soft body: hands, tools, links. Implicit in the step.
+//!
+//! In: pulls and links. Out: forces and stiffness in the system, and what each gave. Never here: vertices that never move.
+//! Theory: docs/theory/soft.md, eq. 3, 4; docs/theory/coupling.md, eq. 9.
+
+use super::system::System;
+use glam::{DMat3, DVec3};
+use metachron_contact::Pull;
+use metachron_contact::{Far, Link, Pulled};
+use metachron_core::{AgentId, Anchor};
+
+/// A spring on one vertex.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Tie {
+    /// Who pulls; `None` is the user's hand.
+    pub by: Option<AgentId>,
+    /// Which vertex.
+    pub vertex: usize,
+    /// The link that it is, if the other end gives way.
+    pub link: Option<Link>,
+    /// Where the other end is at the start of the substep, metres, and how it moves, m/s.
+    target: DVec3,
+    target_velocity: DVec3,
+    /// N/m and N·s/m.
+    stiffness: DMat3,
+    damping: DMat3,
+    /// What is left of a force because the other end gives way.
+    ease: DMat3,
+    /// The impulse of the substep if the vertex stood still, N·s, and what its velocity takes away, kg.
+    still: DVec3,
+    eased: DMat3,
+    /// What a velocity of the far end adds to that impulse, kg, and how the far end yields to all links to the same agent as if
+    /// they were at one point, 1/kg.
+    reach: DMat3,
+    yields: DMat3,
+    /// By how much the far end is expected to yield less than that, m/s.
+    spared: DVec3,
+    /// The impulse of the last substep, and of the step, N·s.
+    pub given: DVec3,
+    pub impulse: DVec3,
+}
+
+impl Tie {
+    /// The tie of a pull; `None` where it has no such vertex or is not finite.
+    pub fn of_pull(pull: &Pull, count: usize) -> Option<Self> {
+        let finite = pull.target.is_finite() && pull.target_velocity.is_finite();
+        let tie = Self::at(pull.anchor, (pull.stiffness_n_m, pull.damping_n_s_m), count)?;
+        let (target, target_velocity) = (pull.target, pull.target_velocity);
+        finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
+    }
+
+    /// The tie of a link, whose far end is told later ([`Tie::aim`]).
+    pub fn of_link(link: &Link, count: usize) -> Option<Self> {
+        let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), count)?;
+        Some(Self { by: Some(link.other), link: Some(*link), ..tie })
+    }
+
+    fn at(anchor: Anchor, (stiffness, damping): (f64, f64), count: usize) -> Option<Self> {
+        let Anchor::Vertex(vertex) = anchor else { return None };
+        let fair = |c: f64| c.is_finite() && c >= 0.0;
+        let known = (vertex as usize) < count && fair(stiffness) && fair(damping);
+        known.then(|| Self {
+            by: None,
+            vertex: vertex as usize,
+            link: None,
+            target: DVec3::ZERO,
+            target_velocity: DVec3::ZERO,
+            stiffness: round(stiffness),
+            damping: round(damping),
+            ease: DMat3::IDENTITY,
+            still: DVec3::ZERO,
+            eased: DMat3::ZERO,
+            reach: DMat3::ZERO,
+            yields: DMat3::ZERO,
+            spared: DVec3::ZERO,
+            given: DVec3::ZERO,
+            impulse: DVec3::ZERO,
+        })
+    }
+
+    /// Takes in where the far end of a link is for a substep of `h` seconds that begins with this end at `point`; `shared`
+    /// links pull at that agent in all.
+    pub fn aim(&mut self, far: &Far, point: DVec3, (h, shared): (f64, usize)) {
+        let Some(link) = self.link else { return };
+        let spring = far.spring(&link, point);
+        (self.stiffness, self.damping) = (spring.stiffness, spring.damping);
+        (self.target, self.target_velocity) = (spring.target, far.velocity);
+        let resistance = self.stiffness * (h * h) + self.damping * h;
+        self.yields = far.inverse_mass * shared as f64;
+        self.ease = (DMat3::IDENTITY + resistance * self.yields).inverse();
+    }
+
+    /// What it gave in the last substep; `None` where nobody feels it.
+    pub fn pulled(&self) -> Option<Pulled> {
+        self.by.map(|by| Pulled { by, link: self.link, given: self.given })
+    }
+
+    /// By how much more the far end is spared than was expected, m/s, where the links to its agent make it `move_m_s` and this end
+    /// has this velocity (eq. 4a).
+    pub fn amiss(&self, move_m_s: DVec3, velocity: DVec3) -> DVec3 {
+        move_m_s + self.yields * self.gives(velocity) - self.spared
+    }
+
+    /// Expects the far end to be spared by `more`, m/s; the impulse that adds.
+    pub fn spare(&mut self, more: DVec3) -> DVec3 {
+        self.spared += more;
+        let impulse = self.reach * more;
+        self.still += impulse;
+        impulse
+    }
+
+    /// The impulse that it gives if this end has this velocity after the substep.
+    pub fn gives(&self, velocity: DVec3) -> DVec3 {
+        self.still - self.eased * velocity
+    }
+
+    /// Adds what it does in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
+    pub fn add(&mut self, position: DVec3, h: f64, system: &mut System) {
+        let eased = self.ease * (self.stiffness * (h * h) + self.damping * h);
+        self.eased = (eased + eased.transpose()) * 0.5;
+        (self.reach, self.spared) = (eased, DVec3::ZERO);
+        let apart = self.target + self.target_velocity * h - position;
+        let force = self.ease * (self.stiffness * apart + self.damping * self.target_velocity);
+        self.still = force * h;
+        system.weigh(self.vertex, self.eased);
+        system.push(self.vertex as u32, force);
+    }
+
+    /// Books what it gave in a substep of `h` seconds that ended with `velocity`, and lets a led end go on.
+    pub fn book(&mut self, velocity: DVec3, h: f64) {
+        self.given = self.gives(velocity);
+        self.impulse += self.given;
+        self.target += self.target_velocity * h;
+    }
+}
+
+fn round(value: f64) -> DMat3 {
+    DMat3::from_diagonal(DVec3::splat(value))
+}

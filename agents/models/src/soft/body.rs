@@ -1,0 +1,256 @@
+//! The soft body as an agent: vertices, what joins them, its rest.
+//!
+//! In: a [`SoftSpec`], steps, pulls, neighbours. Out: snapshots ([`super::publish`]). Never here: how a step is solved
+//! ([`super::step`]), how others are met ([`super::company`]). Theory: docs/theory/soft.md.
+
+use super::anchor_springs::Tie;
+use super::company::Company;
+use super::contact::Contacts;
+use super::fe_mesh::Lattice;
+use super::footing::Footing;
+use super::foretold::Foretold;
+use super::spec::{SoftError, SoftSpec};
+use super::step::HASTE_MAX;
+use super::step_doubling::Doubling;
+use super::system::System;
+use glam::DVec3;
+use metachron_contact::beside;
+use metachron_contact::beside::has_a_say;
+use metachron_contact::crowd;
+use metachron_contact::crowd::Lately;
+use metachron_contact::{Agent, Neighbour, Surroundings};
+use metachron_contact::{Knock, Law, Link};
+use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftState, StepError, StepReport, check_span};
+use metachron_geometry::{Form, FormKind, Placed, View, height_j_kg};
+use std::sync::Arc;
+
+/// A sheet, solid or rope that lives by its own steps.
+pub struct SoftBody {
+    pub(super) spec: SoftSpec,
+    pub(super) lattice: Lattice,
+    pub(super) system: System,
+    pub(super) positions: Vec<DVec3>,
+    pub(super) velocities: Vec<DVec3>,
+    /// The velocities a substep would end with, if nothing were touched.
+    pub(super) free: Vec<DVec3>,
+    /// What others gave since the last step, N·s a vertex, until it is taken in; empty for nothing.
+    pub(super) given: Vec<DVec3>,
+    pub(super) ties: Vec<Tie>,
+    pub(super) company: Company,
+    /// Who sleeps in its way.
+    pub(super) knock: Knock,
+    pub(super) contacts: Contacts,
+    pub(super) grips: Vec<Grip>,
+    /// Of the centre of mass in the last step, without what others gave, m/s².
+    pub(super) acceleration: DVec3,
+    /// What it tells others of its next step.
+    pub(super) foretold: Foretold,
+    /// Where fixed solids carry it.
+    pub(super) footing: Footing,
+    pub(super) at_rest: bool,
+    pub(super) doubling: Doubling,
+    before: Vec<DVec3>,
+    quiet_s: f64,
+    pub(super) steps: u64,
+    /// What it did lately.
+    pub(super) lately: Lately,
+}
+
+/// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is not seen on any screen.
+const SPEED_MAX_M_S: f64 = 1e-4;
+/// A vertex is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
+const ACCELERATION_MAX_M_S2: f64 = 1e-2;
+/// For so long all vertices must have been quiet, seconds of the body's own time.
+const QUIET_S: f64 = 0.5;
+
+impl SoftBody {
+    /// Builds the body of `spec` in its rest shape.
+    ///
+    /// # Errors
+    /// [`SoftError`] for a number outside its range, a side it does not have, an obstacle that is no shape.
+    pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
+        spec.check()?;
+        let lattice = Lattice::new(&spec);
+        let rotation = spec.rotation.normalize();
+        let positions: Vec<_> = lattice.rest.iter().map(|rest| spec.position + rotation * *rest).collect();
+        let velocities: Vec<_> =
+            lattice.held.iter().map(|&held| if held { DVec3::ZERO } else { spec.velocity }).collect();
+        let held = lattice.held.contains(&true);
+        let height_j_kg = height_j_kg(&positions, spec.gravity, held);
+        let surface = lattice.surface(height_j_kg);
+        let edge_m = surface.edge_m;
+        let form = Form { kind: FormKind::Surface(surface), friction: spec.friction, restitution: 0.0 };
+        let contacts = Contacts::new(&spec, Arc::new(form), edge_m)?;
+        Ok(Self {
+            system: lattice.system(),
+            free: positions.clone(),
+            before: velocities.clone(),
+            positions,
+            velocities,
+            lattice,
+            contacts,
+            given: vec![],
+            ties: vec![],
+            company: Company::default(),
+            knock: Knock::default(),
+            grips: vec![],
+            acceleration: spec.gravity,
+            foretold: Foretold::default(),
+            footing: Footing::default(),
+            at_rest: false,
+            doubling: Doubling::default(),
+            quiet_s: 0.0,
+            steps: 0,
+            lately: Lately::default(),
+            spec,
+        })
+    }
+
+    /// Its vertices as a snapshot shows them.
+    #[must_use]
+    pub fn start(&self) -> Body {
+        Body::Soft(SoftState { positions: self.positions.clone(), velocities: self.velocities.clone() })
+    }
+
+    /// What it was built from.
+    #[must_use]
+    pub fn spec(&self) -> &SoftSpec {
+        &self.spec
+    }
+
+    /// Kinetic, elastic and gravitational energy, J.
+    #[must_use]
+    pub fn energy_j(&self) -> f64 {
+        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        let of =
+            |((mass, v), x): ((&f64, &DVec3), &DVec3)| mass * (0.5 * v.length_squared() - self.spec.gravity.dot(*x));
+        moving.map(of).sum::<f64>() + self.lattice.energy_j(&self.positions)
+    }
+
+    /// The box around it.
+    pub(super) fn bounds(&self) -> Bounds {
+        let (low, high) = metachron_geometry::bounds(&self.positions);
+        let speed = self.velocities.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        let radius_m = match &self.contacts.form.kind {
+            FormKind::Surface(surface) => surface.radius_m,
+            _ => 0.0,
+        };
+        Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
+    }
+
+    /// Lists this step's springs: hands, tools that hold it, and links whose pair it owns.
+    pub(super) fn take_ties(&mut self, around: &Surroundings<'_>) {
+        let count = self.positions.len();
+        self.ties.clear();
+        self.ties.extend(around.pulls().filter_map(|pull| Tie::of_pull(&pull, count)));
+        let owned = |link: &&Link| around.neighbours.iter().any(|n| n.id == link.other && n.owned);
+        let links = around.links.iter().filter(|link| link.law == Law::Ledger).filter(owned);
+        self.ties.extend(links.filter_map(|link| Tie::of_link(link, count)));
+    }
+
+    /// Counts quiet time; whether it has been quiet for long enough.
+    fn watch_rest(&mut self, dt: f64) -> bool {
+        let Self { velocities, before, .. } = self;
+        let pairs = velocities.iter().zip(before.iter());
+        let limit = (SPEED_MAX_M_S, ACCELERATION_MAX_M_S2 * dt);
+        let mut still = pairs.map(|(v, was)| v.length() <= limit.0 && v.distance(*was) <= limit.1);
+        let calm = self.spec.sleep && self.ties.is_empty() && self.company.is_calm();
+        let quiet = calm && still.all(|still| still);
+        self.quiet_s = if quiet { self.quiet_s + dt } else { 0.0 };
+        let at_rest = self.quiet_s >= QUIET_S;
+        if at_rest {
+            self.doubling.watch.rest();
+            velocities.fill(DVec3::ZERO); // what is drawn of a sleeping body must not drift
+        }
+        before.clone_from(velocities);
+        at_rest
+    }
+
+    /// Finds who sleeps in its way.
+    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        let bounds = self.bounds();
+        let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
+        self.knock.find(&placed, &bounds, (around, dt_s));
+    }
+
+    /// Ends a step of `dt` seconds: books, grips, what others may expect; how many substeps more that took.
+    fn settle(&mut self, around: &Surroundings<'_>, dt: f64) -> u32 {
+        let mass_kg = self.mass_kg();
+        let Self { company, system, .. } = self;
+        company.mates_mut().weigh(system.vertices(), |impulses| system.respond(impulses));
+        self.company.close(around, (dt, mass_kg));
+        self.grips.clear();
+        self.grips.extend(self.ties.iter().map(|tie| Grip { by: tie.by, force_n: tie.impulse / dt }));
+        self.acceleration = if self.lattice.held.contains(&true) { DVec3::ZERO } else { self.spec.gravity };
+        let told = self.foretell(dt);
+        self.lately.pass(self.contacts.is_grounded(), dt);
+        self.steps += 1;
+        self.at_rest = self.watch_rest(dt);
+        self.wake_others(around, dt);
+        told
+    }
+}
+
+impl Agent for SoftBody {
+    fn model(&self) -> &'static str {
+        self.spec.shape.model()
+    }
+
+    /// Advances by `dt`: one solve, more where an edge would turn or stretch too far in one.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        let (substeps, doubled) = self.advance(around, dt_s)?;
+        let told = self.settle(around, dt_s);
+        Ok(StepReport { work: self.work() * f64::from(substeps + doubled + told), substeps, at_rest: self.at_rest })
+    }
+
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let dt = beside::longest_step(dt, around, || self.bounds(), |n| has_a_say(n, around));
+        let dt = crowd::crowded(dt, around, || self.bounds(), crowd::Member::bent(self.lately, &self.contacts.form));
+        beside::unhurried(dt, around, || self.bounds(), |n| self.unhurried_m(n))
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    /// The division of a soft body is fixed by its scene: nothing changes.
+    fn retune(&mut self, _wanted: Resolution) {}
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.contacts.form.clone())
+    }
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        self.publish(into);
+    }
+
+    fn momentum(&self) -> (DVec3, DVec3) {
+        let moving = self.lattice.mass_kg.iter().zip(&self.velocities).zip(&self.positions);
+        moving.fold((DVec3::ZERO, DVec3::ZERO), |(linear, angular), ((mass, v), x)| {
+            let momentum = *v * *mass;
+            (linear + momentum, angular + x.cross(momentum))
+        })
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.lattice.mass_kg.iter().sum()
+    }
+}
+
+impl SoftBody {
+    /// How far a neighbour may come towards it in a step, metres: farther than an edge is long it would turn cells inside out before it is
+    /// felt. Another soft body is to be foreseen, as long as neither has to divide its step ([`HASTE_MAX`]).
+    fn unhurried_m(&self, neighbour: &Neighbour) -> Option<f64> {
+        let edge_m = self.contacts.edge_m();
+        match neighbour.form.as_deref().map(|form| &form.kind) {
+            Some(FormKind::Surface(there)) => Some(HASTE_MAX * edge_m.min(there.edge_m)),
+            _ => Some(edge_m).filter(|_| neighbour.owned),
+        }
+    }
+
+    /// Work of a substep in thousands of multiplications: the factor's, and some 500 an element.
+    pub(super) fn work(&self) -> f64 {
+        1e-3 * self.system.work() as f64 + 0.5 * self.lattice.elements() as f64
+    }
+}

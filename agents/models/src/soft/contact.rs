@@ -1,0 +1,175 @@
+//! Where contact meets a soft body's own step: between its solve and its move.
+//!
+//! In: free velocities, the factor, fixed solids, the company. Out: velocities that keep the skin apart.
+//! Never here: where two forms touch ([`metachron_geometry::narrow_phase`]). Theory: docs/theory/contact.md, eq. 5–11.
+
+use super::company::Company;
+use super::initial_overlap::Bores;
+use super::spec::{SoftError, SoftSpec};
+use super::system::System;
+use glam::{DQuat, DVec3};
+use metachron_contact::{Contact, Owner, Problem, Search, Settings, Solver};
+use metachron_core::Slots;
+use metachron_geometry::narrow_phase::{TouchRoom, touches};
+use metachron_geometry::{Form, FormKind, Placed, SolidForm, Touch, View};
+use std::sync::Arc;
+
+/// When contacts are good enough: 10 µm/s, a tenth of what counts as rest.
+const SETTINGS: Settings = Settings { iterations: 40, tolerance_m_s: 1e-5 };
+/// The same of a body that others press on something fixed: a vertex under one five hundred times as heavy takes so many.
+const SQUEEZED: Settings = Settings { iterations: 300, ..SETTINGS };
+/// Contacts are foreseen this far beyond where they close within a substep, as a share of the mean edge.
+const SLACK_SHARE: f64 = 0.02;
+/// Deeper than this share of the mean edge is through a solid, not beside it.
+const DEEP_SHARE: f64 = 0.5;
+/// Where the number of a fixed solid stands in a key, below [`WALLS_END`].
+const WALL_SHIFT: u32 = 48;
+/// The keys of contacts with agents start here.
+const WALLS_END: u64 = 1 << 63;
+
+/// The contacts of one soft body.
+pub(super) struct Contacts {
+    /// The body's own form.
+    pub form: Arc<Form>,
+    walls: Vec<Wall>,
+    list: Vec<Contact>,
+    solver: Solver,
+    touches: Vec<Touch>,
+    /// The size of the inverse mass of each slot, 1/kg: the body's own first.
+    pub mobilities: Vec<f64>,
+    room: TouchRoom,
+    slack_m: f64,
+}
+
+/// A fixed solid where it stands.
+struct Wall {
+    form: Form,
+    position: DVec3,
+    rotation: DQuat,
+    /// What of the body passes through.
+    bores: Bores,
+}
+
+impl Contacts {
+    /// The contacts of a body of this skin, whose edges are `edge_m` long on average.
+    ///
+    /// # Errors
+    /// [`SoftError::Obstacle`] for a fixed solid that is no shape.
+    pub fn new(spec: &SoftSpec, form: Arc<Form>, edge_m: f64) -> Result<Self, SoftError> {
+        let wall = |obstacle: &metachron_geometry::Obstacle| {
+            let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
+                .map_err(|source| SoftError::Obstacle { name: obstacle.name.clone(), source })?;
+            let form = Form { kind: FormKind::Solid(solid), friction: obstacle.friction, restitution: 0.0 };
+            let (position, rotation) = (obstacle.position, obstacle.rotation.normalize());
+            Ok(Wall { form, position, rotation, bores: Bores::default() })
+        };
+        let walls = spec.obstacles.iter().map(wall).collect::<Result<_, SoftError>>()?;
+        Ok(Self {
+            form,
+            walls,
+            list: vec![],
+            solver: Solver::forming(),
+            touches: vec![],
+            mobilities: vec![],
+            room: TouchRoom::default(),
+            slack_m: SLACK_SHARE * edge_m,
+        })
+    }
+
+    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; they stay one a vertex.
+    pub fn act(
+        &mut self,
+        positions: &[DVec3],
+        velocities: &mut Vec<DVec3>,
+        (system, company): (&mut System, &mut Company),
+        h: f64,
+    ) {
+        let own = velocities.len();
+        self.list.clear();
+        if (self.walls.is_empty() && company.mates().is_empty()) || !velocities.iter().sum::<DVec3>().is_finite() {
+            return;
+        }
+        company.mates_mut().extend(velocities, h);
+        let settings = self.find(positions, velocities, company, h);
+        if self.list.is_empty() {
+            self.solver.forget();
+            velocities.truncate(own);
+            return;
+        }
+        self.list.sort_unstable_by_key(|contact| contact.key);
+        company.mates().scale(&mut self.mobilities);
+        let Self { list, mobilities, solver, .. } = self;
+        let problem = Problem { contacts: &[], kin: &[], h_s: h, mobilities, settings };
+        let respond = |impulses: &mut [DVec3]| system.respond(impulses);
+        company.mates_mut().solve(solver, (list, problem), velocities, Owner { slots: own, respond, tips: true });
+        company.mates_mut().watch(self.list.iter().zip(self.solver.impulses()), velocities);
+        velocities.truncate(own);
+        self.mobilities.truncate(own);
+    }
+
+    /// Finds what may close within the substep, and says how well it is to be solved.
+    fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
+        let deep_m = DEEP_SHARE * self.edge_m();
+        let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
+        let (mut stands, held) = (false, mobilities.contains(&0.0));
+        let here = Placed { form, view: View::Surface(positions) };
+        let own = &velocities[..positions.len()];
+        let speed = own.iter().map(|v| v.length_squared()).fold(0.0, f64::max).sqrt();
+        for (wall, number) in walls.iter_mut().zip(0_u64..) {
+            let view = View::Solid { position: wall.position, rotation: wall.rotation };
+            touches(&here, &Placed { form: &wall.form, view }, *slack_m + speed * h, room, places);
+            wall.bores.follow(places, held, deep_m);
+            let friction = (form.friction * wall.form.friction).sqrt();
+            for place in places.iter().filter(|place| !wall.bores.pass(place)) {
+                let mut slots = Slots::default();
+                place.on_a.join(&mut slots, 0, DVec3::ZERO, (-place.normal, 1.0));
+                let closing = slots.velocity(velocities).dot(place.normal);
+                if place.gap_m + closing * h > *slack_m {
+                    continue;
+                }
+                stands = true;
+                // where it is held it needs no contact to stay
+                if slots.mobility(mobilities) > 0.0 {
+                    let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
+                    let Touch { normal, gap_m, .. } = *place;
+                    list.push(Contact {
+                        key,
+                        slots,
+                        normal,
+                        gap_m,
+                        friction,
+                        rebound_m_s: 0.0,
+                        back_m_s: DVec3::ZERO,
+                        age_s: 0.0,
+                    });
+                }
+            }
+        }
+        let fixed = list.len();
+        let search = Search { h_s: h, slack_m: *slack_m, speed_m_s: speed };
+        company.mates_mut().find(&here, search, velocities, (room, list));
+        if stands && list.len() > fixed { SQUEEZED } else { SETTINGS }
+    }
+
+    /// The mean length of an edge of the skin, metres.
+    pub fn edge_m(&self) -> f64 {
+        self.slack_m / SLACK_SHARE
+    }
+
+    /// Where fixed solids pressed in the last substep: what each place joins, and its normal.
+    pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
+        let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
+        fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
+    }
+
+    /// Whether something fixed pressed in the last substep.
+    pub fn is_grounded(&self) -> bool {
+        self.footholds().next().is_some()
+    }
+
+    /// The contacts of the last substep and their impulses, N·s.
+    pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> + Clone {
+        let solved = if self.list.is_empty() { &[] } else { self.solver.impulses() };
+        self.list.iter().zip(solved)
+    }
+}

@@ -1,0 +1,309 @@
+//! How a soft body is divided: vertices at rest, their masses, the elements between them, its skin.
+//!
+//! In: a shape and its matter. Out: a [`Lattice`], fixed for the body's life. Never here: where the vertices are now.
+
+use super::bar::Strut;
+use super::bending::Fold;
+use super::grid::Grid;
+use super::hexahedron::{Brick, BrickKind};
+use super::membrane::Membrane;
+use super::spec::{SoftMatter, SoftShape, SoftSpec};
+use super::system::System;
+use glam::{DQuat, DVec2, DVec3};
+use metachron_geometry::SurfaceForm;
+use metachron_geometry::narrow_phase::Fans;
+
+/// A divided soft body.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Lattice {
+    /// Where the vertices are at rest, in the body's own axes, metres.
+    pub rest: Vec<DVec3>,
+    /// What each weighs, kg.
+    pub mass_kg: Vec<f64>,
+    /// Which never move.
+    pub held: Vec<bool>,
+    struts: Vec<Strut>,
+    membranes: Vec<Membrane>,
+    folds: Vec<Fold>,
+    bricks: Vec<Brick>,
+    kinds: Vec<BrickKind>,
+    /// Three vertices in a row, and how far the middle one is from the line at rest, metres.
+    rows: Vec<([u32; 3], f64)>,
+    triangles: Vec<[u32; 3]>,
+    edges: Vec<[u32; 2]>,
+    radius_m: f64,
+}
+
+impl Lattice {
+    /// Divides the body of `spec`.
+    pub fn new(spec: &SoftSpec) -> Self {
+        let grid = Grid::of(&spec.shape);
+        let count = grid.count();
+        let mut lattice = Self {
+            rest: vec![DVec3::ZERO; count],
+            mass_kg: vec![0.0; count],
+            held: vec![false; count],
+            ..Self::default()
+        };
+        for side in &spec.held {
+            grid.on(*side).for_each(|vertex| lattice.held[vertex as usize] = true);
+        }
+        match &spec.shape {
+            SoftShape::Sheet { size_m, thickness_m, .. } => lattice.sheet(&grid, *size_m, *thickness_m, &spec.matter),
+            SoftShape::Box { size_m, .. } => lattice.solid(&grid, &spec.matter, |share| *size_m * share),
+            SoftShape::Ball { radius_m, .. } => lattice.solid(&grid, &spec.matter, |share| ball(share) * *radius_m),
+            SoftShape::Rope { path_m, radius_m, .. } => lattice.rope(&grid, path_m, *radius_m, &spec.matter),
+        }
+        let sag = |row: [u32; 3], rest: &[DVec3]| sagitta(row, rest).length();
+        lattice.rows = grid.rows().into_iter().map(|row| (row, sag(row, &lattice.rest))).collect();
+        lattice
+    }
+
+    fn sheet(&mut self, grid: &Grid, size_m: [f64; 2], thickness_m: f64, matter: &SoftMatter) {
+        let [nx, ny, _] = grid.cells;
+        let step = DVec2::new(size_m[0] / nx as f64, size_m[1] / ny as f64);
+        for place in grid.places() {
+            let flat = DVec2::new(place[0] as f64, place[1] as f64) * step;
+            self.rest[grid.at(place) as usize] = flat.extend(0.0);
+        }
+        let elastic = (matter.young_pa, matter.poisson);
+        for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
+            let [a, b, c, d] = [[i, j, 0], [i + 1, j, 0], [i + 1, j + 1, 0], [i, j + 1, 0]].map(|place| grid.at(place));
+            // diagonals that alternate favour no direction
+            let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
+            for corners in halves {
+                let membrane = Membrane::new(corners, self.flat(corners), thickness_m, elastic);
+                let third = membrane.volume_m3() * matter.density_kg_m3 / 3.0;
+                corners.iter().for_each(|vertex| self.mass_kg[*vertex as usize] += third);
+                self.membranes.push(membrane);
+                self.triangles.push(corners);
+            }
+        }
+        let rigidity = matter.young_pa * thickness_m.powi(3) / (12.0 * (1.0 - matter.poisson * matter.poisson));
+        self.bend(grid, step, (rigidity, matter.poisson));
+        self.list_edges();
+        self.radius_m = 0.5 * thickness_m;
+    }
+
+    fn flat<const N: usize>(&self, corners: [u32; N]) -> [DVec2; N] {
+        corners.map(|vertex| self.rest[vertex as usize].truncate())
+    }
+
+    /// Lists what a flat grid of cells of `step` metres resists of bending: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
+    fn bend(&mut self, grid: &Grid, step: DVec2, (rigidity_n_m, poisson): (f64, f64)) {
+        let cell = step.x * step.y;
+        let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
+        for [i, j, _] in grid.places() {
+            let [inner_x, inner_y] = [(i, grid.cells[0]), (j, grid.cells[1])].map(|(at, last)| at > 0 && at < last);
+            let here = grid.at([i, j, 0]);
+            let along_x = || [grid.at([i - 1, j, 0]), grid.at([i + 1, j, 0])];
+            let along_y = || [grid.at([i, j - 1, 0]), grid.at([i, j + 1, 0])];
+            if inner_x && inner_y {
+                let ([a, b], [c, d]) = (along_x(), along_y());
+                for (sign, share) in [(1.0, 0.5 * (1.0 + poisson)), (-1.0, 0.5 * (1.0 - poisson))] {
+                    let (x, y) = (far[0], sign * far[1]);
+                    let terms = [(a, x), (b, x), (c, y), (d, y), (here, -2.0 * (x + y))];
+                    self.folds.push(Fold::new(&terms, share * rigidity_n_m * cell));
+                }
+            } else if inner_x != inner_y {
+                // beside a free edge the sheet bends across as it likes
+                let ([a, b], w) = if inner_x { (along_x(), far[0]) } else { (along_y(), far[1]) };
+                let stiffness = 0.5 * (1.0 - poisson * poisson) * rigidity_n_m * cell;
+                self.folds.push(Fold::new(&[(a, w), (b, w), (here, -2.0 * w)], stiffness));
+            }
+            if i < grid.cells[0] && j < grid.cells[1] {
+                let w = 1.0 / cell;
+                let square = [(here, w), (grid.at([i + 1, j, 0]), -w), (grid.at([i, j + 1, 0]), -w)];
+                let terms = [square[0], square[1], square[2], (grid.at([i + 1, j + 1, 0]), w)];
+                self.folds.push(Fold::new(&terms, 2.0 * (1.0 - poisson) * rigidity_n_m * cell));
+            }
+        }
+    }
+
+    /// Lists the edges of all triangles.
+    fn list_edges(&mut self) {
+        let sides = self.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]);
+        self.edges = sides.map(|[a, b]| [a.min(b), a.max(b)]).collect();
+        self.edges.sort_unstable();
+        self.edges.dedup();
+    }
+
+    fn solid(&mut self, grid: &Grid, matter: &SoftMatter, place_of: impl Fn(DVec3) -> DVec3) {
+        let [nx, ny, nz] = grid.cells;
+        let cells = DVec3::new(nx as f64, ny as f64, nz as f64);
+        for place in grid.places() {
+            let share = DVec3::new(place[0] as f64, place[1] as f64, place[2] as f64) / cells;
+            self.rest[grid.at(place) as usize] = place_of(share);
+        }
+        let elastic = (matter.young_pa, matter.poisson);
+        for [i, j, k] in grid.places().filter(|place| (0..3).all(|axis| place[axis] < grid.cells[axis])) {
+            let vertices = std::array::from_fn(|bits| grid.at([i + (bits & 1), j + (bits >> 1 & 1), k + (bits >> 2)]));
+            let corners: [DVec3; 8] = vertices.map(|vertex: u32| self.rest[vertex as usize]);
+            let kind = self.kind_of(corners, elastic);
+            for (vertex, volume) in vertices.iter().zip(self.kinds[kind].volumes_m3) {
+                self.mass_kg[*vertex as usize] += volume * matter.density_kg_m3;
+            }
+            self.bricks.push(Brick { vertices, kind, turn: DQuat::IDENTITY });
+        }
+        self.skin(grid);
+        self.list_edges();
+    }
+
+    /// The kind of a cell with these corners: one for all that look alike.
+    fn kind_of(&mut self, corners: [DVec3; 8], elastic: (f64, f64)) -> usize {
+        let kind = BrickKind::new(corners, elastic);
+        let known = self.kinds.iter().position(|known| known.is_like(&kind));
+        known.unwrap_or_else(|| {
+            self.kinds.push(kind);
+            self.kinds.len() - 1
+        })
+    }
+
+    /// Lists the triangles of the faces of a solid, counter-clockwise seen from outside.
+    fn skin(&mut self, grid: &Grid) {
+        for axis in 0..3 {
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            for (a, b) in (0..grid.cells[u]).flat_map(|a| (0..grid.cells[v]).map(move |b| (a, b))) {
+                for last in [false, true] {
+                    let at = |du: usize, dv: usize| {
+                        let mut place = [0; 3];
+                        (place[axis], place[u], place[v]) = (if last { grid.cells[axis] } else { 0 }, a + du, b + dv);
+                        grid.at(place)
+                    };
+                    let [p, q, r, s] = [at(0, 0), at(1, 0), at(1, 1), at(0, 1)];
+                    let halves = if (a + b) % 2 == 0 { [[p, q, r], [p, r, s]] } else { [[p, q, s], [q, r, s]] };
+                    let out = |[a, b, c]: [u32; 3]| if last { [a, b, c] } else { [a, c, b] };
+                    self.triangles.extend(halves.map(out));
+                }
+            }
+        }
+    }
+
+    fn rope(&mut self, grid: &Grid, path_m: &[DVec3], radius_m: f64, matter: &SoftMatter) {
+        let count = grid.cells[0];
+        let total: f64 = path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+        let section = std::f64::consts::PI * radius_m * radius_m;
+        let rest_m = total / count as f64;
+        self.rest = (0..=count).map(|i| along(path_m, rest_m * i as f64)).collect();
+        for i in 0..count as u32 {
+            self.struts.push(Strut { ends: [i, i + 1], rest_m, ea_n: matter.young_pa * section });
+            self.edges.push([i, i + 1]);
+            let half = 0.5 * rest_m * section * matter.density_kg_m3;
+            self.mass_kg[i as usize] += half;
+            self.mass_kg[i as usize + 1] += half;
+        }
+        self.radius_m = radius_m;
+    }
+
+    /// The system of this body: who of those that move is joined to whom.
+    pub fn system(&self) -> System {
+        let mut first: Vec<u32> = (0..self.rest.len() as u32).collect();
+        let mut join = |vertices: &[u32]| {
+            let moving = || vertices.iter().copied().filter(|v| !self.held[*v as usize]);
+            let lowest = moving().min().unwrap_or(0);
+            moving().for_each(|v| first[v as usize] = first[v as usize].min(lowest));
+        };
+        self.struts.iter().for_each(|strut| join(&strut.ends));
+        self.triangles.iter().for_each(|corners| join(corners));
+        self.folds.iter().for_each(|fold| join(&fold.vertices()));
+        self.bricks.iter().for_each(|brick| join(&brick.vertices));
+        System::new(&first, &self.held)
+    }
+
+    /// Adds what all elements do at these positions; cells follow their turns.
+    pub fn add(&mut self, positions: &[DVec3], system: &mut System) {
+        self.struts.iter().for_each(|strut| strut.add(positions, system));
+        self.membranes.iter().for_each(|membrane| membrane.add(positions, system));
+        self.folds.iter().for_each(|fold| fold.add(positions, system));
+        for brick in &mut self.bricks {
+            let kind = &self.kinds[brick.kind];
+            let firm = brick.follow(kind, positions);
+            brick.add(kind, positions, firm, system);
+        }
+    }
+
+    /// Elastic energy, J; cells follow their turns.
+    pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
+        let struts: f64 = self.struts.iter().map(|strut| strut.energy_j(positions)).sum();
+        let membranes: f64 = self.membranes.iter().map(|membrane| membrane.energy_j(positions)).sum();
+        let folds: f64 = self.folds.iter().map(|fold| fold.energy_j(positions)).sum();
+        let bricks = self.bricks.iter().map(|brick| {
+            let mut brick = *brick;
+            brick.follow(&self.kinds[brick.kind], positions);
+            brick.energy_j(&self.kinds[brick.kind], positions)
+        });
+        struts + membranes + folds + bricks.sum::<f64>()
+    }
+
+    /// How far lines through three vertices in a row sag beyond what they do at rest, metres: the error of straight pieces.
+    pub fn residual_m(&self, positions: &[DVec3]) -> f64 {
+        // a rope bends freely: a kink that has gone is no error
+        let slack = self.membranes.is_empty() && self.bricks.is_empty();
+        let sag = |(row, rest): &([u32; 3], f64)| {
+            let now = sagitta(*row, positions).length();
+            let beyond = (now - rest).abs();
+            if slack { beyond.min(now) } else { beyond }
+        };
+        self.rows.iter().map(sag).fold(0.0, f64::max)
+    }
+
+    /// The largest share of their lengths at rest by which edges change within `h` seconds at these velocities.
+    pub fn haste(&self, velocities: &[DVec3], h: f64) -> f64 {
+        let share = |&[a, b]: &[u32; 2]| {
+            let [a, b] = [a as usize, b as usize];
+            velocities[a].distance(velocities[b]) * h / self.rest[a].distance(self.rest[b])
+        };
+        self.edges.iter().map(share).fold(0.0, f64::max)
+    }
+
+    /// The skin, as others touch it, of a body that starts at `height_j_kg` (see [`SurfaceForm`]).
+    pub fn surface(&self, height_j_kg: f32) -> SurfaceForm {
+        let mut on = vec![false; self.rest.len()];
+        self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
+        let lengths = self.edges.iter().map(|[a, b]| self.rest[*a as usize].distance(self.rest[*b as usize]));
+        let edge_m = lengths.sum::<f64>() / self.edges.len() as f64;
+        SurfaceForm {
+            edge_m,
+            vertices: (0..on.len() as u32).filter(|vertex| on[*vertex as usize]).collect(),
+            edges: self.edges.clone().into(),
+            triangles: self.triangles.clone().into(),
+            radius_m: self.radius_m,
+            height_j_kg,
+            closed: !self.bricks.is_empty(),
+            held: self.held.contains(&true),
+            fans: Fans::of(&self.edges, &self.triangles).into(),
+        }
+    }
+
+    /// How many elements there are.
+    pub fn elements(&self) -> usize {
+        self.struts.len() + self.membranes.len() + self.bricks.len()
+    }
+}
+
+/// How far the middle of three points is from the line between the others, metres: an eighth of the second difference.
+fn sagitta([a, b, c]: [u32; 3], positions: &[DVec3]) -> DVec3 {
+    let [a, b, c] = [a, b, c].map(|vertex| positions[vertex as usize]);
+    (a - b * 2.0 + c) * 0.125
+}
+
+/// The point of the unit ball for the shares 0 … 1 of a cube: smooth, and one to one.
+fn ball(share: DVec3) -> DVec3 {
+    let p = share * 2.0 - DVec3::ONE;
+    let q = p * p;
+    let stretched = |a: f64, b: f64| (1.0 - 0.5 * (a + b) + a * b / 3.0).max(0.0).sqrt();
+    p * DVec3::new(stretched(q.y, q.z), stretched(q.z, q.x), stretched(q.x, q.y))
+}
+
+/// The point of a path at this length from its start.
+fn along(path_m: &[DVec3], at_m: f64) -> DVec3 {
+    let mut left = at_m;
+    for pair in path_m.windows(2) {
+        let length = pair[0].distance(pair[1]);
+        if left <= length && length > 0.0 {
+            return pair[0].lerp(pair[1], left / length);
+        }
+        left -= length;
+    }
+    path_m.last().copied().unwrap_or(DVec3::ZERO)
+}

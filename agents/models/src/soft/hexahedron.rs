@@ -1,0 +1,199 @@
+//! A cell of a solid: eight vertices, linear elasticity in axes that turn with it.
+//!
+//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the cell bends without
+//! locking by the incompatible modes of (TBW76), and its forces are the exact gradient of its energy, so that they do not turn it.
+
+use super::system::System;
+use glam::{DMat3, DQuat, DVec3};
+use metachron_core::skyline_cholesky::Envelope;
+
+/// What all cells of one rest shape share.
+#[derive(Debug, Clone)]
+pub(super) struct BrickKind {
+    /// Corners at rest from the first on, metres.
+    rest: [DVec3; 8],
+    /// Mean gradient of each corner's share, 1/m.
+    gradients: [DVec3; 8],
+    /// Stiffness between corners, N/m.
+    stiffness: Box<[[DMat3; 8]; 8]>,
+    /// The volume that belongs to each corner, m³.
+    pub volumes_m3: [f64; 8],
+}
+
+/// A cell.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Brick {
+    /// Its corners: bit 0 of a corner's place says whether it is the far one in x, bit 1 in y, bit 2 in z.
+    pub vertices: [u32; 8],
+    /// Which kind it is.
+    pub kind: usize,
+    /// How far it has turned from rest.
+    pub turn: DQuat,
+}
+
+/// Corners and incompatible modes.
+const MODES: usize = 11;
+/// Where Gauss looks along each axis.
+const GAUSS: f64 = 0.577_350_269_189_625_8;
+/// Turns that are followed by Newton's method in so many tries: it needs three, more where a cell is turned inside out.
+const TURN_TRIES: usize = 30;
+
+fn outer(a: DVec3, b: DVec3) -> DMat3 {
+    DMat3::from_cols(a * b.x, a * b.y, a * b.z)
+}
+
+/// The place of a corner in the cell's own coordinates, −1 … 1.
+fn corner(i: usize) -> DVec3 {
+    let sign = |bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
+    DVec3::new(sign(0), sign(1), sign(2))
+}
+
+/// How the share of each corner changes along the cell's own coordinates at `at`.
+fn slopes(at: DVec3) -> [DVec3; 8] {
+    std::array::from_fn(|i| {
+        let c = corner(i);
+        let f = DVec3::ONE + c * at;
+        DVec3::new(c.x * f.y * f.z, f.x * c.y * f.z, f.x * f.y * c.z) * 0.125
+    })
+}
+
+impl BrickKind {
+    /// The kind of a cell with these corners at rest, metres.
+    pub fn new(corners: [DVec3; 8], (young_pa, poisson): (f64, f64)) -> Self {
+        let mu = 0.5 * young_pa / (1.0 + poisson);
+        let lambda = young_pa * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson));
+        let jacobian = |at: DVec3| slopes(at).iter().zip(&corners).fold(DMat3::ZERO, |j, (s, x)| j + outer(*x, *s));
+        let middle = jacobian(DVec3::ZERO);
+        let mut whole = [[DMat3::ZERO; MODES]; MODES];
+        let (mut gradients, mut volumes_m3, mut volume) = ([DVec3::ZERO; 8], [0.0; 8], 0.0);
+        for point in 0..8 {
+            let at = corner(point) * GAUSS;
+            let j = jacobian(at);
+            let (weight, back) = (j.determinant(), j.inverse().transpose());
+            let own = slopes(at).map(|s| back * s);
+            // the corrected gradients of 1 − ξ² vanish on the mean: constant strains are exact in cells of any shape
+            let scale = middle.determinant() / weight;
+            let beyond =
+                (0..3).map(|axis| middle.inverse().transpose() * (DVec3::AXES[axis] * (-2.0 * at[axis] * scale)));
+            let all: Vec<DVec3> = own.into_iter().chain(beyond).collect();
+            for (a, row) in whole.iter_mut().enumerate() {
+                for (b, block) in row.iter_mut().enumerate() {
+                    let (ga, gb) = (all[a], all[b]);
+                    let round = DMat3::from_diagonal(DVec3::splat(mu * ga.dot(gb)));
+                    *block += (outer(ga, gb) * lambda + outer(gb, ga) * mu + round) * weight;
+                }
+            }
+            for i in 0..8 {
+                gradients[i] += own[i] * weight;
+                volumes_m3[i] += weight * ((DVec3::ONE + corner(i) * at) * 0.5).element_product();
+            }
+            volume += weight;
+        }
+        let gradients = gradients.map(|g| g / volume);
+        let rest = corners.map(|x| x - corners[0]);
+        Self { rest, gradients, stiffness: Box::new(condensed(&whole)), volumes_m3 }
+    }
+
+    /// Whether two kinds are the same but for rounding.
+    pub fn is_like(&self, other: &Self) -> bool {
+        let size = self.rest[7].length();
+        self.rest.iter().zip(&other.rest).all(|(a, b)| a.distance(*b) <= 1e-12 * size)
+    }
+}
+
+/// What is left of the stiffness where the incompatible modes are free (eq. 11).
+fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
+    let mut inner = Envelope::<3>::default();
+    inner.shape(&[0, 0, 0]);
+    for a in 0..3 {
+        for b in 0..=a {
+            inner.add_block((a, b), whole[8 + a][8 + b].transpose().to_cols_array_2d());
+        }
+    }
+    let mut left: [[DMat3; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| whole[i][j]));
+    if !inner.factor() {
+        return left; // a cell without volume: its own stiffness says so
+    }
+    for j in 0..8 {
+        let mut columns = [[0.0; 9]; 3];
+        for (axis, column) in columns.iter_mut().enumerate() {
+            (0..3).for_each(|a| column[3 * a..3 * a + 3].copy_from_slice(&whole[8 + a][j].col(axis).to_array()));
+            inner.solve(column);
+        }
+        for (i, row) in left.iter_mut().enumerate() {
+            for a in 0..3 {
+                let answer = DMat3::from_cols_array_2d(&columns.map(|c| [c[3 * a], c[3 * a + 1], c[3 * a + 2]]));
+                row[j] -= whole[i][8 + a] * answer;
+            }
+        }
+    }
+    left
+}
+
+/// What a cell is at one moment.
+struct Bent {
+    /// How it is turned.
+    turn: DMat3,
+    /// How far each corner is displaced, in the axes of rest.
+    by: [DVec3; 8],
+    /// What the stiffness makes of it, in the same axes, N.
+    force: [DVec3; 8],
+}
+
+impl Brick {
+    /// Follows the turn of the cell, by Newton's method on the trace of RᵀF from the last turn on (eq. 12); returns the matrix by
+    /// which a change of F turns it further.
+    pub fn follow(&mut self, kind: &BrickKind, positions: &[DVec3]) -> DMat3 {
+        let mut f = DMat3::ZERO;
+        for (vertex, gradient) in self.vertices.iter().zip(&kind.gradients) {
+            f += outer(positions[*vertex as usize] - positions[self.vertices[0] as usize], *gradient);
+        }
+        let mut firm = DMat3::ZERO;
+        for _ in 0..TURN_TRIES {
+            let h = f * DMat3::from_quat(self.turn).transpose();
+            let twist = DVec3::new(h.y_axis.z - h.z_axis.y, h.z_axis.x - h.x_axis.z, h.x_axis.y - h.y_axis.x);
+            let trace = h.x_axis.x + h.y_axis.y + h.z_axis.z;
+            let slope = DMat3::from_diagonal(DVec3::splat(trace)) - (h + h.transpose()) * 0.5;
+            let minor = slope.x_axis.x * slope.y_axis.y - slope.x_axis.y * slope.y_axis.x;
+            let solid = slope.x_axis.x > 0.0 && minor > 0.0 && slope.determinant() > 1e-9;
+            firm = if solid { slope.inverse() } else { DMat3::ZERO };
+            let by = if solid { firm * twist } else { twist / (trace.abs() + 1.0) };
+            if by.length_squared() < 1e-28 || !by.is_finite() {
+                break;
+            }
+            self.turn = (DQuat::from_scaled_axis(by.clamp_length_max(1.0)) * self.turn).normalize();
+        }
+        firm
+    }
+
+    fn bent(&self, kind: &BrickKind, positions: &[DVec3]) -> Bent {
+        let turn = DMat3::from_quat(self.turn);
+        let back = turn.transpose();
+        let origin = positions[self.vertices[0] as usize];
+        let by: [DVec3; 8] =
+            std::array::from_fn(|i| back * (positions[self.vertices[i] as usize] - origin) - kind.rest[i]);
+        let force = std::array::from_fn(|i| kind.stiffness[i].iter().zip(by).map(|(block, u)| *block * u).sum());
+        Bent { turn, by, force }
+    }
+
+    /// Adds what it does at these positions; `firm` is what [`Self::follow`] told (eq. 13, 14).
+    pub fn add(&self, kind: &BrickKind, positions: &[DVec3], firm: DMat3, system: &mut System) {
+        let Bent { turn, force, .. } = self.bent(kind, positions);
+        let origin = positions[self.vertices[0] as usize];
+        let arms = self.vertices.map(|vertex| positions[vertex as usize] - origin);
+        let torque: DVec3 = arms.iter().zip(force).map(|(arm, f)| arm.cross(turn * f)).sum();
+        let turning = firm * torque;
+        for (i, &row) in self.vertices.iter().enumerate() {
+            system.push(row, turning.cross(turn * kind.gradients[i]) - turn * force[i]);
+            for (j, &column) in self.vertices.iter().enumerate().filter(|(_, column)| row >= **column) {
+                system.stiffen(row, column, turn * kind.stiffness[i][j] * turn.transpose());
+            }
+        }
+    }
+
+    /// Energy in it, J.
+    pub fn energy_j(&self, kind: &BrickKind, positions: &[DVec3]) -> f64 {
+        let Bent { by, force, .. } = self.bent(kind, positions);
+        0.5 * by.iter().zip(force).map(|(u, f)| u.dot(f)).sum::<f64>()
+    }
+}

@@ -1,0 +1,219 @@
+//! What a soft body is made of and how it starts: the numbers a scene gives, and what is wrong with them.
+
+use super::grid::Side;
+use glam::{DQuat, DVec3};
+use metachron_geometry::{Obstacle, ShapeError};
+use std::sync::Arc;
+
+/// A soft body before it is built.
+#[derive(Debug, Clone)]
+pub struct SoftSpec {
+    /// Its shape at rest, and how finely it is divided.
+    pub shape: SoftShape,
+    /// What it is made of.
+    pub matter: SoftMatter,
+    /// Where its first corner starts, or a ball's centre, metres.
+    pub position: DVec3,
+    /// Rotation from its own axes to the world's.
+    pub rotation: DQuat,
+    /// Velocity of all of it at the start, m/s.
+    pub velocity: DVec3,
+    /// The sides whose vertices never move.
+    pub held: Vec<Side>,
+    /// Coulomb friction coefficient of its skin, ≥ 0.
+    pub friction: f64,
+    /// Gravity, m/s².
+    pub gravity: DVec3,
+    /// Solids that never move.
+    pub obstacles: Arc<[Obstacle]>,
+    /// Whether it may report that it is at rest.
+    pub sleep: bool,
+}
+
+/// What a soft body is made of.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SoftMatter {
+    /// Young's modulus, Pa, 1 … 1e11.
+    pub young_pa: f64,
+    /// Poisson's ratio, 0 … 0.49.
+    pub poisson: f64,
+    /// Density, kg/m³, 1 … 1e5.
+    pub density_kg_m3: f64,
+    /// Mass-proportional damping, 1/s, 0 … 1e4: dv/dt = … − c v.
+    pub damping_per_s: f64,
+}
+
+/// The shapes of soft bodies in their own axes.
+#[derive(Debug, Clone, PartialEq)]
+pub enum SoftShape {
+    /// A flat rectangle in the plane z = 0, from its first corner on.
+    Sheet {
+        /// Length along x and y, metres.
+        size_m: [f64; 2],
+        /// Thickness, metres.
+        thickness_m: f64,
+        /// Cells along x and y.
+        segments: [u32; 2],
+    },
+    /// A box, from its first corner on.
+    Box {
+        /// Length along x, y and z, metres.
+        size_m: DVec3,
+        /// Cells along x, y and z.
+        segments: [u32; 3],
+    },
+    /// A ball about its position.
+    Ball {
+        /// Radius, metres.
+        radius_m: f64,
+        /// Cells across it.
+        segments: u32,
+    },
+    /// A rope along a path.
+    Rope {
+        /// Points, metres, in the rope's own axes; equal lengths of it lie between vertices.
+        path_m: Vec<DVec3>,
+        /// Radius, metres.
+        radius_m: f64,
+        /// Pieces.
+        segments: u32,
+    },
+}
+
+/// Why a soft body cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SoftError {
+    /// A number is outside its range.
+    #[error("{what} is {value}; it must be {wanted}")]
+    BadNumber {
+        /// Which number.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range it must be in.
+        wanted: &'static str,
+    },
+    /// A vector or rotation is not finite, or a rotation is zero.
+    #[error("{what} is not finite")]
+    BadVector {
+        /// Which one.
+        what: &'static str,
+    },
+    /// A rope's path has no length.
+    #[error("the path of a rope needs two points that are apart")]
+    NoPath,
+    /// There are more vertices than a step can take.
+    #[error("it has {vertices} vertices; at most {VERTICES_MAX} can be stepped: give it fewer segments")]
+    TooFine {
+        /// How many it would have.
+        vertices: u64,
+    },
+    /// A side that its shape does not have.
+    #[error("a {model} has no side `{side}`")]
+    NoSide {
+        /// The model.
+        model: &'static str,
+        /// The side's name.
+        side: &'static str,
+    },
+    /// An obstacle is no shape.
+    #[error("the shape of obstacle `{name}` is unusable: {source}")]
+    Obstacle {
+        /// The obstacle's name.
+        name: String,
+        /// What is wrong with its shape.
+        source: ShapeError,
+    },
+}
+
+/// The most vertices of a soft body: the factor of a cube of as many takes 2e9 multiplications, a second a step.
+pub const VERTICES_MAX: u64 = 2048;
+
+impl SoftShape {
+    /// The model's name as scenes write it.
+    #[must_use]
+    pub const fn model(&self) -> &'static str {
+        match self {
+            Self::Sheet { .. } => "sheet",
+            Self::Box { .. } | Self::Ball { .. } => "solid",
+            Self::Rope { .. } => "rope",
+        }
+    }
+
+    /// How many vertices it has.
+    #[must_use]
+    pub fn vertices(&self) -> u64 {
+        let along = |segments: u32| u64::from(segments) + 1;
+        match self {
+            Self::Sheet { segments: [x, y], .. } => along(*x).saturating_mul(along(*y)),
+            Self::Box { segments: [x, y, z], .. } => along(*x).saturating_mul(along(*y)).saturating_mul(along(*z)),
+            Self::Ball { segments, .. } => along(*segments).saturating_pow(3),
+            Self::Rope { segments, .. } => along(*segments),
+        }
+    }
+
+    fn check(&self) -> Result<(), SoftError> {
+        let length = |what, value| number(what, value, (1e-6, 1e4), "between 1e-6 and 1e4 m");
+        let count = |what, value: u32| number(what, f64::from(value), (1.0, 2047.0), "between 1 and 2047");
+        match self {
+            Self::Sheet { size_m, thickness_m, segments } => {
+                size_m.iter().try_for_each(|size| length("the size", *size))?;
+                length("the thickness", *thickness_m)?;
+                segments.iter().try_for_each(|n| count("the number of segments", *n))?;
+            }
+            Self::Box { size_m, segments } => {
+                size_m.to_array().into_iter().try_for_each(|size| length("the size", size))?;
+                segments.iter().try_for_each(|n| count("the number of segments", *n))?;
+            }
+            Self::Ball { radius_m, segments } => {
+                length("the radius", *radius_m)?;
+                number("the number of segments", f64::from(*segments), (2.0, 2047.0), "between 2 and 2047")?;
+            }
+            Self::Rope { path_m, radius_m, segments } => {
+                length("the radius", *radius_m)?;
+                count("the number of segments", *segments)?;
+                path_m.iter().try_for_each(|point| vector("a point of the path", *point))?;
+                let length_m: f64 = path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum();
+                if length_m.is_nan() || length_m < 1e-6 {
+                    return Err(SoftError::NoPath);
+                }
+            }
+        }
+        let vertices = self.vertices();
+        if vertices > VERTICES_MAX { Err(SoftError::TooFine { vertices }) } else { Ok(()) }
+    }
+}
+
+impl SoftSpec {
+    /// Whether every number is in its range.
+    pub(super) fn check(&self) -> Result<(), SoftError> {
+        let SoftMatter { young_pa, poisson, density_kg_m3, damping_per_s } = self.matter;
+        self.shape.check()?;
+        number("Young's modulus", young_pa, (1.0, 1e11), "between 1 and 1e11 Pa")?;
+        number("Poisson's ratio", poisson, (0.0, 0.49), "between 0 and 0.49: nearer to 0.5 nothing yields any more")?;
+        number("the density", density_kg_m3, (1.0, 1e5), "between 1 and 1e5 kg/m³")?;
+        number("the damping", damping_per_s, (0.0, 1e4), "between 0 and 1e4 per second")?;
+        number("the friction", self.friction, (0.0, 1e3), "between 0 and 1000")?;
+        vector("the position", self.position)?;
+        vector("the velocity", self.velocity)?;
+        vector("the gravity", self.gravity)?;
+        if !(self.rotation.is_finite() && self.rotation.length_squared() > 0.0) {
+            return Err(SoftError::BadVector { what: "the rotation" });
+        }
+        let model = self.shape.model();
+        self.held.iter().try_for_each(|side| match side.of(&self.shape) {
+            true => Ok(()),
+            false => Err(SoftError::NoSide { model, side: side.name() }),
+        })
+    }
+}
+
+fn number(what: &'static str, value: f64, range: (f64, f64), wanted: &'static str) -> Result<(), SoftError> {
+    let good = (range.0..=range.1).contains(&value);
+    if good { Ok(()) } else { Err(SoftError::BadNumber { what, value, wanted }) }
+}
+
+fn vector(what: &'static str, value: DVec3) -> Result<(), SoftError> {
+    if value.is_finite() { Ok(()) } else { Err(SoftError::BadVector { what }) }
+}

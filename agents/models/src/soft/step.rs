@@ -1,0 +1,126 @@
+//! One substep of a soft body, told as a contents page: linearly implicit Euler, contacts between solve and move.
+//!
+//! In: a state, and what is around. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
+
+use super::body::SoftBody;
+use glam::{DMat3, DVec3};
+use metachron_contact::Surroundings;
+use metachron_core::StepError;
+use metachron_core::foot::press;
+
+/// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
+pub(super) const HASTE_MAX: f64 = 0.3;
+/// Past this no coordinate or speed is taken, metres or m/s: its square would soon be no number.
+const REACH_MAX: f64 = 1e9;
+/// A step is divided into no more substeps than this.
+pub(super) const SUBSTEPS_MAX: u32 = 16;
+
+impl SoftBody {
+    /// Advances by `dt` seconds; into how many substeps it was divided, and how many more its error estimate took.
+    ///
+    /// # Errors
+    /// [`StepError::Diverged`] where the state stops being finite.
+    pub(super) fn advance(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(u32, u32), StepError> {
+        self.receive(around, dt)?;
+        let doubled = self.rehearse(around.me, dt);
+        let (mut parts, mut left, mut done) = (1_u32, 1_u32, 0_u32);
+        while left > 0 {
+            let h = dt / f64::from(parts);
+            self.foresee(h).map_err(|what| self.lost(what, dt))?;
+            self.touch(h);
+            if self.lattice.haste(&self.free, h) > HASTE_MAX && parts < SUBSTEPS_MAX {
+                (parts, left) = (2 * parts, 2 * left);
+                self.given.iter_mut().for_each(|given| *given *= 0.5); // it acts evenly through the step
+                continue;
+            }
+            if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
+                return Err(self.lost("a vertex was thrown out of reach", dt));
+            }
+            self.act(f64::from(parts - left) * h, h);
+            (left, done) = (left - 1, done + 1);
+        }
+        self.judge(dt, done);
+        Ok((done, doubled))
+    }
+
+    /// Solves for the velocities at the end of a substep of `h` seconds without contact (eq. 1–4).
+    pub(super) fn foresee(&mut self, h: f64) -> Result<(), &'static str> {
+        self.assemble(h);
+        if !self.system.factor() {
+            return Err("its stiffness has no inverse");
+        }
+        let Self { system, lattice, velocities, free, given, ties, company, .. } = self;
+        free.clear();
+        let momenta = velocities.iter().zip(&lattice.mass_kg).map(|(v, mass)| *v * *mass);
+        free.extend(momenta.zip(&system.forces).map(|(momentum, force)| momentum + *force * h));
+        free.iter_mut().zip(&*given).for_each(|(momentum, given)| *momentum += *given);
+        system.respond(free);
+        company.share(ties, free, system);
+        Ok(())
+    }
+
+    /// Forms the system of a substep of `h` seconds from where it is.
+    pub(super) fn assemble(&mut self, h: f64) {
+        let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
+        company.aim(ties, positions, h);
+        system.begin(h);
+        lattice.add(positions, system);
+        let inertia = 1.0 + h * spec.matter.damping_per_s;
+        for (vertex, &mass) in lattice.mass_kg.iter().enumerate() {
+            system.weigh(vertex, DMat3::from_diagonal(DVec3::splat(mass * inertia)));
+            system.push(vertex as u32, spec.gravity * mass);
+        }
+        ties.iter_mut().for_each(|tie| tie.add(positions[tie.vertex], h, system));
+        contacts.mobilities.clear();
+        contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
+    }
+
+    /// Lets contact act on the foreseen velocities.
+    pub(super) fn touch(&mut self, h: f64) {
+        let Self { system, positions, free, company, contacts, .. } = self;
+        contacts.act(positions, free, (system, company), h);
+    }
+
+    /// Moves along the foreseen velocities, and gives the others their part.
+    fn act(&mut self, start: f64, h: f64) {
+        let Self { positions, velocities, free, ties, company, contacts, foretold, .. } = self;
+        std::mem::swap(velocities, free);
+        positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
+        ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
+        company.accept(contacts.impulses(), ties, (positions.len(), start, h));
+        foretold.note(contacts, positions.len(), h);
+    }
+
+    /// Takes in what others gave since the last step, and looks who is near.
+    fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
+        let Self { system, positions, velocities, given, company, foretold, footing, .. } = self;
+        given.clear();
+        company.open(around, positions.len(), dt);
+        if let Some([sums, carried]) = company.received() {
+            // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
+            let borne = footing.stance.bears(sums.iter().sum());
+            let answer = footing.under(borne, system.answer());
+            given.extend_from_slice(sums);
+            for (sum, (given, moment)) in sums.iter_mut().zip(given.iter_mut().zip(&*carried)) {
+                let past = moment.dot(*sum) / (foretold.span_s * sum.length_squared()).max(f64::MIN_POSITIVE);
+                *sum *= past.clamp(0.0, 1.0);
+                *given -= *sum;
+            }
+            answer.respond(sums);
+            if borne {
+                press(footing.stance.on_others(), sums, given);
+            }
+            answer.respond(carried);
+            velocities.iter_mut().zip(&*sums).for_each(|(v, dv)| *v += *dv);
+            positions.iter_mut().zip(&*carried).for_each(|(x, dx)| *x += *dx);
+        }
+        self.take_ties(around);
+        let bounds = self.bounds();
+        self.company.gather(around, &bounds, (dt, self.spec.friction));
+        Ok(())
+    }
+
+    fn lost(&self, what: &str, dt_s: f64) -> StepError {
+        StepError::Diverged { model: self.spec.shape.model(), dt_s, what: what.to_owned() }
+    }
+}

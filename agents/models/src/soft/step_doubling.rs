@@ -1,0 +1,87 @@
+//! A soft body's own estimate of its error in time, metres: now and then steps are made a second time, in twice the substeps.
+//!
+//! In: the body before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
+//! ([`crate::soft::fe_mesh`]), any change of its state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
+
+use super::anchor_springs::Tie;
+use super::body::SoftBody;
+use glam::DVec3;
+use metachron_core::AgentId;
+use metachron_core::step_doubling::{Watch, farthest};
+
+/// The error in time of one soft body.
+#[derive(Debug, Default)]
+pub(super) struct Doubling {
+    pub watch: Watch,
+    /// Places and velocities in twice the substeps.
+    finer: [Vec<DVec3>; 2],
+    /// The springs of the step.
+    ties: Vec<Tie>,
+    /// Into how many substeps the step was divided the second time, and the last one the first time.
+    parts: u32,
+    last: u32,
+}
+
+impl SoftBody {
+    /// Makes the step of `dt` seconds that comes in twice the substeps of the last one, where it is the turn of the body `me`, beside
+    /// the state; in how many. Steps that others press on are made once: what they give is given once.
+    pub(super) fn rehearse(&mut self, me: AgentId, dt: f64) -> u32 {
+        let Self { doubling, positions, velocities, ties, .. } = self;
+        if doubling.watch.begins(self.steps, me) {
+            doubling.finer[0].clone_from(positions);
+            doubling.finer[1].clone_from(velocities);
+        }
+        if !(self.company.mates().is_empty() && self.given.is_empty()) {
+            doubling.watch.give_up();
+        }
+        if !doubling.watch.is_on() {
+            return 0;
+        }
+        doubling.parts = 2 * doubling.last.max(1);
+        doubling.ties.clone_from(ties);
+        let parts = doubling.parts;
+        self.swap();
+        let made = (0..parts).all(|_| self.half(dt / f64::from(parts)));
+        self.swap();
+        self.ties.clone_from(&self.doubling.ties);
+        if !made {
+            self.doubling.watch.give_up();
+        }
+        parts
+    }
+
+    /// Puts the state in twice the substeps in the place of the state, or back.
+    fn swap(&mut self) {
+        let Self { doubling, positions, velocities, .. } = self;
+        std::mem::swap(&mut doubling.finer[0], positions);
+        std::mem::swap(&mut doubling.finer[1], velocities);
+    }
+
+    /// One of its substeps, of which nobody is told; whether there was an answer.
+    fn half(&mut self, h: f64) -> bool {
+        if self.foresee(h).is_err() {
+            return false;
+        }
+        self.touch(h);
+        let Self { positions, velocities, free, ties, .. } = self;
+        velocities.clone_from(free);
+        positions.iter_mut().zip(&*velocities).for_each(|(x, v)| *x += *v * h);
+        ties.iter_mut().for_each(|tie| tie.book(velocities[tie.vertex], h));
+        true
+    }
+
+    /// Ends a step of `dt` seconds in `done` substeps.
+    pub(super) fn judge(&mut self, dt: f64, done: u32) {
+        let Self { doubling, positions, .. } = self;
+        doubling.last = done;
+        if !doubling.watch.is_on() {
+            return;
+        }
+        if doubling.parts != 2 * done {
+            return doubling.watch.give_up();
+        }
+        if doubling.watch.made_twice(dt) {
+            doubling.watch.learn(farthest(positions, &doubling.finer[0]), 1);
+        }
+    }
+}

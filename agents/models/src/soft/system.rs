@@ -1,0 +1,131 @@
+//! The linear system of one substep: forces, stiffness and mass of all vertices, and its factor.
+//!
+//! In: what each element adds. Out: velocities. Never here: what an element is. Theory: docs/theory/soft.md, eq. 1, 2.
+
+use glam::{DMat3, DVec3};
+use metachron_core::skyline_cholesky::Envelope;
+
+/// A = (1 + h c) M + h² K, vertices that are held left out.
+#[derive(Debug, Clone, Default)]
+pub(super) struct System {
+    matrix: Factor,
+    /// Lowest row that each row is joined to.
+    first: Vec<u32>,
+    /// Force on each vertex at the start of the substep, N.
+    pub forces: Vec<DVec3>,
+    /// h², s²: what a stiffness counts.
+    square: f64,
+}
+
+/// The matrix of the vertices that move, and then its factor.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Factor {
+    matrix: Envelope<3>,
+    /// The row of each vertex; none for those that are held. Rows rise with the vertices.
+    rows: Vec<Option<u32>>,
+}
+
+impl System {
+    /// A system in which vertex i, where it moves, is joined to none lower than `first[i]` of those that move.
+    pub fn new(first: &[u32], held: &[bool]) -> Self {
+        let mut next = 0..;
+        let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
+        let first: Vec<u32> =
+            rows.iter().zip(first).filter_map(|(row, first)| row.and(rows[*first as usize])).collect();
+        let mut matrix = Envelope::default();
+        matrix.shape(&first);
+        Self { matrix: Factor { matrix, rows }, first, forces: vec![DVec3::ZERO; held.len()], square: 0.0 }
+    }
+
+    /// How many vertices there are.
+    pub const fn vertices(&self) -> usize {
+        self.forces.len()
+    }
+
+    /// Begins a substep of `h` seconds: no force, no stiffness.
+    pub fn begin(&mut self, h: f64) {
+        // the factor overwrote the matrix in place, of the same shape
+        self.matrix.matrix.clear();
+        self.forces.fill(DVec3::ZERO);
+        self.square = h * h;
+    }
+
+    /// Adds a force on a vertex, N.
+    pub fn push(&mut self, vertex: u32, force: DVec3) {
+        self.forces[vertex as usize] += force;
+    }
+
+    /// Adds the stiffness −∂fᵢ/∂xⱼ, N/m, where `i` is not below `j`: the matrix is symmetric.
+    pub fn stiffen(&mut self, i: u32, j: u32, stiffness: DMat3) {
+        if i >= j {
+            self.add((i as usize, j as usize), stiffness * self.square);
+        }
+    }
+
+    /// Adds what joins the velocities of two vertices, `i` not below `j`, kg.
+    pub fn join(&mut self, (i, j): (u32, u32), inertia: DMat3) {
+        self.add((i as usize, j as usize), inertia);
+    }
+
+    /// Adds an inertia to a vertex, kg.
+    pub fn weigh(&mut self, vertex: usize, inertia: DMat3) {
+        self.add((vertex, vertex), inertia);
+    }
+
+    fn add(&mut self, (i, j): (usize, usize), block: DMat3) {
+        let Factor { matrix, rows } = &mut self.matrix;
+        if let (Some(row), Some(column)) = (rows[i], rows[j]) {
+            matrix.add_block((row as usize, column as usize), block.transpose().to_cols_array_2d());
+        }
+    }
+
+    /// Factors the matrix; `false` where it is not positive.
+    pub fn factor(&mut self) -> bool {
+        self.matrix.matrix.factor()
+    }
+
+    /// The factor.
+    pub const fn answer(&self) -> &Factor {
+        &self.matrix
+    }
+
+    /// Turns impulses, one a vertex (N·s), into the velocities they cause (m/s) by the factor (eq. 2).
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        self.matrix.respond(impulses);
+    }
+
+    /// The size of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
+    pub fn mobility(&self, vertex: usize) -> f64 {
+        let Factor { matrix, rows } = &self.matrix;
+        let trace = |row: u32| (0..3).map(|axis| matrix.diagonal(3 * row as usize + axis)).sum::<f64>();
+        rows[vertex].map_or(0.0, |row| 3.0 / trace(row))
+    }
+
+    /// What a factorisation costs, multiplications.
+    pub fn work(&self) -> usize {
+        Envelope::<3>::work(&self.first)
+    }
+}
+
+impl Factor {
+    /// How many vertices there are; none before the first step.
+    pub const fn vertices(&self) -> usize {
+        self.rows.len()
+    }
+
+    /// Takes over `other` into the storage that is here.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.matrix.copy_from(&other.matrix);
+        self.rows.clone_from(&other.rows);
+    }
+
+    /// A⁻¹ on impulses, one a vertex; those that are held stay still.
+    pub fn respond(&self, impulses: &mut [DVec3]) {
+        let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
+        rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);
+        self.matrix.solve_vectors(&mut impulses[..self.matrix.rows() / 3]);
+        for (vertex, row) in self.rows.iter().enumerate().rev() {
+            impulses[vertex] = row.map_or(DVec3::ZERO, |row| impulses[row as usize]);
+        }
+    }
+}

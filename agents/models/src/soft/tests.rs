@@ -1,0 +1,174 @@
+//! What a soft body must do, against closed forms.
+
+mod bullets;
+mod error;
+mod falls;
+mod foretold;
+mod links;
+mod lying;
+mod meetings;
+mod promises;
+mod skins;
+mod slides;
+mod slopes;
+mod statics;
+mod thin;
+
+use super::{Side, SoftBody, SoftMatter, SoftShape, SoftSpec};
+use glam::{DQuat, DVec3};
+use metachron_contact::{Agent, Surroundings};
+use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot, SoftState};
+
+const MATTER: SoftMatter = SoftMatter { young_pa: 1e5, poisson: 0.3, density_kg_m3: 1000.0, damping_per_s: 0.0 };
+const SHEET: SoftShape = SoftShape::Sheet { size_m: [0.3, 0.2], thickness_m: 0.002, segments: [6, 4] };
+const G: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+
+/// A free body in empty space.
+fn spec(shape: SoftShape) -> SoftSpec {
+    SoftSpec {
+        shape,
+        matter: MATTER,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        velocity: DVec3::ZERO,
+        held: vec![],
+        friction: 0.5,
+        gravity: DVec3::ZERO,
+        obstacles: [].into(),
+        sleep: false,
+    }
+}
+
+fn solid() -> SoftShape {
+    SoftShape::Box { size_m: DVec3::new(0.2, 0.1, 0.1), segments: [4, 2, 2] }
+}
+
+fn rope() -> SoftShape {
+    SoftShape::Rope { path_m: vec![DVec3::ZERO, DVec3::X], radius_m: 0.005, segments: 20 }
+}
+
+fn all() -> [SoftShape; 4] {
+    [SHEET, solid(), SoftShape::Ball { radius_m: 0.1, segments: 4 }, rope()]
+}
+
+fn dt(seconds: f64) -> SimSpan {
+    SimSpan::from_secs_f64(seconds).unwrap()
+}
+
+/// Steps a body alone for so many steps.
+fn run(body: &mut SoftBody, dt_s: f64, steps: u32) {
+    for _ in 0..steps {
+        body.step(dt(dt_s), &Surroundings::alone(AgentId(0), SimTime::ZERO)).unwrap();
+    }
+}
+
+fn state(body: &SoftBody) -> SoftState {
+    let mut snapshot = Snapshot::default();
+    body.write_snapshot(&mut snapshot);
+    match snapshot.body {
+        Body::Soft(soft) => soft,
+        other => panic!("{other:?}"),
+    }
+}
+
+/// A body that was stretched and sheared at once by velocities of its own, without momentum.
+fn shaken(shape: SoftShape) -> SoftBody {
+    let mut body = SoftBody::new(spec(shape)).unwrap();
+    for (v, x) in body.velocities.iter_mut().zip(&body.positions) {
+        *v = DVec3::new(x.y - 3.0 * x.x, 2.0 * x.z + x.x, x.x * x.y * 20.0) + DVec3::splat(0.3);
+    }
+    body
+}
+
+#[test]
+fn what_was_never_touched_stays_as_it_was() {
+    for shape in all() {
+        let mut body = SoftBody::new(SoftSpec { rotation: DQuat::from_rotation_y(0.4), ..spec(shape) }).unwrap();
+        let before = state(&body);
+        run(&mut body, 0.01, 50);
+        for (now, was) in state(&body).positions.iter().zip(&before.positions) {
+            assert!(now.distance(*was) < 1e-12, "{now} {was}"); // rounding of lengths near 1 m
+        }
+        assert!(body.energy_j().abs() < 1e-12);
+    }
+}
+
+#[test]
+fn a_free_body_falls_and_keeps_its_shape() {
+    for shape in all() {
+        let mut body = SoftBody::new(SoftSpec { gravity: G, velocity: DVec3::X, ..spec(shape) }).unwrap();
+        let before = state(&body);
+        run(&mut body, 0.005, 100);
+        // the last velocity moves each step: half a step's fall beyond the parabola
+        let way = DVec3::X * 0.5 + G * (0.5 * 0.5 * 0.505);
+        for (now, was) in state(&body).positions.iter().zip(&before.positions) {
+            assert!((*now - *was - way).length() < 1e-10, "{} {way}", *now - *was);
+        }
+    }
+}
+
+#[test]
+fn momentum_is_kept_and_energy_never_rises_while_it_shakes() {
+    for shape in all() {
+        let mut body = shaken(shape);
+        let (linear, angular) = body.momentum();
+        let mut energy_j = body.energy_j();
+        for _ in 0..200 {
+            run(&mut body, 0.002, 1);
+            // one linear solve a step: what is left of the forces' curvature is far below what the step takes
+            assert!(body.energy_j() <= energy_j * (1.0 + 1e-7), "{} {energy_j}", body.energy_j());
+            energy_j = body.energy_j();
+        }
+        let (now, turned) = body.momentum();
+        assert!((now - linear).length() < 1e-11 * linear.length(), "{now} {linear}"); // rounding of a stiff solve
+        // the implicit step damps the turning too: of first order in the step
+        assert!((turned - angular).length() < 0.3 * angular.length().max(1e-4), "{turned} {angular}");
+    }
+}
+
+#[test]
+fn the_forces_of_a_bent_body_have_no_sum_and_no_torque() {
+    for shape in all() {
+        let mut body = shaken(shape);
+        run(&mut body, 0.005, 5);
+        let SoftBody { lattice, system, positions, .. } = &mut body;
+        system.begin(0.01);
+        lattice.add(positions, system);
+        let size: f64 = system.forces.iter().map(|f| f.length()).sum();
+        let sum: DVec3 = system.forces.iter().sum();
+        let torque: DVec3 = system.forces.iter().zip(&*positions).map(|(f, x)| x.cross(*f)).sum();
+        assert!(size > 0.1 && sum.length() < 1e-12 * size && torque.length() < 1e-11 * size, "{size} {sum} {torque}");
+    }
+}
+
+#[test]
+fn forces_are_minus_the_slope_of_the_energy() {
+    for shape in all() {
+        let mut body = shaken(shape);
+        run(&mut body, 0.005, 5);
+        let SoftBody { lattice, system, positions, .. } = &mut body;
+        system.begin(0.01);
+        lattice.add(positions, system);
+        let force = system.forces.clone();
+        let way = |k: usize| DVec3::new(libm::sin(k as f64), libm::cos(3.0 * k as f64), libm::sin(5.0 * k as f64));
+        let at = |by: f64| -> Vec<DVec3> { positions.iter().enumerate().map(|(k, x)| *x + way(k) * by).collect() };
+        let slope = (lattice.energy_j(&at(1e-7)) - lattice.energy_j(&at(-1e-7))) / 2e-7;
+        let wanted: f64 = force.iter().enumerate().map(|(k, f)| -f.dot(way(k))).sum();
+        // central differences of second order in 1e-7, rounding of energies near 0.1 J
+        assert!((slope - wanted).abs() < 1e-5 * force.iter().map(|f| f.length()).sum::<f64>(), "{slope} {wanted}");
+    }
+}
+
+#[test]
+fn what_cannot_be_is_refused_with_its_limit() {
+    let fails = |spec: SoftSpec| SoftBody::new(spec).err().expect("must be refused").to_string();
+    let rubber = SoftMatter { poisson: 0.5, ..MATTER };
+    assert!(fails(SoftSpec { matter: rubber, ..spec(solid()) }).contains("0.49"));
+    assert!(fails(SoftSpec { held: vec![Side::Top], ..spec(SHEET) }).contains("a sheet has no side `top`"));
+    let fine = SoftShape::Ball { radius_m: 0.1, segments: 40 };
+    assert!(fails(spec(fine)).contains("68921 vertices; at most 2048"));
+    let point = SoftShape::Rope { path_m: vec![DVec3::X; 3], radius_m: 0.01, segments: 4 };
+    assert!(fails(spec(point)).contains("two points that are apart"));
+    let bad = SoftShape::Box { size_m: DVec3::new(1.0, f64::NAN, 1.0), segments: [1; 3] };
+    assert!(fails(spec(bad)).contains("the size is NaN"));
+}

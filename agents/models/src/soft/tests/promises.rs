@@ -1,0 +1,37 @@
+//! What every agent promises, held against soft bodies.
+
+use super::*;
+use crate::conformance::fall_deviation;
+use crate::conformance::{Suite, check};
+use metachron_contact::Pull;
+use metachron_core::Anchor;
+
+#[test]
+fn every_promise_of_an_agent_is_kept() {
+    for shape in all() {
+        let make = || {
+            let made = SoftBody::new(SoftSpec { gravity: G, ..spec(shape.clone()) }).unwrap();
+            Box::new(made) as Box<dyn Agent>
+        };
+        let fall = |agent: &dyn Agent, t: f64| fall_deviation(agent, G, t);
+        let pull = Pull {
+            by: None,
+            anchor: Anchor::Vertex(7),
+            target: DVec3::new(0.1, 0.1, 0.1),
+            target_velocity: DVec3::ZERO,
+            stiffness_n_m: 10.0,
+            damping_n_s_m: 0.1,
+        };
+        let absurd = [1e300, f64::NAN, f64::INFINITY].map(|x| Pull { target: DVec3::X * x, ..pull }).to_vec();
+        let count = |f: &mut dyn FnMut()| allocation_counter::measure(f).count_total;
+        let suite = Suite {
+            steps: 60,
+            pull: Some(pull),
+            absurd,
+            closed_form: Some((&fall, 1e-12)),
+            allocations: Some((&count, 0.0)),
+            ..Suite::new(&make, dt(0.005))
+        };
+        assert_eq!(check(&suite), [], "{shape:?}");
+    }
+}

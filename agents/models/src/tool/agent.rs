@@ -1,0 +1,334 @@
+//! The agent: one step of a tool, told as a contents page.
+//!
+//! In: a span, the hand, what can be held. Out: a [`ToolState`]. Never here: forces; who is held or touched solves them.
+//!
+//! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
+//! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
+//! What touches the tip moves it off the led point as far as the drive is strong ([`super::drive`]).
+
+use super::drive::{Drive, Led};
+use super::force_sensor::Felt;
+use super::gripper::{Jaws, let_in, nearest};
+use super::spec::REACH_MAX_M;
+use super::trajectory::{Pose, Script};
+use super::{ToolError, ToolSpec};
+use glam::{DQuat, DVec3};
+use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_contact::{Knock, beside};
+use metachron_core::{
+    AgentId, Anchor, Body, Bounds, GRASP_BELOW, Resolution, SimSpan, Snapshot, StepError, StepReport, ToolState,
+    check_span,
+};
+use metachron_geometry::ToolShape;
+use metachron_geometry::{Form, FormKind, Placed, View};
+use std::fmt;
+use std::sync::Arc;
+
+/// A driven tool that lives by its own steps.
+#[derive(Clone)]
+pub struct Instrument {
+    spec: ToolSpec,
+    script: Script,
+    tool: ToolState,
+    /// Where the tip is led, and how fast: where it is, if nothing pushes it.
+    led: Led,
+    drive: Drive,
+    /// How far the tip is from where the script or the hand wants it, metres.
+    lag_m: f64,
+    jaws: Jaws,
+    felt: Felt,
+    knock: Knock,
+    form: Arc<Form>,
+    /// How fast any of its points went in the last step, m/s.
+    speed_m_s: f64,
+    at_rest: bool,
+    steps: u64,
+}
+
+impl fmt::Debug for Instrument {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_struct("Instrument").field("tool", &self.tool).field("jaws", &self.jaws).finish_non_exhaustive()
+    }
+}
+
+/// Coulomb friction coefficient of wet steel.
+const FRICTION: f64 = 0.2;
+
+/// How fast the tip closes up to a hand, 1/s: nine tenths of the way in 65 ms, the tremor of a mouse is gone.
+const HAND_RATE_PER_S: f64 = 60.0;
+/// How fast it returns to its script after a hand, 1/s: nine tenths of the way in a second.
+const RETURN_RATE_PER_S: f64 = 4.0;
+/// How fast jaws open and close where no script says, 1/s.
+const JAW_RATE_PER_S: f64 = 4.0;
+/// In the hand, jaws close on what has its skin is nearer than this share of their reach.
+const CATCH_SHARE: f64 = 0.5;
+/// A tip nearer than this to its script has arrived, metres (and m/s).
+const ARRIVED: f64 = 1e-7;
+/// A tool on which others sleep keeps still below this, m/s.
+const LAIN_M_S: f64 = 2e-3;
+/// Near others steps are no longer than a rigid body's there, seconds.
+const PART_MAX_S: f64 = 1.0 / 240.0;
+/// Rotations whose dot product is within this of one are the same.
+const SAME_TURN: f64 = 1e-14;
+
+impl Instrument {
+    /// Builds the tool of `spec`, in its first keyframe or as far off as it says.
+    ///
+    /// # Errors
+    /// [`ToolError`] for a script without keyframes, times that do not rise, and any number outside its range.
+    pub fn new(spec: ToolSpec) -> Result<Self, ToolError> {
+        spec.check()?;
+        let script = Script::new(&spec.keyframes, spec.repeat);
+        let Pose { tip, velocity, rotation, jaw } = script.at(0.0);
+        let tip = tip + spec.starts_off_m;
+        let spin = DVec3::ZERO;
+        let tool =
+            ToolState { tip, rotation, velocity, spin, jaw, grasp: None, lets_in: None, force_n: 0.0, is_left: false };
+        let form = Arc::new(Form { kind: FormKind::Tool(shape()), friction: FRICTION, restitution: 0.0 });
+        let (jaws, felt, knock) = (Jaws::new(), Felt::default(), Knock::default());
+        let (led, drive) = ((tip, velocity), Drive::new(spec.max_force_n));
+        Ok(Self {
+            spec,
+            script,
+            tool,
+            led,
+            drive,
+            lag_m: 0.0,
+            jaws,
+            felt,
+            knock,
+            form,
+            speed_m_s: 0.0,
+            at_rest: false,
+            steps: 0,
+        })
+    }
+
+    /// Where the hand wants the tip, and how fast it moves there.
+    fn hand_target(&self, hand: &Pull) -> (DVec3, DVec3) {
+        let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
+        (hand.target - self.tool.rotation * local, hand.target_velocity)
+    }
+
+    /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on what is near.
+    fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
+        let (target, target_velocity) = self.hand_target(hand);
+        let now = (self.led.0 - target, self.led.1 - target_velocity);
+        let (off, off_velocity) = die_out(now, HAND_RATE_PER_S, dt);
+        let tip = target + target_velocity * dt + off;
+        let near =
+            nearest(&self.spec, self.tool.tip, around).is_some_and(|near| near.gap_m < CATCH_SHARE * self.spec.reach_m);
+        let wanted = if near || self.jaws.holds() { 0.0 } else { 1.0 };
+        let jaw = self.tool.jaw + (wanted - self.tool.jaw).clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
+        ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
+    }
+
+    /// Follows the script; what separates the tool from it dies out.
+    fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
+        let now = (self.led.0 - from.tip, self.led.1 - from.velocity);
+        let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
+        let jaw_off = self.tool.jaw - from.jaw;
+        let jaw = to.jaw + jaw_off - jaw_off.clamp(-JAW_RATE_PER_S * dt, JAW_RATE_PER_S * dt);
+        let turned_off = self.tool.rotation * from.rotation.conjugate();
+        let rotation = if turned_off.w.abs() >= 1.0 - SAME_TURN {
+            to.rotation
+        } else {
+            let left = libm::exp(-RETURN_RATE_PER_S * dt);
+            (DQuat::IDENTITY.slerp(turned_off, left) * to.rotation).normalize()
+        };
+        ToolState {
+            tip: to.tip + off,
+            velocity: to.velocity + off_velocity,
+            rotation,
+            jaw: jaw.clamp(0.0, 1.0),
+            ..self.tool
+        }
+    }
+
+    /// Whether the tool holds a neighbour or is linked to it: they see it as led, and so it is to them.
+    fn is_held_by(&self, other: &Neighbour, around: &Surroundings<'_>) -> bool {
+        let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
+        held || around.links.iter().any(|link| link.other == other.id)
+    }
+
+    /// The drive takes the tip along, against what others gave it in contact.
+    fn drive_on(&mut self, led: ToolState, around: &Surroundings<'_>, dt_s: f64) -> ToolState {
+        let mut felt = std::mem::take(&mut self.felt);
+        let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
+        self.felt = felt;
+        let (tip, velocity);
+        [self.led, (tip, velocity)] = self.drive.go_on([self.led, (led.tip, led.velocity)], &given, dt_s);
+        ToolState { tip, velocity, ..led }
+    }
+
+    /// The rigid body for which the jaws are open: one that is near them, or may be within two steps of `dt_s` seconds.
+    fn let_in(&self, around: &Surroundings<'_>, dt_s: f64) -> Option<AgentId> {
+        let open = self.tool.jaw > GRASP_BELOW;
+        let reach_m = self.spec.reach_m + reach().2 + 2.0 * dt_s * self.speed_m_s;
+        if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
+    }
+
+    /// Finds who sleeps in its way.
+    fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
+        let ToolState { tip, rotation, jaw, .. } = self.tool;
+        let bounds = bounds(&self.tool, self.speed_m_s);
+        let placed = Placed { form: &self.form, view: View::Tool { tip, rotation, jaw } };
+        self.knock.find(&placed, &bounds, (around, dt_s));
+    }
+
+    /// Whether the led point has come to where the script ends: what stands in the way of a drive that gives all it can holds it back.
+    fn has_led_to(&self, end: &Pose) -> bool {
+        (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED
+    }
+
+    /// Whether the tool has come to the end of its script and waits there, empty.
+    fn rests(&mut self, end: &Pose) -> bool {
+        // who sleeps on it gives no more: it keeps still as well, or it would rise into them
+        let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
+        let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
+        if rests {
+            self.led = (end.tip, DVec3::ZERO);
+            self.tool.tip = if self.drive.is_there() { end.tip } else { self.tool.tip };
+            self.tool.velocity = DVec3::ZERO;
+        }
+        rests
+    }
+}
+
+/// The shape of every tool.
+fn shape() -> ToolShape {
+    ToolShape::default()
+}
+
+/// The ends of a tool in its own axes, and how far it reaches sideways of the line between them, metres.
+fn reach() -> (DVec3, DVec3, f64) {
+    let ToolShape { shaft_radius_m: r, shaft_length_m } = shape();
+    // jaws: 2 radii before the tip and 6 behind it, 4 to the side when they are wide open; clevis and ring, then the shaft
+    (DVec3::Z * (2.0 * r), DVec3::NEG_Z * (10.0 * r + shaft_length_m), 5.0 * r)
+}
+
+/// The box around a tool whose points move no faster than `speed_m_s`.
+fn bounds(tool: &ToolState, speed_m_s: f64) -> Bounds {
+    let (front, back, side_m) = reach();
+    let (front, back) = (tool.tip + tool.rotation * front, tool.tip + tool.rotation * back);
+    Bounds { low: front.min(back) - side_m, high: front.max(back) + side_m, speed_m_s }
+}
+
+/// How fast the fastest point of a tool went between two states `dt` seconds apart, m/s.
+fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
+    let (front, back, side_m) = reach();
+    let way = |end: DVec3| (after.tip + after.rotation * end).distance(before.tip + before.rotation * end);
+    (way(front).max(way(back)) + (after.jaw - before.jaw).abs() * side_m) / dt
+}
+
+/// The angular velocity that leads from one rotation to another in `dt` seconds, world axes, rad/s.
+fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
+    let turned = to * from.conjugate();
+    let shorter = if turned.w < 0.0 { -turned } else { turned };
+    if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
+}
+
+/// A deviation and its rate after `t` seconds of critical damping: exact, whatever the step.
+fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
+    let left = libm::exp(-damping_s * t);
+    let push = rate + off * damping_s;
+    ((off + push * t) * left, (rate - push * (damping_s * t)) * left)
+}
+
+impl Agent for Instrument {
+    fn model(&self) -> &'static str {
+        "instrument"
+    }
+
+    /// Leads the tip by `dt`, moves the jaws, reads what is felt.
+    ///
+    /// Of a hand's spring only the target counts: a tool is led, so stiffness and damping mean nothing to it.
+    fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
+        let dt_s = check_span(dt)?;
+        let (start_s, end_s) = (around.time.as_secs_f64(), (around.time + dt).as_secs_f64());
+        let end = self.script.at(end_s);
+        let hand = around.hands.first();
+        let led = match hand {
+            Some(hand) => self.follow_hand(hand, dt_s, around),
+            None => self.follow_script(&self.script.at(start_s), &end, dt_s),
+        };
+        let inside = led.tip.is_finite() && led.tip.abs().max_element() <= REACH_MAX_M;
+        if !(inside && led.velocity.is_finite() && led.rotation.is_finite()) {
+            let what = format!("the hand leads its tip to {}", led.tip);
+            return Err(StepError::Diverged { model: "instrument", dt_s, what });
+        }
+        let was = self.tool.jaw;
+        let wanted = hand.map_or(end.tip, |hand| self.hand_target(hand).0);
+        let led = self.drive_on(led, around, dt_s);
+        self.lag_m = led.tip.distance(wanted);
+        self.speed_m_s = speed(&self.tool, &led, dt_s);
+        let is_left = hand.is_none() && self.script.is_over(end_s) && self.has_led_to(&end);
+        self.tool = ToolState { spin: spin(self.tool.rotation, led.rotation, dt_s), is_left, ..led };
+        self.jaws.move_to(&self.spec, (was, led.jaw), (led.tip, led.rotation), (around, dt_s));
+        self.tool.grasp = self.jaws.grasp(&self.spec);
+        self.tool.lets_in = self.let_in(around, dt_s);
+        self.wake_others(around, dt_s);
+        self.tool.force_n = self.felt.force_n();
+        self.steps += 1;
+        self.at_rest = is_left && self.rests(&end);
+        Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
+    }
+
+    /// What its drive and a body that it pushes together make of each other neither foresees; and what it hears of once in several
+    /// steps of who pushes it would go on through all of its own.
+    fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
+        let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
+        let bounds = || bounds(&self.tool, self.speed_m_s);
+        let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
+        // what it comes to catch it will let in
+        let catches = |n: &Neighbour| self.tool.jaw > GRASP_BELOW && self.spec.graspable.contains(&n.id);
+        let pushes = |n: &Neighbour| !(spared(n) || catches(n));
+        beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
+    }
+
+    fn rename_time(&mut self, by_s: f64) {
+        self.script.begin_later(by_s);
+    }
+
+    fn resolution(&self) -> Option<Resolution> {
+        None
+    }
+
+    /// Tells how long a step is before it has made one: others foresee its drive over that.
+    fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
+        self.drive.look(self.longest_step(dt, around).as_secs_f64());
+    }
+
+    /// A tool has no samples to spread: nothing changes.
+    fn retune(&mut self, _wanted: Resolution) {}
+
+    fn write_snapshot(&self, into: &mut Snapshot) {
+        into.clear();
+        into.steps = self.steps;
+        into.resolution = None;
+        into.body = Body::Tool(self.tool);
+        into.energy_j = 0.0;
+        into.residual_m = self.lag_m;
+        into.touches.extend(self.tool.grasp.map(|grasp| grasp.target));
+        into.touches
+            .extend(self.knock.on().iter().filter(|id| self.tool.grasp.is_none_or(|grasp| grasp.target != **id)));
+        into.at_rest = self.at_rest;
+        into.inertia = self.drive.inertia();
+        into.sprung.set(Some(self.drive.sprung(self.led.1)));
+        into.bounds = Some(bounds(&self.tool, self.speed_m_s));
+        self.felt.write(into);
+    }
+
+    fn form(&self) -> Option<Arc<Form>> {
+        Some(self.form.clone())
+    }
+
+    /// A tool is led from outside and weighs nothing here.
+    fn momentum(&self) -> (DVec3, DVec3) {
+        (DVec3::ZERO, DVec3::ZERO)
+    }
+
+    fn mass_kg(&self) -> f64 {
+        0.0
+    }
+}

@@ -1,0 +1,159 @@
+//! What drives a tool: its tip is a mass on a spring to the point that is led, and the spring gives way at the force of the drive.
+//!
+//! In: how the led point goes, what the tip was given in contact. Out: where the tip is, and the led point, which the tip holds
+//! back where the drive is not strong enough; what others need to foresee both. Never here: where the path leads, holds.
+//! Theory: docs/theory/coupling.md, eq. 9d–9f: the god-object of haptics (ZS95), its coupling limited in force.
+
+use glam::{DMat3, DVec3};
+use metachron_core::Inertia;
+use metachron_core::{Six, Sprung};
+
+/// A point and its velocity, metres and m/s.
+pub(super) type Led = (DVec3, DVec3);
+
+/// What the tip was given in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Given {
+    /// What is new: dJ, and t dJ − dS.
+    pub sum: DVec3,
+    /// See [`Self::sum`].
+    pub carried: DVec3,
+    /// What acts evenly over the step.
+    pub lasting: DVec3,
+}
+
+/// The drive of one tool.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Drive {
+    /// The most that it can give, newtons.
+    limit_n: f64,
+    /// From the led point to the tip, and how that changes.
+    off: DVec3,
+    rate: DVec3,
+    /// What it gives, newtons, while the tip holds the led point back.
+    slips: Option<DVec3>,
+    /// The tip's acceleration in the last step without what it was given, m/s².
+    past: DVec3,
+    /// How long that step was, seconds.
+    span_s: f64,
+}
+
+/// How far the tip gives way to the drive's full force, metres: a tool that pushes with a tenth of it is half a millimetre off.
+const GIVE_M: f64 = 5e-3;
+/// How fast tip and drive swing, rad/s, damped critically: with [`GIVE_M`] the full force moves the tip by 16 g and no faster.
+const SWING_PER_S: f64 = 180.0;
+/// A tip nearer than this to the led point, that nothing pushes, is there, metres; and m/s.
+const THERE: f64 = 1e-7;
+/// Nothing turns a tool: 1/(kg·m²).
+const TURNS_PER_KG_M2: f64 = 1e-9;
+
+impl Drive {
+    /// A drive of so many newtons whose tip is where it is led.
+    pub(super) fn new(limit_n: f64) -> Self {
+        let none = DVec3::ZERO;
+        Self { limit_n, off: none, rate: none, slips: None, past: none, span_s: 0.0 }
+    }
+
+    /// Stiffness, N/m, and damping, N·s/m, as others know them: a drive that gives all it can still resists what changes its velocity
+    /// within a step.
+    fn spring(&self) -> [f64; 2] {
+        let stiffness_n_m = if self.slips.is_some() { 0.0 } else { self.stiffness_n_m() };
+        [stiffness_n_m, self.damping_n_s_m()]
+    }
+
+    fn damping_n_s_m(&self) -> f64 {
+        2.0 * SWING_PER_S * self.mass_kg()
+    }
+
+    fn stiffness_n_m(&self) -> f64 {
+        self.limit_n / GIVE_M
+    }
+
+    fn mass_kg(&self) -> f64 {
+        self.stiffness_n_m() / (SWING_PER_S * SWING_PER_S)
+    }
+
+    /// Steps will last so many seconds.
+    pub(super) const fn look(&mut self, dt: f64) {
+        self.span_s = dt;
+    }
+
+    /// Whether the tip is where it is led.
+    pub(super) fn is_there(&self) -> bool {
+        self.off == DVec3::ZERO && self.rate == DVec3::ZERO
+    }
+
+    /// Goes on for `dt` seconds in which the path would lead the led point `from` … `to`: the led point and the tip after it.
+    ///
+    /// As a body on springs goes on (eq. 7d). Where the spring would have to give more than the drive can, it gives that and the led
+    /// point stays where it does (eq. 9f).
+    pub(super) fn go_on(&mut self, [from, to]: [Led; 2], given: &Given, dt: f64) -> [Led; 2] {
+        let [k, c] = self.spring();
+        let known = (self.mass_kg() + self.span_s * (c + self.span_s * k)).recip();
+        self.off += given.carried * known;
+        self.rate += given.sum * known;
+        self.span_s = dt;
+        let idle = self.off.length() < THERE && self.rate.length() < THERE && *given == Given::default();
+        if idle {
+            (self.off, self.rate, self.past, self.slips) = (DVec3::ZERO, DVec3::ZERO, DVec3::ZERO, None);
+            return [to, to];
+        }
+        let led = self.pull(to, given.lasting, dt).unwrap_or_else(|force| self.slip(from, (force, given.lasting), dt));
+        [led, (led.0 + self.off, led.1 + self.rate)]
+    }
+
+    /// The spring pulls the tip to a point that goes on as it is led; the mean force that it lacks, where that is too much for it.
+    fn pull(&mut self, to: Led, lasting: DVec3, dt: f64) -> Result<Led, DVec3> {
+        let (m, k, c) = (self.mass_kg(), self.stiffness_n_m(), self.damping_n_s_m());
+        let yields = (m + dt * (c + dt * k)).recip();
+        let pull = -(self.off + self.rate * dt) * k - self.rate * c;
+        let change = (pull * dt + lasting) * yields;
+        let force = (change * m - lasting) / dt;
+        if force.length() > self.limit_n {
+            return Err(force.clamp_length_max(self.limit_n));
+        }
+        self.off += self.rate * dt + change * (0.5 * dt);
+        self.rate += change;
+        (self.past, self.slips) = ((change - lasting * yields) / dt, None);
+        Ok(to)
+    }
+
+    /// The drive gives all its `force`, and the led point is as far from the tip as that stretches the spring.
+    fn slip(&mut self, from: Led, (force, lasting): (DVec3, DVec3), dt: f64) -> Led {
+        let yields = (self.mass_kg() + dt * self.damping_n_s_m()).recip();
+        let change = (force * dt + lasting) * yields;
+        let (place, velocity) = (from.0 + self.off, from.1 + self.rate);
+        let tip = place + velocity * dt + change * (0.5 * dt);
+        (self.off, self.rate) = (-force / self.stiffness_n_m(), DVec3::ZERO);
+        (self.past, self.slips) = (force * yields, Some(force));
+        (tip - self.off, velocity + change)
+    }
+
+    /// How the tip answers what it is given beside its spring.
+    pub(super) fn inertia(&self) -> Inertia {
+        Inertia::Rigid {
+            inverse_mass: self.mass_kg().recip(),
+            inverse_inertia: DMat3::from_diagonal(DVec3::splat(TURNS_PER_KG_M2)),
+        }
+    }
+
+    /// What others need to foresee the tip, whose led point goes on with `velocity` (eq. 7b, 7c).
+    pub(super) fn sprung(&self, velocity: DVec3) -> Sprung {
+        let [k, c] = self.spring();
+        let all_ways = |x: f64| {
+            let mut six = Six::ZERO;
+            six.add_point(DVec3::ZERO, DMat3::from_diagonal(DVec3::splat(x)));
+            six
+        };
+        let force = self.slips.unwrap_or(self.off * -k - self.rate * c);
+        Sprung {
+            force: [force, DVec3::ZERO],
+            rising: [velocity * k, DVec3::ZERO],
+            stiffness: all_ways(k),
+            damping: all_ways(c),
+            past: [self.past, DVec3::ZERO],
+            span_s: self.span_s,
+            limit_n: self.limit_n,
+        }
+    }
+}

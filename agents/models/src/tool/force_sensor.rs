@@ -1,0 +1,127 @@
+//! What a tool feels: the impulses that others gave it, as a force; and what of it moves the tool.
+//!
+//! In: the ledgers of those who touch it or are held by it. Out: a force, and what contact gives the drive ([`super::drive`]).
+//! Never here: where the tool goes.
+//!
+//! Whom the tool holds, and who is linked to it, sees it as led; it takes what they give without yielding.
+
+use super::drive::Given;
+use glam::DVec3;
+use metachron_contact::Exchange;
+use metachron_contact::{Neighbour, Surroundings};
+use metachron_core::Impulse;
+use metachron_core::{AgentId, SimTime, Snapshot};
+
+/// The forces on one tool.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Felt {
+    exchange: Exchange,
+    /// Everybody who holds on to it, by rising ids: who gives nothing yet is read too, so that it is known since when its first
+    /// impulses count.
+    from: Vec<From>,
+    /// Those who see the tool as led, and the others, while it reads.
+    held: Vec<Neighbour>,
+    touching: Vec<Neighbour>,
+    /// The force of contact, newtons.
+    pushed_n: DVec3,
+    /// Whether only agents at rest push it.
+    lain_on: bool,
+}
+
+/// The force of one agent.
+#[derive(Debug, Clone, Copy)]
+struct From {
+    id: AgentId,
+    /// How far its account has been read.
+    until: SimTime,
+    /// Given since then, N·s.
+    given: DVec3,
+    force_n: DVec3,
+    /// Whether it is still near.
+    here: bool,
+}
+
+impl Felt {
+    /// Reads what was given since the last reading, by those to whom the tool `is_led` and by the others, and what the others
+    /// give in a step of `dt` seconds.
+    pub(super) fn read(&mut self, around: &Surroundings<'_>, is_led: impl Fn(&Neighbour) -> bool, dt: f64) -> Given {
+        self.exchange.open(around);
+        let [mut held, mut touching] = [&mut self.held, &mut self.touching].map(std::mem::take);
+        for other in around.neighbours {
+            if is_led(other) { held.push(other.clone()) } else { touching.push(other.clone()) }
+        }
+        self.hold(&Surroundings { neighbours: &held, ..*around });
+        let given = self.touch(&Surroundings { neighbours: &touching, ..*around }, dt);
+        held.clear();
+        touching.clear();
+        (self.held, self.touching) = (held, touching);
+        given
+    }
+
+    /// Takes what contact gives, as forces that go on.
+    fn touch(&mut self, around: &Surroundings<'_>, dt: f64) -> Given {
+        let (mut given, mut awake) = (Given::default(), false);
+        self.exchange.follow(around, dt, |id, [sum, carried, lasting]| {
+            given.sum += sum.linear;
+            given.carried += carried.linear;
+            given.lasting += lasting.linear;
+            let rests = around.neighbours.iter().any(|other| other.id == id && other.snapshot.at_rest);
+            awake |= !rests && lasting != Impulse::ZERO;
+        });
+        self.pushed_n = given.lasting / dt;
+        self.lain_on = !awake && given.lasting != DVec3::ZERO;
+        given
+    }
+
+    /// Reads what those gave to whom the tool is led: a force is the mean over the giver's own time between two readings.
+    fn hold(&mut self, around: &Surroundings<'_>) {
+        let Self { exchange, from, .. } = self;
+        from.iter_mut().for_each(|f| (f.here, f.given) = (false, DVec3::ZERO));
+        for other in around.neighbours {
+            match from.binary_search_by_key(&other.id, |f| f.id) {
+                Ok(at) => from[at].here = true,
+                Err(at) => from.insert(at, From::new(other, around.me)),
+            }
+        }
+        from.retain(|f| f.here);
+        // all of it, what is still to act too: the mean is over all of the giver's time
+        let newest = around.neighbours.iter().map(|other| other.snapshot.time).fold(around.time, SimTime::max);
+        exchange.take(around, newest, |id, _, Impulse { linear, .. }, _| {
+            if let Ok(at) = from.binary_search_by_key(&id, |f| f.id) {
+                from[at].given += linear;
+            }
+        });
+        for other in around.neighbours {
+            let Ok(at) = from.binary_search_by_key(&other.id, |f| f.id) else { continue };
+            let since_s = other.snapshot.time.secs_after(from[at].until);
+            if since_s > 0.0 {
+                (from[at].force_n, from[at].until) = (from[at].given / since_s, other.snapshot.time);
+            }
+        }
+    }
+
+    /// The magnitude of all forces on the tool, newtons.
+    pub(super) fn force_n(&self) -> f64 {
+        (self.from.iter().map(|f| f.force_n).sum::<DVec3>() + self.pushed_n).length()
+    }
+
+    /// Whether only agents at rest push it: they lie on it.
+    pub(super) const fn is_lain_on(&self) -> bool {
+        self.lain_on
+    }
+
+    /// Writes what was taken.
+    pub(super) fn write(&self, into: &mut Snapshot) {
+        self.exchange.write(into);
+    }
+}
+
+impl From {
+    /// Who is seen for the first time: what it has given already counts from when it began the page that it writes on.
+    fn new(other: &Neighbour, me: AgentId) -> Self {
+        let account = other.snapshot.given.iter().find(|ledger| ledger.with == me);
+        let since = account.and_then(|ledger| ledger.pages.last()).map(|page| page.origin);
+        let until = since.map_or(other.snapshot.time, |since| since.min(other.snapshot.time));
+        Self { id: other.id, until, given: DVec3::ZERO, force_n: DVec3::ZERO, here: true }
+    }
+}

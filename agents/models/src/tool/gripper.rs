@@ -1,0 +1,172 @@
+//! What the jaws catch: the nearest point of a tube, soft or rigid body within reach, held by a spring that comes on smoothly.
+//!
+//! In: an opening, where the jaws are, the snapshots around. Out: a [`Grasp`]. Never here: where the tip goes.
+//!
+//! What bends is held at a point: it turns about it as its own stiffness lets it. A rigid body is kept from turning as well: jaws
+//! are plates and no point, and bear on it along all that they reach.
+
+use super::ToolSpec;
+use glam::{DQuat, DVec3};
+use metachron_contact::{Neighbour, Surroundings};
+use metachron_core::{AgentId, Anchor, Body, Clasp, CurveState, GRASP_BELOW, Grasp, RigidState, SoftState};
+use metachron_geometry::{FormKind, SolidForm};
+
+/// Jaws that pass above this opening let go.
+pub(super) const RELEASE_ABOVE: f64 = 0.3;
+/// The hold reaches its full stiffness in this time, seconds: the tube is not torn to the tip at once.
+const RAMP_S: f64 = 0.15;
+/// The share of its stiffness that a hold begins with: a spring must have some.
+const RAMP_START: f64 = 1e-3;
+
+/// Jaws and what they hold.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Jaws {
+    held: Option<Held>,
+    /// The jaws were open, so that closing them can catch something.
+    armed: bool,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Held {
+    target: AgentId,
+    anchor: Anchor,
+    /// From a rigid body's axes to the tool's, when it was caught.
+    rotation: Option<DQuat>,
+    for_s: f64,
+}
+
+/// What lies near the jaws.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Near {
+    target: AgentId,
+    anchor: Anchor,
+    /// From the tip to its skin, metres; a tube's is below zero inside.
+    pub gap_m: f64,
+    /// How a rigid body is turned.
+    rotation: Option<DQuat>,
+}
+
+impl Jaws {
+    /// Empty jaws, ready to catch.
+    pub(super) fn new() -> Self {
+        Self { held: None, armed: true }
+    }
+
+    /// Whether they hold something.
+    pub(super) fn holds(&self) -> bool {
+        self.held.is_some()
+    }
+
+    /// Opens and closes over a step of `dt` seconds: from opening `was` to `now`, the tip at `tip`, the tool turned by `rotation`.
+    pub(super) fn move_to(
+        &mut self,
+        spec: &ToolSpec,
+        (was, now): (f64, f64),
+        (tip, rotation): (DVec3, DQuat),
+        seen: (&Surroundings<'_>, f64),
+    ) {
+        let (around, dt) = seen;
+        if now > RELEASE_ABOVE {
+            *self = Self::new();
+        }
+        if let Some(held) = &mut self.held {
+            held.for_s += dt;
+        } else if now < GRASP_BELOW && self.armed {
+            self.held = nearest(spec, tip, around).map(|Near { target, anchor, rotation: body, .. }| {
+                let rotation = body.map(|body| (rotation.conjugate() * body).normalize());
+                Held { target, anchor, rotation, for_s: 0.0 }
+            });
+            // jaws that have come to a stop catch nothing any more
+            self.armed = self.held.is_none() && now < was;
+        }
+    }
+
+    /// The hold as others see it.
+    pub(super) fn grasp(&self, spec: &ToolSpec) -> Option<Grasp> {
+        let held = self.held?;
+        let u = (held.for_s / RAMP_S).min(1.0);
+        let share = (u * u * (3.0 - 2.0 * u)).max(RAMP_START);
+        Some(Grasp {
+            target: held.target,
+            anchor: held.anchor,
+            clasp: held.rotation.map(|rotation| Clasp { rotation, arm_m: spec.reach_m }),
+            stiffness_n_m: share * spec.stiffness_n_m,
+            damping_n_s_m: share * spec.damping_n_s_m,
+        })
+    }
+}
+
+/// The nearest point within reach of what may be grasped.
+pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<Near> {
+    nearest_of(spec, tip, (around, spec.reach_m), |_| true)
+}
+
+/// The rigid body that open jaws may take, or have just let go: the nearest within `reach_m` of the tip.
+pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundings<'_>, f64)) -> Option<AgentId> {
+    let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
+    nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
+}
+
+/// The nearest point within `reach_m` of those that may be grasped and are `wanted`.
+fn nearest_of(
+    spec: &ToolSpec,
+    tip: DVec3,
+    (around, reach_m): (&Surroundings<'_>, f64),
+    wanted: impl Fn(&Neighbour) -> bool,
+) -> Option<Near> {
+    let graspable = around.neighbours.iter().filter(|other| spec.graspable.contains(&other.id) && wanted(other));
+    let near = graspable.filter_map(|other| point_of(other, tip)).filter(|near| near.gap_m <= reach_m);
+    near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
+}
+
+/// The nearest point of what can be held.
+fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
+    let ((anchor, gap_m), rotation) = match &other.snapshot.body {
+        Body::Curve(curve) => (nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?, None),
+        Body::Soft(soft) => (nearest_vertex(soft, tip)?, None),
+        Body::Rigid(state) => {
+            let FormKind::Solid(form) = &other.form.as_ref()?.kind else { return None };
+            (nearest_in(form, state, tip)?, Some(state.rotation))
+        }
+        Body::Tool(_) | Body::Nothing => return None,
+    };
+    Some(Near { target: other.id, anchor, gap_m, rotation })
+}
+
+/// The point of a solid that is nearest, and how far it is: none inside.
+fn nearest_in(form: &SolidForm, state: &RigidState, tip: DVec3) -> Option<(Anchor, f64)> {
+    let local = state.rotation.conjugate() * (tip - state.position);
+    let place = (local + form.com_local).as_vec3();
+    if !place.is_finite() {
+        return None;
+    }
+    let found = form.shape.project_local_point(place, true);
+    if found.is_inside {
+        return Some((Anchor::Local(local), 0.0));
+    }
+    let point = found.point.as_dvec3() - form.com_local;
+    Some((Anchor::Local(point), point.distance(local)))
+}
+
+/// The nearest vertex of a soft body, and how far it is.
+fn nearest_vertex(soft: &SoftState, tip: DVec3) -> Option<(Anchor, f64)> {
+    let apart = (0..).zip(&soft.positions).map(|(vertex, at)| (Anchor::Vertex(vertex), at.distance(tip)));
+    apart.min_by(|a, b| a.1.total_cmp(&b.1))
+}
+
+/// The point of a curve whose skin is nearest: rest arc length, and the gap (negative inside).
+fn nearest_on(curve: &CurveState, tip: DVec3) -> Option<(f64, f64)> {
+    let mut best: Option<(f64, f64)> = None;
+    for i in 1..curve.positions.len() {
+        let (a, b) = (curve.positions[i - 1], curve.positions[i]);
+        let along = b - a;
+        let length_squared = along.length_squared();
+        let u = if length_squared > 0.0 { ((tip - a).dot(along) / length_squared).clamp(0.0, 1.0) } else { 0.0 };
+        let mix = |from: f64, to: f64| from + (to - from) * u;
+        let gap = tip.distance(a + along * u) - mix(curve.radii_m[i - 1], curve.radii_m[i]);
+        if best.is_none_or(|(_, least)| gap < least) {
+            best = Some((mix(curve.arc_m[i - 1], curve.arc_m[i]), gap));
+        }
+    }
+    best
+}

@@ -1,0 +1,136 @@
+//! A tool's script and hold: the numbers a scene gives, and what is wrong with them.
+
+use glam::{DQuat, DVec3};
+use metachron_core::AgentId;
+
+/// A tool before it is built.
+#[derive(Debug, Clone)]
+pub struct ToolSpec {
+    /// Its motion: at least one keyframe, times rising. One keyframe is a tool that waits there for a hand.
+    pub keyframes: Vec<Keyframe>,
+    /// Whether the motion starts again after the last keyframe. A script that does not end where it began first goes back
+    /// there, in as long as its last leg took.
+    pub repeat: bool,
+    /// How far from the tip the jaws reach, metres, > 0: from the tip to the skin of what they catch. A rigid body is kept
+    /// from turning as by springs at this distance.
+    pub reach_m: f64,
+    /// Stiffness of the hold, N/m, > 0.
+    pub stiffness_n_m: f64,
+    /// Damping of the hold, N·s/m, ≥ 0.
+    pub damping_n_s_m: f64,
+    /// The most that its drive pushes with, newtons, 1e-6 … 1000: what is stronger holds the tip back from its path. Past that what is
+    /// light is pressed into what it stands on.
+    pub max_force_n: f64,
+    /// What it can grasp: tubes, soft and rigid bodies.
+    pub graspable: Vec<AgentId>,
+    /// From the first keyframe to where its tip starts, metres: it goes to its path from there as after a hand.
+    pub starts_off_m: DVec3,
+}
+
+/// Where a tool is at one time of its script.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Keyframe {
+    /// Seconds from the start of the script, ≥ 0.
+    pub at_s: f64,
+    /// The point between the jaws, metres.
+    pub tip_m: DVec3,
+    /// Rotation from the tool's axes (shaft along −z, so the jaws point along +z) to the world's.
+    pub rotation: DQuat,
+    /// Opening of the jaws: 0 shut … 1 wide open. Jaws that pass below 0.2 grasp; above 0.3 they let go.
+    pub jaw: f64,
+}
+
+/// Why a tool cannot be built.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum ToolError {
+    /// There is no keyframe.
+    #[error("a tool needs at least one keyframe")]
+    NoKeyframe,
+    /// A keyframe is not later than the one before it.
+    #[error("keyframe {index} is at {at_s} s; it must be later than the one before, at {before_s} s")]
+    NotRising {
+        /// Number of the keyframe, from 0.
+        index: usize,
+        /// Its time.
+        at_s: f64,
+        /// The time of the keyframe before.
+        before_s: f64,
+    },
+    /// A number of a keyframe is outside its range.
+    #[error("{what} of keyframe {index} is {value}; it must be {wanted}")]
+    BadKeyframe {
+        /// Number of the keyframe, from 0.
+        index: usize,
+        /// Which number.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range it must be in.
+        wanted: &'static str,
+    },
+    /// A number of the tool is outside its range.
+    #[error("{what} is {value}; it must be {wanted}")]
+    BadNumber {
+        /// Which number.
+        what: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range it must be in.
+        wanted: &'static str,
+    },
+}
+
+/// Past this no tool goes, metres.
+pub(super) const REACH_MAX_M: f64 = 1e6;
+/// The strongest drive, newtons: its tip weighs 6 kg.
+const FORCE_MAX_N: f64 = 1e3;
+/// A script is no longer than this, seconds (11 days).
+const SCRIPT_MAX_S: f64 = 1e6;
+
+impl ToolSpec {
+    /// Whether every number is in its range.
+    pub(super) fn check(&self) -> Result<(), ToolError> {
+        if self.keyframes.is_empty() {
+            return Err(ToolError::NoKeyframe);
+        }
+        let number = |what, value: f64, good: bool, wanted| {
+            if good { Ok(()) } else { Err(ToolError::BadNumber { what, value, wanted }) }
+        };
+        let within = |value: f64, low: f64, high: f64| (low..=high).contains(&value);
+        number("the reach", self.reach_m, within(self.reach_m, 1e-9, 1e3), "between 1e-9 and 1000 m")?;
+        let k = self.stiffness_n_m;
+        number("the stiffness", k, within(k, f64::MIN_POSITIVE, 1e9), "above zero and at most 1e9 N/m")?;
+        let c = self.damping_n_s_m;
+        let f = self.max_force_n;
+        number("the greatest force", f, within(f, 1e-6, FORCE_MAX_N), "between 1e-6 and 1000 N")?;
+        number("the damping", c, within(c, 0.0, 1e9), "between 0 and 1e9 N·s/m")?;
+        let off_m = self.starts_off_m.length();
+        number("the way from the first keyframe", off_m, within(off_m, 0.0, REACH_MAX_M), "finite, within 1e6 m")?;
+        let mut before_s = f64::NEG_INFINITY;
+        for (index, key) in self.keyframes.iter().enumerate() {
+            key.check(index)?;
+            if key.at_s <= before_s {
+                return Err(ToolError::NotRising { index, at_s: key.at_s, before_s });
+            }
+            before_s = key.at_s;
+        }
+        Ok(())
+    }
+}
+
+impl Keyframe {
+    fn check(&self, index: usize) -> Result<(), ToolError> {
+        let check = |what, value: f64, range: (f64, f64), wanted| {
+            let good = (range.0..=range.1).contains(&value);
+            if good { Ok(()) } else { Err(ToolError::BadKeyframe { index, what, value, wanted }) }
+        };
+        check("the time", self.at_s, (0.0, SCRIPT_MAX_S), "between 0 and 1e6 s")?;
+        check("the jaw", self.jaw, (0.0, 1.0), "between 0 and 1")?;
+        for value in self.tip_m.to_array() {
+            check("the tip", value, (-REACH_MAX_M, REACH_MAX_M), "finite, within 1e6 m")?;
+        }
+        let length = self.rotation.length_squared();
+        check("the rotation's squared length", length, (1e-12, 1e12), "above zero and finite")
+    }
+}

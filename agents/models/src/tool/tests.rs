@@ -1,0 +1,338 @@
+//! What a tool must do: follow its script, follow a hand, catch, hold and let go.
+
+mod bound;
+mod holds;
+mod pushes;
+mod rigid;
+
+use super::{Instrument, Keyframe, ToolError, ToolSpec};
+use glam::{DQuat, DVec3};
+use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
+use metachron_core::{
+    AgentId, Anchor, Body, Bounds, CurveState, SimSpan, SimTime, Snapshot, StepError, StepReport, ToolState,
+};
+use metachron_core::{Impulse, Ledger, Site};
+use metachron_geometry::{Form, FormKind};
+use std::sync::Arc;
+
+const ME: AgentId = AgentId(7);
+const TUBE: AgentId = AgentId(3);
+const DT_S: f64 = 0.01;
+
+fn key(at_s: f64, tip_m: DVec3, jaw: f64) -> Keyframe {
+    Keyframe { at_s, tip_m, rotation: DQuat::IDENTITY, jaw }
+}
+
+fn spec(keyframes: Vec<Keyframe>) -> ToolSpec {
+    ToolSpec {
+        keyframes,
+        repeat: false,
+        reach_m: 0.02,
+        stiffness_n_m: 200.0,
+        damping_n_s_m: 1.0,
+        max_force_n: 50.0,
+        graspable: vec![TUBE],
+        starts_off_m: DVec3::ZERO,
+    }
+}
+
+/// A straight tube of 1 cm radius along x, 1 m long, at rest.
+fn tube() -> Neighbour {
+    let curve = CurveState {
+        arc_m: vec![0.0, 0.5, 1.0],
+        positions: vec![DVec3::ZERO, DVec3::X * 0.5, DVec3::X],
+        velocities: vec![DVec3::ZERO; 3],
+        frames: vec![DQuat::IDENTITY; 2],
+        radii_m: vec![0.01; 3],
+    };
+    Neighbour::seen(TUBE, Arc::new(Snapshot { body: Body::Curve(curve), ..Snapshot::default() }))
+}
+
+fn state(tool: &Instrument) -> ToolState {
+    let Body::Tool(state) = snapshot(tool).body else { panic!("a tool writes a tool's state") };
+    state
+}
+
+fn snapshot(tool: &Instrument) -> Snapshot {
+    let mut snapshot = Snapshot::default();
+    tool.write_snapshot(&mut snapshot);
+    snapshot
+}
+
+/// A tool and its own time.
+struct Stage {
+    tool: Instrument,
+    time: SimTime,
+    around: Vec<Neighbour>,
+}
+
+impl Stage {
+    fn new(spec: ToolSpec) -> Self {
+        Self { tool: Instrument::new(spec).unwrap(), time: SimTime::ZERO, around: vec![tube()] }
+    }
+
+    fn step_with(&mut self, hands: &[Pull]) -> Result<StepReport, StepError> {
+        let dt = SimSpan::from_secs_f64(DT_S).unwrap();
+        let around = Surroundings { me: ME, time: self.time, neighbours: &self.around, hands, links: &[] };
+        let report = self.tool.step(dt, &around)?;
+        self.time += dt;
+        Ok(report)
+    }
+
+    fn step(&mut self) -> StepReport {
+        self.step_with(&[]).unwrap()
+    }
+
+    fn run(&mut self, seconds: f64) {
+        (0..(seconds / DT_S).round() as u32).for_each(|_| drop(self.step_with(&[])));
+    }
+}
+
+fn hand(target: DVec3) -> Pull {
+    Pull {
+        by: None,
+        anchor: Anchor::Local(DVec3::ZERO),
+        target,
+        target_velocity: DVec3::ZERO,
+        stiffness_n_m: 100.0,
+        damping_n_s_m: 1.0,
+    }
+}
+
+#[test]
+fn the_first_snapshot_is_right_before_any_step() {
+    let tool = Instrument::new(spec(vec![key(0.0, DVec3::Y, 0.7), key(1.0, DVec3::X, 0.0)])).unwrap();
+    let state = state(&tool);
+    assert_eq!((state.tip, state.jaw, state.grasp), (DVec3::Y, 0.7, None));
+}
+
+#[test]
+fn a_tool_follows_its_script_to_the_bit() {
+    let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0), key(2.0, DVec3::Z, 1.0)]));
+    stage.run(1.0);
+    assert_eq!(state(&stage.tool).tip, DVec3::X);
+    stage.run(1.5);
+    assert_eq!(state(&stage.tool).tip, DVec3::Z);
+    assert!(stage.step().at_rest);
+}
+
+#[test]
+fn a_repeating_script_never_rests() {
+    let still = ToolSpec { repeat: true, ..spec(vec![key(0.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0)]) };
+    let mut stage = Stage::new(still);
+    assert!((0..1000).all(|_| !stage.step().at_rest));
+}
+
+#[test]
+fn one_keyframe_is_a_tool_that_waits_there() {
+    let mut stage = Stage::new(ToolSpec { repeat: true, ..spec(vec![key(0.0, DVec3::Y, 0.7)]) });
+    assert!(stage.step().at_rest);
+    assert_eq!(state(&stage.tool).tip, DVec3::Y);
+}
+
+#[test]
+fn closing_jaws_hold_the_nearest_point_and_opening_jaws_let_go() {
+    let over = DVec3::new(0.3, 0.0, 0.02); // 1 cm from the skin
+    let mut stage =
+        Stage::new(spec(vec![key(0.0, over, 1.0), key(1.0, over, 0.0), key(2.0, over, 0.0), key(3.0, over, 1.0)]));
+    let mut opening = vec![];
+    for _ in 0..350 {
+        stage.step();
+        let state = state(&stage.tool);
+        let held = state.grasp.is_some();
+        if opening.last().is_none_or(|&(was, _)| was != held) {
+            opening.push((held, state.jaw));
+        }
+        if let Some(grasp) = state.grasp {
+            assert_eq!((grasp.target, grasp.anchor), (TUBE, Anchor::Arc(0.3)));
+            assert!(grasp.stiffness_n_m > 0.0 && grasp.stiffness_n_m <= 200.0);
+            assert_eq!(snapshot(&stage.tool).touches, [TUBE]);
+        } else {
+            assert!(snapshot(&stage.tool).touches.is_empty());
+        }
+    }
+    let [(false, _), (true, grasped), (false, released)] = opening[..] else { panic!("{opening:?}") };
+    // the first step past each threshold; jaws move by less than 2 % a step here
+    assert!(grasped < 0.2 && grasped > 0.18, "grasps at {grasped}");
+    assert!(released > 0.3 && released < 0.32, "lets go at {released}");
+}
+
+#[test]
+fn a_hold_comes_on_smoothly_and_reaches_its_stiffness() {
+    let over = DVec3::new(0.3, 0.0, 0.02);
+    let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
+    let mut last = 0.0;
+    for _ in 0..30 {
+        stage.step();
+        let now = state(&stage.tool).grasp.expect("shut jaws over a tube hold it from the start").stiffness_n_m;
+        assert!(now >= last && now - last < 25.0, "{last} to {now} N/m"); // 200 N/m in 0.15 s, 1.5 at the steepest
+        last = now;
+    }
+    assert_eq!(last, 200.0);
+}
+
+#[test]
+fn jaws_that_shut_on_nothing_catch_nothing_later() {
+    let (away, over) = (DVec3::new(0.3, 0.0, 0.5), DVec3::new(0.3, 0.0, 0.01));
+    let mut stage = Stage::new(spec(vec![key(0.0, away, 1.0), key(0.5, away, 0.0), key(1.5, over, 0.0)]));
+    stage.run(2.0);
+    assert_eq!(state(&stage.tool).tip, over);
+    assert_eq!(state(&stage.tool).grasp, None);
+}
+
+#[test]
+fn a_tube_that_may_not_be_grasped_is_not() {
+    let over = DVec3::new(0.3, 0.0, 0.02);
+    let mut stage = Stage::new(ToolSpec { graspable: vec![AgentId(99)], ..spec(vec![key(0.0, over, 0.0)]) });
+    stage.run(0.1);
+    assert_eq!(state(&stage.tool).grasp, None);
+}
+
+#[test]
+fn a_tube_out_of_reach_is_not_grasped() {
+    let over = DVec3::new(0.3, 0.0, 0.0301); // 2.01 cm from the skin, the jaws reach 2 cm
+    let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
+    stage.run(0.1);
+    assert_eq!(state(&stage.tool).grasp, None);
+}
+
+#[test]
+fn a_tool_feels_what_it_was_given_as_the_mean_force_since_it_last_read() {
+    let over = DVec3::new(0.3, 0.0, 0.02);
+    let mut stage = Stage::new(spec(vec![key(0.0, over, 0.0)]));
+    let account = |with, linear: DVec3| {
+        let mut ledger = Ledger::new(with);
+        ledger.give(Site::Whole, SimTime::ZERO, 0.0, Impulse { linear, angular: DVec3::ZERO });
+        ledger
+    };
+    let at = |given, millis: u64| {
+        let near = tube();
+        let time = SimTime::from_nanos(millis * 1_000_000);
+        let snapshot = Snapshot { time, given, ..near.snapshot.as_ref().clone() };
+        vec![Neighbour { snapshot: Arc::new(snapshot), ..near }]
+    };
+    stage.around = at(vec![account(AgentId(8), DVec3::X * 9.0), account(ME, DVec3::new(0.0, 0.3, 0.4))], 100);
+    stage.step();
+    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12); // 0.5 N·s in 100 ms
+    stage.step();
+    assert!((state(&stage.tool).force_n - 5.0).abs() < 1e-12, "nothing new is known");
+    stage.around = at(vec![account(ME, DVec3::new(0.0, 0.3, 0.4))], 110);
+    stage.step();
+    assert_eq!(state(&stage.tool).force_n, 0.0, "nothing more was given");
+}
+
+#[test]
+fn a_hand_leads_the_tip_without_a_jump_and_the_tool_returns_to_its_script() {
+    let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
+    let (mut before, target) = (state(&stage.tool), DVec3::new(0.5, 1.0, 0.5));
+    let mut step = |stage: &mut Stage, hands: &[Pull]| {
+        let report = stage.step_with(hands).unwrap();
+        let now = state(&stage.tool);
+        // 0.7 m at 60/s: no faster than 0.7·60/e m/s, so no farther than that in a step
+        assert!(now.tip.distance(before.tip) < 0.7 * 60.0 / std::f64::consts::E * DT_S * 1.01);
+        before = now;
+        report.at_rest
+    };
+    (0..50).for_each(|_| assert!(!step(&mut stage, &[hand(target)])));
+    assert!(state(&stage.tool).tip.distance(target) < 1e-9); // e⁻³⁰ of the way is left
+    let steps = (0..1000).position(|_| step(&mut stage, &[])).expect("it comes to rest");
+    assert!(steps < 700, "it takes {steps} steps");
+    assert_eq!((state(&stage.tool).tip, state(&stage.tool).jaw), (DVec3::Y, 0.7));
+}
+
+#[test]
+fn in_the_hand_jaws_close_on_a_tube_that_is_near_and_open_when_let_go() {
+    let mut stage = Stage::new(spec(vec![key(0.0, DVec3::new(0.3, 0.0, 0.3), 0.7)]));
+    let near = hand(DVec3::new(0.3, 0.0, 0.015)); // 5 mm from the skin
+    (0..100).for_each(|_| drop(stage.step_with(&[near])));
+    assert_eq!(state(&stage.tool).grasp.map(|g| g.anchor), Some(Anchor::Arc(0.3)));
+    (0..100).for_each(|_| drop(stage.step_with(&[hand(DVec3::new(0.3, 0.0, 0.2))])));
+    assert!(state(&stage.tool).grasp.is_some(), "it drags what it holds");
+    stage.run(0.5);
+    assert_eq!(state(&stage.tool).grasp, None);
+}
+
+#[test]
+fn lost_time_does_not_make_the_tip_jump() {
+    let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0)]));
+    stage.run(0.3);
+    let before = state(&stage.tool);
+    stage.time += SimSpan::from_secs_f64(0.4).unwrap();
+    stage.step();
+    let moved = state(&stage.tool).tip.distance(before.tip);
+    assert!(moved < 0.06, "{moved} m"); // the script runs 2 m/s here and catches up at 4/s of 0.8 m
+    stage.run(6.0);
+    assert!(state(&stage.tool).tip.distance(DVec3::X) < 1e-6);
+}
+
+#[test]
+fn a_hand_that_is_nowhere_is_refused() {
+    for target in [DVec3::NAN, DVec3::splat(1e300), DVec3::splat(f64::INFINITY)] {
+        let mut stage = Stage::new(spec(vec![key(0.0, DVec3::Y, 0.7)]));
+        let before = state(&stage.tool);
+        let error = stage.step_with(&[hand(target)]).unwrap_err();
+        assert!(matches!(error, StepError::Diverged { model: "instrument", .. }), "{error}");
+        assert_eq!(state(&stage.tool), before);
+    }
+}
+
+#[test]
+fn scripts_that_are_none_are_refused() {
+    let refuse = |spec: ToolSpec| Instrument::new(spec).expect_err("it is refused");
+    assert_eq!(refuse(spec(vec![])), ToolError::NoKeyframe);
+    let backwards = refuse(spec(vec![key(1.0, DVec3::Y, 1.0), key(1.0, DVec3::X, 1.0)]));
+    assert!(matches!(backwards, ToolError::NotRising { index: 1, .. }), "{backwards}");
+    for bad in [
+        key(-1.0, DVec3::Y, 1.0),
+        key(f64::NAN, DVec3::Y, 1.0),
+        key(0.0, DVec3::NAN, 1.0),
+        key(0.0, DVec3::Y, 1.1),
+        key(0.0, DVec3::Y, f64::NAN),
+        Keyframe { rotation: DQuat::from_xyzw(0.0, 0.0, 0.0, 0.0), ..key(0.0, DVec3::Y, 1.0) },
+    ] {
+        assert!(matches!(refuse(spec(vec![bad])), ToolError::BadKeyframe { index: 0, .. }), "{bad:?}");
+    }
+    for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+        let good = spec(vec![key(0.0, DVec3::Y, 1.0)]);
+        assert!(matches!(refuse(ToolSpec { reach_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { stiffness_n_m: value, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { max_force_n: value, ..good.clone() }), ToolError::BadNumber { .. }));
+        assert!(matches!(refuse(ToolSpec { max_force_n: 1001.0, ..good.clone() }), ToolError::BadNumber { .. }));
+        let damped = Instrument::new(ToolSpec { damping_n_s_m: value, ..good });
+        assert_eq!(damped.is_ok(), value == 0.0, "damping {value}");
+    }
+}
+
+#[test]
+fn a_tool_wakes_who_sleeps_in_its_way_and_nobody_else() {
+    let form =
+        Arc::new(Form { kind: FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, friction: 0.2, restitution: 0.0 });
+    let asleep = |mut neighbour: Neighbour| {
+        let snapshot = Snapshot {
+            at_rest: true,
+            bounds: Some(Bounds { low: DVec3::splat(-0.01), high: DVec3::new(1.01, 0.01, 0.01), speed_m_s: 0.0 }),
+            body: neighbour.snapshot.body.clone(),
+            ..Snapshot::default()
+        };
+        (neighbour.snapshot, neighbour.form) = (Arc::new(snapshot), Some(Arc::clone(&form)));
+        neighbour
+    };
+    // 0.3 m down in a second, the jaws shut and open along z: the tip ends 0.1 m above the axis, or 5 mm
+    for (end_m, wakes) in [(0.1, false), (0.005, true)] {
+        let down = [key(0.0, DVec3::new(0.3, 0.0, 0.4), 0.0), key(1.0, DVec3::new(0.3, 0.0, end_m), 0.0)];
+        let turned = down.map(|key| Keyframe { rotation: DQuat::from_rotation_x(std::f64::consts::PI), ..key });
+        let mut stage = Stage::new(spec(turned.to_vec()));
+        stage.around = vec![asleep(tube())];
+        let mut woke_at_m = None;
+        for _ in 0..130 {
+            stage.step();
+            if snapshot(&stage.tool).touches == [TUBE] {
+                woke_at_m.get_or_insert(state(&stage.tool).tip.z);
+            }
+        }
+        assert_eq!(woke_at_m.is_some(), wakes, "down to {end_m} m");
+        // the jaws reach a centimetre beyond the tip, the skin of the tube one more, two steps at most one more
+        assert!(woke_at_m.is_none_or(|z| z > 0.01 && z < 0.06), "{woke_at_m:?}");
+        assert!(snapshot(&stage.tool).touches.is_empty(), "a tool that stands wakes nobody");
+    }
+}
