@@ -1,7 +1,7 @@
-//! The contract of an agent: an object that lives by its own steps.
+//! The contract of an agent: an object that advances by its own steps.
 //!
-//! In: a step length and what the agent can see of the others ([`Surroundings`]). Out: a new state and what the step took.
-//! Never here: clocks, threads, files, the GPU. What every agent promises is tested by [`crate::conformance`].
+//! In: a step length and the other agents' published states ([`Surroundings`]). Out: a new state and a report of the step.
+//! Never here: clocks, threads, files, the GPU. The promises common to all agents are tested by [`crate::conformance`].
 
 use crate::coupling::{Form, Law, Link};
 use crate::rigid::RigidBody;
@@ -9,11 +9,11 @@ use crate::{Anchor, Body, Resolution, SimSpan, SimTime, Snapshot};
 use glam::DVec3;
 use std::sync::Arc;
 
-/// An agent's number: its place in the scene, fixed for a run.
+/// An agent's number: its index in the scene, fixed for a run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct AgentId(pub u32);
 
-/// An object that runs by itself.
+/// An object that runs by itself, on its own clock.
 ///
 /// Promises, tested for every model: a step advances exactly `dt`; a refused step leaves the state bit for bit;
 /// the same calls give the same bits; nothing is allocated once the sizes settle; a state that is not finite is never written.
@@ -25,32 +25,32 @@ pub trait Agent: Send {
     ///
     /// # Errors
     /// [`StepError::BadSpan`] leaves the state untouched. After [`StepError::Diverged`] the agent must not step again;
-    /// its last snapshot stands.
+    /// its last snapshot stays valid.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError>;
 
-    /// Looks around before its first step, which will be one of `dt`: what it publishes then is what others may expect of it
-    /// from the start. No time passes.
+    /// Reads its surroundings before its first step, which will be one of `dt`, so that its first publication already predicts
+    /// its motion for the others. No time passes.
     fn look(&mut self, _dt: SimSpan, _around: &Surroundings<'_>) {}
 
-    /// The step that it makes next where one of `dt` is wanted: a shorter one beside others whose motion within `dt` nobody
-    /// could foresee; never a longer one. Executors ask before every step.
+    /// The length of the next step where `dt` is requested: shorter next to neighbours whose motion within `dt` cannot be predicted,
+    /// never longer. Executors call this before every step.
     fn longest_step(&self, dt: SimSpan, _around: &Surroundings<'_>) -> SimSpan {
         dt
     }
 
-    /// Calls its own time another from now on, later by `by_s` seconds than it was called; earlier where that is below zero.
-    /// Nothing else changes, and nothing is on its way to it or from it: what it does at which time goes on from where it is.
+    /// Shifts the agent's own time by `by_s` seconds: later where positive, earlier where negative. Nothing else changes: stored times and
+    /// scripts shift along, and no impulse is in flight to or from the agent.
     fn rename_time(&mut self, _by_s: f64) {}
 
-    /// The resolution the simulation holds; `None` for a model that has none.
+    /// The resolution that the simulation runs at; `None` for a model that has none.
     fn resolution(&self) -> Option<Resolution>;
 
-    /// Takes the nearest resolution to `wanted` that the agent can hold.
+    /// Takes the resolution nearest to `wanted` that the agent supports.
     ///
     /// Keeps mass, linear momentum and rest length exactly and angular momentum to O(ε²).
     fn retune(&mut self, wanted: Resolution);
 
-    /// Writes the state into `into`, all of it but `time`, which the runtime stamps.
+    /// Writes the state into `into`, all of it except `time`, which the runtime stamps.
     fn write_snapshot(&self, into: &mut Snapshot);
 
     /// Linear momentum (kg·m/s) and angular momentum about the origin (kg·m²/s), in world axes.
@@ -59,23 +59,23 @@ pub trait Agent: Send {
     /// Total mass in kilograms; zero for a model that has none.
     fn mass_kg(&self) -> f64;
 
-    /// The shape by which others touch it, for its whole life; `None` where nothing can.
+    /// The contact shape, constant over the agent's life; `None` where nothing can touch it.
     fn form(&self) -> Option<Arc<Form>> {
         None
     }
 
-    /// The rigid body that this is, if it is one.
+    /// The rigid body behind this agent, if it is one.
     fn rigid_mut(&mut self) -> Option<&mut RigidBody> {
         None
     }
 
-    /// Advances this agent and `others`, which have handed themselves over to it, as one world on its own clock.
+    /// Advances this agent and `others`, which have handed their stepping over to it, as one island on this agent's clock.
     ///
-    /// `apart` comes back with a number for each of `others`: zero where it stays in this world; else it has left, and equal
+    /// `apart` returns a number for each of `others`: zero where it stays in this island; otherwise it has left, and agents with equal
     /// numbers still belong together. The report counts the work of all.
     ///
     /// # Errors
-    /// [`StepError::Alone`] for a model that leads nobody; else as [`Agent::step`].
+    /// [`StepError::Alone`] for a model that steps no other agents; else as [`Agent::step`].
     fn lead(
         &mut self,
         dt: SimSpan,
@@ -88,48 +88,49 @@ pub trait Agent: Send {
     }
 }
 
-/// An agent that steps in the world of another.
+/// An agent that is stepped in the island of another.
 pub struct Companion<'a> {
-    /// Who.
+    /// The agent's number.
     pub id: AgentId,
     /// The agent.
     pub agent: &'a mut dyn Agent,
-    /// What it sees.
+    /// What the agent sees.
     pub around: Surroundings<'a>,
 }
 
-/// What a step took and what it led to.
+/// What a step cost and what came of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
-    /// Work done, in the model's unit: a declared machine gives its price in seconds.
-    /// Tube: segments × systems solved: one a substep, more where its rule iterates, and those of its own error estimate. Rigid, instrument: 1. Synthetic: its declared microseconds.
+    /// Work done, in the model's unit; a declared machine gives the cost of a unit in seconds.
+    /// Tube: segments × systems solved: one per substep, more where its rule iterates, plus those of its own error estimate.
+    /// Rigid, instrument: 1. Synthetic: its declared microseconds.
     pub work: f64,
-    /// Into how many substeps the step was divided, ≥ 1.
+    /// Number of substeps that the step was divided into, ≥ 1.
     pub substeps: u32,
-    /// Whether the agent could sleep: it has not moved for a while and nothing acts on it.
+    /// Whether the agent may sleep: it has not moved for a while and nothing acts on it.
     pub at_rest: bool,
 }
 
-/// Why a step was refused, or given up.
+/// Why a step was refused or abandoned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
     /// The span was zero, or longer than the model can take. State: untouched.
     #[error("step span is {dt_s} s; it must be above zero and at most {max_s} s")]
     BadSpan {
-        /// The span asked for, in seconds.
+        /// The requested span, in seconds.
         dt_s: f64,
         /// The longest span the model takes, in seconds.
         max_s: f64,
     },
-    /// The state stopped being finite. The agent must not step again; its last snapshot stands.
+    /// The state is no longer finite. The agent must not step again; its last snapshot stays valid.
     #[error("the state of this {model} is no longer finite after a step of {dt_s} s: {what}")]
     Diverged {
         /// The model's name.
         model: &'static str,
         /// The span of the failed step, in seconds.
         dt_s: f64,
-        /// The quantity that was lost first, and where.
+        /// The quantity that stopped being finite first, and where.
         what: String,
     },
     /// The substeps are too long for the integrator. State: untouched.
@@ -141,14 +142,14 @@ pub enum StepError {
         model: &'static str,
         /// The integrator's name.
         integrator: &'static str,
-        /// How finely the body is divided.
+        /// Number of segments that the body is divided into.
         segments: usize,
-        /// The substep that the step would have, in seconds.
+        /// The substep that the step would use, in seconds.
         substep_s: f64,
-        /// The longest that the integrator carries, in seconds.
+        /// The longest substep at which the integrator is stable, in seconds.
         limit_s: f64,
     },
-    /// The model cannot step others in its world. State: untouched.
+    /// The model cannot step other agents in an island of its own. State: untouched.
     #[error("a {model} has no world that others could share")]
     Alone {
         /// The model's name.
@@ -156,7 +157,7 @@ pub enum StepError {
     },
 }
 
-/// The longest step any model takes, in seconds: past it a real-time agent has lost touch with its scene.
+/// The longest step any model takes, in seconds: past it a real-time agent no longer follows its scene.
 pub const DT_MAX_S: f64 = 1.0;
 
 /// The length of `dt` in seconds, if a model may step by it.
@@ -168,16 +169,16 @@ pub fn check_span(dt: SimSpan) -> Result<f64, StepError> {
     if dt_s > 0.0 && dt_s <= DT_MAX_S { Ok(dt_s) } else { Err(StepError::BadSpan { dt_s, max_s: DT_MAX_S }) }
 }
 
-/// What an agent sees while it steps.
+/// What an agent sees of the others while it steps.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
-    /// Who is looking.
+    /// The agent that looks.
     pub me: AgentId,
     /// The agent's own time at the start of the step.
     pub time: SimTime,
-    /// The agents it may touch or hold, that may touch or hold it, and those with which it has an account to settle.
+    /// The agents in possible contact or grasp with this one, in either direction, and those with ledger impulses still to settle.
     pub neighbours: &'a [Neighbour],
-    /// Springs of the user's hand on this agent.
+    /// Springs of the user on this agent.
     pub hands: &'a [Pull],
     /// Bilateral couplings with other agents.
     pub links: &'a [Link],
@@ -186,24 +187,24 @@ pub struct Surroundings<'a> {
 /// The newest known state of another agent.
 #[derive(Debug, Clone)]
 pub struct Neighbour {
-    /// Who.
+    /// The neighbour's number.
     pub id: AgentId,
     /// Its newest published state.
     pub snapshot: Arc<Snapshot>,
     /// Its shape; `None` where the two cannot touch.
     pub form: Option<Arc<Form>>,
-    /// How the two act on each other where they touch.
+    /// How the two act on each other in contact.
     pub law: Law,
     /// Whether the agent that looks owns the pair ([`crate::coupling::owns`]).
     pub owned: bool,
-    /// Whether the two keep step ([`crate::coupling::keep_step`]).
+    /// Whether the two synchronise their steps ([`crate::coupling::keep_step`]).
     pub in_step: bool,
-    /// How long its steps are as a rule, seconds; zero where that does not matter.
+    /// Its usual step length, seconds; zero where that does not matter.
     pub step_s: f64,
 }
 
 impl Neighbour {
-    /// An agent that is only looked at: it is neither touched nor owned.
+    /// A neighbour that is only looked at: neither in contact nor owned.
     #[must_use]
     pub const fn seen(id: AgentId, snapshot: Arc<Snapshot>) -> Self {
         Self { id, snapshot, form: None, law: Law::Ledger, owned: false, in_step: false, step_s: 0.0 }
@@ -213,13 +214,13 @@ impl Neighbour {
 /// A spring from a moving point of space to a material point of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pull {
-    /// Who pulls; `None` is the user's hand.
+    /// The agent that pulls; `None` for the user's spring.
     pub by: Option<AgentId>,
     /// The material point that is pulled.
     pub anchor: Anchor,
-    /// Where the other end of the spring is, metres.
+    /// Position of the spring's other end, metres.
     pub target: DVec3,
-    /// How that end moves, m/s.
+    /// Velocity of that end, m/s.
     pub target_velocity: DVec3,
     /// Stiffness, N/m, ≥ 0.
     pub stiffness_n_m: f64,
@@ -227,22 +228,22 @@ pub struct Pull {
     pub damping_n_s_m: f64,
 }
 
-/// Past this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag its catch along.
+/// Beyond this age a tool's motion is no longer extrapolated, in seconds: a stopped tool must not drag what it grasps along.
 const EXTRAPOLATION_MAX_S: f64 = 0.1;
 
-/// By how many seconds a tool seen at `seen` is brought forward to `time`.
+/// By how many seconds the motion of a tool, published at `seen`, is extrapolated to reach `time`.
 pub(crate) fn led_s(time: SimTime, seen: SimTime) -> f64 {
     time.secs_after(seen).clamp(-EXTRAPOLATION_MAX_S, EXTRAPOLATION_MAX_S)
 }
 
 impl<'a> Surroundings<'a> {
-    /// An empty world at `time`, for tests and for agents that see nobody.
+    /// Empty surroundings at `time`, for tests and for agents without neighbours.
     #[must_use]
     pub fn alone(me: AgentId, time: SimTime) -> Self {
         Self { me, time, neighbours: &[], hands: &[], links: &[] }
     }
 
-    /// Every spring on this agent: the user's hands, and the tools that hold it, their tips brought forward to `time`.
+    /// Every spring on this agent: the user's, and the grasps of tools, with their tips extrapolated to `time`.
     pub fn pulls(&self) -> impl Iterator<Item = Pull> + 'a {
         let (me, time) = (self.me, self.time);
         let held = self.neighbours.iter().filter_map(move |other| {
