@@ -1,7 +1,7 @@
-//! What an agent publishes: its whole visible state at one moment of its own time.
+//! An agent's publication: its whole visible state at one moment of its own time.
 //!
-//! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
-//! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
+//! In: an agent writes itself into a [`Snapshot`] that is reused (no allocation once the sizes settle).
+//! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 mod lies;
 mod stand;
@@ -23,58 +23,60 @@ use glam::{DMat3, DQuat, DVec3};
 pub struct Snapshot {
     /// The agent's own time, written by the runtime when it publishes.
     pub time: SimTime,
-    /// How far behind the scene its time may lie, written like it: who cannot keep up beside others lives on, later.
+    /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub put_off: SimSpan,
-    /// How long its last step was where that was shorter than its scene wants ([`crate::Agent::longest_step`]), written like its time; `None`
-    /// elsewhere.
+    /// Length of its last step where that was shorter than its scene requests ([`crate::Agent::longest_step`]), written likewise; `None`
+    /// otherwise.
     pub shorter: Option<SimSpan>,
-    /// How many steps led here.
+    /// Number of steps so far.
     pub steps: u64,
-    /// The resolution the simulation holds; `None` for a model that has none.
+    /// The resolution that the simulation runs at; `None` for a model that has none.
     pub resolution: Option<Resolution>,
-    /// Where the agent's matter is and how it moves.
+    /// Position and motion of the agent's matter.
     pub body: Body,
     /// Mechanical energy in joules: kinetic + elastic + gravity, zero at the origin.
     pub energy_j: f64,
     /// The agent's estimate of its own error, in metres, ≥ 0.
     pub residual_m: f64,
-    /// The part of it that steps make in [`crate::DRIFT_S`], metres, ≥ 0; the rest is what its spacing leaves.
+    /// The part of it that steps accumulate in [`crate::DRIFT_S`], metres, ≥ 0; the rest comes from its spacing.
     pub drift_m: f64,
-    /// Agents this one acts on now: they must not rest meanwhile.
+    /// Agents that this one acts on now: they must not sleep meanwhile.
     pub touches: Vec<AgentId>,
-    /// Forces by which others hold this agent.
+    /// Grasp and spring forces on this agent.
     pub grips: Vec<Grip>,
-    /// Whether the agent is at rest: others take it for immovable until they wake it.
+    /// Whether the agent is at rest: others treat it as immovable until they wake it.
     pub at_rest: bool,
-    /// Whether something fixed bears it: what bends has touched some within a second, a rigid body stands, or has tipped within one.
+    /// Whether a fixed solid supports it: a deformable touched one within the last second, a rigid body stands on one, or tipped within the
+    /// last second.
     pub grounded: bool,
-    /// Whether it steps in one world with others.
+    /// Whether it steps in one island with others.
     pub shares: bool,
-    /// Its smooth acceleration, m/s²: without what couplings and blows did. Others expect it to go on like this.
+    /// Its smooth acceleration, m/s², without couplings and impacts. Others predict its motion by it.
     pub acceleration: DVec3,
-    /// How it answers impulses.
+    /// Its response to impulses.
     pub inertia: Inertia,
-    /// How it stands on something fixed; `None` where it does not, or not on one level.
+    /// Its support by a fixed solid; `None` where there is none, or not on a single level.
     pub stand: Option<Stand>,
-    /// How it tips over an edge or a corner that something fixed bears; none where it does not.
+    /// Its tipping about an edge or a corner that a fixed solid supports; none where it does not tip.
     pub tips: Rare<Tips>,
-    /// In how many seconds of free flight something fixed may be in its way, ≥ 0; `None` where nothing is soon, and where that is not
-    /// told: it stands, or others hold it.
+    /// Seconds of free flight until a fixed solid may be in its way, ≥ 0; `None` where there is none soon, and where it is not
+    /// reported: the body is supported, or held by others.
     pub lands_s: Option<f64>,
-    /// How springs on led points hold it; none where none do, or where nobody would have to know.
+    /// Forces and stiffness of the springs from driven points on it; none without such springs, or where no other agent needs them.
     pub sprung: Rare<Sprung>,
-    /// What fixed solids gave it in its last step: it was not there before, and late impulses may have spared it.
+    /// Impulses of fixed solids in its last step: it was not in contact before, and late impulses of others may have averted them.
     pub rebound: Rare<Rebound>,
-    /// On whom it lies, where something fixed holds that one up.
+    /// The agent on which it rests, where a fixed solid supports that one.
     pub lies: Rare<LiesOn>,
-    /// How it answers impulses among those whose world it shares, about its centre of mass: velocities (m/s, rad/s) of impulses (N·s,
-    /// N·m·s); none where it shares none, or where something fixed holds that world.
+    /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by impulses
+    /// (N·s,
+    /// N·m·s); none where it shares none, or where a fixed solid holds that island.
     pub within: Rare<Six>,
-    /// The box around its matter; `None` where nothing of it can be touched.
+    /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
-    /// What it has given to others, in couplings that it owns.
+    /// Impulses given to others, in couplings that it owns.
     pub given: Vec<Ledger>,
-    /// What it has taken from others, in couplings that they own.
+    /// Impulses taken from others, in couplings that they own.
     pub taken: Vec<Ledger>,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
@@ -82,10 +84,10 @@ pub struct Snapshot {
     pub bonds: Vec<AgentId>,
 }
 
-/// How a body answers impulses: its inverse mass, at the time of the snapshot.
+/// A body's response to impulses: its inverse mass, at the time of the snapshot.
 #[derive(Debug, Clone, Default)]
 pub enum Inertia {
-    /// Nothing moves it.
+    /// Immovable.
     #[default]
     Immovable,
     /// A rigid body about its centre of mass.
@@ -101,21 +103,21 @@ pub enum Inertia {
     Soft(SoftInertia),
 }
 
-/// Where matter is and how fast it may leave.
+/// Position of matter and the fastest speed at which it may leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// The lowest coordinates, metres.
     pub low: DVec3,
     /// The highest coordinates, metres.
     pub high: DVec3,
-    /// No point moves faster, m/s.
+    /// The largest speed of any point, m/s.
     pub speed_m_s: f64,
 }
 
 /// The state of an agent's matter; which one is fixed for an agent's life.
 #[derive(Debug, Clone, Default)]
 pub enum Body {
-    /// Nothing to see (a synthetic agent).
+    /// No matter (a synthetic agent).
     #[default]
     Nothing,
     /// A tube or cable: a framed curve with a radius.
@@ -128,10 +130,10 @@ pub enum Body {
     Soft(SoftState),
 }
 
-/// The vertices of a soft body. What joins them never changes ([`crate::coupling::SurfaceForm`]).
+/// The vertices of a soft body. Its connectivity never changes ([`crate::coupling::SurfaceForm`]).
 #[derive(Debug, Clone, Default)]
 pub struct SoftState {
-    /// Where they are, metres, world axes.
+    /// Positions, metres, world axes.
     pub positions: Vec<DVec3>,
     /// Their velocities, m/s.
     pub velocities: Vec<DVec3>,
@@ -146,7 +148,7 @@ pub struct CurveState {
     pub positions: Vec<DVec3>,
     /// Node velocities in m/s; N + 1 entries.
     pub velocities: Vec<DVec3>,
-    /// Section frames, one a segment: the third axis (z) is the axial director; N entries.
+    /// Section frames, one per segment: the third axis (z) is the axial director; N entries.
     pub frames: Vec<DQuat>,
     /// Outer radius at each node in metres; N + 1 entries.
     pub radii_m: Vec<f64>,
@@ -178,37 +180,37 @@ pub struct ToolState {
     pub spin: DVec3,
     /// Opening of the jaws: 0 shut … 1 wide open.
     pub jaw: f64,
-    /// What the jaws hold.
+    /// The grasp of the jaws, if any.
     pub grasp: Option<Grasp>,
-    /// The rigid body that the open jaws are about to take, or have just let go: it may come between them.
+    /// The rigid body that the open jaws are about to grasp, or have just released: it may come between them.
     pub lets_in: Option<AgentId>,
-    /// Magnitude of the force that what is held exerts on the tool, newtons.
+    /// Magnitude of the force that the grasped body exerts on the tool, newtons.
     pub force_n: f64,
-    /// Whether nothing leads it on: it has come to the end of its script, which nothing holds it back from, and no hand has it.
+    /// Whether nothing drives it any more: its script has ended without anything holding it back, and no user spring is on it.
     pub is_left: bool,
 }
 
-/// A tool's hold on a material point of another agent.
+/// A tool's attachment to a material point of another agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grasp {
-    /// Who is held.
+    /// The grasped agent.
     pub target: AgentId,
-    /// Which material point of it.
+    /// The material point grasped.
     pub anchor: Anchor,
-    /// How it is kept from turning between the jaws; `None` where it may.
+    /// Rotational attachment between the jaws; `None` where the body may turn freely.
     pub clasp: Option<Clasp>,
-    /// Stiffness of the hold, N/m, > 0.
+    /// Stiffness of the attachment, N/m, > 0.
     pub stiffness_n_m: f64,
-    /// Damping of the hold, N·s/m, ≥ 0.
+    /// Damping of the attachment, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
 }
 
-/// How jaws keep a rigid body from turning: they are as long as `arm_m`, and bear on all of it.
+/// Rotational attachment of a rigid body to jaws of length `arm_m` that press along all of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clasp {
-    /// Rotation from the body's axes to the tool's in which the hold turns nothing.
+    /// Rotation from the body's axes to the tool's at which the attachment exerts no torque.
     pub rotation: DQuat,
-    /// The hold resists turning about every axis as springs and dampers of its own strength do at this distance, metres, ≥ 0.
+    /// The resistance to turning about every axis is that of springs and dampers of the grasp's strength at this distance, metres, ≥ 0.
     pub arm_m: f64,
 }
 
@@ -223,10 +225,10 @@ pub enum Anchor {
     Vertex(u32),
 }
 
-/// The force by which `by` holds this agent.
+/// The force with which `by` holds this agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grip {
-    /// Who holds; `None` is the user's hand.
+    /// The agent that holds; `None` for the user's spring.
     pub by: Option<AgentId>,
     /// The force on this agent, newtons, world axes.
     pub force_n: DVec3,
@@ -253,7 +255,7 @@ impl CurveState {
 }
 
 impl CurveState {
-    /// The segment that holds the material point at rest arc length `arc_m`, and how far along it the point lies, 0 … 1;
+    /// The segment that contains the material point at rest arc length `arc_m`, and the point's share of it, 0 … 1;
     /// clamped to the curve's ends. `None` for a curve without segments.
     #[must_use]
     pub fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
@@ -284,7 +286,7 @@ impl Body {
     }
 
     /// The point a probe at `at` (0 start … 1 end of a curve's rest length) reports: position and velocity.
-    /// A soft body reports the vertex at that share of their numbers: of its first corner at 0, of the opposite one at 1.
+    /// A soft body reports the vertex at that share of its vertex numbers: its first corner at 0, the opposite one at 1.
     /// Any other body reports its centre of mass or tip.
     #[must_use]
     pub fn probe(&self, at: f64) -> Option<(DVec3, DVec3)> {
@@ -299,7 +301,7 @@ impl Body {
         }
     }
 
-    /// Whether every number is finite. A body that is not is never published.
+    /// Whether every number is finite. A body that is not finite is never published.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         match self {
@@ -320,7 +322,7 @@ impl Body {
         }
     }
 
-    /// The soft body to write into, keeping its storage when this is one already.
+    /// The soft body to write into; reuses the storage if this is one already.
     pub fn soft_mut(&mut self) -> &mut SoftState {
         if !matches!(self, Self::Soft(_)) {
             *self = Self::Soft(SoftState::default());
@@ -331,7 +333,7 @@ impl Body {
         }
     }
 
-    /// The curve to write into, keeping its storage when this is a curve already.
+    /// The curve to write into; reuses the storage if this is one already.
     pub fn curve_mut(&mut self) -> &mut CurveState {
         if !matches!(self, Self::Curve(_)) {
             *self = Self::Curve(CurveState::default());
@@ -344,7 +346,7 @@ impl Body {
 }
 
 impl Inertia {
-    /// A soft body's to write into, keeping its storage when this is one already.
+    /// The inertia of a soft body to write into; reuses the storage if this is one already.
     pub fn soft_mut(&mut self) -> &mut SoftInertia {
         if !matches!(self, Self::Soft(_)) {
             *self = Self::Soft(SoftInertia::default());
@@ -355,7 +357,7 @@ impl Inertia {
         }
     }
 
-    /// A tube's to write into, keeping its storage when this is one already.
+    /// The inertia of a tube to write into; reuses the storage if this is one already.
     pub fn curve_mut(&mut self) -> &mut CurveInertia {
         if !matches!(self, Self::Curve(_)) {
             *self = Self::Curve(CurveInertia::default());
@@ -368,8 +370,8 @@ impl Inertia {
 }
 
 impl Snapshot {
-    /// Empties what an agent may leave unsaid, keeping the storage. Ledgers stay for an agent that has some to write over:
-    /// theirs is storage within storage.
+    /// Empties what an agent may leave unset, keeping the storage. Ledgers stay, for agents with ledgers to overwrite:
+    /// their storage is nested.
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
@@ -385,19 +387,19 @@ impl Snapshot {
         self.bonds.clear();
     }
 
-    /// The moment of the scene that it belongs to: its own time, and how far that has been put off.
+    /// The scene time that it belongs to: its own time plus its delay.
     #[must_use]
     pub fn moment(&self) -> SimTime {
         self.time + self.put_off
     }
 
-    /// How long its steps are as a rule, seconds, where its scene wants `wanted_s`.
+    /// Its usual step length, seconds, where its scene requests `wanted_s`.
     #[must_use]
     pub fn step_s(&self, wanted_s: f64) -> f64 {
         self.shorter.map_or(wanted_s, SimSpan::as_secs_f64)
     }
 
-    /// Whether every number that others act on is finite.
+    /// Whether every number that others use is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()

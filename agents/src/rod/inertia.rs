@@ -1,6 +1,6 @@
-//! How a tube answers impulses: its factor, as others may know it.
+//! A tube's response to impulses, as published to other agents: its factor.
 //!
-//! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
+//! In: the factor of the last substep. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::band::Factor;
 use super::config::Matter;
@@ -8,23 +8,23 @@ use super::contact::respond;
 use crate::coupling::{Carried, Foot, Lies};
 use glam::DVec3;
 
-/// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
+/// A tube's response to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), held ends excluded.
 #[derive(Debug, Clone, Default)]
 pub struct CurveInertia {
     factor: Factor,
-    /// Where something fixed carries it, and its answer there.
+    /// The tube's supports, and its response there.
     standing: Carried<Factor>,
     held: [bool; 2],
-    /// How fast each segment turns, rad/s, world axes.
+    /// Spin of each segment, rad/s, world axes.
     pub spins: Vec<DVec3>,
-    /// How each slot will accelerate in its next step, or did in the last one without what others gave at its start, m/s² and rad/s²;
-    /// empty before the first.
+    /// Predicted acceleration of each slot in the next step, or its acceleration in the last step without what others gave at its start,
+    /// m/s² and rad/s²; empty before the first.
     pub accelerations: Vec<DVec3>,
-    /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
+    /// The length of the last substep, seconds: published velocities are the means over it. Zero before the first.
     pub span_s: f64,
-    /// The length of the step that the accelerations foretell, seconds; zero where they are those of the last one.
+    /// The length of the step that the accelerations predict, seconds; zero where they are those of the last one.
     pub ahead_s: f64,
-    /// Of each segment: length (m) and direction.
+    /// Length (m) and direction of each segment.
     segments: Vec<(f64, DVec3)>,
     /// Mass per length, kg/m, rotary inertia per length, kg·m, and damping, 1/s.
     mu: f64,
@@ -33,7 +33,7 @@ pub struct CurveInertia {
 }
 
 impl CurveInertia {
-    /// Takes over the factor of a substep of `span_s` seconds and the velocities of all slots, into the storage that is here.
+    /// Copies the factor of a substep of `span_s` seconds and the velocities of all slots, into the existing storage.
     pub(super) fn copy_from(&mut self, (factor, span_s): (&Factor, f64), held: [bool; 2], velocities: &[DVec3]) {
         self.span_s = span_s;
         self.factor.copy_from(factor);
@@ -42,30 +42,30 @@ impl CurveInertia {
         self.spins.extend(velocities.iter().skip(1).step_by(2));
     }
 
-    /// Takes over where it lies and how it will accelerate there.
+    /// Copies the supports and the accelerations there.
     pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
-    /// Where it lies.
+    /// The contact points at which the tube is supported.
     pub(crate) fn feet(&self) -> &[Foot] {
         self.standing.feet()
     }
 
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    /// Predicted acceleration of each slot, with the supports' response if they have `borne` the load given; empty where unknown.
     pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
         self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
     }
 
-    /// Takes over what the tube weighs.
+    /// Copies mass, rotary inertia and damping, and lengths and directions of segments.
     pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();
         self.segments.extend(length_m.iter().copied().zip(directions.iter().copied()));
     }
 
-    /// What is on its way changes by how much how each slot accelerates in the step that is foretold: `changed` are the velocities that
-    /// it adds when that step begins, and `carried` how far it has moved the tube by then, divided by that step, m/s. The answer goes to
+    /// Change of the predicted acceleration of each slot by impulses still in flight: `changed` are the velocities that they add when the
+    /// predicted step begins, and `carried` the displacement they have caused by then, divided by that step, m/s. The result goes to
     /// `changed`, m/s² (docs/theory/soft.md, eq. 16e).
     pub(crate) fn take_back(&self, borne: bool, changed: &mut [DVec3], carried: &mut [DVec3]) {
         let damped = self.ahead_s * self.damping_per_s;
@@ -84,13 +84,13 @@ impl CurveInertia {
         momenta((self.mu, self.rotary), self.segments.iter().copied(), list);
     }
 
-    /// How many slots it knows: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.
+    /// Number of slots: node k is slot 2k, segment k slot 2k + 1; zero before the tube's first step.
     #[must_use]
     pub fn slots(&self) -> usize {
         self.factor.slots()
     }
 
-    /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
+    /// Appends the size of the inverse mass of each slot: accurate enough to scale an iteration.
     pub(crate) fn scale(&self, into: &mut Vec<f64>) {
         let first = into.len();
         into.extend(self.factor.scales());
@@ -101,11 +101,11 @@ impl CurveInertia {
         }
     }
 
-    /// Turns impulses, one a slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s), with what it lies on, where that
-    /// has `borne` them, or without.
+    /// Turns impulses, one per slot (N·s; N·m·s for a segment), into the velocities they cause (m/s; rad/s), with the supports' response if
+    /// they have `borne` the load, else without.
     ///
     /// # Panics
-    /// Where there are not as many as [`Self::slots`].
+    /// Where their number is not [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
         respond((self.standing.factor().filter(|_| borne).unwrap_or(&self.factor), self.held), impulses);
