@@ -94,11 +94,11 @@ pub struct Companion<'a> {
     pub id: AgentId,
     /// The agent.
     pub agent: &'a mut dyn Agent,
-    /// What the agent sees.
+    /// The surroundings of that agent.
     pub around: Surroundings<'a>,
 }
 
-/// What a step cost and what came of it.
+/// The cost and the outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
     /// Work done, in the model's unit; a declared machine gives the cost of a unit in seconds.
@@ -169,7 +169,7 @@ pub fn check_span(dt: SimSpan) -> Result<f64, StepError> {
     if dt_s > 0.0 && dt_s <= DT_MAX_S { Ok(dt_s) } else { Err(StepError::BadSpan { dt_s, max_s: DT_MAX_S }) }
 }
 
-/// What an agent sees of the others while it steps.
+/// The other agents and springs that an agent sees while it steps.
 #[derive(Debug, Clone, Copy)]
 pub struct Surroundings<'a> {
     /// The agent that looks.

@@ -90,7 +90,7 @@ pub enum Promise {
 pub struct Breach {
     /// Which promise.
     pub promise: Promise,
-    /// What happened.
+    /// Description of the failure.
     pub what: String,
 }
 

@@ -1,6 +1,6 @@
 //! The pair (ε, n) that sets how finely an object is simulated or drawn (GDC04).
 
-/// The highest primitive level: 2¹⁰ polygons for each of level 0; past it a patch outgrows 16-bit indices.
+/// The highest primitive level: 2¹⁰ polygons for every O(1) of level 0; past it a patch outgrows 16-bit indices.
 pub const N_MAX: u8 = 10;
 
 /// How finely an object is divided: the pair (ε, n) of (GDC04).

@@ -68,9 +68,8 @@ pub struct Snapshot {
     pub rebound: Rare<Rebound>,
     /// The agent on which it rests, where a fixed solid supports that one.
     pub lies: Rare<LiesOn>,
-    /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by impulses
-    /// (N·s,
-    /// N·m·s); none where it shares none, or where a fixed solid holds that island.
+    /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by
+    /// impulses (N·s, N·m·s); none where it shares none, or where a fixed solid holds that island.
     pub within: Rare<Six>,
     /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,

@@ -35,7 +35,7 @@ fn fill_segments(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [
         let (before, after) = (DMat3::from_quat(now.q[k]), DMat3::from_quat(next.q[k]));
         let (e0, e1) = (now.e[k], next.e[k]);
         let strains = before.transpose() * e0 + after.transpose() * e1 - rest * 2.0;
-        // twice the mean force n̄: the unknown is doubled too, and h is half the substep
+        // twice the mean force n̄, as h is half the substep
         let n = (before + after) * (stiffness * strains) * 0.5;
         let weight = gravity * (mu * l);
         let (b, m) = (want(2 * k + 2), mu * l / 6.0);

@@ -35,7 +35,7 @@ pub struct Division {
     pub joint: Vec<f64>,
     /// Stress-free rotation vector of each joint, in the axes of the segment (or wall) before it: N + 1 entries (eq. 3).
     pub bend: Vec<DVec3>,
-    /// Frames of the walls that clamps hold: start, end.
+    /// Frames of the walls to which clamped ends are held: start, end.
     pub wall: [DQuat; 2],
 }
 

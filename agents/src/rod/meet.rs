@@ -32,7 +32,7 @@ impl Tube {
         self.dt_s = dt_s;
         self.stepper.company.open(around, &self.division, around.time + dt);
         if self.ahead_s > 0.0 && !self.stepper.company.received().is_empty() {
-            // matches the predicted step that the givers were told to expect
+            // matches the predicted step that was published to the givers
             self.stepper.company.received().put_off(dt_s / f64::from(self.spec.substeps));
         }
         // a displacement of more than a radius could put a tube on the far side of a wall

@@ -37,7 +37,7 @@ pub struct Iterate<'a> {
     pub start: &'a Config,
     /// The state linearised about: the start itself in the first iteration.
     pub at: &'a Config,
-    /// Whether `at` is the start: its own motion then counts as zero.
+    /// Whether `at` is the start: velocities since the start then count as zero.
     pub first: bool,
 }
 

@@ -59,7 +59,7 @@ pub struct Tube {
     wave_from_s: f64,
     pub(super) dt_s: f64,
     pub(super) steps: u64,
-    /// Its recent contact with fixed solids.
+    /// Its recent support by fixed solids, and its last step length.
     pub(super) lately: Lately,
 }
 

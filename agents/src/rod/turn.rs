@@ -5,9 +5,9 @@
 
 use glam::{DQuat, DVec3};
 
-/// Below this square of the half angle the terms of [`exp`] are exact to 1 ulp.
+/// Below this square of the half angle the error of the terms of [`exp`] is less than 1 ulp.
 const EXP_SERIES_MAX: f64 = 0.02;
-/// Below this square of the half angle's sine the eight terms of [`log`] are exact to 1 ulp.
+/// Below this square of the half angle's sine the error of the eight terms of [`log`] is less than 1 ulp.
 const LOG_SERIES_MAX: f64 = 0.01;
 /// Below this square of the angle the error of the five terms of [`bend_share`] is less than 1e-14.
 const SHARE_SERIES_MAX: f64 = 0.1;

@@ -1,4 +1,4 @@
-//! Parts of a tube that start inside a solid and through it, where pushing out would tear the tube.
+//! Parts of a tube that pass through a solid from the start: pushing them out would tear the tube.
 //!
 //! In: a tube's axis and a solid. Out: the parts of it that pass through without contact, until they have left the solid.
 //! Never here: contacts. Theory: `docs/theory/contact.md`, eq. 25.

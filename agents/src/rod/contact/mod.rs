@@ -139,7 +139,7 @@ impl TubeContacts {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
-    /// Where fixed solids pressed in the last solve: the slots of each place, and its normal.
+    /// Contacts in which fixed solids pressed in the last solve: slots and normal of each.
     pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
