@@ -1,6 +1,6 @@
-//! Physics models that can live as autonomous agents.
+//! Physics models that run as autonomous agents.
 //!
-//! In: step lengths and what an agent sees of the others. Out: states, as [`Snapshot`]s.
+//! In: step lengths and the published states of the other agents. Out: states, as [`Snapshot`]s.
 //! Never here: a clock, a thread, a file, the GPU. Theory: `docs/theory/rod.md`.
 
 mod agent;
