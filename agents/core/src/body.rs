@@ -5,21 +5,21 @@
 use crate::AgentId;
 use glam::{DQuat, DVec3};
 
-/// Where matter is and how fast it may leave.
+/// Position of matter and the fastest speed at which it may leave.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// The lowest coordinates, metres.
     pub low: DVec3,
     /// The highest coordinates, metres.
     pub high: DVec3,
-    /// No point moves faster, m/s.
+    /// The largest speed of any point, m/s.
     pub speed_m_s: f64,
 }
 
 /// The state of an agent's matter; which one is fixed for an agent's life.
 #[derive(Debug, Clone, Default)]
 pub enum Body {
-    /// Nothing to see (a synthetic agent).
+    /// No matter (a synthetic agent).
     #[default]
     Nothing,
     /// A tube or cable: a framed curve with a radius.
@@ -35,7 +35,7 @@ pub enum Body {
 /// The vertices of a soft body. What joins them never changes ([`metachron_geometry::SurfaceForm`]).
 #[derive(Debug, Clone, Default)]
 pub struct SoftState {
-    /// Where they are, metres, world axes.
+    /// Positions, metres, world axes.
     pub positions: Vec<DVec3>,
     /// Their velocities, m/s.
     pub velocities: Vec<DVec3>,
@@ -50,7 +50,7 @@ pub struct CurveState {
     pub positions: Vec<DVec3>,
     /// Node velocities in m/s; N + 1 entries.
     pub velocities: Vec<DVec3>,
-    /// Section frames, one a segment: the third axis (z) is the axial director; N entries.
+    /// Section frames, one per segment: the third axis (z) is the axial director; N entries.
     pub frames: Vec<DQuat>,
     /// Outer radius at each node in metres; N + 1 entries.
     pub radii_m: Vec<f64>,
@@ -85,37 +85,37 @@ pub struct ToolState {
     pub spin: DVec3,
     /// Opening of the jaws: 0 shut … 1 wide open.
     pub jaw: f64,
-    /// What the jaws hold.
+    /// The grasp of the jaws, if any.
     pub grasp: Option<Grasp>,
-    /// The rigid body that the open jaws are about to take, or have just let go: it may come between them.
+    /// The rigid body that the open jaws are about to grasp, or have just released: it may come between them.
     pub lets_in: Option<AgentId>,
-    /// Magnitude of the force that what is held exerts on the tool, newtons.
+    /// Magnitude of the force that the grasped body exerts on the tool, newtons.
     pub force_n: f64,
-    /// Whether nothing leads it on: it has come to the end of its script, which nothing holds it back from, and no hand has it.
+    /// Whether nothing drives it any more: its script has ended without anything holding it back, and no user spring is on it.
     pub is_left: bool,
 }
 
-/// A tool's hold on a material point of another agent.
+/// A tool's attachment to a material point of another agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grasp {
-    /// Who is held.
+    /// The grasped agent.
     pub target: AgentId,
-    /// Which material point of it.
+    /// The material point grasped.
     pub anchor: Anchor,
-    /// How it is kept from turning between the jaws; `None` where it may.
+    /// Rotational attachment between the jaws; `None` where the body may turn freely.
     pub clasp: Option<Clasp>,
-    /// Stiffness of the hold, N/m, > 0.
+    /// Stiffness of the attachment, N/m, > 0.
     pub stiffness_n_m: f64,
-    /// Damping of the hold, N·s/m, ≥ 0.
+    /// Damping of the attachment, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
 }
 
-/// How jaws keep a rigid body from turning: they are as long as `arm_m`, and bear on all of it.
+/// Rotational attachment of a rigid body to jaws of length `arm_m` that press along all of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Clasp {
-    /// Rotation from the body's axes to the tool's in which the hold turns nothing.
+    /// Rotation from the body's axes to the tool's at which the attachment exerts no torque.
     pub rotation: DQuat,
-    /// The hold resists turning about every axis as springs and dampers of its own strength do at this distance, metres, ≥ 0.
+    /// The resistance to turning about every axis is that of springs and dampers of the grasp's strength at this distance, metres, ≥ 0.
     pub arm_m: f64,
 }
 
@@ -130,10 +130,10 @@ pub enum Anchor {
     Vertex(u32),
 }
 
-/// The force by which `by` holds this agent.
+/// The force with which `by` holds this agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Grip {
-    /// Who holds; `None` is the user's hand.
+    /// The agent that holds; `None` for the user's spring.
     pub by: Option<AgentId>,
     /// The force on this agent, newtons, world axes.
     pub force_n: DVec3,
@@ -160,7 +160,7 @@ impl CurveState {
 }
 
 impl CurveState {
-    /// The segment that holds the material point at rest arc length `arc_m`, and how far along it the point lies, 0 … 1;
+    /// The segment that contains the material point at rest arc length `arc_m`, and the point's share of it, 0 … 1;
     /// clamped to the curve's ends. `None` for a curve without segments.
     #[must_use]
     pub fn locate(&self, arc_m: f64) -> Option<(usize, f64)> {
@@ -191,7 +191,7 @@ impl Body {
     }
 
     /// The point a probe at `at` (0 start … 1 end of a curve's rest length) reports: position and velocity.
-    /// A soft body reports the vertex at that share of their numbers: of its first corner at 0, of the opposite one at 1.
+    /// A soft body reports the vertex at that share of its vertex numbers: its first corner at 0, the opposite one at 1.
     /// Any other body reports its centre of mass or tip.
     #[must_use]
     pub fn probe(&self, at: f64) -> Option<(DVec3, DVec3)> {
@@ -206,7 +206,7 @@ impl Body {
         }
     }
 
-    /// Whether every number is finite. A body that is not is never published.
+    /// Whether every number is finite. A body that is not finite is never published.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         match self {
@@ -227,7 +227,7 @@ impl Body {
         }
     }
 
-    /// The soft body to write into, keeping its storage when this is one already.
+    /// The soft body to write into; reuses the storage if this is one already.
     pub fn soft_mut(&mut self) -> &mut SoftState {
         if !matches!(self, Self::Soft(_)) {
             *self = Self::Soft(SoftState::default());
@@ -238,7 +238,7 @@ impl Body {
         }
     }
 
-    /// The curve to write into, keeping its storage when this is a curve already.
+    /// The curve to write into; reuses the storage if this is one already.
     pub fn curve_mut(&mut self) -> &mut CurveState {
         if !matches!(self, Self::Curve(_)) {
             *self = Self::Curve(CurveState::default());

@@ -1,9 +1,9 @@
-//! A value that most states do not have, in storage of its own.
+//! An optional value that most states lack, in storage of its own.
 //!
-//! In: values that come and go. Out: the newest, or none; the storage stays, so that nothing is allocated when it comes again.
+//! In: values that appear and disappear. Out: the newest, or none; the storage is kept, so that a new value needs no allocation.
 //! Never here: what the values mean.
 
-/// A value or none. Without one it takes two words, however large the value would be.
+/// An optional value. Empty, it takes two words, however large the value would be.
 #[derive(Debug, Clone)]
 pub struct Rare<T> {
     storage: Option<Box<T>>,
@@ -23,7 +23,7 @@ impl<T> Rare<T> {
         self.storage.as_deref().filter(|_| self.is_there)
     }
 
-    /// Has `value` from now on.
+    /// Replaces the value.
     pub fn set(&mut self, value: Option<T>) {
         self.is_there = value.is_some();
         let Some(value) = value else { return };

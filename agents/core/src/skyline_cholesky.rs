@@ -1,11 +1,11 @@
-//! Cholesky's factor of a symmetric positive matrix in double precision, each row stored from its first entry on.
+//! Cholesky factor of a symmetric positive definite matrix in double precision, each row stored from its first entry on.
 //!
-//! In: the first body that each body is joined to, and blocks of B rows. Out: the solution. Never here: where the matrix comes from.
-//! A chain's factor has a constant width, so it costs as much as the chain is long.
+//! In: the first body that each body is coupled to, and blocks of B rows. Out: the solution. Never here: where the matrix comes from.
+//! The factor of a chain has constant width, so its cost is linear in the chain's length.
 
 use glam::DVec3;
 
-/// A matrix of B rows a body, its lower half.
+/// The lower half of a matrix with B rows per body.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Envelope<const B: usize> {
     /// First column of each row.
@@ -16,7 +16,7 @@ pub struct Envelope<const B: usize> {
 }
 
 impl<const B: usize> Envelope<B> {
-    /// Makes room, all zero: body i is joined to none lower than `first_body[i]` ≤ i.
+    /// Allocates the envelope, all zero: body i is coupled to no body below `first_body[i]` ≤ i.
     pub fn shape(&mut self, first_body: &[u32]) {
         self.first.clear();
         self.start.clear();
@@ -32,7 +32,7 @@ impl<const B: usize> Envelope<B> {
         self.values.resize(size, 0.0);
     }
 
-    /// What a factorisation costs: the sum of squares of the widths.
+    /// Cost of a factorisation: the sum of squares of the row widths.
     pub fn work(first_body: &[u32]) -> usize {
         first_body.iter().enumerate().map(|(body, &first)| B * (B * (body + 1 - first as usize)).pow(2)).sum()
     }
@@ -58,35 +58,35 @@ impl<const B: usize> Envelope<B> {
         }
     }
 
-    /// Makes it zero again, as it was shaped.
+    /// Sets all entries to zero and keeps the shape.
     pub fn clear(&mut self) {
         self.values.fill(0.0);
     }
 
-    /// The diagonal, one number a row.
+    /// The diagonal entry of a row.
     pub fn diagonal(&self, row: usize) -> f64 {
         self.values[self.start[row] + row - self.first[row]]
     }
 
-    /// Takes over `other` into the storage that is here.
+    /// Copies `other` into the existing storage.
     pub fn copy_from(&mut self, other: &Self) {
         self.first.clone_from(&other.first);
         self.start.clone_from(&other.start);
         self.values.clone_from(&other.values);
     }
 
-    /// How many rows there are.
+    /// Number of rows.
     pub fn rows(&self) -> usize {
         self.first.len()
     }
 
-    /// Replaces the matrix by its factor; `false` where it is not positive.
+    /// Replaces the matrix by its factor; `false` where it is not positive definite.
     pub fn factor(&mut self) -> bool {
         (0..self.rows() / B).all(|body| self.factor_body(B * body))
     }
 
-    /// Finds the rows of a body, which begin with row `i`: side by side as far as the bodies before it go, which takes each number of
-    /// those once for B of its own.
+    /// Factors the B rows of a body, beginning with row `i`: all B together against the rows of earlier bodies, so that each of those is
+    /// read once.
     fn factor_body(&mut self, i: usize) -> bool {
         let Self { first, start, values } = self;
         let (done, mut rest) = values.split_at_mut(start[i]);
@@ -120,7 +120,7 @@ impl<const B: usize> Envelope<B> {
         true
     }
 
-    /// Solves for `x` with the factor.
+    /// Replaces the right side `x` by the solution; the matrix must be factored.
     pub fn solve(&self, x: &mut [f64]) {
         let count = self.first.len();
         for i in 0..count {
@@ -139,7 +139,7 @@ impl<const B: usize> Envelope<B> {
 }
 
 impl Envelope<3> {
-    /// Solves for `x`, one vector a body, with the factor.
+    /// Replaces the right side `x`, one vector per body, by the solution; the matrix must be factored.
     pub fn solve_vectors(&self, x: &mut [DVec3]) {
         for (body, row) in (0..x.len()).flat_map(|body| (0..3).map(move |axis| (body, 3 * body + axis))) {
             let (first, values) = (self.first[row] / 3, self.row(row));
@@ -166,7 +166,7 @@ impl Envelope<3> {
     }
 }
 
-/// A sum of products in six lanes: a fixed order, so the same bits everywhere.
+/// Dot product in six lanes: a fixed order of summation, so the same bits everywhere.
 fn dot_vectors(a: &[f64], b: &[DVec3]) -> f64 {
     let mut lanes = [DVec3::ZERO; 2];
     for (k, (a, b)) in a.chunks_exact(3).zip(b).enumerate() {
@@ -175,12 +175,12 @@ fn dot_vectors(a: &[f64], b: &[DVec3]) -> f64 {
     (lanes[0] + lanes[1]).element_sum()
 }
 
-/// A sum of products in four lanes: a fixed order, so the same bits everywhere.
+/// Dot product in four lanes: a fixed order of summation, so the same bits everywhere.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
     dots([a], b)[0]
 }
 
-/// The same of several with one: the bits of each are those of [`dot`].
+/// Dot products of several rows with one: the bits of each are those of [`dot`].
 fn dots<const N: usize>(all: [&[f64]; N], b: &[f64]) -> [f64; N] {
     let (b4, rest) = b.as_chunks::<4>();
     let all = all.map(|a| (&a.as_chunks::<4>().0[..b4.len()], &a[4 * b4.len()..b.len()]));

@@ -1,7 +1,7 @@
-//! What an agent publishes: its whole visible state at one moment of its own time.
+//! An agent's publication: its whole visible state at one moment of its own time.
 //!
-//! In: an agent writes itself into a [`Snapshot`] that is used again and again (no allocation once the sizes settle).
-//! Out: drawing, coupling, probes and hashes read it. Never here: how it travels between threads (the runtime does that).
+//! In: an agent writes itself into a [`Snapshot`] that is reused (no allocation once the sizes settle).
+//! Out: drawing, coupling, probes and hashes read it. Never here: its transport between threads (the runtime does that).
 
 mod lies;
 mod stand;
@@ -22,58 +22,59 @@ use std::any::Any;
 pub struct Snapshot {
     /// The agent's own time, written by the runtime when it publishes.
     pub time: SimTime,
-    /// How far behind the scene its time may lie, written like it: who cannot keep up beside others lives on, later.
+    /// Delay of its time behind the scene's, written likewise: an agent that cannot keep up with its neighbours continues delayed.
     pub put_off: SimSpan,
     /// How long its last step was where that was shorter than its scene wants ([`metachron_contact::Agent::longest_step`]), written like its time; `None`
     /// elsewhere.
     pub shorter: Option<SimSpan>,
-    /// How many steps led here.
+    /// Number of steps so far.
     pub steps: u64,
-    /// The resolution the simulation holds; `None` for a model that has none.
+    /// The resolution that the simulation runs at; `None` for a model that has none.
     pub resolution: Option<Resolution>,
-    /// Where the agent's matter is and how it moves.
+    /// Position and motion of the agent's matter.
     pub body: Body,
     /// Mechanical energy in joules: kinetic + elastic + gravity, zero at the origin.
     pub energy_j: f64,
     /// The agent's estimate of its own error, in metres, ≥ 0.
     pub residual_m: f64,
-    /// The part of it that steps make in [`crate::DRIFT_S`], metres, ≥ 0; the rest is what its spacing leaves.
+    /// The part of it that steps accumulate in [`crate::DRIFT_S`], metres, ≥ 0; the rest comes from its spacing.
     pub drift_m: f64,
-    /// Agents this one acts on now: they must not rest meanwhile.
+    /// Agents that this one acts on now: they must not sleep meanwhile.
     pub touches: Vec<AgentId>,
-    /// Forces by which others hold this agent.
+    /// Grasp and spring forces on this agent.
     pub grips: Vec<Grip>,
-    /// Whether the agent is at rest: others take it for immovable until they wake it.
+    /// Whether the agent is at rest: others treat it as immovable until they wake it.
     pub at_rest: bool,
-    /// Whether something fixed bears it: what bends has touched some within a second, a rigid body stands, or has tipped within one.
+    /// Whether a fixed solid supports it: a deformable touched one within the last second, a rigid body stands on one, or tipped within the
+    /// last second.
     pub grounded: bool,
-    /// Whether it steps in one world with others.
+    /// Whether it steps in one island with others.
     pub shares: bool,
-    /// Its smooth acceleration, m/s²: without what couplings and blows did. Others expect it to go on like this.
+    /// Its smooth acceleration, m/s², without couplings and impacts. Others predict its motion by it.
     pub acceleration: DVec3,
-    /// How it answers impulses.
+    /// Its response to impulses.
     pub inertia: Inertia,
-    /// How it stands on something fixed; `None` where it does not, or not on one level.
+    /// Its support by a fixed solid; `None` where there is none, or not on a single level.
     pub stand: Option<Stand>,
-    /// How it tips over an edge or a corner that something fixed bears; none where it does not.
+    /// Its tipping about an edge or a corner that a fixed solid supports; none where it does not tip.
     pub tips: Rare<Tips>,
-    /// In how many seconds of free flight something fixed may be in its way, ≥ 0; `None` where nothing is soon, and where that is not
-    /// told: it stands, or others hold it.
+    /// Seconds of free flight until a fixed solid may be in its way, ≥ 0; `None` where there is none soon, and where it is not
+    /// reported: the body is supported, or held by others.
     pub lands_s: Option<f64>,
-    /// How springs on led points hold it; none where none do, or where nobody would have to know.
+    /// Forces and stiffness of the springs from driven points on it; none without such springs, or where no other agent needs them.
     pub sprung: Rare<Sprung>,
-    /// What fixed solids gave it in its last step: it was not there before, and late impulses may have spared it.
+    /// Impulses of fixed solids in its last step: it was not in contact before, and late impulses of others may have averted them.
     pub rebound: Rare<Rebound>,
-    /// On whom it lies, where something fixed holds that one up.
+    /// The agent on which it rests, where a fixed solid supports that one.
     pub lies: Rare<LiesOn>,
-    /// How it answers impulses among those whose world it shares, about its centre of mass: velocities (m/s, rad/s) of impulses (N·s,
-    /// N·m·s); none where it shares none, or where something fixed holds that world.
+    /// Its response to impulses within the island that it shares, about its centre of mass: velocities (m/s, rad/s) caused by
+    /// impulses (N·s, N·m·s); none where it shares none, or where a fixed solid holds that island.
     pub within: Rare<Six>,
-    /// The box around its matter; `None` where nothing of it can be touched.
+    /// The bounding box of its matter; `None` where nothing of it can be touched.
     pub bounds: Option<Bounds>,
-    /// What it has given to others, in couplings that it owns.
+    /// Impulses given to others, in couplings that it owns.
     pub given: Vec<Ledger>,
-    /// What it has taken from others, in couplings that they own.
+    /// Impulses taken from others, in couplings that they own.
     pub taken: Vec<Ledger>,
     /// The couplings that it owns.
     pub pairs: Vec<PairState>,
@@ -81,10 +82,10 @@ pub struct Snapshot {
     pub bonds: Vec<AgentId>,
 }
 
-/// How a body answers impulses: its inverse mass, at the time of the snapshot.
+/// A body's response to impulses: its inverse mass, at the time of the snapshot.
 #[derive(Debug, Clone, Default)]
 pub enum Inertia {
-    /// Nothing moves it.
+    /// Immovable.
     #[default]
     Immovable,
     /// A rigid body about its centre of mass.
@@ -123,8 +124,8 @@ impl Inertia {
 }
 
 impl Snapshot {
-    /// Empties what an agent may leave unsaid, keeping the storage. Ledgers stay for an agent that has some to write over:
-    /// theirs is storage within storage.
+    /// Empties what an agent may leave unset, keeping the storage. Ledgers stay, for agents with ledgers to overwrite:
+    /// their storage is nested.
     pub fn clear(&mut self) {
         self.touches.clear();
         self.grips.clear();
@@ -140,19 +141,19 @@ impl Snapshot {
         self.bonds.clear();
     }
 
-    /// The moment of the scene that it belongs to: its own time, and how far that has been put off.
+    /// The scene time that it belongs to: its own time plus its delay.
     #[must_use]
     pub fn moment(&self) -> SimTime {
         self.time + self.put_off
     }
 
-    /// How long its steps are as a rule, seconds, where its scene wants `wanted_s`.
+    /// Its usual step length, seconds, where its scene requests `wanted_s`.
     #[must_use]
     pub fn step_s(&self, wanted_s: f64) -> f64 {
         self.shorter.map_or(wanted_s, SimSpan::as_secs_f64)
     }
 
-    /// Whether every number that others act on is finite.
+    /// Whether every number that others use is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         self.body.is_finite()

@@ -2,38 +2,39 @@
 
 use crate::SimSpan;
 
-/// What a step took and what it led to.
+/// The cost and the outcome of a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct StepReport {
-    /// Work done, in the model's unit: a declared machine gives its price in seconds.
-    /// Tube: segments × systems solved: one a substep, more where its rule iterates, and those of its own error estimate. Rigid, instrument: 1. Synthetic: its declared microseconds.
+    /// Work done, in the model's unit; a declared machine gives the cost of a unit in seconds.
+    /// Tube: segments × systems solved: one per substep, more where its rule iterates, plus those of its own error estimate.
+    /// Rigid, instrument: 1. Synthetic: its declared microseconds.
     pub work: f64,
-    /// Into how many substeps the step was divided, ≥ 1.
+    /// Number of substeps that the step was divided into, ≥ 1.
     pub substeps: u32,
-    /// Whether the agent could sleep: it has not moved for a while and nothing acts on it.
+    /// Whether the agent may sleep: it has not moved for a while and nothing acts on it.
     pub at_rest: bool,
 }
 
-/// Why a step was refused, or given up.
+/// Why a step was refused or abandoned.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum StepError {
     /// The span was zero, or longer than the model can take. State: untouched.
     #[error("step span is {dt_s} s; it must be above zero and at most {max_s} s")]
     BadSpan {
-        /// The span asked for, in seconds.
+        /// The requested span, in seconds.
         dt_s: f64,
         /// The longest span the model takes, in seconds.
         max_s: f64,
     },
-    /// The state stopped being finite. The agent must not step again; its last snapshot stands.
+    /// The state is no longer finite. The agent must not step again; its last snapshot stays valid.
     #[error("the state of this {model} is no longer finite after a step of {dt_s} s: {what}")]
     Diverged {
         /// The model's name.
         model: &'static str,
         /// The span of the failed step, in seconds.
         dt_s: f64,
-        /// The quantity that was lost first, and where.
+        /// The quantity that stopped being finite first, and where.
         what: String,
     },
     /// The substeps are too long for the integrator. State: untouched.
@@ -45,14 +46,14 @@ pub enum StepError {
         model: &'static str,
         /// The integrator's name.
         integrator: &'static str,
-        /// How finely the body is divided.
+        /// Number of segments that the body is divided into.
         segments: usize,
-        /// The substep that the step would have, in seconds.
+        /// The substep that the step would use, in seconds.
         substep_s: f64,
-        /// The longest that the integrator carries, in seconds.
+        /// The longest substep at which the integrator is stable, in seconds.
         limit_s: f64,
     },
-    /// The model cannot step others in its world. State: untouched.
+    /// The model cannot step other agents in an island of its own. State: untouched.
     #[error("a {model} has no world that others could share")]
     Alone {
         /// The model's name.
@@ -60,7 +61,7 @@ pub enum StepError {
     },
 }
 
-/// The longest step any model takes, in seconds: past it a real-time agent has lost touch with its scene.
+/// The longest step any model takes, in seconds: past it a real-time agent no longer follows its scene.
 pub const DT_MAX_S: f64 = 1.0;
 
 /// The length of `dt` in seconds, if a model may step by it.

@@ -1,7 +1,7 @@
 //! Simulated time: whole nanoseconds, so that sums of steps are exact.
 //!
 //! In: seconds or nanoseconds. Out: [`SimTime`] (a point) and [`SimSpan`] (a length).
-//! Never here: wall time. It is a `std::time::Duration` and meets simulated time only in the runtime's pacing.
+//! Never here: wall time. That is a `std::time::Duration`, related to simulated time only in the runtime's pacing.
 
 use std::ops::{Add, AddAssign, Sub};
 
@@ -16,34 +16,34 @@ pub struct SimSpan(u64);
 const NANOS_PER_SECOND: f64 = 1e9;
 
 impl SimTime {
-    /// The moment the scene began.
+    /// The start of the scene.
     pub const ZERO: Self = Self(0);
 
-    /// A point `nanos` nanoseconds after the beginning.
+    /// A point `nanos` nanoseconds after the start.
     #[must_use]
     pub const fn from_nanos(nanos: u64) -> Self {
         Self(nanos)
     }
 
-    /// Nanoseconds since the beginning.
+    /// Nanoseconds since the start.
     #[must_use]
     pub const fn as_nanos(self) -> u64 {
         self.0
     }
 
-    /// Seconds since the beginning; exact to the nanosecond below 104 days.
+    /// Seconds since the start; exact to the nanosecond below 104 days.
     #[must_use]
     pub fn as_secs_f64(self) -> f64 {
         self.0 as f64 / NANOS_PER_SECOND
     }
 
-    /// The span from `earlier` to here; zero where `earlier` is later.
+    /// The span from `earlier` to this time; zero where `earlier` is later.
     #[must_use]
     pub const fn since(self, earlier: Self) -> SimSpan {
         SimSpan(self.0.saturating_sub(earlier.0))
     }
 
-    /// Seconds from `other` to here, negative where `other` is later.
+    /// Seconds from `other` to this time, negative where `other` is later.
     #[must_use]
     pub fn secs_after(self, other: Self) -> f64 {
         if self >= other { self.since(other).as_secs_f64() } else { -other.since(self).as_secs_f64() }
@@ -51,7 +51,7 @@ impl SimTime {
 }
 
 impl SimSpan {
-    /// No time at all. A step refuses it.
+    /// The zero span. A step refuses it.
     pub const ZERO: Self = Self(0);
 
     /// A span of `nanos` nanoseconds.

@@ -1,7 +1,7 @@
-//! What every agent promises, as one suite that any model can be held against.
+//! The promises of every agent, as one test suite for any model.
 //!
-//! In: a [`Suite`]: how to build the agent, what to do to it. Out: every [`Breach`] of a promise, none as a rule.
-//! Never here: what one model alone promises; that is tested beside the model.
+//! In: a [`Suite`]: how to build the agent, what to do to it. Out: every broken promise ([`Breach`]), normally none.
+//! Never here: promises of a single model; those are tested next to that model.
 //!
 //! ```
 //! use crate::conformance::{Suite, check};
@@ -34,33 +34,33 @@ mod tests;
 
 /// Builds an agent.
 pub type Make<'a> = &'a dyn Fn() -> Box<dyn Agent>;
-/// Runs what it is given and says how often that asked for memory.
+/// Runs the given closure and returns its number of allocations.
 pub type CountAllocations<'a> = &'a dyn Fn(&mut dyn FnMut()) -> u64;
-/// How far an agent is from where it must be after so many seconds, as a share of what that is.
+/// Distance of an agent from its exact state after so many seconds, relative to that state.
 pub type Deviation<'a> = &'a dyn Fn(&dyn Agent, f64) -> f64;
 
 /// An agent and what to do to it.
 pub struct Suite<'a> {
-    /// Builds the agent, always the same, in a state that moves.
+    /// Builds the agent, identical each time, in a state of motion.
     pub make: Make<'a>,
     /// The span of a usual step.
     pub dt: SimSpan,
-    /// How many steps a run has.
+    /// Number of steps in a run.
     pub steps: u32,
-    /// What the agent sees.
+    /// The agent's neighbours.
     pub neighbours: Vec<Neighbour>,
-    /// A pull within reason, if the agent can be pulled.
+    /// A moderate pull, if the agent can be pulled.
     pub pull: Option<Pull>,
-    /// Pulls that no state survives: the way in for what is not finite.
+    /// Pulls so large that the state may stop being finite.
     pub absurd: Vec<Pull>,
-    /// A closed form: how wrong the agent is after t seconds, and how wrong it may be.
+    /// A closed form: the agent's deviation from it after t seconds, and the deviation allowed.
     pub closed_form: Option<(Deviation<'a>, f64)>,
-    /// Resolutions to retune to and fro, from coarse to fine. Where none are given, a wish for what it holds (or for
-    /// anything, where it holds none) must change no bit.
+    /// Resolutions to retune through, from coarse to fine and back. Where none are given, a request for the present resolution (or for
+    /// any, where the model has none) must change no bit.
     pub resolutions: Vec<Resolution>,
-    /// Builds the agent in a case that converges, and how many steps of `dt` that takes.
+    /// Builds the agent in a case that converges, and the number of steps of `dt` until it has.
     pub converging: Option<(Make<'a>, u32)>,
-    /// Counts allocations, and how many a step may make once warm.
+    /// Counts allocations, and the number allowed per step once warm.
     pub allocations: Option<(CountAllocations<'a>, f64)>,
 }
 
@@ -88,12 +88,12 @@ pub enum Promise {
 pub struct Breach {
     /// Which promise.
     pub promise: Promise,
-    /// What happened.
+    /// Description of the failure.
     pub what: String,
 }
 
 impl<'a> Suite<'a> {
-    /// A suite of 200 steps of `dt` on an agent that sees nobody, is not pulled and has no resolution.
+    /// A suite of 200 steps of `dt` on an agent that has no neighbours, no pull and no resolution.
     #[must_use]
     pub fn new(make: Make<'a>, dt: SimSpan) -> Self {
         Self {
@@ -116,7 +116,7 @@ impl<'a> Suite<'a> {
     }
 }
 
-/// Holds the agent of `suite` against every promise.
+/// Tests the agent of `suite` against every promise.
 #[must_use]
 pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     let promises = [
@@ -132,7 +132,7 @@ pub fn check(suite: &Suite<'_>) -> Vec<Breach> {
     broken.collect()
 }
 
-/// Who the agent under test is.
+/// The number of the agent under test.
 const ME: AgentId = AgentId(0);
 
 /// An agent and its own time.
@@ -161,7 +161,7 @@ impl Run<'_> {
         into
     }
 
-    /// A hash of every bit that the agent shows.
+    /// A hash of every bit that the agent publishes.
     fn hash(&self) -> u64 {
         let snapshot = self.snapshot();
         let (linear, angular) = self.agent.momentum();
@@ -177,7 +177,7 @@ fn rest_length_m(body: &Body) -> f64 {
     if let Body::Curve(curve) = body { curve.arc_m.last().copied().unwrap_or(0.0) } else { 0.0 }
 }
 
-/// The fastest point of a body, m/s, and the largest distance of a point from the origin, metres.
+/// The speed of the fastest point of a body, m/s, and the largest distance of a point from the origin, metres.
 fn extents(body: &Body) -> (f64, f64) {
     let longest = |vectors: &mut dyn Iterator<Item = DVec3>| vectors.map(DVec3::length).fold(0.0, f64::max);
     match body {

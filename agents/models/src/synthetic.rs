@@ -1,23 +1,23 @@
 //! An agent with declared cost and error curves and no matter, for controllers and tests.
 //!
-//! In: two power laws and the spacings they hold for. Out: work in microseconds, a residual in metres.
+//! In: two power laws and their range of spacings. Out: work in microseconds, a residual in metres.
 //! Never here: a clock. A step burns its cost in arithmetic, so its microseconds are nominal: see [`Synthetic`].
 
 use glam::DVec3;
 use metachron_contact::{Agent, Surroundings};
 use metachron_core::{Body, Resolution, ResolutionRange, SimSpan, Snapshot, StepError, StepReport, check_span};
 
-/// A synthetic agent: cost a step = `cost_us · (eps_ref / ε)^cost_order`, error = `error_m · (ε / eps_ref)^error_order`,
+/// A synthetic agent: cost per step = `cost_us · (eps_ref / ε)^cost_order`, error = `error_m · (ε / eps_ref)^error_order`,
 /// with `eps_ref` the coarsest spacing of its range.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SyntheticSpec {
     /// Cost of one step at the reference spacing, microseconds, ≥ 0.
     pub cost_us: f64,
-    /// How the cost rises with refinement, ≥ 0.
+    /// Order at which the cost rises with refinement, ≥ 0.
     pub cost_order: f64,
     /// Error at the reference spacing, metres, ≥ 0.
     pub error_m: f64,
-    /// How the error falls with refinement, ≥ 0.
+    /// Order at which the error falls with refinement, ≥ 0.
     pub error_order: f64,
 }
 
@@ -28,7 +28,7 @@ pub enum SyntheticError {
     /// A number of the curves is negative or not finite.
     #[error("{what} is {value}; it must be finite and not negative")]
     BadNumber {
-        /// Which number.
+        /// Name of the number.
         what: &'static str,
         /// The value given.
         value: f64,
@@ -43,10 +43,10 @@ pub enum SyntheticError {
     },
 }
 
-/// A synthetic agent that lives by its own steps.
+/// A synthetic agent that advances by its own steps.
 ///
-/// Its microseconds are nominal: a step does a fixed count of dependent multiplications for each, which take one
-/// microsecond on a core near 3 GHz, more on a slower one. That keeps it deterministic and free of a clock.
+/// Its microseconds are nominal: for each of them a step does a fixed count of dependent multiplications, which take one
+/// microsecond on a core near 3 GHz, more on a slower one. That keeps the agent deterministic and free of a clock.
 #[derive(Debug, Clone)]
 pub struct Synthetic {
     spec: SyntheticSpec,
@@ -57,13 +57,13 @@ pub struct Synthetic {
     ash: u64,
 }
 
-/// Links of the burning chain in a nominal microsecond: a 64-bit multiply and an add take 4 cycles, 3 GHz gives 750.
+/// Links of the burning chain per nominal microsecond: a 64-bit multiply and an add take 4 cycles, 3 GHz gives 750.
 const LINKS_PER_US: f64 = 750.0;
-/// No step declares more than this, microseconds: past it an agent does nothing else.
+/// The highest cost of a step, microseconds: past it an agent does nothing else.
 const COST_MAX_US: f64 = 1e6;
 
 impl Synthetic {
-    /// An agent with the curves of `spec` over `range`, holding the spacing nearest to `start`.
+    /// An agent with the curves of `spec` over `range`, at the spacing nearest to `start`.
     ///
     /// # Errors
     /// [`SyntheticError`] for a curve with a negative or non-finite number and for an empty range.
@@ -86,26 +86,26 @@ impl Synthetic {
         Ok(Self { spec, range, held: range.clamp(start), burns: true, steps: 0, ash: 0 })
     }
 
-    /// The same agent, declaring its cost without burning it: for lockstep, where declared costs are all that counts.
+    /// The same agent, declaring its cost without burning it: for lockstep, where only declared costs matter.
     #[must_use]
     pub fn declared_only(self) -> Self {
         Self { burns: false, ..self }
     }
 
-    /// Cost of a step at the spacing held, microseconds, at most 1e6.
+    /// Cost of a step at the present spacing, microseconds, at most 1e6.
     #[must_use]
     pub fn cost_us(&self) -> f64 {
         let finer = self.range.eps_m.1 / self.held.eps_m;
         (self.spec.cost_us * libm::pow(finer, self.spec.cost_order)).min(COST_MAX_US)
     }
 
-    /// Error at the spacing held, metres.
+    /// Error at the present spacing, metres.
     #[must_use]
     pub fn error_m(&self) -> f64 {
         self.spec.error_m * libm::pow(self.held.eps_m / self.range.eps_m.1, self.spec.error_order)
     }
 
-    /// A chain of multiplications in which each waits for the one before.
+    /// A chain of multiplications, each dependent on the one before.
     fn burn(&mut self) {
         let links = (self.cost_us() * LINKS_PER_US) as u64;
         for _ in 0..links {

@@ -1,11 +1,11 @@
 //! Promises about bits: refused steps, repeated runs, memory, what is not finite.
 //!
-//! In: a [`Suite`]. Out: what was not kept. Never here: promises about physics ([`super::form`]).
+//! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about physics ([`super::form`]).
 
 use super::{Run, Suite, too_long};
 use metachron_core::{SimSpan, StepError};
 
-/// A refused step leaves the state bit for bit, and the steps after it too.
+/// A refused step changes no bit, neither of the state nor of the steps after it.
 pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
     let (mut tried, mut spared) = (suite.start(), suite.start());
     for i in 0..suite.steps.min(50) {
@@ -28,7 +28,7 @@ pub(super) fn refused_span(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// Two agents that are told the same do the same.
+/// Two agents with the same inputs give the same bits.
 pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
     let (mut one, mut other) = (suite.start(), suite.start());
     for i in 0..suite.steps {
@@ -47,7 +47,7 @@ pub(super) fn same_bits(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// Steps and snapshots ask for no memory once the sizes have settled.
+/// Steps and snapshots allocate nothing once the sizes have settled.
 pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
     let Some((count, allowed)) = suite.allocations else { return Ok(()) };
     let mut run = suite.start();
@@ -70,7 +70,7 @@ pub(super) fn allocation(suite: &Suite<'_>) -> Result<(), String> {
     if each <= allowed { Ok(()) } else { Err(format!("{each} allocations a step; {allowed} are allowed")) }
 }
 
-/// Whatever pulls, no state is written that is not finite: the agent says that it is lost, or leaves the pull aside.
+/// Under any pull no state is written that is not finite: the agent reports that it has diverged, or ignores the pull.
 pub(super) fn finite(suite: &Suite<'_>) -> Result<(), String> {
     let mut run = suite.start();
     for i in 0..suite.steps {

@@ -1,17 +1,17 @@
-//! Promises about physics: time, what a change of resolution keeps, how error falls with it.
+//! Promises about physics: time, conservation across a change of resolution, convergence of the error.
 //!
-//! In: a [`Suite`]. Out: what was not kept. Never here: promises about bits ([`super::bits`]).
+//! In: a [`Suite`]. Out: the promises that were broken. Never here: promises about bits ([`super::bits`]).
 
 use super::{Run, Suite, extents, rest_length_m};
 use metachron_contact::Agent;
 use metachron_core::{Resolution, SimSpan};
 
-/// Sums of one quantity over a body's parts agree to this share of their size: a thousand roundings.
+/// Relative tolerance of a sum over a body's parts: a thousand rounding errors.
 const ROUNDING: f64 = 1e-12;
-/// By how much a finer resolution may leave a larger residual.
+/// Factor by which a finer resolution may leave a larger residual.
 const RESIDUAL_SLACK: f64 = 1.1;
 
-/// Steps of any length, also mixed, lead to where the closed form is at the sum of their lengths; each is counted once.
+/// Steps of any length, also mixed, reach the closed form at the sum of their lengths; each is counted once.
 pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
     let nanos = suite.dt.as_nanos();
     let mixed = [nanos, nanos / 3, nanos * 2, nanos / 7].map(|n| SimSpan::from_nanos(n.max(1)));
@@ -27,7 +27,7 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
         }
         if let Some((deviation, allowed)) = suite.closed_form {
             let wrong = deviation(run.agent.as_ref(), run.time.as_secs_f64());
-            // a deviation that is no number is no agreement
+            // NaN is a failure too
             if wrong.is_nan() || wrong > allowed {
                 let t = run.time.as_secs_f64();
                 return Err(format!("after {t} s it is {wrong:e} from its closed form; {allowed:e} is allowed"));
@@ -37,15 +37,15 @@ pub(super) fn exact_time(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// What a change of resolution must keep.
+/// Quantities that a change of resolution must conserve.
 struct Kept {
     mass_kg: f64,
     length_m: f64,
     linear: glam::DVec3,
     angular: glam::DVec3,
-    /// Mass × the fastest speed: what momentum is rounded against.
+    /// Mass × the fastest speed: the scale of rounding errors in momentum.
     push: f64,
-    /// That × how far out the body reaches.
+    /// `push` × the distance of the farthest point from the origin: the same for angular momentum.
     swing: f64,
 }
 
@@ -65,7 +65,7 @@ impl Kept {
     }
 }
 
-/// Mass, linear momentum and rest length stay; angular momentum changes by no more than (ε/L)² of what moves.
+/// Mass, linear momentum and rest length stay; angular momentum changes by at most (ε/L)² of `swing`.
 pub(super) fn retune(suite: &Suite<'_>) -> Result<(), String> {
     let mut run = suite.start();
     for _ in 0..suite.steps.min(50) {
@@ -77,7 +77,7 @@ pub(super) fn retune(suite: &Suite<'_>) -> Result<(), String> {
         run.agent.retune(wanted);
         return if run.hash() == before { Ok(()) } else { Err("a wish for what it holds changed it".to_owned()) };
     }
-    // to and fro: coarsening loses more than refining
+    // coarse to fine and back: coarsening loses more than refining
     for wanted in suite.resolutions.iter().chain(suite.resolutions.iter().rev()) {
         let (before, held_before) = (Kept::of(&run), run.agent.resolution());
         run.agent.retune(*wanted);
@@ -125,7 +125,7 @@ pub(super) fn residual(suite: &Suite<'_>) -> Result<(), String> {
     Ok(())
 }
 
-/// How far an agent's linear momentum is from that of free fall from rest, as a share of it: m g t exactly.
+/// Deviation of an agent's linear momentum from that of free fall from rest, relative to it: m g t exactly.
 #[must_use]
 pub fn fall_deviation(agent: &dyn Agent, gravity: glam::DVec3, t: f64) -> f64 {
     let wanted = gravity * (agent.mass_kg() * t);

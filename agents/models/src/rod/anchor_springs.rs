@@ -1,7 +1,7 @@
-//! Springs from outside: attachments along the tube, and pulls at material points.
+//! External springs: attachments along the tube, and pulls at material points.
 //!
 //! In: specs and pulls. Out: forces and stiffnesses at nodes, implicit in the step. Never here: clamps and pins (they are
-//! no springs: their slots are taken out of the system). Theory: docs/theory/rod.md, eq. 21–24.
+//! not springs: their slots are removed from the system). Theory: docs/theory/rod.md, eq. 21–24.
 
 use super::discretization::Division;
 use super::spec::Attachment;
@@ -11,12 +11,12 @@ use metachron_contact::Pull;
 use metachron_contact::{Far, Link, Pulled};
 use metachron_core::{AgentId, Anchor};
 
-/// The spring that an attachment makes at one node.
+/// The spring of an attachment at one node.
 #[derive(Debug, Clone, Copy)]
 pub struct NodeSpring {
-    /// Which node.
+    /// Index of the node.
     pub node: usize,
-    /// Where the node was at rest, metres.
+    /// Rest position of the node, metres.
     anchor: DVec3,
     /// N/m.
     stiffness: f64,
@@ -38,7 +38,7 @@ pub struct Linear {
 }
 
 impl NodeSpring {
-    /// The spring about `point` (eq. 21, 22); nothing while it is slack.
+    /// The spring linearised about `point` (eq. 21, 22); zero while it is slack.
     pub fn linear(&self, point: DVec3) -> Linear {
         let d = point - self.anchor;
         let distance = d.length();
@@ -62,7 +62,7 @@ impl NodeSpring {
     }
 }
 
-/// Lists the springs of `attachments` at the nodes of `division`: each node takes its dual length's share (eq. 23).
+/// Lists the springs of `attachments` at the nodes of `division`: each node takes the share of its dual length (eq. 23).
 pub fn springs(attachments: &[Attachment], division: &Division, into: &mut Vec<NodeSpring>) {
     into.clear();
     let (total, count) = (division.total_m(), division.segments());
@@ -87,37 +87,37 @@ pub fn springs(attachments: &[Attachment], division: &Division, into: &mut Vec<N
 /// A pull on this tube during one step.
 #[derive(Debug, Clone, Copy)]
 pub struct Tie {
-    /// Who pulls.
+    /// The agent that pulls; `None` for the user's spring.
     pub by: Option<AgentId>,
-    /// The segment that holds the material point.
+    /// The segment that contains the material point.
     pub segment: usize,
-    /// How far along the segment the point lies, 0 … 1.
+    /// Share of the segment at which the point is, 0 … 1.
     pub share: f64,
-    /// What holds the other end.
+    /// The other end of the spring.
     pub end: End,
-    /// Where the other end would be at the start of the step, had it always moved as it does now.
+    /// Position of the other end, extrapolated back to the start of the step by its present velocity.
     target: DVec3,
     target_velocity: DVec3,
     stiffness: Sym3,
     damping: Sym3,
-    /// What is left of a force because the other end gives way (eq. 35).
+    /// Factor on the force, because the other end yields (eq. 35).
     ease: DMat3,
-    /// The impulse that it gave in this step, N·s.
+    /// Impulse of the spring on the tube in this step, N·s.
     pub impulse: DVec3,
-    /// The part of it that the last substep gave.
+    /// The part of it from the last substep.
     pub given: DVec3,
-    /// What its stiffness in the factor of the substep that ended last resists a change of velocity with, kg.
+    /// Resistance of the spring to a change of velocity, as it is in the factor of the last substep, kg.
     resistance: Sym3,
-    /// What it has taken of impulses from others since and still owes to its far end, N·s.
+    /// Impulse taken up since then from what other agents gave, still owed to the far end, N·s.
     taken: DVec3,
 }
 
-/// What holds the other end of a pull.
+/// The other end of a pull.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum End {
-    /// A hand or a tool: it is led and never gives way.
+    /// A user spring or a tool: driven, never yields.
     Led,
-    /// A point of another agent, which gives way.
+    /// A point of another agent, which yields.
     Linked(Link),
 }
 
@@ -130,7 +130,7 @@ impl Tie {
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
-    /// The tie of a link, whose far end is told later ([`Tie::aim`]); `None` where it has no point on this tube.
+    /// The tie of a link, whose far end is set later ([`Tie::aim`]); `None` where it has no point on this tube.
     pub fn of_link(link: &Link, division: &Division) -> Option<Self> {
         let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), division)?;
         Some(Self { by: Some(link.other), end: End::Linked(*link), ..tie })
@@ -160,7 +160,7 @@ impl Tie {
         })
     }
 
-    /// Takes in where the far end of a link is for the substep from `start` to `start + h` seconds of the step; `point` is
+    /// Sets the far end of a link for the substep from `start` to `start + h` seconds of the step; `point` is
     /// the near end at its start (eq. 35, 36).
     pub fn aim(&mut self, far: &Far, point: DVec3, (start, h): (f64, f64)) {
         let End::Linked(link) = self.end else { return };
@@ -171,50 +171,50 @@ impl Tie {
         self.ease = (DMat3::IDENTITY + resistance * far.inverse_mass).inverse();
     }
 
-    /// The value at the tied point of a quantity given at the ends of its segment.
+    /// Interpolates a quantity given at the ends of the segment to the tied point.
     #[inline]
     pub fn mix(&self, a: DVec3, b: DVec3) -> DVec3 {
         a * (1.0 - self.share) + b * self.share
     }
 
-    /// Books what it gave in a substep of `h` seconds that ended `after` seconds into the step at `x`, moving by `v`, and what
-    /// it has taken since the last one.
+    /// Records the impulse of a substep of `h` seconds that ended `after` seconds into the step with the point at `x` and velocity `v`,
+    /// including what the tie has taken up since the last one.
     pub fn book(&mut self, (x, v): (DVec3, DVec3), (h, after): (f64, f64)) {
         self.given = self.force(x, v, after) * h + self.taken;
         self.impulse += self.given;
         (self.resistance, self.taken) = (self.implicit(h), DVec3::ZERO);
     }
 
-    /// What it gave in the last substep; `None` where nobody feels it.
+    /// The impulse of the last substep; `None` for the user's spring, which has no agent to receive it.
     pub fn pulled(&self) -> Option<Pulled> {
         let link = if let End::Linked(link) = self.end { Some(link) } else { None };
         self.by.map(|by| Pulled { by, link, given: self.given })
     }
 
-    /// Notes what it takes where an impulse from another changes the velocities at the ends of its segment by `a` and `b`: the
-    /// factor that the tube answers with holds the tie too (eq. 37a).
+    /// Records the impulse that the tie takes up where an impulse from another agent changes the velocities at the ends of its segment
+    /// by `a` and `b`: the factor of that response includes the tie (eq. 37a).
     pub fn take(&mut self, a: DVec3, b: DVec3) {
         self.taken -= self.resistance * self.mix(a, b);
     }
 
-    /// Goes on from the same tie of the step before: what that has taken is this one's to pass on.
+    /// Continues the same tie of the step before: inherits the impulse still owed to the far end.
     pub fn follow(&mut self, before: &[Self]) {
         let same = before.iter().find(|tie| tie.by == self.by && tie.end == self.end);
         self.taken = same.map_or(DVec3::ZERO, |tie| tie.taken);
     }
 
-    /// Forgets what the factor held of it: there is a new one without it.
+    /// Resets the tie's share of the factor: there is a new factor without it.
     pub fn forget(&mut self) {
         self.resistance = Sym3::default();
     }
 
-    /// Force on the point at `x` moving by `v`, `after` seconds into the step, N (eq. 24, 35).
+    /// Force on the point at `x` with velocity `v`, `after` seconds into the step, N (eq. 24, 35).
     pub fn force(&self, x: DVec3, v: DVec3, after: f64) -> DVec3 {
         let target = self.target + self.target_velocity * after;
         self.ease * (self.stiffness * (target - x) + self.damping * (self.target_velocity - v))
     }
 
-    /// What a change of the point's velocity changes of the impulse of a substep `h`: h² k + h d, kg.
+    /// Change of a substep's impulse per change of the point's velocity: h² k + h d, kg, reduced by the yield of the far end.
     #[inline]
     pub fn implicit(&self, h: f64) -> Sym3 {
         let resistance = self.stiffness * (h * h) + self.damping * h;
@@ -240,7 +240,7 @@ mod tests {
         let mut list = vec![];
         springs(&[stretch], &line(), &mut list);
         let sum: f64 = list.iter().map(|s| s.stiffness).sum();
-        assert!((sum - 50.0 * 0.58).abs() < 1e-13); // seven roundings of 29
+        assert!((sum - 50.0 * 0.58).abs() < 1e-13); // seven rounding errors of 29
     }
 
     #[test]

@@ -1,7 +1,7 @@
-//! What other agents gave a tube since its last step, and how the tube takes it.
+//! Impulses that other agents gave a tube since its last step, and their effect on its state.
 //!
-//! In: impulses at rest arc lengths, and how far they have carried by now. Out: the state with both in it, and what springs
-//! from outside took of them. Never here: who gave them, and why. Theory: docs/theory/rod.md, eq. 37.
+//! In: impulses at rest arc lengths, and the displacements they have caused by now. Out: the state with both applied, and the impulses
+//! that external springs took of them. Never here: which agent gave them, and why. Theory: docs/theory/rod.md, eq. 37.
 
 use super::anchor_springs::Tie;
 use super::banded_ldl::Factor;
@@ -15,66 +15,66 @@ use metachron_core::SimTime;
 use metachron_core::foot::press;
 use metachron_core::{Foot, Impulse, Site, Slots};
 
-/// From who is ahead of a tube, or behind it, by more steps than this comes what no linear way tells: how far it has carried the tube since,
-/// or is to take it back.
+/// A giver whose clock differs from the tube's by more steps than this makes impulses untimely: the displacement since (or its reversal)
+/// is then too long for a linear response.
 const TIMELY_STEPS: f64 = 2.0;
-/// How often that way is halved before none of it is gone.
+/// How often that displacement is halved before it is dropped.
 const WAY_HALVINGS: u32 = 6;
 
-/// Impulses received, gathered in slots.
+/// Received impulses, gathered in slots.
 #[derive(Debug, Clone, Default)]
 pub struct Received {
     /// dJ: N·s at nodes, N·m·s at segments.
     sum: Vec<DVec3>,
     /// t dJ − dS: seconds times that.
     carried: Vec<DVec3>,
-    /// The part of dJ that acts through the step that comes; empty for none.
+    /// The part of dJ that acts through the coming step; may be empty.
     fresh: Vec<DVec3>,
-    /// What has acted through the substep that ended; empty for none.
+    /// The part that acted through the last substep; may be empty.
     spent: Vec<DVec3>,
     slots: usize,
     any: bool,
-    /// Whether any came from one whose time is another.
+    /// Whether any came from a giver whose clock is too far off.
     untimely: bool,
-    /// Room for a state that is only tried.
+    /// A trial state.
     trial: Config,
 }
 
 impl Received {
-    /// Empties the slots of a tube of so many.
+    /// Empties the slots of a tube with that many.
     pub fn clear(&mut self, slots: usize) {
         (self.slots, self.any, self.untimely) = (slots, false, false);
         self.fresh.clear();
         self.spent.clear();
     }
 
-    /// Whether nothing came.
+    /// Whether nothing was received.
     pub fn is_empty(&self) -> bool {
         !self.any
     }
 
-    /// What came, at all nodes together, N·s.
+    /// The sum of the impulses at all nodes, N·s.
     pub fn push(&self) -> DVec3 {
         [&self.sum, &self.fresh].into_iter().flat_map(|list| list.iter().step_by(2)).sum()
     }
 
-    /// What of it acts through the substep that comes, N·s and N·m·s in slots; empty for nothing.
+    /// The part that acts through the coming substep, N·s and N·m·s in slots; may be empty.
     pub fn fresh(&self) -> &[DVec3] {
         &self.fresh
     }
 
-    /// What of it acted through the substep that ended, N·s and N·m·s in slots; empty for nothing.
+    /// The part that acted through the last substep, N·s and N·m·s in slots; may be empty.
     pub fn spent(&self) -> &[DVec3] {
         &self.spent
     }
 
-    /// That substep has been made.
+    /// Marks that substep as done.
     pub fn spend(&mut self) {
         std::mem::swap(&mut self.spent, &mut self.fresh);
         self.fresh.clear();
     }
 
-    /// Leaves what has not acted through a substep of `h` seconds to the one that comes (docs/theory/soft.md, eq. 16b).
+    /// Defers the part that has not yet acted for a substep of `h` seconds to the coming one (docs/theory/soft.md, eq. 16b).
     pub fn put_off(&mut self, h: f64) {
         let Self { sum, carried, fresh, .. } = self;
         fresh.clear();
@@ -86,14 +86,14 @@ impl Received {
         }));
     }
 
-    /// Notes who gave something to a tube that is about to make a step of `dt` seconds from `now`.
+    /// Checks the clock of an agent that gave impulses, for a tube about to make a step of `dt` seconds from `now`.
     pub fn note(&mut self, giver: &Neighbour, now: SimTime, dt: f64) {
         let ahead_s = giver.snapshot.time.secs_after(now);
-        // what it gave last acted at the start of its step
+        // its last impulse acted at the start of its step
         self.untimely |= ahead_s - giver.step_s > TIMELY_STEPS * dt || -ahead_s > TIMELY_STEPS * dt.max(giver.step_s);
     }
 
-    /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division does not lose any of it.
+    /// Adds an impulse. Between two nodes it is shared linearly, so that a change of division loses none of it.
     pub fn add(&mut self, division: &Division, site: Site, sum: Impulse, carried: Impulse) {
         let Site::Arc(arc_m) = site else { return };
         let (segment, share) = division.locate(arc_m);
@@ -105,7 +105,7 @@ impl Received {
         }
     }
 
-    /// Adds an impulse that acts now on what gathers from `slots`.
+    /// Adds an impulse that acts now on the velocities that `slots` gathers.
     pub fn add_slots(&mut self, slots: &Slots, impulse: DVec3) {
         self.begin();
         slots.scatter(impulse, &mut self.sum);
@@ -121,11 +121,11 @@ impl Received {
         self.any = true;
     }
 
-    /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; brings the strains up to date. Needs a factor of this division.
+    /// v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS), frames likewise; recomputes the strains. Needs a factor of this division.
     ///
-    /// `feet` are those on others that the factor knows: what they take presses the tube on them through the substep that comes.
-    /// No node is carried farther than `way_m`, and what is untimely none so far that it strains the tube. `ties` are those
-    /// that the factor holds: each notes what it takes.
+    /// `feet` are the contact points on moving supports that the factor includes: the impulses they take act on the tube through the coming
+    /// substep. No node is displaced by more than `way_m`, and untimely displacements are shortened until they do not strain the tube.
+    /// `ties` are those in the factor: each records the impulse it takes.
     pub fn apply(
         &mut self,
         state: &mut Config,
@@ -139,7 +139,7 @@ impl Received {
             factor.solve(list);
         }
         if !(sum.iter().sum::<DVec3>() + carried.iter().sum::<DVec3>()).is_finite() {
-            return; // impulses past all measure: better to lose them than the tube
+            return; // overflowing impulses: losing them is better than losing the tube
         }
         if !feet.is_empty() {
             fresh.resize(*slots, DVec3::ZERO);
@@ -159,8 +159,8 @@ impl Received {
         state.strain(matter, division);
     }
 
-    /// The share of what carries `state`, at most `share`, halved until the tube is strained no more by it; none where a few times do
-    /// not suffice (eq. 37b).
+    /// The share of the displacement of `state`, at most `share`, halved until it does not increase the tube's strain energy; zero where a
+    /// few halvings do not suffice (eq. 37b).
     fn unstrained(&mut self, state: &Config, (matter, division): (&Matter, &Division), mut share: f64) -> f64 {
         let Self { carried, trial, .. } = self;
         for _ in 0..WAY_HALVINGS {
@@ -177,14 +177,14 @@ impl Received {
     }
 }
 
-/// Moves and turns a state by a share of what each slot is carried.
+/// Moves and turns a state by a share of each slot's displacement.
 fn carry(state: &mut Config, carried: &[DVec3], share: f64) {
     state.x.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, way)| *x += *way * share);
     let turns = carried.iter().skip(1).step_by(2);
     state.q.iter_mut().zip(turns).for_each(|(q, turn)| *q = unit(exp(*turn * share) * *q));
 }
 
-/// Takes held ends out of an array of slots.
+/// Zeroes held ends in an array of slots.
 fn hold(list: &mut [DVec3], held: [bool; 2]) {
     let last = list.len() - 1;
     for (end, slot) in [(0, 0), (1, last)] {

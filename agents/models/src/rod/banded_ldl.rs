@@ -1,11 +1,11 @@
 //! The tube's linear system: symmetric, 3×3 blocks, each row coupled to the two before it; factor, solve, inverse blocks.
 //!
 //! In: [`Row`]s in the interleaved order x₀, φ₀, x₁, φ₁, … x_N ("slots": node k is slot 2k, segment k slot 2k + 1).
-//! Pairs (φ_k, x_{k+1}) of it are the 6×6 blocks of a block-tridiagonal matrix.
+//! Its pairs (φ_k, x_{k+1}) are the 6×6 blocks of a block-tridiagonal matrix.
 //! Out: L D Lᵀ without square roots in O(N), one answer A⁻¹ r in O(N), the blocks of A⁻¹ inside the band in O(N).
-//! Elimination runs from both ends at once, two rows side by side in one register, and ends in the two or three rows in the
-//! middle: half the waiting for pivots, and half the instructions.
-//! Never here: what the numbers mean, allocation once the sizes settle. Theory: docs/theory/rod.md, eq. 15–18.
+//! Elimination runs from both ends simultaneously, two rows in one register, and meets in the three rows in the
+//! middle: half the latency of the pivots, and half the instructions.
+//! Never here: the physical meaning of the numbers, allocation once the sizes settle. Theory: docs/theory/rod.md, eq. 15–18.
 
 mod inverse;
 
@@ -27,7 +27,7 @@ pub struct Row {
     pub far: Sym3,
 }
 
-/// A row as elimination meets it, from its own end.
+/// A row as elimination reads it, counted from the front's own end.
 #[derive(Clone, Copy)]
 struct Met<T> {
     diag: Symmetric<T>,
@@ -46,7 +46,7 @@ struct Factored<T> {
     far: Matrix<T>,
 }
 
-/// How far elimination has come: what the next row needs of the two before it.
+/// State of elimination: what the next row needs of the two before it.
 struct Front<T> {
     /// Inverses of the pivots of rows i − 2 and i − 1.
     before: Symmetric<T>,
@@ -55,7 +55,7 @@ struct Front<T> {
     last_near: Matrix<T>,
 }
 
-/// What elimination makes of a row.
+/// The result of eliminating the earlier rows from one row.
 struct Reached<T> {
     near: Matrix<T>,
     far: Matrix<T>,
@@ -64,17 +64,17 @@ struct Reached<T> {
     pivot: Symmetric<T>,
 }
 
-/// The factor of A. It answers impulses with velocities: this is the seam at which contacts work ([`crate::rod`]).
+/// The factor of A. It maps impulses to velocities; contacts work through this interface ([`crate::rod`]).
 #[derive(Debug, Clone, Default)]
 pub struct Factor {
-    /// Rows i and n − 1 − i side by side, from the ends on; in the last two only what links the middle to the rest.
+    /// Rows i and n − 1 − i side by side, from the ends inwards; the last two entries hold only the couplings of the middle to the rest.
     ends: Vec<Factored<f64x2>>,
-    /// The three rows that are eliminated last, in their order.
+    /// The three rows that are eliminated last, in order.
     middle: Box<[Factored<f64>; 3]>,
 }
 
 impl Row {
-    /// Nothing at all. (No `Default`: that of a `DMat3` is the identity.)
+    /// All zero. (No `Default`: that of a `DMat3` is the identity.)
     pub const ZERO: Self = Self { diag: Sym3::ZERO, near: DMat3::ZERO, far: Sym3::ZERO };
 }
 
@@ -85,7 +85,7 @@ impl From<&Row> for Met<f64> {
 }
 
 impl Met<f64x2> {
-    /// Row i as the front meets it, and row n − 1 − i as the back does.
+    /// Row i as the front elimination reads it, and row n − 1 − i as the back one does.
     #[inline(always)]
     fn both(rows: &[Row], i: usize) -> Self {
         let j = rows.len() - 1 - i;
@@ -109,7 +109,7 @@ impl<T: Number> Default for Factored<T> {
 impl<T: Number> Front<T> {
     const START: Self = Self { before: Symmetric::ZERO, last: Symmetric::ZERO, last_near: Matrix::ZERO };
 
-    /// Takes the rows that are eliminated out of the next one (eq. 16).
+    /// Eliminates the earlier rows from the next one (eq. 16).
     #[inline(always)]
     fn reach(&self, row: &Met<T>) -> Reached<T> {
         let across = row.far.full();
@@ -120,7 +120,7 @@ impl<T: Number> Front<T> {
         Reached { near, far, changed, pivot }
     }
 
-    /// Eliminates the next row; with it what must be positive and finite.
+    /// Eliminates the next row; also returns the minors that must be positive and finite.
     #[inline(always)]
     fn eliminate(&mut self, row: &Met<T>) -> (Factored<T>, [T; 3]) {
         let Reached { near, far, changed, pivot } = self.reach(row);
@@ -129,7 +129,7 @@ impl<T: Number> Front<T> {
         (Factored { inverse, near, far }, minors)
     }
 
-    /// Goes on behind a row.
+    /// Advances past a row.
     #[inline(always)]
     fn pass(&mut self, changed: Matrix<T>, inverse: Symmetric<T>) {
         *self = Self { before: self.last, last: inverse, last_near: changed };
@@ -137,28 +137,28 @@ impl<T: Number> Front<T> {
 }
 
 impl Factor {
-    /// How many slots the matrix had; none before the first.
+    /// Number of slots of the matrix; zero before the first factorisation.
     pub fn slots(&self) -> usize {
         if self.ends.is_empty() { 0 } else { 2 * self.pairs() + 3 }
     }
 
-    /// How many rows were eliminated from each end.
+    /// Number of rows eliminated from each end.
     fn pairs(&self) -> usize {
         self.ends.len().saturating_sub(2)
     }
 
-    /// How much memory it takes, bytes.
+    /// Memory in use, bytes.
     pub fn bytes(&self) -> usize {
         size_of_val(&self.ends[..]) + size_of_val(&*self.middle)
     }
 
-    /// Takes over another factor, into the storage that is here.
+    /// Copies another factor into the existing storage.
     pub fn copy_from(&mut self, other: &Self) {
         self.ends.clone_from(&other.ends);
         self.middle.clone_from(&other.middle);
     }
 
-    /// The size of the inverse of each slot's pivot: a scale, not the inverse mass itself.
+    /// The mean of the diagonal of each slot's inverse pivot: a scale, not the inverse mass itself.
     pub fn scales(&self) -> impl Iterator<Item = f64> {
         let ends = self.ends[..self.pairs()].iter().map(|row| row.inverse.apart());
         let (front, back) = (ends.clone().map(|[front, _]| front), ends.rev().map(|[_, back]| back));
@@ -166,13 +166,15 @@ impl Factor {
         front.chain(middle).chain(back).map(|inverse| inverse.mean())
     }
 
-    /// Forgets the matrix.
+    /// Discards the factor.
     pub fn forget(&mut self) {
         self.ends.clear();
     }
 
-    /// Factors a matrix of an odd number of rows, three or more; returns a slot whose pivot is not positive definite, where
-    /// there is one (eq. 16).
+    /// Factors a matrix with an odd number of rows, at least three (eq. 16).
+    ///
+    /// # Errors
+    /// A slot whose pivot is not positive definite.
     pub fn factor(&mut self, rows: &[Row]) -> Result<(), usize> {
         let pairs = (rows.len() - 3) / 2;
         self.ends.resize(pairs + 2, Factored::default());
@@ -196,12 +198,12 @@ impl Factor {
         Ok(())
     }
 
-    /// Keeps what links the three rows in the middle to those eliminated before, and takes those out of them.
+    /// Stores the couplings of the three middle rows to those eliminated before, and returns the middle with those eliminated.
     fn link(&mut self, mut front: Front<f64x2>, rows: &[Row]) -> [Met<f64>; 3] {
         let pairs = self.pairs();
         let first = front.reach(&Met { diag: Symmetric::ZERO, ..Met::both(rows, pairs) });
         front.pass(first.changed, Symmetric::ZERO);
-        // the middle's own links are not elimination's
+        // the couplings within the middle are eliminated later, in `factor`
         let second = front.reach(&Met { diag: Symmetric::ZERO, near: Matrix::ZERO, ..Met::both(rows, pairs + 1) });
         for (out, reached) in self.ends[pairs..].iter_mut().zip([&first, &second]) {
             *out = Factored { inverse: Symmetric::ZERO, near: reached.near, far: reached.far };
@@ -218,7 +220,7 @@ impl Factor {
         middle
     }
 
-    /// Turns the right side r into A⁻¹ r, in place (eq. 17): impulses, one a slot, into the velocities they cause.
+    /// Replaces the right side r by A⁻¹ r (eq. 17): impulses, one per slot, become the velocities they cause.
     pub fn solve(&self, r: &mut [DVec3]) {
         let pairs = self.pairs();
         let (mut before, mut last) = (Column::ZERO, Column::ZERO);
@@ -246,7 +248,7 @@ impl Factor {
         }
     }
 
-    /// The same for the three rows in the middle, once the others are taken out of them.
+    /// The same for the three middle rows, after the others have been eliminated from them.
     fn solve_middle(&self, r: &mut [DVec3]) {
         let [a, b, c] = &*self.middle;
         let y0 = Column::from(r[0]);
@@ -267,7 +269,7 @@ fn both(r: &[DVec3], i: usize) -> Column<f64x2> {
     Column::of(r[i], r[r.len() - 1 - i])
 }
 
-/// Puts them back.
+/// Writes them back.
 #[inline(always)]
 fn put(r: &mut [DVec3], i: usize, value: Column<f64x2>) {
     let [front, back] = value.apart().map(DVec3::from);
@@ -279,7 +281,7 @@ fn put(r: &mut [DVec3], i: usize, value: Column<f64x2>) {
 mod tests {
     use super::*;
 
-    /// A positive definite band matrix of `n` rows with entries of about one, from a fixed sequence.
+    /// A positive definite band matrix of `n` rows with entries of order one, from a fixed sequence.
     pub fn example(n: usize) -> Vec<Row> {
         let mut seed = 1_u64;
         let mut next = move || {
@@ -325,7 +327,7 @@ mod tests {
             let mut r = multiply(&rows, &x);
             factor.solve(&mut r);
             for (got, want) in r.iter().zip(&x) {
-                assert!((*got - *want).length() < 1e-12, "{got} is not {want}"); // 17 of 3e-16, condition below 100
+                assert!((*got - *want).length() < 1e-12, "{got} is not {want}"); // error of 17 rows at 3e-16, condition number below 100
             }
         }
     }

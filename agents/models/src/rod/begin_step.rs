@@ -1,6 +1,6 @@
-//! How a tube begins a step: what others gave it, who is near, what holds it.
+//! The beginning of a tube's step: received impulses, neighbours, pulls.
 //!
-//! In: its surroundings. Out: the tube with everything received, its company and its ties. Never here: the step itself
+//! In: its surroundings. Out: the tube with everything received, its peers and its ties. Never here: the step itself
 //! ([`super::step`]), contacts ([`super::company`]). Theory: docs/theory/rod.md, eq. 24, 35–37.
 
 use super::anchor_springs::Tie;
@@ -13,7 +13,7 @@ use metachron_contact::{Law, Link};
 use metachron_core::{SimSpan, StepError};
 
 impl Tube {
-    /// Lists this step's pulls; none is forgotten and none is made up.
+    /// Lists this step's pulls, each of them exactly once.
     pub(super) fn take_pulls(&mut self, around: &Surroundings<'_>) {
         std::mem::swap(&mut self.ties, &mut self.ties_before);
         self.ties.clear();
@@ -24,19 +24,19 @@ impl Tube {
         self.ties.iter_mut().for_each(|tie| tie.follow(&self.ties_before));
     }
 
-    /// Takes in what others gave since the last step, and looks who is near.
+    /// Applies what others gave since the last step, and collects the neighbours in reach.
     ///
     /// # Errors
-    /// [`StepError::Diverged`] where what was given cannot be taken.
+    /// [`StepError::Diverged`] where the impulses received cannot be applied.
     pub(super) fn meet(&mut self, around: &Surroundings<'_>, dt: SimSpan) -> Result<(), StepError> {
         let dt_s = dt.as_secs_f64();
         self.dt_s = dt_s;
         self.stepper.company.open(around, &self.division, around.time + dt);
         if self.ahead_s > 0.0 && !self.stepper.company.received().is_empty() {
-            // as those foresaw it who were told
+            // matches the predicted step that was published to the givers
             self.stepper.company.received().put_off(dt_s / f64::from(self.spec.substeps));
         }
-        // past a radius a tube could be found beyond a wall
+        // a displacement of more than a radius could put a tube on the far side of a wall
         let way_m = if self.spec.obstacles.is_empty() { f64::INFINITY } else { self.spec.section.radius_m };
         if around.neighbours.iter().any(|neighbour| is_sided(neighbour, around)) {
             self.act_on_itself(around, dt_s).map_err(|lost| self.diverged(lost, dt_s))?;
@@ -52,7 +52,7 @@ impl Tube {
         Ok(())
     }
 
-    /// Adds what laws that need no ledger do to what the tube is given.
+    /// Adds the forces of pair laws that need no ledger to the impulses that the tube receives.
     fn act_on_itself(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), Lost> {
         self.step_by(dt, |stepper, now, setting, _| stepper.prepare(now, setting))?;
         let mut company = std::mem::take(&mut self.stepper.company);

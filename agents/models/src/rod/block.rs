@@ -1,4 +1,4 @@
-//! 3×3 blocks of numbers that may be several side by side: one code for one block, and for two at once in one register.
+//! 3×3 blocks of scalars or of SIMD lanes: one code for a single block and for two simultaneously in one register.
 //!
 //! Never here: anything but arithmetic.
 
@@ -8,11 +8,11 @@ use std::array::from_fn;
 use std::ops::{Add, Div, Mul, Sub};
 use wide::f64x2;
 
-/// A number, or several side by side that take part in the same arithmetic.
+/// A scalar, or SIMD lanes that take part in the same arithmetic.
 pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self> {
-    /// Zero, everywhere.
+    /// Zero in every lane.
     const ZERO: Self;
-    /// One, everywhere.
+    /// One in every lane.
     const ONE: Self;
 }
 
@@ -26,7 +26,7 @@ impl Number for f64x2 {
     const ONE: Self = Self::ONE;
 }
 
-/// A column of three.
+/// A vector of three.
 #[derive(Debug, Clone, Copy)]
 pub struct Column<T>(pub [T; 3]);
 
@@ -34,7 +34,7 @@ pub struct Column<T>(pub [T; 3]);
 #[derive(Debug, Clone, Copy)]
 pub struct Matrix<T>(pub [[T; 3]; 3]);
 
-/// A symmetric matrix: its diagonal, and yz, xz, xy beside it.
+/// A symmetric matrix: its diagonal, and the off-diagonal entries yz, xz, xy.
 #[derive(Debug, Clone, Copy)]
 pub struct Symmetric<T> {
     d: [T; 3],
@@ -42,10 +42,10 @@ pub struct Symmetric<T> {
 }
 
 impl<T: Number> Column<T> {
-    /// Nothing.
+    /// The zero vector.
     pub const ZERO: Self = Self([T::ZERO; 3]);
 
-    /// self − m v, summed in pairs: where each row waits for the one before it, the way from `v` is kept short.
+    /// self − m v, summed in pairs: keeps the dependency chain from `v` short where each row waits for the one before it.
     #[inline(always)]
     pub fn minus(self, Matrix([x, y, z]): &Matrix<T>, Self(v): Self) -> Self {
         Self(from_fn(|i| (self.0[i] - x[i] * v[0]) - (y[i] * v[1] + z[i] * v[2])))
@@ -59,10 +59,10 @@ impl<T: Number> Column<T> {
 }
 
 impl<T: Number> Matrix<T> {
-    /// No entry at all.
+    /// The zero matrix.
     pub const ZERO: Self = Self([[T::ZERO; 3]; 3]);
 
-    /// Rows for columns.
+    /// The transpose.
     #[inline(always)]
     pub fn transposed(&self) -> Self {
         let Self(m) = self;
@@ -89,10 +89,10 @@ impl<T: Number> Matrix<T> {
 }
 
 impl<T: Number> Symmetric<T> {
-    /// No entry at all.
+    /// The zero matrix.
     pub const ZERO: Self = Self { d: [T::ZERO; 3], o: [T::ZERO; 3] };
 
-    /// The same matrix with nine numbers.
+    /// The same matrix with all nine entries.
     #[inline(always)]
     pub fn full(&self) -> Matrix<T> {
         let Self { d, o } = *self;
@@ -113,14 +113,14 @@ impl<T: Number> Symmetric<T> {
         Column(from_fn(|i| x[i] * v[0] + y[i] * v[1] + z[i] * v[2]))
     }
 
-    /// self − a bᵀ, for an a bᵀ that is known to be symmetric.
+    /// self − a bᵀ, where a bᵀ is known to be symmetric.
     #[inline(always)]
     pub fn minus_across(&self, Matrix(a): &Matrix<T>, Matrix(b): &Matrix<T>) -> Self {
         let entry = |i: usize, j: usize| a[0][i] * b[0][j] + a[1][i] * b[1][j] + a[2][i] * b[2][j];
         self.minus([entry(0, 0), entry(1, 1), entry(2, 2)], [entry(1, 2), entry(0, 2), entry(0, 1)])
     }
 
-    /// self − aᵀ b, for an aᵀ b that is known to be symmetric.
+    /// self − aᵀ b, where aᵀ b is known to be symmetric.
     #[inline(always)]
     pub fn minus_along(&self, Matrix(a): &Matrix<T>, Matrix(b): &Matrix<T>) -> Self {
         let entry = |i: usize, j: usize| a[i][0] * b[j][0] + a[i][1] * b[j][1] + a[i][2] * b[j][2];
@@ -138,7 +138,7 @@ impl<T: Number> Symmetric<T> {
         Self { d: from_fn(|i| self.d[i] - d[i]), o: from_fn(|i| self.o[i] - o[i]) }
     }
 
-    /// The inverse, by cofactors, and what must all be positive and finite for it to be one of a positive definite matrix.
+    /// The inverse, by cofactors, and the leading minors, which are all positive and finite if the matrix is positive definite.
     #[inline(always)]
     pub fn inverse(&self) -> (Self, [T; 3]) {
         let Self { d: [xx, yy, zz], o: [yz, xz, xy] } = *self;
@@ -150,7 +150,7 @@ impl<T: Number> Symmetric<T> {
     }
 }
 
-/// Whether what an inverse asks for is positive and finite.
+/// Whether all minors of [`Symmetric::inverse`] are positive and finite.
 #[inline(always)]
 pub fn positive(minors: [f64; 3]) -> bool {
     minors.iter().all(|&m| m > 0.0 && m < f64::INFINITY)
@@ -164,7 +164,7 @@ impl Symmetric<f64> {
     }
 }
 
-/// A number of each of two blocks, side by side.
+/// The same entry of two blocks, side by side.
 #[inline(always)]
 fn pair(front: f64, back: f64) -> f64x2 {
     f64x2::new([front, back])
@@ -177,7 +177,7 @@ impl Column<f64x2> {
         Self(from_fn(|i| pair(front[i], back[i])))
     }
 
-    /// The two of them.
+    /// Both lanes, separated.
     #[inline(always)]
     pub fn apart(&self) -> [Column<f64>; 2] {
         let [x, y, z] = self.0.map(f64x2::to_array);
@@ -192,7 +192,7 @@ impl Matrix<f64x2> {
         Self(from_fn(|j| from_fn(|i| pair(front.col(j)[i], back.col(j)[i]))))
     }
 
-    /// The two of them.
+    /// Both lanes, separated.
     #[inline(always)]
     pub fn apart(&self) -> [Matrix<f64>; 2] {
         let columns = self.0.map(|column| Column(column).apart());
@@ -207,7 +207,7 @@ impl Symmetric<f64x2> {
         Self { d: Column::of(front.d, back.d).0, o: Column::of(front.o, back.o).0 }
     }
 
-    /// The two of them.
+    /// Both lanes, separated.
     #[inline(always)]
     pub fn apart(&self) -> [Symmetric<f64>; 2] {
         let (d, o) = (Column(self.d).apart(), Column(self.o).apart());

@@ -1,4 +1,4 @@
-//! Refuses a tube that cannot be: each reason with the value that is wrong.
+//! Validates a tube's specification; each error carries the value that is wrong.
 
 use super::TubeSpec;
 use glam::DVec3;
@@ -11,13 +11,13 @@ pub enum TubeError {
     /// The path has fewer than two points.
     #[error("a tube's path needs at least 2 points, this one has {count}")]
     ShortPath {
-        /// How many it has.
+        /// Number of points.
         count: usize,
     },
     /// A point of the path is not finite, or the same as the one before it.
     #[error("point {index} of the tube's path, {point}, is not finite or repeats the one before it")]
     BadPoint {
-        /// Which point, from 0.
+        /// Index of the point, from 0.
         index: usize,
         /// Its value, metres.
         point: DVec3,
@@ -25,19 +25,19 @@ pub enum TubeError {
     /// The path turns back on itself.
     #[error("the tube's path turns back on itself at point {index} (by {degrees:.0}°; at most 170° can be followed)")]
     Cusp {
-        /// At which point, from 0.
+        /// Index of the point, from 0.
         index: usize,
-        /// By how much.
+        /// Angle of the turn, degrees.
         degrees: f64,
     },
     /// A number is outside its range.
     #[error("{name} of the tube is {value}; it must be {range}")]
     OutOfRange {
-        /// Which number.
+        /// Name of the number.
         name: &'static str,
         /// Its value.
         value: f64,
-        /// What it may be.
+        /// Its valid range.
         range: &'static str,
     },
     /// An obstacle has no shape.
@@ -45,9 +45,9 @@ pub enum TubeError {
     Obstacle(#[from] ShapeError),
 }
 
-/// The sharpest turn between two chords of a path, radians: past it the smooth curve has almost a cusp.
+/// The sharpest turn between two chords of a path, radians: past it the smooth curve is almost a cusp.
 const TURN_MAX_RAD: f64 = 170.0 * std::f64::consts::PI / 180.0;
-/// The most twist of a whole tube, radians: what the most segments can hold at some 15° each.
+/// The largest twist of a whole tube, radians: some 15° per segment at the highest number of segments.
 const TWIST_MAX_RAD: f64 = 1000.0;
 /// Points nearer than this share of the path's extent are the same point.
 const SAME_POINT: f64 = 1e-9;

@@ -1,7 +1,7 @@
-//! How a tube is divided: where its nodes are along the rest length, and what is stress-free there.
+//! Division of a tube: positions of its nodes along the rest length, and the stress-free state there.
 //!
 //! In: the skeleton and a density of nodes. Out: rest lengths, rest strains and rest bends of every segment and joint.
-//! Never here: the present state ([`super::remesh`] carries that over). Theory: docs/theory/rod.md, eq. 1–4, 25.
+//! Never here: the present state ([`super::remesh`] transfers that). Theory: docs/theory/rod.md, eq. 1–4, 25.
 
 use super::rest_curve::Skeleton;
 use super::rotation::{exp, log, shortest_arc};
@@ -9,13 +9,13 @@ use glam::{DQuat, DVec3};
 
 /// The fewest segments of any tube: one alone has no joint and cannot bend.
 pub const SEGMENTS_MIN: usize = 2;
-/// The most segments of any tube: past it a step takes longer than any controller would wait (0.7 ms on one core).
+/// The most segments of any tube: past it a step takes longer than a controller can wait (0.7 ms on one core).
 pub const SEGMENTS_MAX: usize = 4096;
-/// The largest angle of the stress-free curve that one segment may span, radians: past it chords stop to look like the curve.
+/// The largest angle of the stress-free curve that one segment may span, radians: past it chords no longer resemble the curve.
 const TURN_MAX_RAD: f64 = std::f64::consts::FRAC_PI_3;
-/// How much denser than a straight stretch the sharpest bend is divided. Mild: neighbours must stay alike for second order.
+/// Density of nodes in the sharpest bend, relative to a straight stretch. Mild: neighbouring lengths must stay similar for second order.
 const DENSER_MAX: f64 = 2.0;
-/// Rounding of L/ε that does not make another segment.
+/// Excess of L/ε over an integer that counts as rounding and adds no segment.
 const CEIL_SLACK: f64 = 1e-9;
 
 /// The rest shape of a divided tube of N segments.
@@ -29,30 +29,30 @@ pub struct Division {
     pub length: Vec<f64>,
     /// Chord over arc of each stress-free segment: its rest strain along the director, ≤ 1 (eq. 2).
     pub chord: Vec<f64>,
-    /// Frames of the start: stress-free but for a twist that the skeleton has; N entries.
+    /// Frames at the start: stress-free except for the twist of the skeleton; N entries.
     pub frame: Vec<DQuat>,
     /// 1/l̄ of the joint before each segment and of the end: N + 1 entries; 2/l at the ends (eq. 4).
     pub joint: Vec<f64>,
-    /// Stress-free rotation vector of each joint, in the axes of what lies before it: N + 1 entries (eq. 3).
+    /// Stress-free rotation vector of each joint, in the axes of the segment (or wall) before it: N + 1 entries (eq. 3).
     pub bend: Vec<DVec3>,
-    /// Frames of the walls that a clamp holds its end to: start, end.
+    /// Frames of the walls to which clamped ends are held: start, end.
     pub wall: [DQuat; 2],
 }
 
-/// How many segments a spacing `eps_m` makes of this skeleton: ⌈L/ε⌉ within the limits.
+/// Number of segments of this skeleton at spacing `eps_m`: ⌈L/ε⌉ within the limits.
 pub fn segments_for(skeleton: &Skeleton, eps_m: f64) -> usize {
     let wanted = libm::ceil(skeleton.length_m() / eps_m - CEIL_SLACK);
     let count = if wanted >= SEGMENTS_MAX as f64 { SEGMENTS_MAX } else { wanted.max(0.0) as usize };
     limit(skeleton, count)
 }
 
-/// The nearest number of segments that can follow this skeleton.
+/// The nearest number of segments that can represent this skeleton.
 pub fn limit(skeleton: &Skeleton, count: usize) -> usize {
     let turns = libm::ceil(skeleton.turning_rad() / TURN_MAX_RAD) as usize;
     count.clamp(SEGMENTS_MIN.max(turns).min(SEGMENTS_MAX), SEGMENTS_MAX)
 }
 
-/// Puts `count` segments on the rest length, `density` (by segment of `arcs`) to each metre (eq. 25).
+/// Distributes `count` segments over the rest length in proportion to `density` (one per interval of `arcs`, per metre; eq. 25).
 ///
 /// `arcs` are the arc lengths at which the density changes, from 0 to L.
 pub fn spread(arcs: &[f64], density: &[f64], count: usize, into: &mut Vec<f64>) {
@@ -74,13 +74,13 @@ pub fn spread(arcs: &[f64], density: &[f64], count: usize, into: &mut Vec<f64>) 
 
 /// The density of nodes for curvatures `bend` (1/m) of segments of these lengths: 1 … 2, smoothed (eq. 25).
 ///
-/// A chord misses its arc by κ l²/8, so equal errors ask for √κ; 1/L keeps the noise of a straight tube from steering.
+/// A chord misses its arc by κ l²/8, so equal errors require √κ; 1/L keeps the noise of a straight tube from dominating.
 pub fn densities(bend: &mut [f64], length: &[f64]) {
     let total: f64 = length.iter().sum();
     let turned: f64 = bend.iter().zip(length).map(|(b, l)| b * l).sum();
     let scale = (turned + 1.0) / total;
     bend.iter_mut().for_each(|b| *b = 1.0 + (*b / scale).sqrt().min(DENSER_MAX - 1.0));
-    // a few passes spread a jump over its neighbours, so that no two lengths side by side differ much
+    // a few passes smooth jumps, so that no two adjacent lengths differ much
     for _ in 0..4 {
         let mut before = bend[0];
         for k in 0..bend.len() {
@@ -93,7 +93,7 @@ pub fn densities(bend: &mut [f64], length: &[f64]) {
 }
 
 impl Division {
-    /// Divides the skeleton at first: evenly where it is straight, denser where it bends.
+    /// The initial division of the skeleton: even where it is straight, denser where it bends.
     pub fn first(skeleton: &Skeleton, count: usize) -> Self {
         let mut division = Self::default();
         let length = skeleton.length_m();
@@ -116,12 +116,12 @@ impl Division {
         self.length.len()
     }
 
-    /// Rest length of the whole, metres.
+    /// Total rest length, metres.
     pub fn total_m(&self) -> f64 {
         self.arc_m[self.segments()]
     }
 
-    /// The segment that holds the material point at `arc_m`, and how far along it lies, 0 … 1.
+    /// The segment that contains the material point at `arc_m`, and the point's share of it, 0 … 1.
     pub fn locate(&self, arc_m: f64) -> (usize, f64) {
         let right = self.arc_m.partition_point(|&s| s < arc_m).clamp(1, self.segments());
         let share = (arc_m - self.arc_m[right - 1]) / self.length[right - 1];
@@ -133,7 +133,7 @@ impl Division {
         0.5 * (self.arc_m[segment] + self.arc_m[segment + 1])
     }
 
-    /// Divides the skeleton at `arcs` (0 … L, rising), keeping the storage.
+    /// Divides the skeleton at `arcs` (0 … L, rising), reusing the storage.
     pub fn rebuild(&mut self, skeleton: &Skeleton, arcs: &[f64]) {
         let count = arcs.len() - 1;
         self.arc_m.clear();
@@ -157,7 +157,7 @@ impl Division {
         self.twist(skeleton);
     }
 
-    /// Turns the sections and the wall at the end about the curve.
+    /// Twists the sections and the end wall about the curve.
     fn twist(&mut self, skeleton: &Skeleton) {
         let turned = |frame: DQuat, arc_m: f64| match skeleton.twist_at(arc_m) {
             0.0 => frame,

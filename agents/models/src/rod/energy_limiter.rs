@@ -1,15 +1,15 @@
-//! The last safeguard: takes energy that a substep made out of motion, and leaves momentum as it was.
+//! The last safeguard: removes energy that a substep created from the motion, and conserves momentum.
 //!
-//! In: a state and the energy to take. Out: the same state, slower about its own rigid motion.
-//! Never here: the decision to call. Theory: docs/theory/rod.md, eq. 28.
+//! In: a state and the energy to remove. Out: the same state, moving more slowly about its own rigid motion.
+//! Never here: the decision to do so. Theory: docs/theory/rod.md, eq. 28.
 
 use super::discretization::Division;
 use super::state::{Config, Matter};
 use super::sym3::Sym3;
 use glam::DVec3;
 
-/// Takes `excess` joules from the motion, as far as there is any: from all of it where an end is held, else from what
-/// differs from the rigid motion of the same momentum.
+/// Removes `excess` joules of kinetic energy, or all there is: of all motion where an end is held, else of what differs from
+/// the rigid motion with the same momentum.
 pub fn take(excess: f64, state: &mut Config, matter: &Matter, division: &Division) {
     let held = matter.held[0] || matter.held[1];
     let rigid = if held { Rigid::default() } else { Rigid::of(state, matter, division) };
@@ -22,7 +22,7 @@ pub fn take(excess: f64, state: &mut Config, matter: &Matter, division: &Divisio
     state.measure_motion(matter, division);
 }
 
-/// A rigid motion: velocity at a centre, and a spin.
+/// A rigid motion: velocity of a centre, and a spin.
 #[derive(Debug, Clone, Copy, Default)]
 struct Rigid {
     centre: DVec3,
@@ -75,7 +75,7 @@ mod tests {
         let (energy, momentum) = (state.kinetic_j, state.momentum(matter, division));
         take(0.3 * energy, &mut state, matter, division);
         let (after, kept) = (state.kinetic_j, state.momentum(matter, division));
-        // roundings of sums of a dozen terms
+        // rounding of sums of a dozen terms
         assert!((after - 0.7 * energy).abs() < 1e-12 * energy, "{after} of {energy}");
         assert!((kept.0 - momentum.0).length() < 1e-12 * momentum.0.length());
         assert!((kept.1 - momentum.1).length() < 1e-12 * momentum.1.length());

@@ -1,9 +1,9 @@
-//! Mean forces of the energy-momentum rule: what they do along a substep is exactly what the energies change by.
+//! Mean forces of the energy-momentum rule: their work over a substep is exactly the change of the energies.
 //!
 //! In: the states at both ends of a substep. Out: the right side of a Newton iteration, in slots. Stretch and shear are
-//! quadratic in strains of the segments' own axes, so means of strains and frames do (Simo and Tarnow's argument); a joint's
-//! rotation vector is not, and its moment is put right along the turn that was made (GON96).
-//! Never here: damping, the matrix but for springs from outside, the iteration. Theory: docs/theory/rod.md, eq. 45, 47, 48.
+//! quadratic in strains of the segments' own axes, so means of strains and frames suffice (Simo and Tarnow's argument); a joint's
+//! rotation vector is not, and its moment is corrected along the turn made (GON96).
+//! Never here: damping, the matrix except for external springs, the iteration. Theory: docs/theory/rod.md, eq. 45, 47, 48.
 
 use super::banded_ldl::Row;
 use super::rotation::{bend_share, cayley};
@@ -12,7 +12,7 @@ use super::sym3::Sym3;
 use super::system::Scene;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Joints whose ends turned by less than this differently, radians, do no work that could be told from rounding.
+/// Below this difference between the turns of a joint's two segments, radians, the work of the joint is indistinguishable from rounding.
 const TURN_MIN_RAD: f64 = 1e-6;
 
 /// Fills `rhs` with M (v_n − v) + 2 h f̄, and adds springs to both; `scene.h` is half the substep.
@@ -35,7 +35,7 @@ fn fill_segments(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [
         let (before, after) = (DMat3::from_quat(now.q[k]), DMat3::from_quat(next.q[k]));
         let (e0, e1) = (now.e[k], next.e[k]);
         let strains = before.transpose() * e0 + after.transpose() * e1 - rest * 2.0;
-        // twice the mean force n̄: what is solved for is twice too, the halves are in h
+        // twice the mean force n̄, as h is half the substep
         let n = (before + after) * (stiffness * strains) * 0.5;
         let weight = gravity * (mu * l);
         let (b, m) = (want(2 * k + 2), mu * l / 6.0);
@@ -66,7 +66,7 @@ fn fill_joints(scene: &Scene<'_>, (now, next): (&Config, &Config), rhs: &mut [DV
     }
 }
 
-/// Twice the mean moment of joint `k` between two segments, each before and after.
+/// Twice the mean moment of joint `k` between two segments, each given as (before, after).
 fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DVec3 {
     let Scene { matter, division, .. } = *scene;
     let joints = [Joint::between(division, k, left.0, right.0), Joint::between(division, k, left.1, right.1)];
@@ -85,7 +85,7 @@ fn moment(scene: &Scene<'_>, k: usize, [left, right]: [(DQuat, DQuat); 2]) -> DV
     guess + made * ((sum.dot(own[1] - own[0]) - guess.dot(made)) / size)
 }
 
-/// Attachments: the mean of both ends, put right along the way that was made.
+/// Attachments: the mean of the forces at both ends of the substep, corrected along the displacement so that work equals energy change.
 fn add_springs(scene: &Scene<'_>, (now, next): (&Config, &Config), rows: &mut [Row], rhs: &mut [DVec3]) {
     let h = scene.h;
     for spring in scene.springs {
@@ -110,7 +110,7 @@ mod tests {
         let tube = free_tube(9);
         let (matter, division) = (tube.matter(), tube.division());
         let (mut now, mut next) = (shake(&tube, 3), shake(&tube, 8));
-        // only elasticity: nothing moves at either end
+        // elasticity only: both velocities are zero
         now.u.fill(DVec3::ZERO);
         next.u.fill(DVec3::ZERO);
         let scene =

@@ -1,7 +1,7 @@
-//! Substeps whose matrix holds no elastic stiffness: symplectic Euler and XPBD.
+//! Substeps whose matrix has no elastic stiffness: symplectic Euler and XPBD.
 //!
-//! In: a state and what acts on it. Out: velocities after the forces (symplectic Euler) or after the constraints (XPBD),
-//! contact included. Springs from outside are implicit here too: a stiff hand does not shorten the step.
+//! In: a state and the forces on it. Out: velocities after the forces (symplectic Euler) or after the constraints (XPBD),
+//! contact included. External springs are implicit here too, so a stiff user spring does not shorten the step.
 //! Never here: whether the step is short enough ([`super::method`]). Theory: docs/theory/rod.md, eq. 40–42.
 
 use super::banded_ldl::Row;
@@ -12,7 +12,7 @@ use super::system::{Iterate, Scene, add_springs, add_ties, gyrate, hold_ends};
 use glam::DVec3;
 
 impl Stepper {
-    /// A substep of symplectic Euler: velocities by the forces at the start, positions by those velocities.
+    /// A substep of symplectic Euler: velocities from the forces at the start, positions from those velocities.
     pub(super) fn push(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, false);
         self.answer()?;
@@ -21,7 +21,7 @@ impl Stepper {
         self.must_be_finite()
     }
 
-    /// A substep of XPBD: gravity and springs from outside, then the constraints, then contact.
+    /// A substep of XPBD: gravity and external springs, then the constraints, then contact.
     pub(super) fn project(&mut self, now: &Config, scene: &Scene<'_>) -> Result<(), Lost> {
         self.assemble_light(now, scene, true);
         self.answer()?;
@@ -32,7 +32,7 @@ impl Stepper {
         self.must_be_finite()
     }
 
-    /// The system of masses and springs alone; `lumped` with every node's mass by itself and no elastic forces (eq. 40).
+    /// The system of masses and springs alone; `lumped` with lumped node masses and no elastic forces (eq. 40).
     pub(super) fn assemble_light(&mut self, now: &Config, scene: &Scene<'_>, lumped: bool) {
         let Self { rows, rhs, .. } = self;
         rows.resize(now.u.len(), Row::ZERO);
@@ -54,7 +54,7 @@ impl Stepper {
     }
 }
 
-/// (1 + h c) M in rows: consistent, or with the mass of every node by itself.
+/// (1 + h c) M in rows: consistent, or lumped.
 fn fill_masses(scene: &Scene<'_>, at: &Config, lumped: bool, rows: &mut [Row]) {
     let Matter { mu, rotary, damping, .. } = *scene.matter;
     let slow = 1.0 + scene.h * damping;
@@ -81,7 +81,7 @@ fn fill_forces(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
     }
 }
 
-/// M v_n + h · weight, with the mass of every node by itself.
+/// M v_n + h · weight, with lumped mass.
 fn fill_weights(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
     let Matter { mu, rotary, gravity, .. } = *scene.matter;
     let h = scene.h;
@@ -94,7 +94,7 @@ fn fill_weights(scene: &Scene<'_>, now: &Config, rhs: &mut [DVec3]) {
     }
 }
 
-/// The angular momentum of a segment about itself, turned by its gyroscopic torque (eq. 19).
+/// The angular momentum of a segment about its own centre, turned by its gyroscopic torque (eq. 19).
 fn spin(w: DVec3, t: DVec3, (rotary, h): (f64, f64)) -> DVec3 {
     let w = gyrate(w, t, h);
     (w + t * t.dot(w)) * rotary

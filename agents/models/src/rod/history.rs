@@ -1,27 +1,27 @@
-//! What the substep before changed: methods of two steps need it, and guesses of the next state are better for it.
+//! Changes made by the previous substep: required by two-step methods, and useful as a guess of the next state.
 //!
 //! In: the states at both ends of a substep. Out: the state from which a backward difference of second order is one step of
-//! implicit Euler. Never here: what to do when there is no past. Theory: docs/theory/rod.md, eq. 43, 44.
+//! implicit Euler. Never here: the choice of method without a past. Theory: docs/theory/rod.md, eq. 43, 44.
 
 use super::rotation::{exp, log, unit};
 use super::state::Config;
 use glam::DVec3;
 
-/// Changes over the substep that ended last, in slots.
+/// Changes over the last substep, in slots.
 #[derive(Debug, Clone, Default)]
 pub struct Past {
-    /// Of nodes' places, metres, and of segments' frames, radians in world axes.
+    /// Of node positions, metres, and of segment frames, radians in world axes.
     way: Vec<DVec3>,
     /// Of velocities, m/s and rad/s.
     gain: Vec<DVec3>,
-    /// The length of that substep, seconds; zero where there is none to go by.
+    /// The length of that substep, seconds; zero where there is no past.
     span_s: f64,
-    /// Energy that backward differences lost since velocities last jumped, and may find again, J.
+    /// Energy that backward differences have lost since velocities last jumped, and may regain, J.
     spare_j: f64,
 }
 
 impl Past {
-    /// Takes in a substep of `h` seconds.
+    /// Stores the changes of a substep of `h` seconds.
     pub fn learn(&mut self, from: &Config, to: &Config, h: f64) {
         self.span_s = h;
         self.gain.clear();
@@ -35,29 +35,29 @@ impl Past {
         self.way.push(to.x[last] - from.x[last]);
     }
 
-    /// Takes over another past, into the storage that is here.
+    /// Copies another past, into the existing storage.
     pub fn copy_from(&mut self, other: &Self) {
         self.way.clone_from(&other.way);
         self.gain.clone_from(&other.gain);
         (self.span_s, self.spare_j) = (other.span_s, other.spare_j);
     }
 
-    /// Forgets it: velocities have jumped, or the tube was divided anew.
+    /// Discards the past: velocities have jumped, or the tube was divided anew.
     pub fn forget(&mut self) {
         (self.span_s, self.spare_j) = (0.0, 0.0);
     }
 
-    /// How much energy may come back in a substep, J: backward differences lose and find it in turns, and lose on the whole.
+    /// Energy that a substep may regain, J: backward differences alternately lose and regain it, and lose on the whole.
     pub fn spare_j(&self) -> f64 {
         self.spare_j
     }
 
-    /// Books the rise of energy of a substep, J; what it lost is spared for later.
+    /// Books the rise of energy of a substep, J; a loss is stored for later.
     pub fn spend(&mut self, rise_j: f64) {
         self.spare_j = (self.spare_j - rise_j).max(0.0);
     }
 
-    /// By how much velocities will change in the next `h` seconds if they change as before.
+    /// Predicted change of velocity in the next `h` seconds, by linear extrapolation.
     pub fn expected(&self, slot: usize, h: f64) -> DVec3 {
         if self.span_s > 0.0 { self.gain[slot] * (h / self.span_s) } else { DVec3::ZERO }
     }

@@ -1,6 +1,6 @@
-//! How a tube answers impulses: its factor, as others may know it.
+//! A tube's response to impulses, as published to other agents: its factor.
 //!
-//! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
+//! In: the factor of the last substep. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::banded_ldl::Factor;
 use super::contact::respond;
@@ -9,23 +9,23 @@ use glam::DVec3;
 use metachron_core::{Carried, Foot, Lies};
 use metachron_core::{CurveResponse, ImpulseResponse};
 
-/// A tube's answer to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), ends that are held left out.
+/// A tube's response to impulses: A⁻¹ of its own step (docs/theory/rod.md, eq. 17), held ends excluded.
 #[derive(Debug, Clone, Default)]
 pub struct CurveInertia {
     factor: Factor,
-    /// Where something fixed carries it, and its answer there.
+    /// The tube's supports, and its response there.
     standing: Carried<Factor>,
     held: [bool; 2],
-    /// How fast each segment turns, rad/s, world axes.
+    /// Spin of each segment, rad/s, world axes.
     pub spins: Vec<DVec3>,
-    /// How each slot will accelerate in its next step, or did in the last one without what others gave at its start, m/s² and rad/s²;
-    /// empty before the first.
+    /// Predicted acceleration of each slot in the next step, or its acceleration in the last step without what others gave at its start,
+    /// m/s² and rad/s²; empty before the first.
     pub accelerations: Vec<DVec3>,
-    /// The length of the substep that ended last, seconds: published velocities are the means over it. Zero before the first.
+    /// The length of the last substep, seconds: published velocities are the means over it. Zero before the first.
     pub span_s: f64,
-    /// The length of the step that the accelerations foretell, seconds; zero where they are those of the last one.
+    /// The length of the step that the accelerations predict, seconds; zero where they are those of the last one.
     pub ahead_s: f64,
-    /// Of each segment: length (m) and direction.
+    /// Length (m) and direction of each segment.
     segments: Vec<(f64, DVec3)>,
     /// Mass per length, kg/m, rotary inertia per length, kg·m, and damping, 1/s.
     mu: f64,
@@ -34,7 +34,7 @@ pub struct CurveInertia {
 }
 
 impl CurveInertia {
-    /// Takes over the factor of a substep of `span_s` seconds and the velocities of all slots, into the storage that is here.
+    /// Copies the factor of a substep of `span_s` seconds and the velocities of all slots, into the existing storage.
     pub(super) fn copy_from(&mut self, (factor, span_s): (&Factor, f64), held: [bool; 2], velocities: &[DVec3]) {
         self.span_s = span_s;
         self.factor.copy_from(factor);
@@ -43,12 +43,12 @@ impl CurveInertia {
         self.spins.extend(velocities.iter().skip(1).step_by(2));
     }
 
-    /// Takes over where it lies and how it will accelerate there.
+    /// Copies the supports and the accelerations there.
     pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
-    /// Takes over what the tube weighs.
+    /// Copies mass, rotary inertia and damping, and lengths and directions of segments.
     pub(super) fn weigh(&mut self, matter: &Matter, length_m: &[f64], directions: &[DVec3]) {
         (self.mu, self.rotary, self.damping_per_s) = (matter.mu, matter.rotary, matter.damping);
         self.segments.clear();

@@ -1,6 +1,6 @@
-//! The ways to integrate a tube in time, all of them on the same staggered rod.
+//! The time integrators of a tube, all of them on the same staggered rod.
 //!
-//! In: a name, a material and a division. Out: which method it is, and how long a substep it can carry. Never here: how one
+//! In: a name, a material and a division. Out: the method, and the longest substep it allows. Never here: its
 //! steps ([`super::step`]). Theory: docs/theory/rod.md, 3 and 13.
 
 use super::discretization::Division;
@@ -9,34 +9,34 @@ use super::tube::Tube;
 use metachron_contact::Agent;
 use metachron_core::StepError;
 
-/// How a tube is integrated in time.
+/// Time integration of a tube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Integrator {
     /// Explicit, of first order: no elastic stiffness in the matrix; stable below [`Tube::longest_substep_s`] only.
     SymplecticEuler,
-    /// Compliant constraints, projected forth and back once a substep (MMC16): never unstable, but bends too softly where
+    /// Compliant constraints, projected forth and back once per substep (MMC16): never unstable, but bends too softly where
     /// substeps are longer than [`Tube::longest_substep_s`].
     Xpbd,
-    /// Linearly implicit Euler, one Newton step as a rule: stable at any step, exact at rest, damps motion.
+    /// Linearly implicit Euler, usually one Newton step: stable at any step, exact at rest, damps motion.
     #[default]
     ImplicitEuler,
     /// Backward differences of second order: little damping, stable at any step.
     Bdf2,
-    /// Mean forces that keep energy and momentum: no damping at all.
+    /// Mean forces that conserve energy and momentum: no damping at all.
     EnergyMomentum,
 }
 
-/// How much too softly a tube of constraints may bend for its substeps.
+/// Share by which bending may be too soft because of substep length (XPBD).
 const SOFTER: f64 = 0.1;
-/// The bend stiffness that one projection forth and back can make, in ρI l²/h²: measured at 16 and 32 segments, 0.81 and 0.80.
+/// The bend stiffness that one projection forth and back reaches, in ρI l²/h²: measured at 16 and 32 segments, 0.81 and 0.80.
 const PROJECTED: f64 = 0.8;
 
 impl Integrator {
-    /// All of them, the cheapest step first.
+    /// All integrators, the cheapest step first.
     pub const ALL: [Self; 5] =
         [Self::SymplecticEuler, Self::Xpbd, Self::ImplicitEuler, Self::Bdf2, Self::EnergyMomentum];
 
-    /// What a scene calls it.
+    /// Its name in scenes.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -48,8 +48,8 @@ impl Integrator {
         }
     }
 
-    /// The longest substep in which the answer can be that of the tube while nothing is stretched, seconds; none where any
-    /// will do (eq. 38, 39).
+    /// The longest substep for a valid result while nothing is stretched, seconds; `None` where any length
+    /// is allowed (eq. 38, 39).
     pub(super) fn longest_substep_s(self, matter: &Matter, division: &Division) -> Option<f64> {
         match self {
             Self::SymplecticEuler => Some(2.0 / fastest_rad_s(matter, division)),
@@ -64,10 +64,10 @@ impl Integrator {
 }
 
 impl Tube {
-    /// The longest substep in which the answer can be that of the tube as it is divided now, seconds; `None` where the
+    /// The longest substep for a valid result with the present division, seconds; `None` where the
     /// integrator takes any: below it `symplectic-euler` is stable and `xpbd` bends less than a tenth too softly.
     ///
-    /// A stretched tube takes shorter ones: it halves its substeps by itself.
+    /// A stretched tube needs shorter ones: it halves its substeps by itself.
     #[must_use]
     pub fn longest_substep_s(&self) -> Option<f64> {
         self.spec.integrator.longest_substep_s(&self.matter, &self.division)
@@ -85,8 +85,8 @@ impl Tube {
     }
 }
 
-/// A bound above every frequency of the divided tube at rest, rad/s: that of a segment alone bounds stretch and shear,
-/// the greatest sum of a row bounds bend and twist, and both together bound their sum (eq. 38).
+/// An upper bound of every frequency of the divided tube at rest, rad/s: the frequency of a single segment bounds stretch and shear,
+/// the greatest row sum bounds bend and twist, and both together bound their sum (eq. 38).
 fn fastest_rad_s(matter: &Matter, division: &Division) -> f64 {
     let Matter { ea, ga, ei, gj, mu, rotary, clamp, .. } = *matter;
     let count = division.segments();
@@ -95,7 +95,7 @@ fn fastest_rad_s(matter: &Matter, division: &Division) -> f64 {
         let l = division.length[k];
         let ends = 12.0 / (mu * l * l);
         let stretch = (ea * ends).max(ga * (ends + 1.0 / rotary));
-        // an inner joint counts twice, for its own row and the one beside it; a wall does not move
+        // an inner joint counts twice, for its own row and the adjacent one; a wall does not move
         let joint = |j: usize, wall: bool| if j > 0 && j < count { 2.0 } else { f64::from(u8::from(wall)) };
         let joints = joint(k, clamp[0]) * division.joint[k] + joint(k + 1, clamp[1]) * division.joint[k + 1];
         stretch + bend * joints / (rotary * l)

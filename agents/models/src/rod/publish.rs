@@ -1,6 +1,6 @@
-//! What a tube tells the world: its snapshot.
+//! A tube's publication: its snapshot.
 //!
-//! In: a tube between two steps. Out: its curve, and what others need to touch it. Never here: any change of its state.
+//! In: a tube between two steps. Out: its curve, and the data that others need to touch it. Never here: any change of its state.
 
 use super::inertia::CurveInertia;
 use super::residual;
@@ -9,7 +9,7 @@ use super::tube::Tube;
 use glam::DVec3;
 use metachron_core::{Bounds, Inertia, Snapshot};
 
-/// The box around a tube of this state that is nowhere wider than `radius_m`.
+/// The bounding box of a tube in this state that is nowhere wider than `radius_m`.
 pub fn bounds(state: &Config, radius_m: f64) -> Bounds {
     let (mut low, mut high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     for x in &state.x {
@@ -20,7 +20,7 @@ pub fn bounds(state: &Config, radius_m: f64) -> Bounds {
 }
 
 impl Tube {
-    /// Writes everything but the time.
+    /// Writes everything except the time.
     pub(super) fn publish(&self, into: &mut Snapshot) {
         into.clear();
         into.steps = self.steps;
@@ -46,7 +46,7 @@ impl Tube {
         curve.radii_m.extend(self.division.arc_m.iter().map(|&s| self.radius_at_m(s)));
     }
 
-    /// How it answers impulses, where somebody is near enough to need it; ledgers and pairs.
+    /// Response to impulses, where a neighbour is near enough to need it; ledgers and pairs.
     fn publish_coupling(&self, into: &mut Snapshot) {
         let company = &self.stepper.company;
         if company.is_watched() || self.steps == 0 {

@@ -1,4 +1,4 @@
-//! Carries a state from one division of a tube to another.
+//! Transfers a state from one division of a tube to another.
 //!
 //! In: the old division and state, the new division. Out: the new state: same length and mass, the same linear momentum to
 //! rounding, angular momentum and shape to O(ε²). Never here: when to do it. Theory: docs/theory/rod.md, eq. 25, 30–32.
@@ -8,10 +8,10 @@ use super::rotation::between;
 use super::state::{Config, Matter};
 use glam::{DQuat, DVec3};
 
-/// Room to work in.
+/// Working storage.
 #[derive(Debug, Clone, Default)]
 pub struct Remesher {
-    /// Rotations from rest to now, known at `at` (arc lengths).
+    /// Rotations from rest to now, sampled at the arc lengths `at`.
     turns: Vec<DQuat>,
     at: Vec<f64>,
     /// Strains beyond rest in the segments' own axes.
@@ -21,7 +21,7 @@ pub struct Remesher {
 }
 
 impl Remesher {
-    /// The arc lengths of `count` segments spread by the present curvature; even where the tube is straight (eq. 25).
+    /// The arc lengths of `count` segments distributed by the present curvature; even where the tube is straight (eq. 25).
     pub fn arcs(&mut self, state: &Config, old: &Division, count: usize) -> &[f64] {
         let last = state.t.len() - 1;
         let turn = |k: usize| if k == 0 || k > last { 0.0 } else { (state.t[k] - state.t[k - 1]).length() };
@@ -35,7 +35,7 @@ impl Remesher {
         &self.arcs
     }
 
-    /// Writes the state `from` on `old` into `to` on `new`.
+    /// Writes the state `from` on division `old` into `to` on division `new`.
     pub fn carry(&mut self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
         to.resize(new.segments());
         self.learn(matter, from, old);
@@ -43,13 +43,13 @@ impl Remesher {
         self.motion(matter, (from, old), (to, new));
     }
 
-    /// Rotations and strains of the old segments against rest.
+    /// Samples rotations and strains of the old segments relative to rest.
     fn learn(&mut self, matter: &Matter, from: &Config, old: &Division) {
         self.turns.clear();
         self.at.clear();
         self.strains.clear();
         if matter.clamp[0] {
-            self.turns.push(DQuat::IDENTITY); // the wall has not turned
+            self.turns.push(DQuat::IDENTITY); // a wall does not turn
             self.at.push(0.0);
         }
         for k in 0..old.segments() {
@@ -75,7 +75,7 @@ impl Remesher {
         self.place(matter, (from, old), (to, new));
     }
 
-    /// Puts held ends back, or the centre of mass where none is held.
+    /// Restores held ends, or the centre of mass where none is held.
     fn place(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
         let gap = from.x[old.segments()] - to.x[new.segments()];
         match matter.held {
@@ -93,7 +93,7 @@ impl Remesher {
         }
     }
 
-    /// Velocities by interpolation, then the free nodes' lack of momentum spread evenly over them (eq. 32).
+    /// Velocities by interpolation, then the missing momentum spread evenly over the free nodes (eq. 32).
     fn motion(&self, matter: &Matter, (from, old): (&Config, &Division), (to, new): (&mut Config, &Division)) {
         let count = new.segments();
         for (k, &s) in new.arc_m.iter().enumerate() {
@@ -111,7 +111,7 @@ impl Remesher {
             0.5 * (before + if k < count { new.length[k] } else { 0.0 })
         };
         let mass: f64 = (0..=count).filter(|&k| free(k)).map(share).sum();
-        // twice: the second round takes back what the first left to rounding
+        // twice: the second pass removes the rounding error of the first
         for _ in 0..2 {
             let lack = (flow(from, old) - flow(to, new)) / mass;
             (0..=count).filter(|&k| free(k)).for_each(|k| to.u[2 * k] += lack);
@@ -131,7 +131,7 @@ impl Remesher {
     }
 }
 
-/// The interval of the `count` rising values `at` that holds or is nearest to `s`, and where in it `s` lies.
+/// The interval of the `count` rising values `at` that contains or is nearest to `s`, and the share of it at `s`.
 fn bracket(count: usize, at: impl Fn(usize) -> f64, s: f64) -> (usize, f64) {
     let (mut low, mut high) = (0, count - 1);
     while low + 1 < high {

@@ -1,6 +1,6 @@
 //! The tube's own estimate of its error in space, metres.
 //!
-//! In: a state. Out: the largest sagitta by which a chord misses the bent curve. Never here: errors in time.
+//! In: a state. Out: the largest sagitta between a chord and the bent curve. Never here: errors in time.
 //! Theory: docs/theory/rod.md, eq. 29.
 
 use super::discretization::Division;
@@ -14,7 +14,7 @@ pub fn estimate_m(state: &Config, matter: &Matter, division: &Division) -> f64 {
     let end = matter.clamp[1].then(|| (count, state.q[count - 1], division.wall[1]));
     let sagitta = |(k, before, after)| {
         let joint = Joint::between(division, k, before, after);
-        // at a wall l̄ is half a segment, whose other half the wall mirrors
+        // at a wall l̄ is half a segment; the wall mirrors the other half
         let reach = if k == 0 || k == count { 2.0 } else { 1.0 } / division.joint[k];
         let curvature = joint.strain.length() * division.joint[k];
         curvature * reach * reach / 8.0

@@ -1,15 +1,15 @@
-//! Whether a tube has come to rest.
+//! Detects that a tube has come to rest.
 //!
-//! In: its motion, step by step. Out: a yes after enough quiet time. Never here: what rest is good for (the runtime's matter).
+//! In: its motion, step by step. Out: true after enough quiet time. Never here: the use of it (sleep is up to the runtime).
 
 use super::state::Config;
 use glam::DVec3;
 
-/// A node is quiet below this speed, m/s: a tenth of a millimetre a second is not seen on any screen.
+/// A node is quiet below this speed, m/s: a tenth of a millimetre per second is invisible on any screen.
 const SPEED_MAX_M_S: f64 = 1e-4;
 /// A node is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
 const ACCELERATION_MAX_M_S2: f64 = 1e-2;
-/// For so long all nodes must have been quiet, seconds of the tube's own time.
+/// All nodes must have been quiet for this long, seconds of the tube's own time.
 const QUIET_S: f64 = 0.5;
 
 /// Counts quiet time.
@@ -20,12 +20,12 @@ pub struct RestWatch {
 }
 
 impl RestWatch {
-    /// Starts to count again.
+    /// Restarts the count.
     pub fn wake(&mut self) {
         self.quiet_s = 0.0;
     }
 
-    /// Takes in a step of `dt` seconds that ended at `now`; whether the tube has been quiet for long enough.
+    /// Observes a step of `dt` seconds that ended at `now`; returns whether the tube has been quiet for long enough.
     pub fn observe(&mut self, now: &Config, dt: f64) -> bool {
         let known = self.before.len() == now.x.len();
         let nodes = now.u.iter().step_by(2);

@@ -1,15 +1,16 @@
-//! The centre line that a tube starts on, stress-free as a rule: a C¹ curve through the path's points, measured by arc length, with frames that do not twist.
+//! The initial centre line of a tube, normally stress-free: a C¹ curve through the path's points, measured by arc length, with twist-free
+//! frames.
 //!
-//! In: the path, and how it strains the tube. Out: place, tangent, frame and curvature at any arc length. Never here: segments, motion.
-//! Between points the curve is the cubic of Hermite with centripetal Catmull–Rom tangents (YSK11); at the ends it leaves
+//! In: the path, and how it strains the tube. Out: position, tangent, frame and curvature at any arc length. Never here: segments, motion.
+//! Between points the curve is a cubic Hermite with centripetal Catmull–Rom tangents (YSK11); at the ends it leaves
 //! along the first and last chord. Two points are joined by an exactly straight line. Theory: docs/theory/rod.md, eq. 1.
 
 use super::rotation::{shortest_arc, unit};
 use glam::{DMat3, DQuat, DVec3};
 
-/// Into how many bins a span between two path points is cut for the arc-length table and the frames.
+/// Number of bins per span between two path points, for the arc-length table and the frames.
 const BINS: usize = 32;
-/// Nodes and weights of Gauss's rule of order 10 on 0 … 1: the arc length of a bin errs by less than 1e-12 of it.
+/// Nodes and weights of Gauss's rule of order 10 on 0 … 1: the relative error of a bin's arc length is below 1e-12.
 const GAUSS: [(f64, f64); 5] = [
     (0.046_910_077_030_668, 0.118_463_442_528_094_5),
     (0.230_765_344_947_158_5, 0.239_314_335_249_683_2),
@@ -17,10 +18,10 @@ const GAUSS: [(f64, f64); 5] = [
     (0.769_234_655_052_841_5, 0.239_314_335_249_683_2),
     (0.953_089_922_969_332, 0.118_463_442_528_094_5),
 ];
-/// Newton's steps for the parameter at an arc length: each doubles the digits from a start that is good to a bin.
+/// Newton steps for the parameter at an arc length: each doubles the number of correct digits from a start inside the right bin.
 const INVERSIONS: usize = 4;
 
-/// One cubic between two path points, by its parameter 0 … 1.
+/// One cubic between two path points, with parameter 0 … 1.
 #[derive(Debug, Clone, Copy)]
 struct Span {
     from: DVec3,
@@ -36,7 +37,7 @@ struct Knot {
     frame: DQuat,
 }
 
-/// The centre line of the start.
+/// The initial centre line.
 #[derive(Debug, Clone)]
 pub struct Skeleton {
     spans: Vec<Span>,
@@ -49,7 +50,7 @@ pub struct Skeleton {
 /// A point of the centre line.
 #[derive(Debug, Clone, Copy)]
 pub struct Station {
-    /// Where, metres.
+    /// Position, metres.
     pub position: DVec3,
     /// Unit tangent.
     pub tangent: DVec3,
@@ -77,7 +78,7 @@ impl Span {
 }
 
 impl Skeleton {
-    /// The curve through `path`: at least two points, no two neighbours alike, no turning back on itself.
+    /// The curve through `path`: at least two points, adjacent ones distinct, without reversals.
     pub fn new(path: &[DVec3]) -> Self {
         let spans = spans_of(path);
         let straight = path.len() == 2;
@@ -92,25 +93,25 @@ impl Skeleton {
             let (a, b) = (bin as f64 / BINS as f64, (bin + 1) as f64 / BINS as f64);
             let from = knots[i];
             let frame = transport(from.frame, span.at(b) - span.at(a), tangent(i), tangent(i + 1));
-            // a line is measured at once: sums of bins would round its length
+            // a line is measured as a whole: sums of bins would round its length
             let arc_m = if straight { (path[1] - path[0]).length() * b } else { from.arc_m + span.length(a, b) };
             knots.push(Knot { arc_m, frame });
         }
         Self { spans, knots, straight, unbent: straight, twist_rad: 0.0 }
     }
 
-    /// The same for a tube that the path strains: one that is straight where nothing bends it, or whose sections are turned
+    /// The same for a tube that the path strains: one that is straight when unloaded, or whose sections are twisted
     /// about the curve, evenly from 0 at the start to `twist_rad` at the end.
     pub fn strained(self, straight: bool, twist_rad: f64) -> Self {
         Self { unbent: straight || self.straight, twist_rad, ..self }
     }
 
-    /// Whether a tube on it is straight where nothing bends it.
+    /// Whether the unloaded tube is straight.
     pub fn is_unbent(&self) -> bool {
         self.unbent
     }
 
-    /// By how much sections at `arc_m` are turned about the curve against its untwisted frames, radians.
+    /// Twist of the section at `arc_m` about the curve, relative to its untwisted frames, radians.
     pub fn twist_at(&self, arc_m: f64) -> f64 {
         self.twist_rad * (arc_m / self.length_m())
     }
@@ -148,7 +149,7 @@ impl Skeleton {
         Station { position: span.at(w), tangent, frame }
     }
 
-    /// The angle that frames sweep along the whole curve, radians, twist added to what the tangent sweeps.
+    /// The angle that frames sweep along the whole curve, radians: turning of the tangent plus twist.
     pub fn turning_rad(&self) -> f64 {
         let tangents = self.knots.iter().map(|k| k.frame * DVec3::Z);
         let bends = tangents.clone().zip(tangents.skip(1)).map(|(a, b)| libm::atan2(a.cross(b).length(), a.dot(b)));
@@ -156,7 +157,7 @@ impl Skeleton {
     }
 }
 
-/// Centripetal Catmull–Rom tangents: the knots' distances are the square roots of the chords (YSK11).
+/// Centripetal Catmull–Rom tangents: knot spacings are the square roots of the chords (YSK11).
 fn spans_of(path: &[DVec3]) -> Vec<Span> {
     let chords: Vec<DVec3> = path.windows(2).map(|p| p[1] - p[0]).collect();
     let steps: Vec<f64> = chords.iter().map(|c| c.length().sqrt()).collect();
@@ -175,12 +176,12 @@ fn spans_of(path: &[DVec3]) -> Vec<Span> {
         .collect()
 }
 
-/// Some frame whose third axis is `tangent`.
+/// An arbitrary frame whose third axis is `tangent`.
 fn first_frame(tangent: DVec3) -> DQuat {
     shortest_arc(DVec3::Z, tangent)
 }
 
-/// Carries `frame` along a step of the curve without twist, by double reflection (WJZL08, §4).
+/// Transports `frame` along a step of the curve without twist, by double reflection (WJZL08, §4).
 fn transport(frame: DQuat, step: DVec3, from: DVec3, to: DVec3) -> DQuat {
     let c1 = step.length_squared();
     if c1 == 0.0 {
@@ -217,7 +218,7 @@ mod tests {
         let angle = |i: usize| std::f64::consts::TAU * i as f64 / f64::from(count);
         let path: Vec<_> = (0..=count as usize).map(|i| DVec3::new(angle(i).cos(), angle(i).sin(), 0.0)).collect();
         let circle = Skeleton::new(&path);
-        // Catmull–Rom errs in the fourth order of the spacing, and at the two ends in the second: 2 (2π/64)³/24 of the length
+        // the error of Catmull–Rom is of fourth order in the spacing, at the two ends of second order: 2 (2π/64)³/24 of the length
         assert!((circle.length_m() - std::f64::consts::TAU).abs() < 1e-4, "{}", circle.length_m());
         assert!((circle.at(circle.length_m() / 4.0).position - DVec3::Y).length() < 1e-4);
         assert!((circle.turning_rad() - std::f64::consts::TAU).abs() < 0.11); // one chord's angle less at the ends

@@ -1,15 +1,15 @@
-//! Rotations: between unit quaternions and rotation vectors, by series where angles are small.
+//! Conversions between unit quaternions and rotation vectors, by series where angles are small.
 //!
 //! In and out: pure numbers, the same bits on every machine (series and libm only). Never here: state.
 //! Theory: docs/theory/rod.md, eq. 5, 6, 20.
 
 use glam::{DQuat, DVec3};
 
-/// Below this square of the half angle the terms of [`exp`] err by less than 1 ulp.
+/// Below this square of the half angle the error of the terms of [`exp`] is less than 1 ulp.
 const EXP_SERIES_MAX: f64 = 0.02;
-/// Below this square of the half angle's sine the eight terms of [`log`] err by less than 1 ulp.
+/// Below this square of the half angle's sine the error of the eight terms of [`log`] is less than 1 ulp.
 const LOG_SERIES_MAX: f64 = 0.01;
-/// Below this square of the angle the five terms of [`bend_share`] err by less than 1e-14.
+/// Below this square of the angle the error of the five terms of [`bend_share`] is less than 1e-14.
 const SHARE_SERIES_MAX: f64 = 0.1;
 
 /// The rotation by `phi` radians about the direction of `phi`.
@@ -69,7 +69,7 @@ pub fn cayley(q: DQuat) -> DVec3 {
     DVec3::new(q.x, q.y, q.z) * (2.0 / q.w)
 }
 
-/// `q` brought back to unit length; exact to rounding for a length within 1e-8 of one.
+/// `q` normalised to first order; exact to rounding for a length within 1e-8 of one.
 #[inline]
 pub fn unit(q: DQuat) -> DQuat {
     q * (1.5 - 0.5 * q.length_squared())
@@ -86,7 +86,7 @@ pub fn shortest_arc(a: DVec3, b: DVec3) -> DQuat {
     DQuat::from_xyzw(v.x, v.y, v.z, w).normalize()
 }
 
-/// The rotation a share `w` of the way from `a` to `b`; past them where `w` is outside 0 … 1.
+/// Interpolates from rotation `a` to `b` by the share `w`; extrapolates where `w` is outside 0 … 1.
 pub fn between(a: DQuat, b: DQuat, w: f64) -> DQuat {
     unit(exp(log(b * a.conjugate()) * w) * a)
 }

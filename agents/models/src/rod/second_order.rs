@@ -1,8 +1,8 @@
-//! Substeps of second order: BDF2 and the energy-momentum rule, where nothing from outside makes velocities jump.
+//! Substeps of second order: BDF2 and the energy-momentum rule, used where nothing external makes velocities jump.
 //!
-//! In: a state and what held before it. Out: the next state, or the wish for another way: where the tube touches, is pulled
-//! or is in company, and where the iteration does not end, the substep is one of implicit Euler.
-//! Never here: how that one goes ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
+//! In: a state and the changes before it. Out: the next state, or a request for smaller substeps: where the tube is in contact, pulled
+//! or near peers, and where the iteration does not converge, the substep is one of implicit Euler.
+//! Never here: implicit Euler itself ([`super::step`]). Theory: docs/theory/rod.md, eq. 43–48.
 
 use super::contact::Solved;
 use super::energy_momentum::fill_mean;
@@ -12,18 +12,18 @@ use super::state::{Config, Matter};
 use super::step::{Lost, Stepper, TURN_MAX_RAD, Verdict};
 use super::system::{Iterate, Scene, assemble, fill_matrix, hold_ends};
 
-/// Newton iterations of BDF2: with one it damps like implicit Euler, and one that has not ended never comes to rest.
+/// Newton iterations of BDF2 (least, most): with a single one it damps like implicit Euler, and an unconverged one never comes to rest.
 const BACK_ITERATIONS: (u32, u32) = (2, 6);
-/// They have ended where the change's kinetic energy is this share of the energies at work: speeds to 1e-4.
+/// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-4.
 const BACK_SLACK: f64 = 1e-8;
-/// The most Newton iterations of the energy-momentum rule: one that needs more has stalled, and half the substep is cheaper.
+/// The most Newton iterations of the energy-momentum rule: one that needs more has stalled, and halving the substep is cheaper.
 const MEAN_ITERATIONS: u32 = 12;
-/// The iteration has ended where the change's kinetic energy is this share of the energies at work: speeds to 1e-7.
-/// What it leaves is energy, and a tube whose damping cannot carry that off never rests.
+/// Converged where the change's kinetic energy is this share of the energies involved: speeds to 1e-7.
+/// The remainder is energy, and a tube whose damping cannot dissipate it never rests.
 const MEAN_SLACK: f64 = 1e-14;
 
 impl Stepper {
-    /// One trial substep of second order (eq. 43–48); `bound` if turns are, `divide` if it can be smaller.
+    /// One trial substep of second order (eq. 43–48); `bound` limits turns, `divide` allows a smaller substep.
     pub(super) fn glide(
         &mut self,
         now: &Config,
@@ -49,7 +49,7 @@ impl Stepper {
         self.attempt_euler(now, scene, (bound, divide))
     }
 
-    /// Backward differences (eq. 43): implicit Euler of another length from another state; whether the iteration ended.
+    /// Backward differences (eq. 43): implicit Euler of another length from another state; returns whether the iteration converged.
     fn look_back(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
         let mut start = std::mem::take(&mut self.ahead);
         let h = self.past.start(now, &mut start, scene.h);
@@ -77,7 +77,7 @@ impl Stepper {
         ended
     }
 
-    /// Velocities as they will be if they change as before, and where they lead to from `start`.
+    /// The first iterate: velocities extrapolated from the past, and the positions they reach from `start`.
     fn guess(&mut self, now: &Config, start: &Config, (h, whole): (f64, f64)) {
         let Self { next, past, .. } = self;
         let count = now.q.len();
@@ -93,7 +93,7 @@ impl Stepper {
         }
     }
 
-    /// Adds the change of velocities just solved, and where it leads to (eq. 20).
+    /// Adds the change of velocities just solved, and moves accordingly (eq. 20).
     fn follow(&mut self, start: &Config, h: f64) {
         let Self { next, rhs, .. } = self;
         next.u.iter_mut().zip(&*rhs).for_each(|(u, change)| *u += *change);
@@ -105,9 +105,10 @@ impl Stepper {
         }
     }
 
-    /// Mean forces that keep energy and momentum between two halves of the damping (eq. 45–49); whether the iteration ended.
+    /// Mean forces that conserve energy and momentum between two halves of the damping (eq. 45–49); returns whether the iteration
+    /// converged.
     ///
-    /// Damping of the mean velocity would leave alone what changes its sign in every substep.
+    /// Damping of the mean velocity would not act on motion that changes sign in every substep.
     fn keep(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
         let slower = libm::exp(-0.5 * scene.h * scene.matter.damping);
         let undamped = Matter { damping: 0.0, ..*scene.matter };
@@ -163,7 +164,7 @@ impl Stepper {
         self.turn_mean(now, 0.5 * h);
     }
 
-    /// Adds the change of velocities just solved, and where the mean of old and new leads to.
+    /// Adds the change of velocities just solved, and moves by the mean of old and new.
     fn follow_mean(&mut self, now: &Config, half: f64) {
         let Self { next, rhs, .. } = self;
         for k in 0..next.x.len() {
@@ -176,7 +177,7 @@ impl Stepper {
         self.turn_mean(now, half);
     }
 
-    /// The spins whose mean, in the segments' own axes, makes the turn that was made (eq. 46).
+    /// The spins whose mean, in the segments' own axes, gives the turn made (eq. 46).
     fn turn_mean(&mut self, now: &Config, half: f64) {
         let Self { next, .. } = self;
         for (k, q) in next.q.iter().enumerate() {
@@ -185,7 +186,7 @@ impl Stepper {
         }
     }
 
-    /// The kinetic energy of the change of velocities in `rhs`, J, every node's mass by itself.
+    /// The kinetic energy of the change of velocities in `rhs`, J, with lumped masses.
     fn change_j(&self, scene: &Scene<'_>) -> f64 {
         let matter = scene.matter;
         let part = |(k, l): (usize, &f64)| {
@@ -196,7 +197,7 @@ impl Stepper {
         scene.division.length.iter().enumerate().map(part).sum()
     }
 
-    /// The widest turn of a segment from `now` to the next state, radians.
+    /// The largest turn of a segment from `now` to the next state, radians.
     fn farthest_turn(&self, now: &Config) -> f64 {
         let share = |(a, b): (&glam::DQuat, &glam::DQuat)| {
             let turn = *b * a.conjugate();
@@ -205,7 +206,7 @@ impl Stepper {
         2.0 * libm::asin(now.q.iter().zip(&self.next.q).map(share).fold(0.0, f64::max).sqrt().min(1.0))
     }
 
-    /// Whether the skin comes near anything on the way to the next state.
+    /// Whether the skin comes near itself or a fixed solid on the way to the next state.
     fn would_touch(&mut self, now: &Config, scene: &Scene<'_>) -> bool {
         let Self { rhs, next, rows, factor, contacts, .. } = self;
         for k in 0..now.x.len() {

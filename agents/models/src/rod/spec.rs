@@ -1,4 +1,4 @@
-//! What a tube is made of and how it is held: the numbers a scene gives.
+//! The specification of a tube: material, section, supports and options, as a scene gives them.
 
 use super::Integrator;
 use glam::DVec3;
@@ -9,40 +9,40 @@ use std::sync::Arc;
 /// A tube, cable or rod before it is divided into segments.
 #[derive(Debug, Clone)]
 pub struct TubeSpec {
-    /// Points of the centre line at the start in metres, at least two, no two neighbours alike; it is free of stress there
-    /// unless one of the next two says otherwise.
+    /// Initial points of the centre line in metres, at least two, adjacent ones distinct; free of stress there
+    /// unless one of the next two fields says otherwise.
     /// Two points make a straight line, more a smooth curve through all of them.
     pub path_m: Vec<DVec3>,
-    /// Whether it is straight where nothing bends it: the path is then what it was bent to, not what it springs back to.
+    /// Whether the unloaded tube is straight: the path is then a bent shape, not the one it springs back to.
     pub straight: bool,
-    /// How far its sections are turned about the centre line at the start, radians, evenly from 0 to this at the end;
-    /// it springs back unless both ends are clamped; −1000 … 1000.
+    /// Initial twist of the sections about the centre line, radians, evenly from 0 to this at the end;
+    /// the tube springs back unless both ends are clamped; −1000 … 1000.
     pub twist_rad: f64,
-    /// The section and what it resists.
+    /// The cross section and its stiffnesses.
     pub section: Section,
     /// Density × area in kg/m, > 0.
     pub mass_per_length_kg_m: f64,
-    /// How the simulation is divided at first, and within what range it may change.
+    /// Initial resolution of the simulation.
     pub resolution: Resolution,
     /// The resolutions that `retune` may take.
     pub range: ResolutionRange,
-    /// Number of segments at first where a scene fixes it; else ⌈L/ε⌉.
+    /// Initial number of segments where a scene fixes it; else ⌈L/ε⌉.
     pub segments: Option<usize>,
-    /// How it is integrated in time.
+    /// Time integrator.
     pub integrator: Integrator,
     /// The least number of substeps in a step, ≥ 1.
     pub substeps: u32,
     /// Mass-proportional damping in 1/s, ≥ 0: dv/dt = … − damping·v.
     pub damping_per_s: f64,
-    /// Ends held in place and direction: start, end.
+    /// Ends held in position and direction: start, end.
     pub clamp: [bool; 2],
-    /// Ends held in place, free to turn: start, end.
+    /// Ends held in position, free to turn: start, end.
     pub pin: [bool; 2],
-    /// Springs along the length to where it was at rest (a mesentery).
+    /// Springs along the length to the rest positions (a mesentery).
     pub attachments: Vec<Attachment>,
     /// A travelling wave of the radius.
     pub peristalsis: Option<Peristalsis>,
-    /// Pressure inside above that outside, Pa: widens the tube by dr = p r² (1 − ν/2) / (E t).
+    /// Inside minus outside pressure, Pa: widens the tube by dr = p r² (1 − ν/2) / (E t).
     pub pressure_pa: f64,
     /// Whether the tube collides with itself.
     pub self_contact: bool,
@@ -56,7 +56,7 @@ pub struct TubeSpec {
     pub sleep: bool,
 }
 
-/// A tube's section: stiffnesses of stretch, shear, bend and twist, and its measures.
+/// A tube's section: dimensions, and stiffnesses of stretch, shear, bend and twist.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Section {
     /// Outer radius at rest, metres, > 0.
@@ -79,12 +79,12 @@ pub struct Section {
     pub rotary_kg_m: f64,
 }
 
-/// Springs between a stretch of the tube and where that stretch is at rest.
+/// Springs between an interval of the tube and its rest position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Attachment {
-    /// The stretch: shares of the rest length, `0 <= from < to <= 1`.
+    /// Start of the interval, as a share of the rest length: `0 <= from < to <= 1`.
     pub from: f64,
-    /// End of the stretch.
+    /// End of the interval.
     pub to: f64,
     /// Stiffness per length, N/m², ≥ 0.
     pub stiffness_n_m2: f64,
@@ -119,8 +119,8 @@ pub struct Material {
 }
 
 impl TubeSpec {
-    /// A free tube along `path_m` of this section and mass per length, in `segments` equal parts: held nowhere, nothing pulls
-    /// at it, damps it or rubs on it, it touches neither itself nor anything that never moves, keeps its resolution, never sleeps.
+    /// A free tube along `path_m` of this section and mass per length, in `segments` equal parts: no supports, pulls, damping or
+    /// friction, no contact with itself or fixed solids, constant resolution, no sleep.
     #[must_use]
     pub fn free(path_m: Vec<DVec3>, (section, mass_per_length_kg_m): (Section, f64), segments: usize) -> Self {
         let length_m: f64 = path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();

@@ -1,13 +1,13 @@
-//! One state of a divided tube, and what the elastic law makes of it: strains, forces, energy.
+//! One state of a divided tube, and its elastic quantities: strains, forces, energy.
 //!
 //! In: positions, frames, velocities. Out: internal and gravity forces in slots, and the quantities that the matrix needs.
-//! Never here: time steps, holds, the linear system. Theory: docs/theory/rod.md, eq. 2–10.
+//! Never here: time steps, attachments, the linear system. Theory: docs/theory/rod.md, eq. 2–10.
 
 use super::discretization::Division;
 use super::rotation::{bend_share, director, log};
 use glam::{DQuat, DVec3};
 
-/// What the tube is made of, as its solver needs it.
+/// The material of the tube, as its solver needs it.
 #[derive(Debug, Clone, Copy)]
 pub struct Matter {
     /// Stretch stiffness EA, N.
@@ -26,16 +26,16 @@ pub struct Matter {
     pub damping: f64,
     /// Gravity, m/s².
     pub gravity: DVec3,
-    /// Ends held in place and direction.
+    /// Ends held in position and direction.
     pub clamp: [bool; 2],
-    /// Ends held in place: clamped or pinned.
+    /// Ends held in position: clamped or pinned.
     pub held: [bool; 2],
 }
 
-/// The share of the shear stiffness that tension may take from the Hessian: the form stays above (GA − b)|δu + u × φ|².
+/// The share of the shear stiffness that tension may take from the Hessian, which keeps its form above (GA − b)|δu + u × φ|².
 const TENSION_SHARE: f64 = 0.9;
 
-/// A state, and the elastic quantities of it that [`Config::strain`] fills.
+/// A state, and its elastic quantities, which [`Config::strain`] fills.
 #[derive(Debug, Clone, Default)]
 pub struct Config {
     /// Node positions, metres; N + 1.
@@ -54,7 +54,7 @@ pub struct Config {
     pub force: Vec<DVec3>,
     /// Elastic energy, J.
     pub elastic_j: f64,
-    /// Energy in gravity, J, zero at the origin.
+    /// Gravitational energy, J, zero at the origin.
     pub gravity_j: f64,
     /// Kinetic energy with consistent mass and rotary inertia, J (eq. 10).
     pub kinetic_j: f64,
@@ -63,14 +63,14 @@ pub struct Config {
 }
 
 impl Config {
-    /// The stress-free state of a division, not moving.
+    /// The stress-free state of a division, at rest.
     pub fn at_rest(division: &Division) -> Self {
         let mut config = Self { x: division.place.clone(), q: division.frame.clone(), ..Self::default() };
         config.resize(division.segments());
         config
     }
 
-    /// Makes room for `segments` segments.
+    /// Allocates for `segments` segments.
     pub fn resize(&mut self, segments: usize) {
         self.x.resize(segments + 1, DVec3::ZERO);
         self.q.resize(segments, DQuat::IDENTITY);
@@ -81,7 +81,7 @@ impl Config {
         self.force.resize(2 * segments + 1, DVec3::ZERO);
     }
 
-    /// Takes over another state but for its forces, into the storage that is here.
+    /// Copies another state except for its forces and tensions, into the existing storage.
     pub fn copy_from(&mut self, other: &Self) {
         self.x.clone_from(&other.x);
         self.q.clone_from(&other.q);
@@ -94,7 +94,7 @@ impl Config {
 
     /// Whether every position, frame and velocity is finite. Needs [`Config::strain`].
     pub fn is_finite(&self) -> bool {
-        // energies hold every position, velocity and frame in squares or products: they are finite only if all are
+        // each energy contains every position, velocity or frame in squares or products: they are finite only if all of those are
         (self.elastic_j + self.gravity_j + self.kinetic_j).is_finite()
     }
 
@@ -122,7 +122,7 @@ impl Config {
             let tk = director(q[k]);
             let u = (x[k + 1] - x[k]) * (1.0 / l);
             let (along, u2) = (tk.dot(u), u.length_squared());
-            // shear and extension apart: C u − s₀ EA t without its cancellation
+            // shear and extension separately: C u − s₀ EA t without its cancellation
             let (shear, extension) = (u - tk * along, along - s0);
             let n = shear * ga + tk * (ea * extension);
             let weight = gravity * (0.5 * mu * l);
@@ -158,7 +158,7 @@ impl Config {
         }
     }
 
-    /// Brings the kinetic energy up to date with the velocities (eq. 10). Needs directors.
+    /// Recomputes the kinetic energy from the velocities (eq. 10). Needs directors.
     pub fn measure_motion(&mut self, matter: &Matter, division: &Division) {
         let (mut linear, mut rotary, mut a) = (0.0, 0.0, self.u[0]);
         for ((pair, t), &l) in self.u[1..].chunks_exact(2).zip(&self.t).zip(&division.length) {
@@ -204,7 +204,7 @@ impl Joint {
         Self { theta, strain, inverse: division.joint[index] }
     }
 
-    /// The moment that turns what lies before the joint forward and what lies after it back (eq. 6, 9).
+    /// The moment that turns the segment before the joint forward and the one after it back (eq. 6, 9).
     #[inline(always)]
     fn moment(&self, matter: &Matter, axis: DVec3, energy_j: &mut f64) -> DVec3 {
         let Self { theta, strain, inverse } = *self;

@@ -1,6 +1,6 @@
-//! One step of the tube: linearly implicit Euler, divided into substeps where that is not enough.
+//! One step of the tube: linearly implicit Euler, divided into substeps where one is not enough.
 //!
-//! In: a state, a span, what holds and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
+//! In: a state, a span, attachments and pulls. Out: the state exactly that span later. Never here: other agents, resolution.
 //! Theory: docs/theory/rod.md, eq. 11–20 and 26–28.
 
 use super::anchor_springs::{NodeSpring, Tie};
@@ -24,18 +24,18 @@ use metachron_core::Lies;
 
 /// A substep turns no segment further, radians: the linear move stretches by φ²/2, 3 % here.
 pub const TURN_MAX_RAD: f64 = 0.25;
-/// A substep is halved at most ten times, into 1024: the last five for energy that rises, not for what merely turns fast.
+/// A substep is halved at most ten times, into 1024: the last five only for rising energy, not for fast turning.
 const HALVINGS: u32 = 10;
-/// Substeps of fewer ticks than this may turn further than [`TURN_MAX_RAD`]: a step is at most 32 substeps for that.
+/// Substeps of fewer ticks than this may turn further than [`TURN_MAX_RAD`]: fast turning divides a step into 32 substeps at most.
 const TURN_TICKS: u64 = 1 << (HALVINGS - 5);
-/// Newton iterations of a substep whose energy rose, beyond the first: each squares what the linear move left over.
+/// Newton iterations of a substep whose energy rose, beyond the first: each squares the remaining error of the linear move.
 const ITERATIONS_MORE: u32 = 2;
-/// A rise of energy below this share of the energies at work is rounding.
+/// A rise of energy below this share of the energies involved is rounding.
 const ENERGY_SLACK: f64 = 1e-9;
-/// Strains below this are rounding (positions of 1 m over segments of 1 cm: 1e-14), whatever energy they hold.
+/// Strains below this are rounding (positions of 1 m over segments of 1 cm: 1e-14), whatever their energy.
 const STRAIN_SLACK: f64 = 1e-10;
 
-/// What a step needs besides the state.
+/// Constants of a step.
 pub struct Setting<'a> {
     /// The material.
     pub matter: &'a Matter,
@@ -47,54 +47,54 @@ pub struct Setting<'a> {
     pub dt: f64,
     /// The least number of substeps.
     pub substeps: u32,
-    /// How it is integrated.
+    /// Time integrator.
     pub integrator: Integrator,
-    /// The longest substep that the integrator carries while nothing is stretched, seconds (eq. 38, 39).
+    /// The longest substep that the integrator allows while nothing is stretched, seconds (eq. 38, 39).
     pub longest_s: f64,
 }
 
-/// The state stopped being finite: which slot gave out.
+/// The state stopped being finite: where it failed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Lost {
     /// The slot whose pivot failed; `None` where the state itself did.
     pub slot: Option<usize>,
 }
 
-/// Room for the linear system and the next state; nothing is allocated once the sizes settle.
+/// Working storage for the linear system and the next state; nothing is allocated once the sizes settle.
 #[derive(Debug, Clone, Default)]
 pub struct Stepper {
     pub(super) rows: Vec<Row>,
-    /// What contacts gave in the last substep.
+    /// Contact impulses of the last substep.
     pub(super) presses: Presses,
     pub(super) factor: Factor,
     pub(super) rhs: Vec<DVec3>,
     pub(super) next: Config,
-    /// What the substep before changed, and a state to start from where that is not the last one.
+    /// Changes of the previous substep, and an extrapolated start state for rules that need one.
     pub(super) past: Past,
     pub(super) ahead: Config,
     pub(super) projector: Projector,
-    /// What the skin touches.
+    /// Contacts of the skin.
     pub contacts: TubeContacts,
-    /// Who else is near.
+    /// Nearby peers.
     pub company: Company,
-    /// What slower owners have to expect.
+    /// The predicted next step, for slower owners.
     pub(super) horizon: Horizon,
-    /// What it lies on, where others have to know.
+    /// Supports of the tube, for others that need them.
     pub(super) footing: Footing,
-    /// Work that contact does in the substep tried, J.
+    /// Work that contact does in the trial substep, J.
     pushed_j: f64,
-    /// The length of the substep that ended last, seconds.
+    /// The length of the last substep, seconds.
     pub(super) span_s: f64,
-    /// Systems factored since the step began for the substeps that stand, iterations among them: its work.
+    /// Systems factored in the step for accepted substeps, iterations included: its work.
     pub(super) solves: u32,
 }
 
-/// What became of a trial substep.
+/// The result of a trial substep.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
-    /// The next state stands.
+    /// The next state is accepted.
     Good,
-    /// Something turned too far, or energy rose: smaller substeps are wanted.
+    /// A segment turned too far, or energy rose: smaller substeps are needed.
     TooFar,
 }
 
@@ -128,7 +128,7 @@ impl Stepper {
             self.accept(now, ties, span);
             self.remember(now, (setting.integrator, ties.is_empty()), span.1);
             (gone, taken) = (gone + size, taken + 1);
-            // twice as long again, where that ends on the grid of the longer substep
+            // double again, where that ends on the grid of the longer substep
             if size < 1 << HALVINGS && gone.is_multiple_of(2 * size) {
                 size *= 2;
             }
@@ -136,7 +136,7 @@ impl Stepper {
         Ok(taken)
     }
 
-    /// Takes what others gave into `now`: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is moved farther than `way_m`. `ties` are
+    /// Applies to `now` what others gave: v += A⁻¹ dJ, x += A⁻¹ (t dJ − dS); no node is displaced by more than `way_m`. `ties` are
     /// those of the step before.
     ///
     /// # Errors
@@ -163,7 +163,7 @@ impl Stepper {
     /// Factors the system of a substep about `now` where there is no factor of this division yet.
     ///
     /// # Errors
-    /// [`Lost`] where it cannot be.
+    /// [`Lost`] where it cannot be factored.
     pub fn prepare(&mut self, now: &Config, setting: &Setting<'_>) -> Result<(), Lost> {
         if self.factor.slots() == now.u.len() {
             return Ok(());
@@ -183,7 +183,7 @@ impl Stepper {
         })
     }
 
-    /// Forgets what it knows of nodes and segments: the tube was divided anew.
+    /// Discards all data by node and segment: the tube was divided anew.
     pub fn forget(&mut self) {
         self.factor.forget();
         self.horizon.forget();
@@ -193,45 +193,45 @@ impl Stepper {
         self.past.forget();
     }
 
-    /// The factor of the substep that ended last; without slots where the division has changed since.
+    /// The factor of the last substep; without slots where the division has changed since.
     pub fn factor(&self) -> &Factor {
         &self.factor
     }
 
-    /// How long that substep was, seconds; zero before the first.
+    /// The length of that substep, seconds; zero before the first.
     pub fn span_s(&self) -> f64 {
         self.span_s
     }
 
-    /// What others may know of how the tube answers impulses: its factor for the step that they foresee or the last one, the length of the
-    /// last one, and where it lies with its factor there.
+    /// Published data on the tube's response to impulses: the factor of the predicted step or else the last one, the length of the
+    /// last one, and the supports with the factor that includes them.
     pub fn told(&self) -> ((&Factor, f64), Lies<'_, Factor>) {
         let Self { footing, horizon, factor, span_s, .. } = self;
         let lies = horizon.standing().or(footing.factor()).map(|standing| (footing.stance.feet(), standing));
         ((horizon.factor().unwrap_or(factor), *span_s), lies.filter(|(feet, _)| !feet.is_empty()))
     }
 
-    /// Finds what the tube lies on after its last substep, where others want to know (`watched`).
+    /// Finds the supports of the tube after its last substep, where others need them (`watched`).
     pub fn stand(&mut self, held: [bool; 2], watched: bool) {
         let Self { footing, rows, contacts, company, .. } = self;
         if watched { footing.stand(rows, (contacts, company.mates_mut()), held) } else { footing.stance.forget() }
     }
 
-    /// Tells everybody that is touched what the contact that bears most weighs, by the factor of the substep that ended last.
+    /// Computes the effective inverse mass of the strongest contact with each touched peer, by the factor of the last substep.
     pub fn weigh(&mut self, held: [bool; 2]) {
         let Self { factor, company, .. } = self;
         company.mates_mut().weigh(factor.slots(), |impulses| respond((factor, held), impulses));
     }
 
-    /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, as the last substep had
-    /// it (eq. 18); `None` where the segments have changed since, or no step was taken.
+    /// The contact-space inverse mass W = J A⁻¹ Jᵀ of a point a share `w` along a segment, 1/kg, in the last
+    /// substep (eq. 18); `None` where the segments have changed since, or no step was taken.
     pub fn inverse_mass(&self, (segment, w): (usize, f64), matter: &Matter, slots: usize) -> Option<DMat3> {
         if self.factor.slots() != slots {
             return None;
         }
         let last = 2 * segment + 3 == slots;
         let (start, end) = (matter.held[0] && segment == 0, matter.held[1] && last);
-        // a held node does not move: its slot of the matrix only keeps a place
+        // a held node does not move: its slot in the matrix is only a placeholder
         let (v, w) = (if start { 0.0 } else { 1.0 - w }, if end { 0.0 } else { w });
         let mut blocks = InverseBlocks::default();
         self.factor.inverse_blocks(&mut blocks);
@@ -240,7 +240,7 @@ impl Stepper {
         Some(a * (v * v) + (across + across.transpose()) * (v * w) + b * (w * w))
     }
 
-    /// One trial substep, from `now` into `next`; `bound` if turns are, `divide` if it can be smaller.
+    /// One trial substep, from `now` into `next`; of `smaller`, the first limits turns, the second allows a smaller substep.
     fn attempt(&mut self, now: &Config, scene: &Scene<'_>, smaller: (bool, bool)) -> Result<Verdict, Lost> {
         match scene.integrator {
             Integrator::SymplecticEuler => self.push(now, scene).map(|()| Verdict::Good),
@@ -266,7 +266,7 @@ impl Stepper {
         self.advance(now, scene, true);
         let mut rise = self.energy_rise(now, scene);
         for _ in 0..ITERATIONS_MORE {
-            // a state far out may have no next iterate: then the best so far is judged as it is
+            // a state far out may have no next iterate: then the best so far is judged
             if rise <= 0.0 || !self.next.is_finite() || self.solve(now, scene, false).is_err() {
                 break;
             }
@@ -292,7 +292,7 @@ impl Stepper {
         Ok(())
     }
 
-    /// Factors the system that was built and solves it, with what others gave that acts through the substep.
+    /// Factors and solves the assembled system, with the received impulses that act through the substep.
     pub(super) fn answer(&mut self) -> Result<(), Lost> {
         self.rhs.iter_mut().zip(self.company.fresh()).for_each(|(r, fresh)| *r += *fresh);
         self.solves += 1;
@@ -305,7 +305,7 @@ impl Stepper {
     pub(super) fn touch(&mut self, now: &Config, scene: &Scene<'_>, first: bool) {
         let Self { rhs, next, rows, factor, contacts, company, pushed_j, .. } = self;
         let solved = Solved { matter: scene.matter, division: scene.division, rows, factor, h: scene.h };
-        // contact is a law of whole velocities, not of what an iteration changes of them
+        // contact is a law of whole velocities, not of their change in an iteration
         let known = if first { &[][..] } else { &next.u[..] };
         rhs.iter_mut().zip(known).for_each(|(change, u)| *change += *u);
         *pushed_j = contacts.act(&now.x, rhs, &solved, (company, first));
@@ -336,10 +336,10 @@ impl Stepper {
         next.strain(scene.matter, scene.division);
     }
 
-    /// By how much the energy of `next` exceeds what `now` had and the pulls gave, less the rounding, J (eq. 27).
+    /// Energy of `next` beyond that of `now` and the work of pulls, contact and received impulses, less rounding, J (eq. 27).
     pub(super) fn energy_rise(&self, now: &Config, scene: &Scene<'_>) -> f64 {
         let (before, after) = (energy(now, scene.springs), energy(&self.next, scene.springs));
-        // what friction takes is no licence to make as much elsewhere
+        // energy that friction removes must not be added elsewhere
         let (mut work, mut effort) = (self.pushed_j.max(0.0), self.pushed_j.abs());
         let fresh: f64 = self.company.fresh().iter().zip(&self.next.u).map(|(fresh, u)| fresh.dot(*u)).sum();
         work += fresh;
@@ -360,7 +360,7 @@ impl Stepper {
         after - before - work - ENERGY_SLACK * at_work - rounding
     }
 
-    /// Keeps what methods of second order need of the substep that ended at `now`, where nothing made velocities jump.
+    /// Stores what rules of second order need of the substep that ended at `now`, where nothing made velocities jump.
     fn remember(&mut self, now: &Config, (integrator, untied): (Integrator, bool), h: f64) {
         if !matches!(integrator, Integrator::Bdf2 | Integrator::EnergyMomentum) {
             return;
@@ -372,14 +372,14 @@ impl Stepper {
         }
     }
 
-    /// Makes `next` the state and books what pulls and contacts gave.
+    /// Makes `next` the state and books the impulses of pulls and contacts.
     fn accept(&mut self, now: &mut Config, ties: &mut [Tie], (start, h): (f64, f64)) {
         std::mem::swap(now, &mut self.next);
         self.span_s = h;
         self.company.received().spend();
         for tie in &mut *ties {
             let (a, b) = (tie.segment, tie.segment + 1);
-            // constraints act after the tie did: what it gave is what it was solved with
+            // constraints act after the tie: its impulse belongs to the velocity before them
             let later = tie.mix(self.projector.gain(2 * a), self.projector.gain(2 * b));
             let point = (tie.mix(now.x[a], now.x[b]) - later * h, tie.mix(now.u[2 * a], now.u[2 * b]) - later);
             tie.book(point, (h, start + h));
@@ -393,7 +393,7 @@ impl Stepper {
     }
 }
 
-/// Kinetic and elastic energy, gravity's and that of the attachments, J (eq. 10).
+/// The sum of kinetic, elastic and gravitational energy and that of the attachments, J (eq. 10).
 pub fn energy(state: &Config, springs: &[NodeSpring]) -> f64 {
     let held: f64 = springs.iter().map(|s| s.energy_j(state.x[s.node])).sum();
     state.kinetic_j + state.elastic_j + state.gravity_j + held

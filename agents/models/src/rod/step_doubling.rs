@@ -1,6 +1,6 @@
-//! The tube's own estimate of its error in time, metres: now and then steps are made a second time, in twice the substeps.
+//! The tube's own estimate of its error in time, metres: some steps are repeated in twice the substeps.
 //!
-//! In: the state before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
+//! In: the state before a step and after it. Out: the error accumulated in a tenth of a second. Never here: errors in space
 //! ([`super::residual`]), any change of the tube's state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
 
 use super::anchor_springs::Tie;
@@ -20,35 +20,35 @@ pub(super) struct Doubling {
     again: Option<Box<Again>>,
 }
 
-/// The tube in twice the substeps, and room for them; only one that has moved has it.
+/// The tube in twice the substeps, and its working storage; only allocated for a tube that has moved.
 #[derive(Debug, Clone, Default)]
 struct Again {
     state: Config,
     past: Past,
     factor: Factor,
-    /// Nobody: what is given is given once.
+    /// Empty: impulses are received and given once only, in the real step.
     company: Company,
     ties: Vec<Tie>,
 }
 
 impl Doubling {
-    /// What steps make wrong in a tenth of a second, metres.
+    /// Error that steps accumulate in a tenth of a second, metres.
     pub fn error_m(&self) -> f64 {
         self.watch.error_m()
     }
 
-    /// Whether the present step is made again.
+    /// Whether the present step is to be repeated.
     pub fn is_on(&self) -> bool {
         self.watch.is_on()
     }
 
-    /// The tube rests: only space errs.
+    /// Resets the estimate: the tube rests, and only the error in space remains.
     pub fn rest(&mut self) {
         self.watch.rest();
     }
 
-    /// Prepares for step number `steps` of the tube `me` from `now`. Those that others press on are made once: what they give is
-    /// given once.
+    /// Prepares for step number `steps` of the tube `me` from `now`. A step with peers or received impulses is not repeated: impulses are
+    /// given once only.
     pub fn begin(&mut self, (steps, me): (u64, AgentId), (now, ties): (&Config, &[Tie]), stepper: &Stepper) {
         let begins = self.watch.begins(steps, me);
         if !stepper.company.is_empty()
@@ -71,7 +71,7 @@ impl Doubling {
         again.ties.extend_from_slice(ties);
     }
 
-    /// A step that is to be made again has ended at `now`, in `setting`'s substeps: it is, in twice as many.
+    /// Repeats the step that has ended at `now`, made in `setting`'s substeps, with twice as many.
     pub fn end(&mut self, stepper: &mut Stepper, now: &Config, setting: &Setting<'_>) {
         let Some(again) = self.again.as_deref_mut() else { return };
         let touching = stepper.contacts.is_touching();
@@ -86,12 +86,12 @@ impl Doubling {
 }
 
 impl Again {
-    /// Whether it is divided as `now` is.
+    /// Whether the number of nodes equals that of `now`.
     fn fits(&self, now: &Config) -> bool {
         self.state.x.len() == now.x.len()
     }
 
-    /// Goes on by a step, with the stepper of the tube but for what that remembers; whether there is a next state.
+    /// Advances by a step with the tube's stepper, its memory swapped for this one's; returns whether there is a next state.
     fn step(&mut self, stepper: &mut Stepper, setting: &Setting<'_>) -> bool {
         let Self { state, past, factor, company, ties } = self;
         let mut lend = |stepper: &mut Stepper| {
@@ -108,7 +108,7 @@ impl Again {
     }
 }
 
-/// The order of the rule: where a tube touches, all of them are of the first.
+/// The order of the rule: in contact all of them are of first order.
 const fn order(integrator: Integrator, touching: bool) -> i32 {
     match integrator {
         Integrator::Bdf2 | Integrator::EnergyMomentum if !touching => 2,

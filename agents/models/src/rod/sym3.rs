@@ -11,12 +11,12 @@ use std::ops::{Add, AddAssign, Mul};
 pub struct Sym3 {
     /// The diagonal: xx, yy, zz.
     pub d: DVec3,
-    /// Beside the diagonal: yz, xz, xy.
+    /// The off-diagonal entries: yz, xz, xy.
     pub o: DVec3,
 }
 
 impl Sym3 {
-    /// No entry at all.
+    /// The zero matrix.
     pub const ZERO: Self = Self { d: DVec3::ZERO, o: DVec3::ZERO };
 
     /// The matrix with this diagonal.
@@ -45,7 +45,7 @@ impl Sym3 {
         Self { d: DVec3::new(x.x, y.y, z.z), o: DVec3::new(y.z + z.y, x.z + z.x, x.y + y.x) * 0.5 }
     }
 
-    /// The same matrix with nine numbers.
+    /// The same matrix with all nine entries.
     #[inline]
     pub fn full(&self) -> DMat3 {
         let Self { d, o } = *self;

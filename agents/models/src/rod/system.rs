@@ -1,7 +1,7 @@
 //! The linear system of one Newton iteration: A Δ = r with A = M + h (c M + D) + h² K.
 //!
-//! In: the state the step started from, the iterate it is linearised about. Out: rows and right side, in slots.
-//! Never here: whether to accept what comes of it ([`super::step`]). Theory: docs/theory/rod.md, eq. 11–15, 19–24.
+//! In: the state at the start of the step, the iterate it is linearised about. Out: rows and right side, in slots.
+//! Never here: acceptance of the result ([`super::step`]). Theory: docs/theory/rod.md, eq. 11–15, 19–24.
 
 use super::anchor_springs::{NodeSpring, Tie};
 use super::banded_ldl::Row;
@@ -11,7 +11,7 @@ use super::state::{Config, Matter};
 use super::sym3::Sym3;
 use glam::{DMat3, DVec3};
 
-/// Everything outside the state that a substep depends on.
+/// All inputs of a substep except the state.
 #[derive(Clone, Copy)]
 pub struct Scene<'a> {
     /// The material.
@@ -26,18 +26,18 @@ pub struct Scene<'a> {
     pub h: f64,
     /// Seconds from the start of the step to the end of this substep.
     pub until: f64,
-    /// How it is integrated.
+    /// Time integrator.
     pub integrator: Integrator,
 }
 
-/// Where Newton's iteration stands: the iterate and the velocities that led to it from the start of the substep.
+/// Newton's iteration: the iterate and the start of the substep.
 #[derive(Clone, Copy)]
 pub struct Iterate<'a> {
     /// The state at the start of the substep.
     pub start: &'a Config,
     /// The state linearised about: the start itself in the first iteration.
     pub at: &'a Config,
-    /// Whether `at` is the start: its velocities then count as zero moved so far.
+    /// Whether `at` is the start: velocities since the start then count as zero.
     pub first: bool,
 }
 
@@ -56,7 +56,7 @@ pub fn assemble(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut Vec<Row>, r
     hold_ends(scene.matter, rows, rhs);
 }
 
-/// Fills `rows` with what elasticity and mass make of them about `at`, and makes room in `rhs` (eq. 12–15).
+/// Fills `rows` with stiffness and mass about `at`, and sizes `rhs` (eq. 12–15).
 pub fn fill_matrix(scene: &Scene<'_>, at: &Config, rows: &mut Vec<Row>, rhs: &mut Vec<DVec3>) {
     rows.resize(at.u.len(), Row::ZERO);
     rhs.resize(at.u.len(), DVec3::ZERO);
@@ -141,7 +141,7 @@ fn fill_right_side(scene: &Scene<'_>, iterate: &Iterate<'_>, rhs: &mut [DVec3]) 
     }
 }
 
-/// Turns a spin as its gyroscopic torque does in `h`: about t by t·ω h, without a change of energy (eq. 19).
+/// Applies the gyroscopic torque to a spin over `h`: turns it about t by t·ω h, energy unchanged (eq. 19).
 #[inline]
 pub fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
     let a = 0.5 * h * t.dot(w);
@@ -149,7 +149,7 @@ pub fn gyrate(w: DVec3, t: DVec3, h: f64) -> DVec3 {
     w + (side + t.cross(side) * a) * (2.0 * a / (1.0 + a * a))
 }
 
-/// Attachments, linearised where the point is bound for so that a slack one is caught in time (eq. 21–23).
+/// Attachments, linearised at the predicted position so that a slack one acts within the step in which it tightens (eq. 21–23).
 pub fn add_springs(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs: &mut [DVec3]) {
     let h = scene.h;
     for spring in scene.springs {
@@ -178,7 +178,7 @@ pub fn add_ties(scene: &Scene<'_>, iterate: &Iterate<'_>, rows: &mut [Row], rhs:
     }
 }
 
-/// Takes the positions of held ends out of the system: their velocity is zero, whatever acts.
+/// Removes the positions of held ends from the system: their velocity is zero under any load.
 pub fn hold_ends(matter: &Matter, rows: &mut [Row], rhs: &mut [DVec3]) {
     let last = rows.len() - 1;
     if matter.held[0] {

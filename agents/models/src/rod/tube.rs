@@ -1,7 +1,7 @@
-//! The tube as an agent: one divided rod, its holds, its radius, its rest.
+//! The tube as an agent: one divided rod, its attachments, its radius, its rest.
 //!
-//! In: a [`TubeSpec`], steps, pulls, neighbours, wishes for a resolution. Out: snapshots ([`super::publish`]). Never here: how a
-//! step is solved ([`super::step`]), how others are met ([`super::company`]), how a state is carried to another division
+//! In: a [`TubeSpec`], steps, pulls, neighbours, requests for a resolution. Out: snapshots ([`super::publish`]). Never here: how a
+//! step is solved ([`super::step`]), contact with peers ([`super::company`]), the transfer of a state to another division
 //! ([`super::remesh`]). Theory: docs/theory/rod.md.
 
 use super::anchor_springs::{NodeSpring, Tie, springs};
@@ -33,7 +33,7 @@ use std::sync::Arc;
 /// The stretch past which a tube warns: sections tilt and lose their shear stiffness at EA/(EA − GA), 1.5 for soft tissue.
 pub const STRETCH_WARN: f64 = 1.4;
 
-/// A tube, cable or rod that lives by its own steps.
+/// A tube, cable or rod that advances by its own steps.
 #[derive(Debug, Clone)]
 pub struct Tube {
     pub(super) spec: TubeSpec,
@@ -50,21 +50,21 @@ pub struct Tube {
     rest: RestWatch,
     pub(super) doubling: Doubling,
     pub(super) at_rest: bool,
-    /// Of the centre of mass in the last step, without what others gave at its start, m/s².
+    /// Acceleration of the centre of mass in the last step, without what others gave at its start, m/s².
     pub(super) acceleration: DVec3,
-    /// The same of each node; empty where nobody is near.
+    /// The same for each slot; empty where no peer is near.
     pub(super) accelerations: Vec<DVec3>,
-    /// The same where what it lies on carries it; empty where they do not foretell, or it lies on nothing.
+    /// The same with the supports' response; empty without a prediction or without supports.
     pub(super) standing_accelerations: Vec<DVec3>,
-    /// The length of the step that these foretell, seconds; zero where they are those of the last one.
+    /// The length of the step that these predict, seconds; zero where they are those of the last one.
     pub(super) ahead_s: f64,
     pub(super) resolution: Resolution,
     time: SimTime,
-    /// From which of its times on its wave counts, seconds.
+    /// Own time at which its wave starts, seconds.
     wave_from_s: f64,
     pub(super) dt_s: f64,
     pub(super) steps: u64,
-    /// What it did lately.
+    /// Its recent support by fixed solids, and its last step length.
     pub(super) lately: Lately,
 }
 
@@ -76,7 +76,7 @@ pub fn pressed_radius_m(section: &Section, pressure_pa: f64) -> f64 {
 }
 
 impl Tube {
-    /// Builds a tube that stands still on its path, stress-free but for what [`TubeSpec::straight`] and a twist make of it.
+    /// Builds a tube at rest on its path, stress-free except for [`TubeSpec::straight`] and twist.
     ///
     /// # Errors
     /// [`TubeError`] for a path that no tube can follow and for numbers outside their range.
@@ -129,13 +129,13 @@ impl Tube {
         Ok(tube)
     }
 
-    /// Sees to it that others can be told how this tube answers impulses, before its first step too.
-    /// A matrix that has no factor is the next step's to report.
+    /// Ensures that the response to impulses can be published, also before the first step.
+    /// A matrix without a factor is reported by the next step.
     fn prepare(&mut self) {
         let _ = self.step_by(self.dt_s, |stepper, now, setting, _| stepper.prepare(now, setting));
     }
 
-    /// Lends the stepper all it works on, for a step of `dt` seconds.
+    /// Passes all that the stepper works on to `act`, for a step of `dt` seconds.
     pub(super) fn step_by<T>(
         &mut self,
         dt: f64,
@@ -160,7 +160,7 @@ impl Tube {
         self.skeleton.length_m()
     }
 
-    /// How many segments the simulation has now: 2 … 4096.
+    /// Present number of segments: 2 … 4096.
     #[must_use]
     pub fn segments(&self) -> usize {
         self.division.segments()
@@ -172,13 +172,13 @@ impl Tube {
         self.now.stretch
     }
 
-    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravity's, zero at the origin.
+    /// Mechanical energy, joules: kinetic, elastic, attachments, and gravitational, zero at the origin.
     #[must_use]
     pub fn energy_j(&self) -> f64 {
         energy(&self.now, &self.springs)
     }
 
-    /// What a user should know of the present state: one sentence each, none as a rule.
+    /// Warnings to the user about the present state: one sentence each, normally none.
     #[must_use]
     pub fn warnings(&self) -> Vec<String> {
         let mut list = vec![];
@@ -194,9 +194,9 @@ impl Tube {
     }
 
     /// The contact-space inverse mass W of the material point at a rest arc length in metres: the velocity (m/s) that an
-    /// impulse (N·s) on it causes, within the substep that ended last (docs/theory/rod.md, eq. 18).
+    /// impulse (N·s) on it causes, within the last substep (docs/theory/rod.md, eq. 18).
     ///
-    /// One O(N) sweep. `None` before the first step, and after a change of resolution until the next where nobody else is near.
+    /// One O(N) sweep. `None` before the first step, and after a change of resolution until the next where no peer is near.
     #[must_use]
     pub fn inverse_mass(&self, arc_m: f64) -> Option<DMat3> {
         let stepped = (self.steps > 0).then_some(&self.stepper)?;
@@ -218,12 +218,12 @@ impl Tube {
         radius * (1.0 - wave.amplitude * lift)
     }
 
-    /// The widest its skin can be, metres.
+    /// The largest radius that its skin can have, metres.
     pub(super) fn widest_m(&self) -> f64 {
         pressed_radius_m(&self.spec.section, self.spec.pressure_pa)
     }
 
-    /// Tells the contacts how wide the tube will be at the end of the step.
+    /// Sets the contact radii to those at the end of the step.
     fn widen(&mut self, then: SimTime) {
         let mut contacts = std::mem::take(&mut self.stepper.contacts);
         let met = !self.stepper.company.is_empty();
@@ -231,7 +231,7 @@ impl Tube {
         self.stepper.contacts = contacts;
     }
 
-    /// Makes a step of `dt` seconds in so many substeps again where it is its turn.
+    /// Repeats a step of `dt` seconds in twice `substeps`, if its turn has come.
     fn double(&mut self, (dt, substeps): (f64, u32)) {
         if !self.doubling.is_on() {
             return;
@@ -255,7 +255,7 @@ impl Tube {
         StepError::Diverged { model: self.model(), dt_s, what }
     }
 
-    /// Notes how the tube moves before its step, for [`Self::end_watch`]: its momentum, where anybody wants to know.
+    /// Stores the motion before a step, for [`Self::end_watch`]; returns the momentum, if a peer needs it.
     fn begin_watch(&mut self, watched: bool) -> Option<DVec3> {
         self.accelerations.clear();
         self.standing_accelerations.clear();
@@ -263,7 +263,7 @@ impl Tube {
         watched.then(|| self.momentum().0)
     }
 
-    /// Works out what others may expect after a step of `dt` seconds.
+    /// Computes the accelerations to publish after a step of `dt` seconds.
     fn end_watch(&mut self, before: Option<DVec3>, around: &Surroundings<'_>, dt: f64) {
         let Some(before) = before else { return };
         let (gained, gravity) = (self.momentum().0 - before, self.spec.gravity);
@@ -272,7 +272,7 @@ impl Tube {
             self.foretell(dt);
             return;
         }
-        // what contact of its own did may be a blow; else it is how the tube goes on over its implicit step
+        // own contact may have been an impact; otherwise the change is the motion to expect over its implicit step
         let lasts = !self.stepper.contacts.is_touching() && around.neighbours.iter().any(|n| owns_it(n, around));
         for (slot, (a, u)) in self.accelerations.iter_mut().zip(&self.now.u).enumerate() {
             let gained = (*u - *a) / dt;
@@ -284,7 +284,7 @@ impl Tube {
         }
     }
 
-    /// Whether the tube is at rest after a step of `dt` seconds; it then stands still exactly.
+    /// Whether the tube is at rest after a step of `dt` seconds; it is then stopped exactly.
     fn watch_rest(&mut self, dt: f64) -> bool {
         let wave = self.spec.peristalsis.is_some_and(|w| w.amplitude > 0.0 && w.speed_m_s != 0.0);
         if !self.spec.sleep || wave || !self.ties.is_empty() || !self.stepper.company.is_calm() {
@@ -294,14 +294,14 @@ impl Tube {
         let at_rest = self.rest.observe(&self.now, dt);
         if at_rest {
             self.doubling.rest();
-            self.now.u.fill(DVec3::ZERO); // what is drawn of a sleeping tube must not drift
+            self.now.u.fill(DVec3::ZERO); // a sleeping tube must not drift on screen
             self.now.kinetic_j = 0.0;
         }
         at_rest
     }
 }
 
-/// What tests look into.
+/// Access for tests.
 #[cfg(test)]
 impl Tube {
     pub(super) fn matter(&self) -> &Matter {
@@ -316,7 +316,7 @@ impl Tube {
         &self.now
     }
 
-    /// Replaces the state, as violent starts do; its strains are brought up to date.
+    /// Replaces the state, for violent starts; its strains are recomputed.
     pub(super) fn set_state(&mut self, mut state: Config) {
         state.strain(&self.matter, &self.division);
         self.now = state;
@@ -330,12 +330,12 @@ impl Agent for Tube {
 
     /// Advances the tube by exactly `dt` (docs/theory/rod.md, eq. 11–28).
     ///
-    /// meet     what others gave, and who is near
-    /// pulls    the springs of hands and tools on this tube, and its links
+    /// meet     impulses received, and the neighbours in reach
+    /// pulls    the springs of the user and of tools on this tube, and its links
     /// step     substeps of the linearly implicit Euler rule (`Stepper::step`)
-    /// doubling what the step did wrong, now and then
+    /// doubling the error in time, estimated now and then
     /// grips    the mean force of each pull
-    /// rest     whether it could sleep
+    /// rest     whether it may sleep
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         self.check_substep(dt_s)?;
@@ -387,7 +387,7 @@ impl Agent for Tube {
         let (fine, coarse) = self.spec.range.eps_m;
         self.resolution.n = wanted.n;
         if fine == coarse {
-            return; // a fixed spacing: the division is the scene's
+            return; // a fixed spacing: the scene sets the division
         }
         let count = discretization::segments_for(&self.skeleton, wanted.eps_m);
         self.resolution = held(wanted, &self.skeleton, count);
@@ -444,7 +444,7 @@ fn matter_of(spec: &TubeSpec) -> Matter {
     }
 }
 
-/// The resolution that `count` segments are: the wish where it gave that count, else the mean spacing.
+/// The resolution of `count` segments: the request where it gave that count, else the mean spacing.
 fn held(wanted: Resolution, skeleton: &Skeleton, count: usize) -> Resolution {
     let kept = discretization::segments_for(skeleton, wanted.eps_m) == count;
     let exact = libm::ceil(skeleton.length_m() / wanted.eps_m - 1e-9) == count as f64;

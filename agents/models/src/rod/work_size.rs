@@ -1,13 +1,13 @@
-//! How much a tube's step has to do: the memory that it works on, and its contacts.
+//! Size of a tube's step: the memory it works on, and its contacts.
 //!
-//! Out: numbers, for those who measure. Never here: time.
+//! Out: numbers for benchmarks. Never here: time.
 
 use super::Tube;
 use super::discretization::Division;
 use super::state::Config;
 
 impl Tube {
-    /// Bytes that a step reads and writes, without those of contacts: the state and the next one, the division, the linear
+    /// Bytes that a step reads and writes, contacts excluded: the state and the next one, the division, the linear
     /// system and its factor.
     #[must_use]
     pub fn memory_bytes(&self) -> usize {
@@ -16,7 +16,7 @@ impl Tube {
         of_state(&self.now) + of_state(&stepper.next) + of_division(&self.division) + system
     }
 
-    /// How many contacts the substep that ended last had: with itself, with what never moves, and with others.
+    /// Number of contacts of the last substep: with itself, with fixed solids, and with peers.
     #[must_use]
     pub fn contacts(&self) -> usize {
         self.stepper.contacts.impulses().count()
@@ -29,7 +29,7 @@ fn of_state(state: &Config) -> usize {
     vectors.sum::<usize>() + size_of_val(&q[..]) + size_of_val(&b[..])
 }
 
-/// What a step reads of it.
+/// The part that a step reads.
 fn of_division(division: &Division) -> usize {
     let Division { length, chord, joint, bend, .. } = division;
     [length, chord, joint].into_iter().map(|list| size_of_val(&list[..])).sum::<usize>() + size_of_val(&bend[..])

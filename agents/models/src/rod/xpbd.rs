@@ -1,7 +1,7 @@
 //! The tube as compliant constraints (XPBD, MMC16), projected one by one from one end to the other and back.
 //!
-//! In: a state and the velocities without elasticity. Out: the velocities that lead to where the constraints put nodes and
-//! frames. Never here: gravity, springs from outside, contact. Theory: docs/theory/rod.md, eq. 41, 42.
+//! In: a state and the velocities without elasticity. Out: the velocities that lead to the projected nodes and
+//! frames. Never here: gravity, external springs, contact. Theory: docs/theory/rod.md, eq. 41, 42.
 
 use super::discretization::Division;
 use super::rotation::{bend_share, exp, log, unit};
@@ -9,20 +9,20 @@ use super::state::{Config, Matter};
 use super::sym3::Sym3;
 use glam::{DQuat, DVec3};
 
-/// Room to work in.
+/// Working storage.
 #[derive(Debug, Clone, Default)]
 pub struct Projector {
     x: Vec<DVec3>,
     q: Vec<DQuat>,
-    /// What stretch and shear have given so far, in each segment's own axes.
+    /// Accumulated multipliers of stretch and shear, in each segment's own axes.
     pull: Vec<DVec3>,
-    /// What bend and twist have given so far, in the axes of what lies before each joint.
+    /// Accumulated multipliers of bend and twist, in the axes of the segment before each joint.
     turn: Vec<DVec3>,
-    /// What the last projection made of velocities, in slots.
+    /// Changes of velocity by the last projection, in slots.
     gain: Vec<DVec3>,
 }
 
-/// What a constraint needs besides the state.
+/// Constants of a projection.
 struct Law<'a> {
     matter: &'a Matter,
     division: &'a Division,
@@ -31,7 +31,7 @@ struct Law<'a> {
 }
 
 impl Projector {
-    /// Projects what `velocities` lead to from `now` in `h` seconds, and makes them lead there.
+    /// Projects the state that `velocities` reach from `now` in `h` seconds, and corrects them to reach the projected one.
     pub fn project(&mut self, now: &Config, velocities: &mut [DVec3], of: (&Matter, &Division), h: f64) {
         let law = Law { matter: of.0, division: of.1, rate2: 1.0 / (h * h) };
         let count = now.q.len();
@@ -52,7 +52,7 @@ impl Projector {
         velocities.iter_mut().zip(&self.gain).for_each(|(v, gain)| *v += *gain);
     }
 
-    /// What the last projection changed of the velocity of a slot; nothing where there was none.
+    /// Change of a slot's velocity by the last projection; zero where there was none.
     pub fn gain(&self, slot: usize) -> DVec3 {
         self.gain.get(slot).copied().unwrap_or(DVec3::ZERO)
     }
@@ -71,7 +71,7 @@ impl Projector {
         self.gain.resize(2 * count + 1, DVec3::ZERO);
     }
 
-    /// Moves a node, and sums up how far: differences of places would round its momentum.
+    /// Moves a node, and sums up its displacement: differences of positions would round its momentum.
     fn shift(&mut self, node: usize, way: DVec3) {
         self.x[node] += way;
         self.gain[2 * node] += way;
@@ -100,7 +100,7 @@ impl Projector {
         self.q[k] = unit(exp(q * about) * q);
     }
 
-    /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall holds it (eq. 42).
+    /// C = log(R_{k−1}ᵀ R_k) − ψ⁰ with compliance l̄ B⁻¹; at an end only where a wall clamps it (eq. 42).
     fn joint(&mut self, k: usize, law: &Law<'_>) {
         let Matter { ei, gj, rotary, clamp, .. } = *law.matter;
         let count = self.q.len();
@@ -133,7 +133,7 @@ impl Projector {
 }
 
 impl Law<'_> {
-    /// One over the mass of a node; zero where it is held.
+    /// Inverse mass of a node; zero where it is held.
     fn lightness(&self, node: usize) -> f64 {
         let (length, held) = (&self.division.length, self.matter.held);
         if (node == 0 && held[0]) || (node == length.len() && held[1]) {

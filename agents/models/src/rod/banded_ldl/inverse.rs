@@ -1,4 +1,4 @@
-//! The blocks of A⁻¹ inside the band, without the rest of it (Takahashi's recurrence).
+//! The blocks of A⁻¹ inside the band, without computing the rest (Takahashi's recurrence).
 //!
 //! In: the factor. Out: the blocks of each slot with itself and with the next two. Theory: docs/theory/rod.md, eq. 18.
 
@@ -53,7 +53,7 @@ impl Factor {
     }
 }
 
-/// The blocks Z of A⁻¹ of the two rows behind row i.
+/// The blocks Z of A⁻¹ of the two rows after row i.
 struct Behind<T> {
     /// Z(i + 1, i + 1).
     next: Symmetric<T>,
@@ -64,7 +64,7 @@ struct Behind<T> {
 }
 
 impl<T: Number> Behind<T> {
-    /// Goes on to row i, of which the inverse of the pivot, L(i + 1, i) and L(i + 2, i) are given; returns Z(i + 2, i) (eq. 18).
+    /// Advances to row i, given the inverse of its pivot, L(i + 1, i) and L(i + 2, i); returns Z(i + 2, i) (eq. 18).
     #[inline(always)]
     fn go_on(&mut self, inverse: &Symmetric<T>, l1: &Matrix<T>, l2: &Matrix<T>) -> Matrix<T> {
         let Self { next, beside, after } = self;

@@ -1,6 +1,6 @@
-//! Where a tube starts through a solid: there is no way out on which it would not be torn.
+//! Parts of a tube that pass through a solid from the start: pushing them out would tear the tube.
 //!
-//! In: a tube's axis in front of a solid. Out: which parts of it pass through untouched, until they have left the solid.
+//! In: a tube's axis and a solid. Out: the parts of it that pass through without contact, until they have left the solid.
 //! Never here: contacts. Theory: `docs/theory/contact.md`, eq. 25.
 
 use super::Skin;
@@ -9,7 +9,7 @@ use metachron_geometry::signed_distance::Field;
 use metachron_geometry::signed_distance::Touch;
 use std::ops::RangeInclusive;
 
-/// Places of each segment at which the axis is looked at.
+/// Number of sample points of the axis per segment.
 const PLACES: usize = 8;
 
 /// The parts of a tube that started through one solid and have not left it since.
@@ -20,7 +20,7 @@ pub(super) struct Bores {
 }
 
 impl Bores {
-    /// What of a tube starts through the solid.
+    /// Finds the parts of a tube that start through the solid.
     pub fn new(skin: &Skin<'_>, field: &Field) -> Self {
         let axis = Axis { skin, field };
         let mut parts = Vec::new();
@@ -35,17 +35,17 @@ impl Bores {
         Self { parts }
     }
 
-    /// Whether nothing passes through.
+    /// Whether no part passes through.
     pub fn is_empty(&self) -> bool {
         self.parts.is_empty()
     }
 
-    /// Whether anything between two arc lengths passes through.
+    /// Whether any part between two arc lengths passes through.
     pub fn meet(&self, from_m: f64, to_m: f64) -> bool {
         self.parts.iter().any(|[low, high]| *low <= to_m && from_m <= *high)
     }
 
-    /// Lets go of what has left the solid.
+    /// Drops or shortens the parts that have left the solid.
     pub fn leave(&mut self, skin: &Skin<'_>, field: &Field) {
         let axis = Axis { skin, field };
         self.parts.retain_mut(|part| {
@@ -60,7 +60,7 @@ impl Bores {
     }
 }
 
-/// The places of a tube's axis, numbered from its start, in front of a solid.
+/// Sample points of a tube's axis, numbered from its start, with the solid they are tested against.
 struct Axis<'a> {
     skin: &'a Skin<'a>,
     field: &'a Field,
@@ -71,7 +71,7 @@ impl Axis<'_> {
         PLACES * self.skin.segments()
     }
 
-    /// The segment of a place, and its share of it.
+    /// The segment of a sample point, and its share of that segment.
     fn place(&self, at: usize) -> (usize, f64) {
         let segment = (at / PLACES).min(self.skin.segments() - 1);
         (segment, (at - PLACES * segment) as f64 / PLACES as f64)
@@ -82,21 +82,21 @@ impl Axis<'_> {
         self.skin.arc_m[segment] + share * (self.skin.arc_m[segment + 1] - self.skin.arc_m[segment])
     }
 
-    /// Where a run of places that are inside comes out on both sides: its skin is out a radius after its axis.
+    /// Where a run of inside points leaves the solid on both sides: the skin leaves one radius after the axis.
     fn mouths(&self, first: usize, last: usize) -> [f64; 2] {
         let radius_m = self.skin.widest_m();
         let (before, after) = (first.saturating_sub(1), (last + 1).min(self.last()));
         [self.arc_m(before) - radius_m, self.arc_m(after) + radius_m]
     }
 
-    /// The shortest way out of the solid, of a place inside it.
+    /// The shortest way out of the solid, for a sample point inside it.
     fn way_out(&self, at: usize) -> Option<Touch> {
         let (segment, share) = self.place(at);
         let ball = self.skin.ball(segment).toward(self.skin.ball(segment + 1), share);
         self.field.touches(ball.centre, ball.radius_m).iter().next().filter(|touch| touch.distance_m < 0.0)
     }
 
-    /// The last place of the run of places from `at` on that are inside, `at` itself where it is not.
+    /// The last point of the run of inside points that begins at `at`; `at` itself where that is outside.
     fn run(&self, at: usize) -> usize {
         let inside = (at..=self.last()).take_while(|&place| self.way_out(place).is_some());
         inside.last().unwrap_or(at)

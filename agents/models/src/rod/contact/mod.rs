@@ -1,6 +1,6 @@
-//! How a tube touches itself and the solids around it: finds the contacts of a substep and solves them.
+//! Contacts of a tube with itself and with the solids around it: detection and solution in a substep.
 //!
-//! In: where the skin is, how it would move without contact, and the body's answer to impulses (the factor of the rod's own solve).
+//! In: the skin's position, its free motion, and the body's response to impulses (the factor of the rod's own solve).
 //! Out: velocities that keep the skin apart. Never here: the rod's elasticity. Theory: `docs/theory/contact.md`.
 
 mod initial_overlap;
@@ -19,27 +19,27 @@ use self_contact::{Meeting, PLACES, Pairs};
 pub(crate) use solve::{Solved, respond};
 use static_contact::{WallTouch, Walls};
 
-/// Contacts are taken up this share of the radius before they touch: impulses of other contacts may close the rest.
+/// Contacts are activated this share of the radius before they touch: impulses of other contacts may close the gap.
 const SLACK_RADII: f64 = 0.05;
 
-/// Where the number of a fixed solid begins in the key of its contacts; those of a tube with itself are lower, with others higher.
+/// Bit at which the number of a fixed solid begins in the key of its contacts; keys of self-contact are lower, those of peers higher.
 const WALL_SHIFT: u32 = 41;
 /// One past the highest number of a fixed solid.
 const WALLS_END: u64 = 1 << (63 - WALL_SHIFT);
 
-/// What a step of the second and of the first segment is in the key of a pair's place.
+/// Key increments of the second and the first segment of a pair.
 const KEY_STEPS: [u64; 2] = [PLACES as u64, 1 << 20];
-/// The names that a foot had before it passed to the next segment, within one tube and between a tube and another.
+/// Key differences to a contact that passed to the next segment, within one tube and between a tube and another; for warm starting.
 const KIN: [i64; 8] = {
     let ([a, b], [c, d]) = (KEY_STEPS, narrow_phase::KEY_STEPS);
     let (a, b, c, d) = (a as i64, b as i64, c as i64, d as i64);
     [a, -a, b, -b, c, -c, d, -d]
 };
 
-/// How many of [`KIN`] matter where there is nobody else.
+/// Number of entries of [`KIN`] that matter without peers.
 const KIN_OWN: usize = 4;
 
-/// A tube's skin at the start of a substep: balls on nodes, joined by spans.
+/// A tube's skin at the start of a substep: balls on nodes, joined by tapered spans.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Skin<'a> {
     /// Node positions, metres.
@@ -50,23 +50,23 @@ pub(crate) struct Skin<'a> {
     pub radii_m: &'a [f64],
     /// Rest arc length of each node, metres.
     pub arc_m: &'a [f64],
-    /// Ends whose node cannot move: walls do not see them.
+    /// Ends whose node cannot move: walls ignore them.
     pub held: [bool; 2],
     /// The substep, seconds.
     pub h_s: f64,
 }
 
-/// The place of a node's velocity in the array of slots that contacts use: nodes and segments take turns.
+/// Index of a node's velocity in the array of slots that contacts use: nodes and segments alternate.
 pub(crate) const fn node_slot(node: usize) -> usize {
     2 * node
 }
 
-/// The place of a segment's spin in the array of slots.
+/// Index of a segment's spin in the array of slots.
 pub(crate) const fn segment_slot(segment: usize) -> usize {
     2 * segment + 1
 }
 
-/// The contacts of one tube, from substep to substep.
+/// The contacts of one tube, carried from substep to substep.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct TubeContacts {
     pairs: Option<Pairs>,
@@ -87,7 +87,7 @@ impl TubeContacts {
         Ok(Self { pairs: with_itself.then(Pairs::default), walls: Walls::new(obstacles)?, friction, ..Self::default() })
     }
 
-    /// Forgets what it knows of nodes and segments: the tube was divided anew.
+    /// Discards all data by node and segment: the tube was divided anew.
     pub fn forget(&mut self) {
         if let Some(pairs) = &mut self.pairs {
             pairs.forget();
@@ -96,7 +96,7 @@ impl TubeContacts {
         self.solver.forget();
     }
 
-    /// Finds the contacts of a substep; returns how many there are.
+    /// Finds the contacts of a substep; returns their number.
     pub fn find(&mut self, skin: &Skin<'_>) -> usize {
         let Self { pairs, walls, friction, contacts, .. } = self;
         contacts.clear();
@@ -115,14 +115,14 @@ impl TubeContacts {
         contacts.len()
     }
 
-    /// Adds the contacts with others, whose velocities stand behind the tube's own.
+    /// Adds the contacts with peers, whose velocities follow the tube's own.
     pub fn find_others(&mut self, skin: &Skin<'_>, company: &mut Company) {
         if !company.is_empty() {
             company.find(skin, SLACK_RADII * skin.widest_m(), &mut self.contacts);
         }
     }
 
-    /// Takes the outer radius at each node, metres; `met` if there is somebody to touch.
+    /// Sets the outer radius at each node, metres; `met` if there are peers to touch.
     pub fn widen(&mut self, radii_m: impl Iterator<Item = f64>, met: bool) {
         self.radii_m.clear();
         if met || !self.is_idle() {
@@ -130,28 +130,28 @@ impl TubeContacts {
         }
     }
 
-    /// Takes back of the `ways` that nodes have just come what led them into fixed solids; `arc_m` are their rest arc lengths.
+    /// Undoes the part of the nodes' latest displacements `ways` that leads into fixed solids; `arc_m` are their rest arc lengths.
     pub fn hold_back(&self, positions: &mut [DVec3], ways: impl Iterator<Item = DVec3>, arc_m: &[f64]) {
         self.walls.hold_back(positions, ways, (arc_m, &self.radii_m));
     }
 
-    /// The contacts found last, and the impulses they then gave.
+    /// The contacts found last, and their impulses.
     pub fn impulses(&self) -> impl Iterator<Item = (&Contact, &DVec3)> + Clone {
         self.contacts.iter().zip(self.solver.impulses())
     }
 
-    /// Where fixed solids pressed in the last solve: what each place joins, and its normal.
+    /// Contacts in which fixed solids pressed in the last solve: slots and normal of each.
     pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| is_fixed(contact));
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
 
-    /// Whether something fixed pressed in the last solve.
+    /// Whether any fixed solid pressed in the last solve.
     pub fn is_grounded(&self) -> bool {
         self.footholds().next().is_some()
     }
 
-    /// Whether the last search found any contact with what moves, itself included.
+    /// Whether the last search found any contact with a moving body, the tube itself included.
     pub fn touches_what_moves(&self) -> bool {
         !self.contacts.iter().all(is_fixed)
     }
@@ -161,7 +161,7 @@ impl TubeContacts {
         !self.contacts.is_empty()
     }
 
-    /// Whether the tube has nothing of its own to touch.
+    /// Whether the tube can touch neither itself nor a fixed solid.
     fn is_idle(&self) -> bool {
         self.pairs.is_none() && self.walls.is_empty()
     }
@@ -172,7 +172,7 @@ impl Skin<'_> {
         self.positions.len() - 1
     }
 
-    /// Whether a node is an end that is held.
+    /// Whether a node is a held end.
     fn is_held(&self, node: usize) -> bool {
         (node == 0 && self.held[0]) || (node == self.segments() && self.held[1])
     }
@@ -227,7 +227,7 @@ fn of_meeting(meeting: &Meeting, friction: f64) -> Contact {
         let (segment, share) = (meeting.segments[side] as usize, meeting.shares[side]);
         slots.add_linear(node_slot(segment) as u32, sign * (1.0 - share));
         slots.add_linear(node_slot(segment + 1) as u32, sign * share);
-        // the arm points at the other side: against the normal for the first, along it for the second
+        // the arm points to the other side: against the normal for the first, along it for the second
         let arm = meeting.normal * -sign * (meeting.radii_m[side] + 0.5 * meeting.gap_m);
         slots.add_angular(segment_slot(segment) as u32, arm * sign);
     }
@@ -256,7 +256,7 @@ fn of_touch(touch: &WallTouch, friction: f64, segments: usize) -> Contact {
         slots.add_angular(segment_slot(index) as u32, arm);
     } else {
         slots.add_linear(node_slot(index) as u32, 1.0);
-        // a node's skin turns with the mean of the segments beside it
+        // a node's skin turns with the mean of the adjacent segments
         let beside = [index.checked_sub(1), Some(index).filter(|&k| k < segments)];
         let count = beside.iter().flatten().count() as f64;
         for segment in beside.into_iter().flatten() {

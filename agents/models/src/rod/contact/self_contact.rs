@@ -1,6 +1,6 @@
-//! Which segments of a tube come near each other: capsules in a uniform hash grid, and a list that lasts several steps.
+//! Broad phase of self-contact: capsules in a uniform hash grid, and a pair list that stays valid for several steps.
 //!
-//! In: the skin of a tube and how it moves. Out: near pairs of segments and where they are nearest.
+//! In: the skin of a tube and its motion. Out: near pairs of segments and where they are nearest.
 //! Never here: forces. Theory: `docs/theory/contact.md`, eq. 15–18.
 
 use super::Skin;
@@ -9,19 +9,19 @@ use metachron_geometry::capsule_chain::{facing, foot};
 use metachron_geometry::{Grid, near_segments};
 use std::f64::consts::PI;
 
-/// How far past touching a pair is listed: this share of the radius and this many margins (eq. 17).
-/// Wider lists last longer, but their making and reading grows with the square of the reach in a packed tube.
+/// How far beyond contact a pair is listed: this share of the radius and this many margins (eq. 17).
+/// Wider lists last longer, but the cost of building and reading them grows with the square of the reach in a packed tube.
 const LIST_RADII: f64 = 0.3;
 /// See [`LIST_RADII`].
 const LIST_MARGINS: f64 = 2.0;
 
-/// A segment as the grid sees it.
+/// A segment as stored in the grid.
 #[derive(Debug, Clone, Copy)]
 struct Capsule {
     middle: DVec3,
-    /// Radius of the ball that holds it.
+    /// Radius of its bounding ball.
     ball_m: f64,
-    /// Rest arc length of its middle, and how far along the tube its neighbourhood reaches from there (eq. 15).
+    /// Rest arc length of its middle, and half the arc length within which no pairs are formed (eq. 15).
     arc_m: f64,
     neighbourhood_m: f64,
 }
@@ -36,12 +36,12 @@ struct Pair {
     measured_at_m: f64,
 }
 
-/// How a segment moves against the mean of all nodes.
+/// Motion of a segment relative to the mean of all nodes.
 #[derive(Debug, Clone, Copy, Default)]
 struct Motion {
-    /// The way of its faster end since the list was made, and any widening, metres; it only grows.
+    /// Distance travelled by its faster end since the list was built, plus any widening, metres; non-decreasing.
     travel_m: f64,
-    /// How far its faster end goes within the step, metres.
+    /// Distance that its faster end travels within the step, metres.
     ahead_m: f64,
 }
 
@@ -50,7 +50,7 @@ struct Motion {
 pub(super) struct Meeting {
     /// The segments; the first has the lower number.
     pub segments: [u32; 2],
-    /// Which of the places of this pair, [`PLACES`] at most: its name together with the segments.
+    /// Index among the places of this pair, below [`PLACES`]; identifies the contact together with the segments.
     pub place: u32,
     /// The facing points, as shares of the segments.
     pub shares: [f64; 2],
@@ -62,13 +62,13 @@ pub(super) struct Meeting {
     pub radii_m: [f64; 2],
 }
 
-/// Places of a pair: the first node of either segment, the last node of the tube, a crossing.
+/// Number of places of a pair: the first node of either segment, the last node of the tube, a crossing.
 pub(super) const PLACES: u32 = 4;
-/// Segments cross if the sine of their angle is above this. Below it their nodes tell it all: at 0.2 the axes of a crossing
+/// Segments cross if the sine of their angle is above this. Below it their nodes are accurate enough: at 0.2 the axes of a crossing
 /// are (0.1 l)²/2d nearer than the nodes, 40 µm for l = 15 mm and d = 30 mm.
 const CROSSING_SINE: f64 = 0.2;
 
-/// The near pairs of a tube, kept while they hold.
+/// The near pairs of a tube, reused while they are valid.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Pairs {
     grid: Grid,
@@ -76,19 +76,19 @@ pub(super) struct Pairs {
     keys: Vec<u64>,
     list: Vec<Pair>,
     motions: Vec<Motion>,
-    /// How far past touching the list reaches.
+    /// How far beyond contact the list reaches.
     reach_m: f64,
     last: Vec<DVec3>,
     last_radius_m: f64,
 }
 
 impl Pairs {
-    /// Forgets the list: the tube was divided anew.
+    /// Discards the list: the tube was divided anew.
     pub fn forget(&mut self) {
         self.last.clear();
     }
 
-    /// Visits every pair whose surfaces may come within `slack_m` of each other during the step, by rising numbers (eq. 17).
+    /// Visits every pair whose surfaces may come within `slack_m` of each other during the step, in order of segment numbers (eq. 17).
     pub fn visit(&mut self, skin: &Skin<'_>, slack_m: f64, mut visit: impl FnMut(Meeting)) {
         self.follow(skin);
         let most = |of: fn(&Motion) -> f64| self.motions.iter().map(of).fold(0.0, f64::max);
@@ -111,7 +111,7 @@ impl Pairs {
         }
     }
 
-    /// Adds up how far segments have moved against the mean, and how much the tube has widened.
+    /// Accumulates the segments' motion relative to the mean, and the tube's widening.
     fn follow(&mut self, skin: &Skin<'_>) {
         let nodes = skin.positions;
         let (widest, count) = (skin.widest_m(), nodes.len() as f64);
@@ -180,14 +180,14 @@ impl Capsule {
         }
     }
 
-    /// Whether two segments are so near along the tube that they touch through its own thickness (eq. 15): a tube bent as
-    /// sharply as it can be, to the radius of its own skin, comes back to itself after π r.
+    /// Whether two segments are so close along the tube that they overlap by its own thickness (eq. 15): a tube bent to the
+    /// radius of its own skin, its sharpest bend, meets itself after π r.
     fn is_neighbour(&self, other: &Self) -> bool {
         (self.arc_m - other.arc_m).abs() < self.neighbourhood_m + other.neighbourhood_m
     }
 }
 
-/// Whether two segments never touch, for tests.
+/// Whether two segments are excluded from contact, for tests.
 #[cfg(test)]
 pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
     i.abs_diff(j) <= 1 || Capsule::new(skin, i).is_neighbour(&Capsule::new(skin, j))
@@ -195,8 +195,8 @@ pub(super) fn is_neighbour(skin: &Skin<'_>, i: usize, j: usize) -> bool {
 
 /// Visits the places of a near pair whose gap is within the margin (eq. 18).
 ///
-/// The nearest points alone would not do: where strands run side by side they jump from end to end at the slightest tilt,
-/// and the tube rocks for ever. Nodes and their feet stay.
+/// The nearest points alone are not enough: between parallel strands they jump from end to end at the slightest tilt,
+/// and the tube rocks for ever. Nodes and their projections stay in place.
 pub(super) fn visit_places(skin: &Skin<'_>, nearest: Meeting, margin_m: f64, visit: &mut impl FnMut(Meeting)) {
     let [first, second] = nearest.segments;
     let [i, j] = [first as usize, second as usize];
@@ -232,7 +232,7 @@ pub(super) fn nearest(skin: &Skin<'_>, segments: [u32; 2]) -> Meeting {
     at(skin, segments, PLACES - 1, [s, t])
 }
 
-/// The meeting of two given points.
+/// The meeting at two given points.
 fn at(skin: &Skin<'_>, segments: [u32; 2], place: u32, shares: [f64; 2]) -> Meeting {
     let [a, b] = segments.map(|k| [skin.ball(k as usize), skin.ball(k as usize + 1)]);
     let (facing, radii_m) = facing(a, b, shares);

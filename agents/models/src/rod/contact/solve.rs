@@ -1,7 +1,7 @@
-//! Where contact meets the rod's own step: between its solve and its move.
+//! Couples contact into the rod's own step, between its solve and its move.
 //!
-//! In: the state a substep starts from, its free velocities and its factor. Out: velocities that keep the skin apart.
-//! Never here: which contacts there are ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
+//! In: the state at the start of a substep, its free velocities and its factor. Out: velocities that keep the skin apart.
+//! Never here: contact detection ([`super::TubeContacts::find`]). Theory: `docs/theory/contact.md`, eq. 5 and 22–23.
 
 use super::{KIN, KIN_OWN, Skin, TubeContacts, node_slot, segment_slot};
 use crate::rod::banded_ldl::{Factor, Row};
@@ -11,11 +11,11 @@ use crate::rod::state::Matter;
 use glam::DVec3;
 use metachron_contact::{Owner, Problem, Settings};
 
-/// When a tube's contacts are good enough: 10 µm/s, a tenth of what counts as rest.
-/// A stiff tube (10⁸ Pa) that lands flat takes 30 answers, a soft one at rest takes one or two.
+/// Tolerance of a tube's contacts: 10 µm/s, a tenth of the speed that counts as rest.
+/// A stiff tube (10⁸ Pa) that lands flat takes 30 solves with the factor, a soft one at rest takes one or two.
 const SETTINGS: Settings = Settings { iterations: 300, tolerance_m_s: 1e-5 };
 
-/// A substep at the point where its system is solved and nothing has moved yet.
+/// A substep whose system is solved, before any node has moved.
 #[derive(Clone, Copy)]
 pub(crate) struct Solved<'a> {
     /// The material.
@@ -33,7 +33,7 @@ pub(crate) struct Solved<'a> {
 impl TubeContacts {
     /// Corrects the free `velocities` of a substep that starts at `positions`; returns the work that contact then does, J.
     ///
-    /// `first` finds the contacts; a further Newton iteration of the same substep keeps them.
+    /// With `first` the contacts are searched; a further Newton iteration of the same substep reuses them.
     pub fn act(
         &mut self,
         positions: &[DVec3],
@@ -42,10 +42,10 @@ impl TubeContacts {
         (company, first): (&mut Company, bool),
     ) -> f64 {
         if self.is_idle() && company.is_empty() {
-            self.contacts.clear(); // of those who have gone
+            self.contacts.clear(); // contacts with peers that have gone
             return 0.0;
         }
-        // a system that was lost has no motion to correct: the step will see it and give up or divide
+        // a diverged system has no motion to correct: the step detects it and gives up or subdivides
         if !velocities.iter().sum::<DVec3>().is_finite() {
             return 0.0;
         }
@@ -82,13 +82,13 @@ impl TubeContacts {
         if met {
             company.mates_mut().watch(self.impulses(), velocities);
         }
-        velocities[own..].fill(DVec3::ZERO); // what the others do is not this tube's work
+        velocities[own..].fill(DVec3::ZERO); // the peers' motion is not this tube's work
         let work = self.impulses().map(|(contact, impulse)| contact.slots.velocity(velocities).dot(*impulse)).sum();
         velocities.truncate(own);
         work
     }
 
-    /// Whether the skin comes near itself or a fixed solid in a substep that starts at `positions` and goes by `velocities`.
+    /// Whether the skin comes near itself or a fixed solid in a substep that starts at `positions` with `velocities`.
     pub fn would_touch(&mut self, positions: &[DVec3], velocities: &[DVec3], solved: &Solved<'_>) -> bool {
         if self.is_idle() {
             self.contacts.clear();
@@ -111,8 +111,8 @@ impl TubeContacts {
         found
     }
 
-    /// The size of each slot's inverse mass (eq. 22): a node's from its own mass, a segment's from the matrix, because what
-    /// it is joined to by shear resists its turning far more than its own inertia.
+    /// The size of each slot's inverse mass (eq. 22): a node's from its own mass, a segment's from the matrix, because its shear coupling
+    /// to the nodes resists turning far more than its own inertia.
     fn scale(&mut self, solved: &Solved<'_>) {
         let Solved { matter, division, rows, .. } = solved;
         let count = division.segments();
@@ -134,7 +134,7 @@ impl TubeContacts {
     }
 }
 
-/// How a tube answers impulses, one a slot, by the factor of its substep: ends that are held stay.
+/// Turns impulses, one per slot, into velocity changes by the factor of the substep; held ends do not move.
 pub(crate) fn respond((factor, held): (&Factor, [bool; 2]), impulses: &mut [DVec3]) {
     let last = impulses.len().saturating_sub(1);
     for (_, slot) in [(held[0], 0), (held[1], last)].into_iter().filter(|(held, _)| *held) {

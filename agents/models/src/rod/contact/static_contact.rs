@@ -1,6 +1,6 @@
-//! Where a tube touches the solids that never move.
+//! Contacts of a tube with fixed solids.
 //!
-//! In: the skin of a tube. Out: touching nodes and spans. Nodes that are far are not measured again until they have moved as far
+//! In: the skin of a tube. Out: touching nodes and spans. A distant node is not measured again until it has moved that distance
 //! (eq. 19). Never here: forces. Theory: `docs/theory/contact.md`.
 
 use super::Skin;
@@ -10,33 +10,33 @@ use metachron_geometry::signed_distance::Touch;
 use metachron_geometry::signed_distance::{Ball, Field};
 use metachron_geometry::{Obstacle, ShapeError};
 
-/// How much farther than needed a mesh is searched, as a share of the radius: what is found far rests the longer.
+/// How much farther than needed a mesh is searched, as a share of the radius: a node found far away can be skipped for longer.
 const LOOK_RADII: f64 = 1.0;
 
 /// All fixed solids around a tube.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Walls {
     walls: Vec<Wall>,
-    /// How far any node has moved, and how much the tube has widened; it only grows.
+    /// Distance that the fastest node has moved, summed over steps, plus any widening of the tube; non-decreasing.
     travel_m: f64,
     last: Vec<DVec3>,
     last_radius_m: f64,
-    /// Whether the tube has been looked at: what it starts through is known.
+    /// Whether the parts that start through a solid have been searched.
     begun: bool,
 }
 
-/// One fixed solid, and how near each node was when it was last measured.
+/// One fixed solid, and how near each node was when last measured.
 #[derive(Debug, Clone)]
 struct Wall {
     field: Field,
     friction: f64,
-    /// Each node: a bound of its gap and the travel at which it was measured. Empty after re-meshing.
+    /// Each node: a lower bound of its gap and the travel at which it was measured. Reset after re-meshing.
     nodes: Vec<(f64, f64)>,
-    /// Each node: its nearest place at the last measurement that found one.
+    /// Each node: the nearest point found by its last measurement, if any.
     near: Vec<Option<Touch>>,
-    /// No node or span is nearer than this at the travel beside it.
+    /// A lower bound of the gap of all nodes and spans, and the travel at which it was measured.
     clear: (f64, f64),
-    /// What of the tube passes through.
+    /// The parts of the tube that pass through.
     bores: Bores,
 }
 
@@ -49,7 +49,7 @@ pub(super) struct WallTouch {
     pub index: u32,
     /// The share of the segment, for a place inside one.
     pub share: Option<f64>,
-    /// Which of the places of a node, from 0.
+    /// Index among the places of a node, from 0.
     pub place: u32,
     /// Unit normal, out of the wall.
     pub normal: DVec3,
@@ -82,12 +82,12 @@ impl Walls {
         Ok(Self { walls, ..Self::default() })
     }
 
-    /// Whether there are none.
+    /// Whether there are no walls.
     pub fn is_empty(&self) -> bool {
         self.walls.is_empty()
     }
 
-    /// Forgets all measurements: the tube was divided anew.
+    /// Discards all measurements: the tube was divided anew.
     pub fn forget(&mut self) {
         self.last.clear();
     }
@@ -109,8 +109,8 @@ impl Walls {
         }
     }
 
-    /// Takes back of the `ways` that nodes have just come, none of which was known when the walls were measured, what led them into walls,
-    /// or deeper. `arc_m` and `radii_m` are those of the nodes.
+    /// Undoes the part of the nodes' latest displacements `ways`, which were unknown when the walls were measured, that leads into
+    /// walls or deeper into them. `arc_m` and `radii_m` are those of the nodes.
     pub fn hold_back(
         &self,
         positions: &mut [DVec3],
@@ -132,14 +132,14 @@ impl Walls {
         }
     }
 
-    /// Finds, once, what of a tube that is held starts through a solid; one that is not is pushed out as a whole.
+    /// Searches, once, the parts of a held tube that start through a solid; a free tube is pushed out as a whole.
     fn begin(&mut self, skin: &Skin<'_>) {
         if !std::mem::replace(&mut self.begun, true) && skin.held.contains(&true) {
             self.walls.iter_mut().for_each(|wall| wall.bores = Bores::new(skin, &wall.field));
         }
     }
 
-    /// Adds up how far any node has moved.
+    /// Accumulates the nodes' greatest displacement.
     fn follow(&mut self, skin: &Skin<'_>) {
         let widest = skin.widest_m();
         if self.last.len() == skin.positions.len() {
@@ -235,7 +235,7 @@ impl Wall {
         }
     }
 
-    /// Whether the place at which a span touches lies behind what one of its nodes touches already (eq. 13).
+    /// Whether the place at which a span touches is hidden by a place that one of its nodes touches already (eq. 13).
     fn hides(&self, skin: &Skin<'_>, node: usize, ball: Ball, touch: Touch) -> bool {
         self.near[node].is_some_and(|near| near.hides(skin.ball(node), ball, touch))
     }
