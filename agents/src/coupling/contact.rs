@@ -1,12 +1,12 @@
-//! One contact: which velocities it joins, and what it asks of them (docs/theory/contact.md, eq. 1–4).
+//! One contact: which velocities it joins, and the conditions it puts on them (docs/theory/contact.md, eq. 1–4).
 
 use glam::DVec3;
 
-/// How much of a penetration a step takes back: 0.2 of the depth. More turns depth into speed: at 1 a body laid 1 cm
+/// Share of a penetration that a step corrects: 0.2 of the depth. More turns depth into speed: at 1 a body placed 1 cm
 /// deep leaves at 2.5 m/s with steps of 4 ms.
 pub const PUSH_OUT_SHARE: f64 = 0.2;
 
-/// The fastest push-out, m/s: a body found deep inside another comes out slowly and not like a shot.
+/// The fastest push-out, m/s: a body found deep inside another comes out slowly instead of being shot out.
 const PUSH_OUT_MAX_M_S: f64 = 0.5;
 
 /// The velocities that a contact joins: u = Σ w v + Σ ω × r, over at most six linear ones and four spins.
@@ -33,7 +33,7 @@ impl Slots {
     /// Adds the velocity that the spin in `slot` gives at the end of `arm_m`.
     ///
     /// # Panics
-    /// At the fifth call: a point lies on one segment at most.
+    /// At the fifth call: a point belongs to one segment at most.
     pub fn add_angular(&mut self, slot: u32, arm_m: DVec3) {
         self.angular[usize::from(self.counts[1])] = (slot, arm_m);
         self.counts[1] += 1;
@@ -55,12 +55,12 @@ impl Slots {
         self.velocity_of_nodes(velocities) + angular
     }
 
-    /// The part of the relative velocity that nodes give: spins move a round skin across its normal only.
+    /// The part of the relative velocity that nodes contribute: spins move a round skin only across its normal.
     pub(crate) fn velocity_of_nodes(&self, velocities: &[DVec3]) -> DVec3 {
         self.linear().iter().map(|&(slot, w)| velocities[slot as usize] * w).sum()
     }
 
-    /// The part of it that the slots from `first` on give.
+    /// The part of the relative velocity that the slots from `first` on contribute.
     pub(crate) fn velocity_from(&self, first: usize, velocities: &[DVec3]) -> DVec3 {
         let is_in = |slot: u32| slot as usize >= first;
         let linear =
@@ -69,7 +69,7 @@ impl Slots {
         linear.sum::<DVec3>() + angular.map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum::<DVec3>()
     }
 
-    /// The linear velocities among the first `own` slots that it gathers, with their weights.
+    /// The linear velocities that it gathers among the first `own` slots, with their weights.
     pub(crate) fn own(&self, own: usize) -> Self {
         let mut slots = Self::default();
         let first = self.linear().iter().filter(|(slot, _)| (*slot as usize) < own);
@@ -77,7 +77,7 @@ impl Slots {
         slots
     }
 
-    /// Marks the slots of a contact with something fixed: those of two parts of one body have weights of both signs.
+    /// Marks the slots of a contact with something fixed; contacts of two parts of one body have weights of both signs and mark nothing.
     pub(crate) fn mark_fixed(&self, fixed: &mut [bool]) {
         if self.linear().iter().all(|(_, weight)| *weight >= 0.0) {
             self.linear().iter().for_each(|(slot, _)| fixed[*slot as usize] = true);
@@ -104,7 +104,7 @@ impl Slots {
         }
     }
 
-    /// The same of the slots that `into` knows.
+    /// The same, restricted to the slots that `into` holds.
     pub fn scatter_known(&self, impulse: DVec3, into: &mut [DVec3]) {
         for &(slot, w) in self.linear() {
             into.get_mut(slot as usize).into_iter().for_each(|sum| *sum += impulse * w);
