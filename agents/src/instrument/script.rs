@@ -1,15 +1,15 @@
-//! Where the keyframes lead: a smooth curve through all of them.
+//! The path through the keyframes: a smooth curve through all of them.
 //!
-//! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: hands, jaws that catch.
+//! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: user springs, grasping jaws.
 //!
 //! Tip and jaw are monotone cubics (FB84): once continuously differentiable, and between two keyframes no coordinate leaves
-//! the range of both, so a tool never dips below the place it was sent to. Rotation turns by slerp along 3u² − 2u³, at rest
+//! the range of both, so a tool never dips below the place it was sent to. Rotation is a slerp along 3u² − 2u³, at rest
 //! in every keyframe. A script that repeats is one closed curve.
 
 use super::Keyframe;
 use glam::{DQuat, DVec3, DVec4};
 
-/// Where the script wants the tool.
+/// The pose that the script commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pose {
     pub tip: DVec3,
