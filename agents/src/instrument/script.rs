@@ -33,7 +33,7 @@ struct Knot {
 pub(super) struct Script {
     knots: Vec<Knot>,
     repeat: bool,
-    /// At which time the script's own begins, seconds.
+    /// Time at which the script starts, seconds.
     begin_s: f64,
 }
 
@@ -57,12 +57,12 @@ impl Script {
         Self { knots, repeat, begin_s: 0.0 }
     }
 
-    /// Its time begins later by so many seconds, earlier where that is below zero.
+    /// Shifts the start of the script by so many seconds, later if positive.
     pub(super) fn begin_later(&mut self, by_s: f64) {
         self.begin_s += by_s;
     }
 
-    /// Where the script leads at `time_s`: it waits in its first keyframe before it and in its last after it.
+    /// The pose at `time_s`: before its first keyframe the script waits in it, after its last it waits in that.
     pub(super) fn at(&self, time_s: f64) -> Pose {
         let time_s = time_s - self.begin_s;
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
@@ -79,13 +79,13 @@ impl Script {
         }
     }
 
-    /// Whether nothing moves any more from `time_s` on.
+    /// Whether the script no longer moves from `time_s` on.
     pub(super) fn is_over(&self, time_s: f64) -> bool {
         !self.repeat && time_s - self.begin_s >= self.knots[self.knots.len() - 1].at_s
     }
 }
 
-/// Ends the script where it began, so that it can start again without a jump.
+/// Appends a keyframe that returns to the start, so that the script can repeat without a jump.
 fn close(knots: &mut Vec<Knot>) {
     let (first, before, last) = (knots[0], knots[knots.len() - 2], knots[knots.len() - 1]);
     let same = first.value == last.value && first.rotation.dot(last.rotation).abs() >= 1.0 - 1e-12;
