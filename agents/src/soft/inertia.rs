@@ -1,22 +1,22 @@
-//! How a soft body answers impulses: its factor, as others may know it.
+//! Published response of a soft body to impulses: its factor.
 //!
-//! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
+//! In: the factor of the last substep. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::system::Factor;
 use crate::coupling::{Carried, Foot, Lies};
 use glam::DVec3;
 
-/// A soft body's answer to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
+/// A soft body's response to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
 #[derive(Debug, Clone, Default)]
 pub struct SoftInertia {
     factor: Factor,
-    /// Where something fixed carries it, and its answer there.
+    /// Its feet on supports, and its response there.
     standing: Carried<Factor>,
-    /// Of each vertex by itself, 1/kg.
+    /// Inverse mass of each vertex by itself, 1/kg.
     mobilities: Vec<f64>,
-    /// How each vertex will accelerate without what others give, m/s².
+    /// Predicted acceleration of each vertex without impulses of peers, m/s².
     pub accelerations: Vec<DVec3>,
-    /// The length of the substep that ended last, seconds: published velocities are the means over it.
+    /// The length of the last substep, seconds: published velocities are the means over it.
     pub span_s: f64,
     /// Mass of each vertex, kg, and damping, 1/s.
     pub(super) mass_kg: Vec<f64>,
@@ -24,41 +24,41 @@ pub struct SoftInertia {
 }
 
 impl SoftInertia {
-    /// Takes over a factor into the storage that is here.
+    /// Copies a factor into the existing storage.
     pub(super) fn copy_from(&mut self, factor: &Factor, mobilities: &[f64]) {
         self.factor.copy_from(factor);
         self.mobilities.clear();
         self.mobilities.extend_from_slice(mobilities);
     }
 
-    /// Takes over where it lies and how it will accelerate there.
+    /// Copies its feet and its predicted accelerations there.
     pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }
 
-    /// Where it lies.
+    /// The feet on which it rests.
     pub(crate) fn feet(&self) -> &[Foot] {
         self.standing.feet()
     }
 
-    /// How each slot will accelerate, with what it lies on where that has `borne` what it is given; empty for nothing known.
+    /// The predicted acceleration of each slot, with the supports where they have `borne` the impulses; empty if unknown.
     pub(crate) fn foretold(&self, borne: bool) -> &[DVec3] {
         self.standing.accelerations().filter(|_| borne).unwrap_or(&self.accelerations)
     }
 
-    /// How many slots it knows: one a vertex; zero before the first step.
+    /// Number of slots: one for each vertex; zero before the first step.
     #[must_use]
     pub const fn slots(&self) -> usize {
         self.factor.vertices()
     }
 
-    /// Appends the size of the inverse mass of each slot: enough for the scale of an iteration.
+    /// Appends the scale of the inverse mass of each slot: enough for the step size of an iteration.
     pub(crate) fn scale(&self, into: &mut Vec<f64>) {
         into.extend_from_slice(&self.mobilities);
     }
 
-    /// What displacements that it does not know of yet, one a vertex as a share of its step (m/s), change of its acceleration in the step
-    /// that comes, m/s²: elastic forces take back what is stiff (docs/theory/soft.md, eq. 16d).
+    /// Change of its acceleration in the coming step, m/s², by displacements that its state does not yet contain, one for each vertex and
+    /// divided by its step (m/s): elastic forces cancel those in stiff directions (docs/theory/soft.md, eq. 16d).
     pub(crate) fn take_back(&self, borne: bool, shares: &mut [DVec3], room: &mut Vec<DVec3>) {
         room.clear();
         room.extend(shares.iter().zip(&self.mass_kg).map(|(share, mass)| *share * *mass));
@@ -67,11 +67,11 @@ impl SoftInertia {
         shares.iter_mut().zip(room).for_each(|(share, moved)| *share = (*moved * damped - *share * 2.0) / self.span_s);
     }
 
-    /// Turns impulses, one a slot (N·s), into the velocities they cause (m/s), with what it lies on, where that has `borne` them,
+    /// Replaces impulses, one for each slot (N·s), by the velocities they cause (m/s), with the supports where they have `borne` them,
     /// or without.
     ///
     /// # Panics
-    /// Where there are not as many as [`Self::slots`].
+    /// If their number differs from [`Self::slots`].
     pub fn respond(&self, impulses: &mut [DVec3], borne: bool) {
         assert_eq!(impulses.len(), self.slots(), "one impulse a slot");
         self.standing.factor().filter(|_| borne).unwrap_or(&self.factor).respond(impulses);
