@@ -46,7 +46,7 @@ pub enum RigidError {
     Obstacle {
         /// The obstacle's name.
         name: String,
-        /// What is wrong with its shape.
+        /// The error of its shape.
         source: ShapeError,
     },
     /// A joint is invalid.

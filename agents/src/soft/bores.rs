@@ -15,8 +15,8 @@ pub(super) struct Bores {
 }
 
 impl Bores {
-    /// Processes all places where a body meets the solid. A held body that starts deeper inside than `deep_m`, at places with
-    /// opposing ways out, passes through.
+    /// Processes all places where a body meets the solid. A held body that starts deeper inside than `deep_m`, at places whose
+    /// ways out diverge, passes through.
     pub fn follow(&mut self, places: &[Touch], held: bool, deep_m: f64) {
         let begins = !std::mem::replace(&mut self.begun, true);
         if begins && held && is_parted(places, deep_m) {

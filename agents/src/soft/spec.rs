@@ -122,7 +122,7 @@ pub enum SoftError {
     Obstacle {
         /// The obstacle's name.
         name: String,
-        /// What is wrong with its shape.
+        /// The error of its shape.
         source: ShapeError,
     },
 }
