@@ -1,12 +1,13 @@
 //! Momentum and energy of agents that keep different clocks, at one common time.
 //!
-//! In: what each published last, and of tubes what they weigh. Out: the sums, with every impulse that was given and not yet
-//! taken delivered as its taker will: v + W dJ, x + W (t dJ − dS) at the taker's own time (docs/theory/coupling.md, eq. 3).
-//! After that rigid bodies fly to the common time; what presses a body on the ground that it stands on goes into the ground. Never here: how anybody steps. Energies simply added over two clocks count
-//! the half of a blow that its owner has felt and the other not yet.
+//! In: the snapshot that each agent published last, and the masses of tubes. Out: the sums, with every impulse that was given and not
+//! yet taken applied as its receiver will apply it: v + W dJ, x + W (t dJ − dS) at the receiver's own time
+//! (docs/theory/coupling.md, eq. 3). After that rigid bodies fly to the common time; an impulse that presses a body on the ground that
+//! supports it goes into the ground. Never here: how agents step. Plain addition of the energies of two clocks would count the half
+//! of an impact that its owner has felt, but not the half that the peer has still to receive.
 //!
-//! Exact for rigid bodies whose acceleration is constant meanwhile. Of tubes the state counts as it was published, with the
-//! change of velocities: what a shift of positions does to the elastic energy is left out, of second order in the impulse.
+//! Exact for rigid bodies whose acceleration is constant in between. For tubes the state counts as published, with the
+//! change of velocities: the effect of a shift of positions on the elastic energy is left out; it is of second order in the impulse.
 
 mod acted;
 
@@ -19,35 +20,35 @@ use metachron_core::{Impulse, Ledger, Site};
 /// An agent as the audit sees it.
 #[derive(Debug, Clone, Copy)]
 pub struct Member<'a> {
-    /// Who.
+    /// The agent.
     pub id: AgentId,
-    /// What it published last.
+    /// The snapshot that it published last.
     pub snapshot: &'a Snapshot,
-    /// Of a tube its mass per length, kg/m; of others not read.
+    /// Mass per length of a tube, kg/m; not read for other agents.
     pub mass_per_length_kg_m: f64,
-    /// Of a tube its rotary inertia ρI about a diameter, per length, kg·m; of others not read.
+    /// Rotary inertia ρI of a tube about a diameter, per length, kg·m; not read for other agents.
     pub rotary_kg_m: f64,
 }
 
 /// The sums at the common time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Audit {
-    /// Kinetic and potential energy, and of tubes elastic, joules.
+    /// Kinetic and potential energy, for tubes also elastic, joules.
     pub energy_j: f64,
     /// Linear momentum, kg·m/s.
     pub momentum: DVec3,
     /// Angular momentum about the origin, kg·m²/s.
     pub angular: DVec3,
-    /// Magnitudes of the impulses that were on their way, N·s.
+    /// Sum of the magnitudes of the impulses in flight, N·s.
     pub in_flight_n_s: f64,
     /// The same for the angular impulses, N·m·s.
     pub in_flight_n_m_s: f64,
 }
 
-/// Audits agents at `at`. Tools and bodies that nothing moves count for nothing: what they are given leaves the system.
+/// Audits agents at `at`. Tools and bodies that nothing moves are not counted: impulses given to them leave the system.
 ///
-/// `potential` gives the potential energy in joules of a rigid body in a state, of gravity and of springs from outside; that of
-/// tubes is in what they publish.
+/// `potential` gives the potential energy in joules of a rigid body in a state, from gravity and external springs; that of
+/// tubes is part of what they publish.
 #[must_use]
 pub fn audit(members: &[Member<'_>], at: SimTime, potential: &mut dyn FnMut(AgentId, &RigidState) -> f64) -> Audit {
     let mut sum = Audit::default();
@@ -61,7 +62,7 @@ pub fn audit(members: &[Member<'_>], at: SimTime, potential: &mut dyn FnMut(Agen
     sum
 }
 
-/// What others have given `member` and it has not taken: who, where, dJ, and t dJ − dS at its own time.
+/// Visits the impulses that peers have given `member` and that it has not taken: giver, site, dJ, and t dJ − dS at its own time.
 pub fn on_their_way(
     member: &Member<'_>,
     members: &[Member<'_>],
@@ -76,7 +77,7 @@ pub fn on_their_way(
     }
 }
 
-/// A rigid body at the time `at`, with all that is on its way; `None` for what is none.
+/// The state of a rigid body at the time `at`, with all impulses in flight applied; `None` for any other body.
 #[must_use]
 pub fn settled(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> Option<RigidState> {
     let (Body::Rigid(mut state), Inertia::Rigid { inverse_mass, inverse_inertia }) =
@@ -145,7 +146,7 @@ fn rigid(
     let Inertia::Rigid { inverse_mass, inverse_inertia } = member.snapshot.inertia else { return };
     let Some(state) = settled(member, members, at) else { return };
     on_their_way(member, members, |_, _, dj, _| sum.on_its_way(dj));
-    // turning freely keeps the angular momentum and the energy: both are those of the published rotation
+    // free rotation keeps angular momentum and energy: both are those of the published rotation
     let (mass, inertia) = (1.0 / inverse_mass, inverse_inertia.inverse());
     let spun = inertia * state.spin;
     let spin_j = 0.5 * state.spin.dot(spun);
@@ -181,13 +182,13 @@ fn curve(sum: &mut Audit, member: &Member<'_>, members: &[Member<'_>], state: &C
     let velocity = |k: usize| state.velocities[k] + pushed[2 * k];
     let spin = |k: usize| spins.get(k).copied().unwrap_or_default() + pushed[2 * k + 1];
     let moved = CurveState { positions: (0..state.positions.len()).map(shifted).collect(), ..state.clone() };
-    // what a spring of the tube takes of them is its far end's: the sum over all is of what was given
+    // the part that a spring of the tube takes belongs to the body at its far end: the sum over all bodies is that of the given impulses
     let momentum = before.momentum + delivered;
     let after = Motion { momentum, ..Motion::of(member, &moved, velocity, spin) };
     after.add(sum, member.snapshot.energy_j, before.kinetic_j);
 }
 
-/// A tube that has not stepped yet, or that nobody could have touched: nothing is on its way to it.
+/// Adds a tube that has not stepped yet, or that no agent could have touched: no impulse is in flight to it.
 fn still(sum: &mut Audit, member: &Member<'_>, state: &CurveState) {
     let motion = Motion::of(member, state, |k| state.velocities[k], |_| DVec3::ZERO);
     motion.add(sum, member.snapshot.energy_j, motion.kinetic_j);
@@ -230,8 +231,8 @@ impl Motion {
     }
 }
 
-/// How a rigid body of this mass and these principal moments answers impulses when it is turned by `rotation`: what a
-/// snapshot of it says ([`Inertia::Rigid`]).
+/// The response to impulses of a rigid body of this mass and these principal moments when it is turned by `rotation`, as
+/// its snapshot publishes it ([`Inertia::Rigid`]).
 #[must_use]
 pub fn rigid_inertia(mass_kg: f64, moments_kg_m2: DVec3, rotation: DQuat) -> Inertia {
     let turn = DMat3::from_quat(rotation);
@@ -280,7 +281,7 @@ mod tests {
 
     #[test]
     fn a_blow_that_only_its_owner_has_felt_is_whole() {
-        // one of two equal bodies meets the other, elastically, at 0.15 s: it has stopped, and the other has not heard
+        // one of two equal bodies meets the other, elastically, at 0.15 s: it has stopped, and the other has not received its impulse
         let blow = DVec3::X * 2.0;
         let mut owner = ball(0.2, DVec3::ZERO, DVec3::ZERO, DVec3::ZERO);
         let mut ledger = Ledger::new(AgentId(1));
@@ -292,7 +293,7 @@ mod tests {
         let before = sum(&owner, &other);
         assert!((before.energy_j - 1.0).abs() < 1e-12 && before.momentum == blow, "{before:?}"); // 2 kg at 1 m/s
         assert_eq!(before.in_flight_n_s, 2.0);
-        // 0.05 s after the blow at 1 m/s, on the line through the origin: no angular momentum
+        // 0.05 s after the impact at 1 m/s, on the line through the origin: no angular momentum
         assert!(before.angular.length() < 1e-15);
         other.taken.push(Ledger { with: AgentId(0), ..ledger });
         assert_eq!(sum(&owner, &other).momentum, DVec3::ZERO, "what was taken is not delivered again");
@@ -310,7 +311,7 @@ mod tests {
         assert!((of(&pushed).angular - of(&owner).angular - twist).length() < 1e-15);
     }
 
-    /// A free tube that a hand has swung for a while.
+    /// A free tube that a user spring has swung for a while.
     fn swung() -> Tube {
         let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
         let section = Section::hollow(0.015, 0.002, material);
@@ -341,7 +342,7 @@ mod tests {
         let sum = audit(&[member], SimTime::ZERO, &mut |_, _| 0.0);
         let (momentum, angular) = tube.momentum();
         assert!(momentum.length() > 0.1 && (sum.momentum - momentum).length() < 1e-14, "{sum:?} {momentum}");
-        // a tube that nobody is near does not publish how its segments turn: a tenth of a thousandth of the whole
+        // a tube with no agent near does not publish how its segments turn: a tenth of a thousandth of the whole
         assert!((sum.angular - angular).length() < 1e-3 * angular.length(), "{sum:?} {angular}");
         assert!((sum.energy_j - tube.energy_j()).abs() < 1e-14); // one sum and one difference
     }

@@ -1,13 +1,13 @@
-//! One contact: which velocities it joins, and what it asks of them (docs/theory/contact.md, eq. 1–4).
+//! One contact: which velocities it joins, and the conditions it puts on them (docs/theory/contact.md, eq. 1–4).
 
 use glam::DVec3;
 use metachron_core::Slots;
 
-/// How much of a penetration a step takes back: 0.2 of the depth. More turns depth into speed: at 1 a body laid 1 cm
+/// Share of a penetration that a step corrects: 0.2 of the depth. More turns depth into speed: at 1 a body placed 1 cm
 /// deep leaves at 2.5 m/s with steps of 4 ms.
 pub const PUSH_OUT_SHARE: f64 = 0.2;
 
-/// The fastest push-out, m/s: a body found deep inside another comes out slowly and not like a shot.
+/// The fastest push-out, m/s: a body found deep inside another comes out slowly instead of being shot out.
 const PUSH_OUT_MAX_M_S: f64 = 0.5;
 
 /// A place where two bodies touch, or may touch within the step.
@@ -26,16 +26,16 @@ pub struct Contact {
     /// Speed at which the surfaces must part, m/s, ≥ 0: restitution times the speed of the approach. Zero for contact
     /// that does not bounce.
     pub rebound_m_s: f64,
-    /// The velocity across the normal by which the two are to come back to where friction holds them, m/s, with its sign turned: what
-    /// friction brings to zero is u + this.
+    /// The velocity across the normal by which the two bodies are to return to where friction holds them, m/s, with reversed sign:
+    /// friction brings u + this to zero.
     pub back_m_s: DVec3,
-    /// Age of what is known of the other body, seconds, ≥ 0. A depth is taken back over this where it is longer than the
-    /// step: what has been pushed out already shows only that much later.
+    /// Age of the other body's state, seconds, ≥ 0. A depth is corrected over this time where it is longer than the step: the effect
+    /// of a push-out becomes visible only that much later.
     pub age_s: f64,
 }
 
 impl Contact {
-    /// The normal velocity that the contact adds to the real one before it asks for u·n + bias ≥ 0 (eq. 3, 4).
+    /// The velocity added to the real normal velocity before the condition u·n + bias ≥ 0 (eq. 3, 4).
     #[must_use]
     pub fn bias_m_s(&self, h: f64) -> f64 {
         let bias = if self.gap_m >= 0.0 {
@@ -46,7 +46,7 @@ impl Contact {
         if self.rebound_m_s > 0.0 { bias.min(-self.rebound_m_s) } else { bias }
     }
 
-    /// Asks no more for what is inside to come out.
+    /// Stops pushing out an overlap: neither depth nor rebound count any more.
     pub fn leave_inside(&mut self) {
         (self.gap_m, self.rebound_m_s) = (self.gap_m.max(0.0), 0.0);
     }

@@ -1,20 +1,20 @@
-//! W of a few contacts written out, where many products with it are to come.
+//! Explicit W of a few contacts, for solves that need many products with it.
 //!
-//! In: contacts, a body's answer to impulses. Out: products W λ at the cost of the contacts alone. Never here: when that pays
-//! ([`super::solver`]). Theory: docs/theory/contact.md, eq. 5.
+//! In: contacts, a body's response to impulses. Out: products W λ at a cost that depends on the contacts alone. Never here: when that
+//! is cheaper ([`super::solver`]). Theory: docs/theory/contact.md, eq. 5.
 
 use super::{Contact, Response};
 use glam::{DMat3, DVec3};
 
-/// W = J A⁻¹ Jᵀ (1/kg): what an impulse at each contact does to each.
+/// W = J A⁻¹ Jᵀ (1/kg): the velocity at each contact caused by an impulse at each.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Formed {
-    /// One a pair of contacts, those that one impulse moves one after the other; none while it is not formed.
+    /// One block for each pair of contacts, those of one impulse in a row; empty while W is not formed.
     blocks: Vec<DMat3>,
 }
 
 impl Formed {
-    /// Forms W by three answers a contact; `room` has one entry a slot.
+    /// Forms W from three responses for each contact; `room` has one entry for each slot.
     pub fn form(&mut self, contacts: &[Contact], body: &mut impl Response, room: &mut [DVec3]) {
         self.blocks.clear();
         for pushed in contacts {
@@ -39,7 +39,7 @@ impl Formed {
         !self.blocks.is_empty()
     }
 
-    /// W λ, a velocity a contact.
+    /// W λ, one velocity for each contact.
     pub fn times(&self, lambda: &[DVec3], caused: &mut Vec<DVec3>) {
         caused.clear();
         caused.resize(lambda.len(), DVec3::ZERO);

@@ -1,7 +1,7 @@
-//! What agents do to each other: contact laws, the ledger between different clocks, and one agent as another expects it.
+//! Interaction between agents: contact laws, the ledger between different clocks, and the prediction of a peer's motion.
 //!
-//! In: contacts, free velocities and how bodies answer impulses; what neighbours published. Out: impulses, and the account of
-//! them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
+//! In: contacts, free velocities and how bodies respond to impulses; snapshots of neighbours. Out: impulses, and the ledgers that
+//! record them. Never here: any model's own state, threads. Theory: `docs/theory/contact.md`, `docs/theory/coupling.md`.
 
 pub mod agent;
 pub mod audit;

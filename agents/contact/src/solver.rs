@@ -1,15 +1,15 @@
-//! The impulses of many contacts at once: accelerated projected gradient (MHNT15) on Signorini's and Coulomb's laws.
+//! The impulses of many simultaneous contacts: accelerated projected gradient (MHNT15) on Signorini's and Coulomb's laws.
 //!
-//! In: contacts, the free velocities, and a body's answer to impulses. Out: the impulses, and the velocities after them.
-//! Each iteration costs one answer, however many contacts there are, or none where W is formed. Theory: docs/theory/contact.md, eq. 5–11.
+//! In: contacts, the free velocities, and a body's response to impulses. Out: the impulses, and the velocities after them.
+//! Each iteration costs one response, for any number of contacts, or none where W is formed. Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::Contact;
 use super::delassus::Formed;
 use glam::DVec3;
 
-/// How a body answers impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
+/// The response of a body to impulses: the operator A⁻¹ of (eq. 5), symmetric and positive.
 pub trait Response {
-    /// Turns impulses, one a slot, into the changes of velocity they cause. Linear.
+    /// Replaces impulses, one for each slot, by the changes of velocity they cause. Linear.
     fn respond(&mut self, impulses: &mut [DVec3]);
 }
 
@@ -19,12 +19,12 @@ impl<F: FnMut(&mut [DVec3])> Response for F {
     }
 }
 
-/// When the iteration stops.
+/// Stopping criteria of the iteration.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The most answers a solve may ask for, ≥ 1. Fewer leave friction creeping and piles sinking.
+    /// The most responses that a solve may use, ≥ 1. Fewer leave friction creeping and piles sinking.
     pub iterations: u32,
-    /// The error of velocity at which a solve is done, m/s, > 0. A millionth of a metre a step is far below any drawing.
+    /// The error of velocity at which a solve is done, m/s, > 0. A millionth of a metre a step is far below what a picture shows.
     pub tolerance_m_s: f64,
 }
 
@@ -33,33 +33,33 @@ pub struct Settings {
 pub struct Problem<'a> {
     /// The contacts, by rising keys.
     pub contacts: &'a [Contact],
-    /// How far, in keys, the names lie that a contact may have had in the last solve: a place that passes from one
+    /// Differences of keys by which a contact may have been named otherwise in the last solve: a place that passes from one
     /// segment to the next takes its impulse along.
     pub kin: &'a [i64],
     /// The step, seconds, > 0.
     pub h_s: f64,
     /// A scale of each slot's inverse mass, 1/kg, or 1/(kg·m²) for a spin; ≥ 0. Only the speed of convergence depends on it.
     pub mobilities: &'a [f64],
-    /// When the iteration stops.
+    /// Stopping criteria of the iteration.
     pub settings: Settings,
 }
 
-/// How a solve went.
+/// Result of a solve.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct SolverReport {
-    /// Products with W, each an answer of the body where W is not formed.
+    /// Products with W, each a response of the body where W is not formed.
     pub iterations: u32,
-    /// The largest velocity by which a contact still fails its law, m/s.
+    /// The largest velocity by which a contact still violates its law, m/s.
     pub residual_m_s: f64,
 }
 
-/// The memory of the solve: warm starts by key, and room to work in (nothing is allocated once the sizes settle).
+/// The state kept between solves: warm starts by key, and scratch storage (nothing is allocated once the sizes settle).
 #[derive(Debug, Clone, Default)]
 pub struct Solver {
     known: Vec<Known>,
     known_h: f64,
     stiffness: f64,
-    /// The same three as the last solve found them.
+    /// The same three values as they were before the last solve.
     before: (Vec<Known>, f64, f64),
     scale: Vec<f64>,
     free: Vec<DVec3>,
@@ -67,7 +67,7 @@ pub struct Solver {
     ahead: Iterate,
     next: Iterate,
     answer: Vec<DVec3>,
-    /// Whether W may be formed: an answer is dear beside a product with the W of as many contacts.
+    /// Whether W may be formed: for bodies whose response is expensive compared with a product with the W of as many contacts.
     forms: bool,
     formed: Formed,
     /// Products that the last solve took.
@@ -79,7 +79,7 @@ pub struct Solver {
 struct Known {
     key: u64,
     lambda: DVec3,
-    /// Whether a contact of this solve has taken it up.
+    /// Whether a contact of this solve has used it.
     taken: bool,
 }
 
@@ -90,36 +90,36 @@ struct Iterate {
     caused: Vec<DVec3>,
 }
 
-/// How far past the measured need the step bound is raised: a little, so that rounding does not ask for it again.
+/// Factor by which the step bound is raised past the measured need: a little, so that rounding does not raise it again.
 const BOUND_MARGIN: f64 = 1.02;
 /// The share of the step bound that a new solve starts from: contacts come and go, a bound that only rises slows all later ones.
 const BOUND_DECAY: f64 = 0.9;
-/// The least mobility, 1/kg: a contact between held matter only has none, and any number will do.
+/// The least mobility, 1/kg: a contact between held nodes only has none, and any number will do.
 const MOBILITY_MIN: f64 = 1e-12;
-/// Where the last solve ended before its tolerance W is formed for up to so many times the answers that it may take.
+/// Where the last solve ended before its tolerance, W is formed if that costs up to this many times the allowed responses.
 const DEAR: usize = 3;
-/// The most products with a W that is formed.
+/// The most products with a formed W.
 const FORMED_PRODUCTS: u32 = 2_000;
 
 impl Solver {
-    /// A solver that forms W where the last solve took more answers than that costs.
+    /// A solver that forms W where the last solve used more responses than forming it costs.
     #[must_use]
     pub fn forming() -> Self {
         Self { forms: true, ..Self::default() }
     }
 
-    /// Forgets every warm start: keys have lost their meaning (the body was divided anew).
+    /// Drops every warm start: keys have lost their meaning (the body was divided anew).
     pub fn forget(&mut self) {
         self.known.clear();
     }
 
-    /// Forgets all of the solves before, the bound of eq. 11 with them.
+    /// Drops the history of all earlier solves, including the bound of eq. 11.
     pub fn start_afresh(&mut self) {
         self.forget();
         self.stiffness = 1.0;
     }
 
-    /// Forgets the last solve alone: it was asked with what turned out to be wrong.
+    /// Undoes the last solve's effect on warm starts: its input turned out to be wrong.
     pub fn take_back(&mut self) {
         std::mem::swap(&mut self.known, &mut self.before.0);
         self.known.iter_mut().for_each(|known| known.taken = false);
@@ -132,7 +132,7 @@ impl Solver {
         &self.now.lambda
     }
 
-    /// Finds the impulses and adds what they do to `velocities`, one entry a slot (eq. 5–8).
+    /// Finds the impulses and adds the changes they cause to `velocities`, one entry for each slot (eq. 5–8).
     pub fn solve(&mut self, problem: &Problem<'_>, velocities: &mut [DVec3], body: &mut impl Response) -> SolverReport {
         if problem.contacts.is_empty() {
             self.now.lambda.clear();
@@ -158,7 +158,7 @@ impl Solver {
         self.stiffness = (self.stiffness * BOUND_DECAY).max(1.0);
     }
 
-    /// Starts from the impulses of the last solve: those of the same name, then those of kin that no longer are.
+    /// Starts from the impulses of the last solve: those with the same key, then those with a related key (`kin`) that no longer exist.
     fn start(&mut self, problem: &Problem<'_>) {
         let Self { known, known_h, now, .. } = self;
         let longer = if *known_h > 0.0 { problem.h_s / *known_h } else { 0.0 };
@@ -216,7 +216,7 @@ impl Solver {
         loop {
             self.descend(contacts);
             report.residual_m_s = self.residual();
-            // `answer` must belong to `now`: no stop between a refused move and the next one
+            // `answer` must belong to `now`: no stop between a rejected move and the next one
             if taken && (report.residual_m_s <= settings.tolerance_m_s || report.iterations >= most) {
                 break;
             }
@@ -235,7 +235,7 @@ impl Solver {
         report
     }
 
-    /// Forms W where that costs less than the last solve did; the most products that may be taken.
+    /// Forms W where that costs less than the last solve did; returns the most products allowed.
     fn form(&mut self, problem: &Problem<'_>, body: &mut impl Response) -> u32 {
         let Problem { contacts, settings, .. } = *problem;
         let (columns, taken) = (3 * contacts.len(), self.products as usize);
@@ -278,7 +278,7 @@ impl Solver {
         holds
     }
 
-    /// Takes the move and looks ahead of it; starts afresh where looking ahead went uphill.
+    /// Accepts the move and extrapolates; restarts the momentum where the extrapolation went uphill.
     fn advance(&mut self, momentum: f64) -> f64 {
         let uphill: f64 = (0..self.next.lambda.len())
             .map(|i| {
@@ -298,8 +298,8 @@ impl Solver {
     }
 }
 
-/// The inverse mass of both sides of a contact along its normal, 1/kg: n·J A⁻¹ Jᵀ n over the slots before `own`, and over those from
-/// there on, of `slots` in all. One answer; nothing is allocated once `room` has its size.
+/// The inverse masses of both sides of a contact along its normal, 1/kg: n·J A⁻¹ Jᵀ n over the slots before `own`, and over those from
+/// there on, of `slots` in all. One response; nothing is allocated once `room` has its size.
 pub fn inverse_mass(
     contact: &Contact,
     (own, slots): (usize, usize),

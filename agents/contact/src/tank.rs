@@ -1,15 +1,15 @@
-//! The energy that the coupling of one pair may still add: what each pair's account has in common.
+//! The energy that the coupling of one pair may still add: the part that the energy budgets of all kinds of pairs share.
 //!
-//! In: what impulses added. Out: what is left. Never here: what is counted as added, and what push-out makes of it (the pairs of
-//! rigid bodies and of bodies that bend each have their own). Theory: docs/theory/coupling.md, section 5.
+//! In: the energy that impulses added. Out: the energy left. Never here: which work counts as added, and how push-out depends on it
+//! (pairs of rigid bodies and pairs with deformables each have their own rule). Theory: docs/theory/coupling.md, section 5.
 
-/// The speed whose energy a tank holds at the start, m/s: what the push-out of a few steps may spend before it fades.
+/// The speed whose kinetic energy a tank holds at the start, m/s: enough for the push-out of a few steps before it fades.
 pub const RESERVE_M_S: f64 = 0.1;
-/// An empty tank is full again after this, seconds, and a debt goes down to a third: a watchdog that never forgave would let
-/// bodies sink for good.
+/// Time in which an empty tank fills up again and a debt decays to a third, seconds: without recovery push-out would stay off and
+/// bodies would sink for good.
 pub const REFILL_S: f64 = 1.0;
 
-/// The energy account of one pair.
+/// The energy budget of one pair.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Tank {
     left_j: f64,
@@ -17,32 +17,32 @@ pub struct Tank {
 }
 
 impl Tank {
-    /// A full one, for a pair whose reduced mass is `mass_kg`.
+    /// A full tank, for a pair whose reduced mass is `mass_kg`.
     #[must_use]
     pub fn of(mass_kg: f64) -> Self {
         let reserve_j = 0.5 * mass_kg * RESERVE_M_S * RESERVE_M_S;
         Self { left_j: reserve_j, reserve_j }
     }
 
-    /// What is left, joules; below zero where more was added than the tank held.
+    /// The energy left, joules; below zero where more was added than the tank held.
     #[must_use]
     pub const fn left_j(&self) -> f64 {
         self.left_j
     }
 
-    /// What it held at the start, joules.
+    /// The energy at the start, joules.
     #[must_use]
     pub const fn reserve_j(&self) -> f64 {
         self.reserve_j
     }
 
-    /// What is left as a share of what it held at the start.
+    /// The energy left as a share of that at the start.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.left_j / self.reserve_j
     }
 
-    /// Books the energy that impulses added, joules. A full tank takes in no more: what contact took long ago pays for nothing.
+    /// Books the energy that impulses added, joules. A full tank takes in no more: energy that contact dissipated long ago gives no credit.
     pub fn spend(&mut self, work_j: f64) {
         self.left_j = (self.left_j - work_j).min(self.reserve_j);
     }

@@ -26,7 +26,7 @@ impl Slots {
     /// Adds the velocity that the spin in `slot` gives at the end of `arm_m`.
     ///
     /// # Panics
-    /// At the fifth call: a point lies on one segment at most.
+    /// At the fifth call: a point belongs to one segment at most.
     pub fn add_angular(&mut self, slot: u32, arm_m: DVec3) {
         self.angular[usize::from(self.counts[1])] = (slot, arm_m);
         self.counts[1] += 1;
@@ -48,12 +48,12 @@ impl Slots {
         self.velocity_of_nodes(velocities) + angular
     }
 
-    /// The part of the relative velocity that nodes give: spins move a round skin across its normal only.
+    /// The part of the relative velocity that nodes contribute: spins move a round skin only across its normal.
     pub fn velocity_of_nodes(&self, velocities: &[DVec3]) -> DVec3 {
         self.linear().iter().map(|&(slot, w)| velocities[slot as usize] * w).sum()
     }
 
-    /// The part of it that the slots from `first` on give.
+    /// The part of the relative velocity that the slots from `first` on contribute.
     pub fn velocity_from(&self, first: usize, velocities: &[DVec3]) -> DVec3 {
         let is_in = |slot: u32| slot as usize >= first;
         let linear =
@@ -62,7 +62,7 @@ impl Slots {
         linear.sum::<DVec3>() + angular.map(|&(slot, arm)| velocities[slot as usize].cross(arm)).sum::<DVec3>()
     }
 
-    /// The linear velocities among the first `own` slots that it gathers, with their weights.
+    /// The linear velocities that it gathers among the first `own` slots, with their weights.
     pub fn own(&self, own: usize) -> Self {
         let mut slots = Self::default();
         let first = self.linear().iter().filter(|(slot, _)| (*slot as usize) < own);
@@ -70,7 +70,7 @@ impl Slots {
         slots
     }
 
-    /// Marks the slots of a contact with something fixed: those of two parts of one body have weights of both signs.
+    /// Marks the slots of a contact with something fixed; contacts of two parts of one body have weights of both signs and mark nothing.
     pub fn mark_fixed(&self, fixed: &mut [bool]) {
         if self.linear().iter().all(|(_, weight)| *weight >= 0.0) {
             self.linear().iter().for_each(|(slot, _)| fixed[*slot as usize] = true);
@@ -97,7 +97,7 @@ impl Slots {
         }
     }
 
-    /// The same of the slots that `into` knows.
+    /// The same, restricted to the slots that `into` holds.
     pub fn scatter_known(&self, impulse: DVec3, into: &mut [DVec3]) {
         for &(slot, w) in self.linear() {
             into.get_mut(slot as usize).into_iter().for_each(|sum| *sum += impulse * w);

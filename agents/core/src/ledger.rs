@@ -1,13 +1,13 @@
-//! The ledger of a coupling: what its owner has given to one other agent, from the start, so that no reading can go wrong.
+//! The ledger of a coupling: all impulses that its owner has given to one peer since the start, so that no reading can go wrong.
 //!
-//! In: impulses with the time they acted. Out: what has been given since an earlier reading. Counters are cumulative: a
-//! reading that is lost, late or made twice changes nothing (docs/theory/coupling.md, eq. 1–4). Never here: who touches whom.
+//! In: impulses with the times at which they acted. Out: the impulses given since an earlier reading. Counters are cumulative: a
+//! reading that is lost, late or repeated changes nothing (docs/theory/coupling.md, eq. 1–4). Never here: which agents touch.
 //!
-//! Sums of impulse and of impulse × time grow without end and would cancel badly; they are kept on pages, each with its own
-//! origin of time. A page is closed after a second and torn out once the other side has acknowledged all of it.
+//! Sums of impulse and of impulse × time grow without end and would cancel badly; they are stored on pages, each with its own
+//! time origin. A page is closed after a second and dropped once the peer has acknowledged all of it.
 //!
-//! A slow owner publishes a step when it begins: what acts late in it stands in a list beside the sums, so that a faster
-//! reader takes each impulse when its time has come, and not all of them at once.
+//! A slow owner publishes a step when it begins: impulses that act late in it are also listed separately (`coming`), so that a faster
+//! reader takes each impulse when it is due, and not all of them together.
 
 use crate::{AgentId, SimSpan, SimTime};
 use glam::DVec3;
@@ -34,7 +34,7 @@ pub enum Site {
     Vertex(u32),
 }
 
-/// What one site was given on one page.
+/// The sums that one site was given on one page.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Entry {
     /// Which site.
@@ -50,45 +50,45 @@ pub struct Entry {
 pub struct Page {
     /// Pages of a ledger are numbered from zero.
     pub number: u64,
-    /// From when the times in [`Entry::moment`] count.
+    /// Origin of the times in [`Entry::moment`].
     pub origin: SimTime,
-    /// What each site was given, by rising sites.
+    /// The sums of each site, by rising sites.
     pub entries: Vec<Entry>,
 }
 
 /// An impulse that acts late in the owner's newest step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coming {
-    /// From when on it may be taken.
+    /// The earliest time at which it may be taken.
     pub due: SimTime,
     /// When it acts.
     pub acts: SimTime,
-    /// The number of the page on which it stands.
+    /// The number of the page that contains it.
     pub page: u64,
-    /// What it adds to that page.
+    /// Its contribution to that page.
     pub entry: Entry,
 }
 
-/// What a body as a whole has taken before it was booked, or not yet taken of what was: it lets a force go on evenly.
+/// The difference between the impulse that a rigid body has taken and the booked one, of either sign: it lets a force continue evenly.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ahead {
     /// The impulse taken beyond the ledger.
     pub sum: Impulse,
-    /// Over which time it acts: evenly around so many seconds after this.
+    /// Start of the time over which it acts: evenly around `middle_s` seconds after this.
     pub from: SimTime,
-    /// See [`Self::from`]; below zero before it.
+    /// See [`Self::from`]; negative before it.
     pub middle_s: f64,
 }
 
 impl Ahead {
-    /// How far it has carried by the time `at`: its impulse times the seconds since.
+    /// Its effect on positions by the time `at`: its impulse times the seconds since.
     #[must_use]
     pub fn carried(&self, at: SimTime) -> Impulse {
         self.sum * (at.secs_after(self.from) - self.middle_s)
     }
 }
 
-/// What the owner of a coupling has given to the other side; the other side keeps a copy of what it has taken.
+/// All that the owner of a coupling has given to the peer; the peer keeps a copy of all that it has taken.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Ledger {
     /// The agent on the other side.
@@ -97,17 +97,17 @@ pub struct Ledger {
     pub revision: u64,
     /// Pages not yet acknowledged and the one in use, by rising numbers: two at most.
     pub pages: Vec<Page>,
-    /// Of the owner: what of the page in use acts late in its newest step. Of a copy: what it has left out.
+    /// In the owner's ledger: the parts of the page in use that act late in its newest step. In a copy: the parts not yet taken.
     pub coming: Vec<Coming>,
-    /// In a copy: what was taken beyond it.
+    /// In a copy: the impulse taken beyond it.
     pub ahead: Option<Ahead>,
-    /// Of the owner: what it gives to a body as a whole a second and is expected to go on giving, N and N·m.
+    /// In the owner's ledger: the force and torque on a rigid body that it expects to go on giving, N and N·m.
     pub force: Impulse,
 }
 
-/// How long a page is written on, seconds.
+/// How long a page is in use, seconds.
 const PAGE_S: f64 = 1.0;
-/// Impulses that act within so long of each other are taken together, nanoseconds: a millisecond, in which a body falls 5 µm.
+/// Impulses that act within this time of each other are taken together, nanoseconds: a millisecond, in which a body falls 5 µm.
 const GRAIN_NS: u64 = 1_000_000;
 
 impl Impulse {
@@ -215,14 +215,14 @@ impl Ledger {
         }
     }
 
-    /// Books an impulse that acts and may be taken so many seconds after `time`, past the end of the owner's step too.
+    /// Books an impulse that acts `acts_s` and may be taken `due_s` seconds after `time`, possibly past the end of the owner's step.
     pub fn give_late(&mut self, site: Site, time: SimTime, [acts_s, due_s]: [f64; 2], impulse: Impulse) {
         let (page, entry) = self.book(site, time, acts_s, impulse);
         let [acts, due] = [acts_s, due_s].map(|s| time + SimSpan::from_secs_f64(s).unwrap_or(SimSpan::ZERO));
         self.announce(Coming { due, acts, page, entry });
     }
 
-    /// Writes on the page in use: its number, and what was written.
+    /// Books on the page in use; returns its number and the booked entry.
     fn book(&mut self, site: Site, time: SimTime, after_s: f64, impulse: Impulse) -> (u64, Entry) {
         if self.pages.is_empty() {
             self.pages.push(Page { number: 0, origin: time, entries: Vec::new() });
@@ -235,7 +235,7 @@ impl Ledger {
         (page.number, entry)
     }
 
-    /// Notes that a part of a page acts late.
+    /// Lists a part of a page that acts late.
     fn announce(&mut self, part: Coming) {
         let same = |known: &&mut Coming| {
             (known.due, known.acts, known.page) == (part.due, part.acts, part.page)
@@ -247,11 +247,11 @@ impl Ledger {
         }
     }
 
-    /// Begins a step of the owner at `now`: what was to come has acted, but for what waits for somebody's answer. Tears out the pages that the other side has taken
-    /// whole, and turns over one that is full.
+    /// Begins a step of the owner at `now`: removes late parts from `coming`, as they have acted, except those that still wait for a
+    /// peer's answer. Drops the pages that the peer has taken completely, and starts a new page where the present one is full.
     ///
-    /// `taken` is the other side's copy, `None` where it has none yet. A full page is only turned when none waits before it:
-    /// a side that has stopped acknowledging costs two pages and no more.
+    /// `taken` is the peer's copy, `None` where it has none yet. A new page starts only when no older one waits:
+    /// a peer that has stopped acknowledging costs two pages and no more.
     pub fn turn(&mut self, taken: Option<&Self>, now: SimTime) {
         self.coming.retain(|coming| coming.due > coming.acts && coming.due > now);
         let settled = |page: &Page| taken.and_then(|t| t.page(page.number)).is_some_and(|t| t.entries == page.entries);
@@ -269,10 +269,10 @@ impl Ledger {
         }
     }
 
-    /// What this ledger holds beyond `earlier` (`None`: beyond nothing): dJ, and dJ t − dS at the time `at`. What `earlier` took
-    /// ahead comes back with the opposite sign.
+    /// The contents of this ledger beyond `earlier` (`None`: all of it): dJ, and dJ t − dS at the time `at`. The impulse that `earlier`
+    /// took ahead is returned with the opposite sign.
     ///
-    /// A page that only `earlier` has was torn out because all of it was taken: it counts for nothing.
+    /// A page that only `earlier` has was dropped because all of it was taken: it counts for nothing.
     pub fn since(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
         if let Some(ahead) = earlier.and_then(|e| e.ahead) {
             visit(Site::Whole, -ahead.sum, -ahead.carried(at));
@@ -280,7 +280,7 @@ impl Ledger {
         self.beyond(earlier, at, visit);
     }
 
-    /// The same without what was taken ahead.
+    /// The same without the impulse taken ahead.
     pub fn beyond(&self, earlier: Option<&Self>, at: SimTime, mut visit: impl FnMut(Site, Impulse, Impulse)) {
         for page in &self.pages {
             let known = earlier.and_then(|e| e.page(page.number));
@@ -298,14 +298,14 @@ impl Ledger {
         }
     }
 
-    /// Whether this ledger is a later one than the copy `taken`, or that one has left out what may be due by now.
+    /// Whether this ledger is later than the copy `taken`, or that copy has left out impulses that may be due by now.
     #[must_use]
     pub fn is_beyond(&self, taken: &Self) -> bool {
         let open = !taken.coming.is_empty() || taken.ahead.is_some();
         self.revision > taken.revision || (self.revision == taken.revision && open)
     }
 
-    /// Whether `taken` holds all that this ledger does.
+    /// Whether `taken` contains all of this ledger.
     #[must_use]
     pub fn is_settled(&self, taken: Option<&Self>) -> bool {
         let mut settled = true;
@@ -320,7 +320,7 @@ impl Ledger {
         entries.map(|e| [e.sum, e.moment]).chain([[self.force; 2]]).flatten().all(|i| i.is_finite())
     }
 
-    /// Copies `given` into the storage of this one, but for what acts at `until` or later.
+    /// Copies `given` into the storage of this one, except the impulses that are due at `until` or later.
     pub fn read(&mut self, given: &Self, until: SimTime) {
         self.copy_from(given);
         let Self { pages, coming, .. } = self;
@@ -430,8 +430,8 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever is lost, repeated, seen late or not due yet, the other side ends with every impulse once, and with
-        /// their times.
+        /// The peer ends with every impulse exactly once, and at its time, whether readings are lost, repeated, late
+        /// or not due yet.
         #[test]
         fn every_schedule_delivers_each_impulse_once(
             steps in prop::collection::vec(
@@ -457,7 +457,7 @@ mod tests {
             };
             for (gap, size, site, late, what, after) in steps {
                 now = at(now + gap).as_secs_f64(); // times are whole nanoseconds
-                // what the owner sees of the other side may be old
+                // the peer's copy as the owner sees it may be old
                 let seen: Option<&Ledger> = acknowledged.len().checked_sub(1 + late).and_then(|i| acknowledged.get(i));
                 given.turn(seen, at(now));
                 for (after, size) in [(0.0, size), (after, 0.5 * size), (after, size)] {
@@ -469,10 +469,10 @@ mod tests {
                 total += size;
                 moment += size * (now + after);
                 published.push(given.clone());
-                // the other side reads the newest, an old one, or nothing
+                // the peer reads the newest, an old one, or nothing
                 let read = match what { 0 => None, 1 => published.last(), _ => published.get(published.len().saturating_sub(1 + late)) };
                 if let Some(ledger) = read {
-                    until = now.max(until) + 0.5 * gap; // no step of a reader ends before the one before it
+                    until = now.max(until) + 0.5 * gap; // no step of a reader ends before its previous one
                     take(ledger, &mut taken, now, until);
                     acknowledged.extend(taken.clone());
                 }

@@ -1,19 +1,19 @@
-//! Six by six: the algebra of a rigid body's velocity and spin.
+//! Six by six matrices: the algebra of a rigid body's velocity and spin.
 //!
 //! In: forces and stiffnesses at points of a body. Out: matrices on (linear, angular) about its centre of mass. Never here:
-//! what the points belong to.
+//! the springs or contacts that the points belong to.
 
 use glam::{DMat3, DVec3};
 
 /// A linear and an angular part about a body's centre of mass: velocities (m/s, rad/s) or forces (N, N·m).
 pub type Twist = [DVec3; 2];
 
-/// A matrix that takes one [`Twist`] to another, rows first.
+/// A matrix that maps one [`Twist`] to another, rows first.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Six(pub [[f64; 6]; 6]);
 
 impl Six {
-    /// Nothing but zeros.
+    /// The zero matrix.
     pub const ZERO: Self = Self([[0.0; 6]; 6]);
 
     /// The mass (kg) and the inertia tensor (kg·m²) of a body.
@@ -27,9 +27,9 @@ impl Six {
         whole
     }
 
-    /// Adds Gᵀ m G: what `m` at a point `r` from the centre, where G = (1, −r×), is about the centre.
+    /// Adds Gᵀ m G: the matrix `m` at a point `r` from the centre, carried over to the centre, G = (1, −r×).
     pub fn add_point(&mut self, r: DVec3, m: DMat3) {
-        // the rows of Gᵀ: forces pass as they are, torques as r ×
+        // the rows of Gᵀ: forces stay as they are, torques are r × force
         let rows: [DVec3; 6] = std::array::from_fn(|i| match i {
             0..3 => DVec3::AXES[i],
             _ => DVec3::AXES[i - 3].cross(r),
@@ -41,7 +41,7 @@ impl Six {
         }
     }
 
-    /// Adds g m gᵀ: what `m` along the direction `g` is.
+    /// Adds g m gᵀ: the scalar `m` along the direction `g`.
     pub fn add_outer(&mut self, g: Twist, m: f64) {
         let g = flat(g);
         for (row, a) in self.0.iter_mut().zip(g) {
@@ -49,7 +49,7 @@ impl Six {
         }
     }
 
-    /// Adds stiffness against turning across the arm `r`; about every axis where that has no length.
+    /// Adds stiffness against rotation across the arm `r`; about every axis where the arm has zero length.
     pub fn add_turning(&mut self, r: DVec3, stiffness: f64) {
         let axis = r.normalize_or_zero();
         for i in 0..3 {
@@ -76,7 +76,7 @@ impl Six {
         of_flat(whole)
     }
 
-    /// The x with this matrix times x = `right`, by LDLᵀ without pivots: the matrix must be symmetric and positive definite.
+    /// Solves this matrix · x = `right`, by LDLᵀ without pivots: the matrix must be symmetric and positive definite.
     #[must_use]
     pub fn solve(&self, right: Twist) -> Twist {
         of_flat(self.factored().solved(flat(right)))
@@ -94,13 +94,13 @@ impl Six {
         inverse
     }
 
-    /// The columns of L with L Lᵀ = this matrix, which must be symmetric and positive or zero in every direction; those that are
-    /// nothing are left out.
+    /// The columns of L with L Lᵀ = this matrix, which must be symmetric and positive semidefinite; zero columns
+    /// are left out.
     pub fn roots(&self) -> impl Iterator<Item = Twist> {
         let (mut left, mut roots) = (self.0, [[0.0; 6]; 6]);
         let largest = (0..6).map(|i| self.0[i][i]).fold(0.0, f64::max);
         for (j, root) in roots.iter_mut().enumerate() {
-            // below that it is rounding
+            // a pivot below that is rounding
             if left[j][j] <= 1e-12 * largest {
                 continue;
             }

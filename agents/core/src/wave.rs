@@ -3,15 +3,15 @@
 use crate::SimTime;
 use glam::DVec3;
 
-/// What one end publishes.
+/// The data that one end publishes.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Wave {
     /// ∫ w dt since the run began, N·s.
     pub sent: DVec3,
     /// The delay of the line, seconds; zero as long as the owner of the pair has not chosen it.
     pub delay_s: f64,
-    /// From this end to the other one when the line was made, metres; zero for a line of a contact.
+    /// Vector from this end to the other when the line was made, metres; zero for a line of a contact.
     pub start: DVec3,
-    /// From when on both ends feel how far the link was stretched when it was made.
+    /// The time from which both ends apply the initial stretch of the link.
     pub since: SimTime,
 }

@@ -1,4 +1,4 @@
-//! What others must know of an agent's shape to touch it, and where it is.
+//! The shape of an agent as its peers need it for contact, and its placement.
 //!
 //! In: solids, tubes, tools, soft surfaces. Out: [`Form`]s, fixed for an agent's life and shared, and [`Placed`] ones.
 //! Never here: how the nearest points are found ([`crate::narrow_phase`]).
@@ -22,19 +22,19 @@ pub struct Form {
 }
 
 impl Form {
-    /// How many ends of a tube are held in place; none of anything else.
+    /// How many ends of a tube are held in place; zero for anything else.
     #[must_use]
     pub const fn held_ends(&self) -> u8 {
         if let FormKind::Chain { held_ends, .. } = self.kind { held_ends } else { 0 }
     }
 
-    /// Whether it is thin and held somewhere: a sheet or rope that hangs, or is stretched.
+    /// Whether it is a thin soft body that is held somewhere: a hanging or stretched sheet or rope.
     #[must_use]
     pub const fn is_hung(&self) -> bool {
         matches!(&self.kind, FormKind::Surface(SurfaceForm { held: true, closed: false, .. }))
     }
 
-    /// Whether it bends and is held somewhere.
+    /// Whether it is deformable and held somewhere.
     #[must_use]
     pub const fn is_held(&self) -> bool {
         match &self.kind {
@@ -44,8 +44,8 @@ impl Form {
         }
     }
 
-    /// How high the middle of what bends is at the start, of what is held its lowest point, −g·x, J/kg; zero of what does not bend.
-    /// Of two that keep the same rate the higher owns (docs/decisions/0019).
+    /// The height of a deformable at the start, −g·x, J/kg: that of its middle, or of its lowest point where it is held; zero for a rigid
+    /// body or tool. Of two deformables that keep the same rate the higher one owns the pair (docs/decisions/0019).
     #[must_use]
     pub const fn height_j_kg(&self) -> f32 {
         match &self.kind {
@@ -56,7 +56,8 @@ impl Form {
     }
 }
 
-/// How high what bends is at its start, J/kg ([`Form::height_j_kg`]): what hangs from where it is `held` is as high as what it would bear lies.
+/// The height of a deformable at its start, J/kg ([`Form::height_j_kg`]). One that is `held` counts as high as its lowest point: a body
+/// that it would support starts there.
 pub fn height_j_kg(positions: &[DVec3], gravity: DVec3, held: bool) -> f32 {
     let heights = || positions.iter().map(|position| -gravity.dot(*position));
     let height =
@@ -76,16 +77,16 @@ pub enum FormKind {
         /// See [`Form::height_j_kg`].
         height_j_kg: f32,
     },
-    /// A tool: its parts depend on how far its jaws are open.
+    /// A tool: the placement of its parts depends on the jaw opening.
     Tool(ToolShape),
     /// The skin of a soft body: triangles and edges between vertices that move.
     Surface(SurfaceForm),
 }
 
-/// What holds the skin of a soft body together; it never changes.
+/// The topology of a soft body's skin; it never changes.
 #[derive(Debug, Clone)]
 pub struct SurfaceForm {
-    /// The vertices that lie on the skin, by rising numbers.
+    /// The vertices of the skin, by rising numbers.
     pub vertices: Arc<[u32]>,
     /// Pairs of vertices of the skin.
     pub edges: Arc<[[u32; 2]]>,
@@ -101,11 +102,11 @@ pub struct SurfaceForm {
     pub closed: bool,
     /// Whether it is held somewhere.
     pub held: bool,
-    /// What lies around each vertex and edge.
+    /// The neighbours of each vertex and edge.
     pub fans: Arc<Fans>,
 }
 
-/// A solid as others touch it.
+/// A solid as peers touch it.
 #[derive(Clone)]
 pub struct SolidForm {
     /// The solid.
@@ -118,7 +119,7 @@ pub struct SolidForm {
     pub radius_m: f64,
 }
 
-/// Where a form is.
+/// Placement of a form.
 #[derive(Debug, Clone, Copy)]
 pub enum View<'a> {
     /// A solid: its centre of mass and its rotation.
@@ -151,9 +152,9 @@ pub enum View<'a> {
 /// A form at its place.
 #[derive(Debug, Clone, Copy)]
 pub struct Placed<'a> {
-    /// What.
+    /// The form.
     pub form: &'a Form,
-    /// Where.
+    /// Its placement.
     pub view: View<'a>,
 }
 
@@ -171,11 +172,11 @@ pub enum Place {
         /// The radius there, metres.
         radius_m: f64,
     },
-    /// A point of a soft body's skin, in the surface between its vertices: its thickness turns nothing.
+    /// A point of a soft body's skin, in the surface between its vertices: forces there have no lever arm from its thickness.
     Surface {
         /// Three vertices.
         vertices: [u32; 3],
-        /// What each counts, in sum one; vertices of share zero do not matter.
+        /// Weight of each vertex, in sum one; vertices of share zero do not matter.
         shares: [f64; 3],
     },
 }
@@ -205,7 +206,7 @@ impl SolidForm {
     /// The form of a solid with its centre of mass at `com_local`.
     ///
     /// # Errors
-    /// [`ShapeError`] for a solid that is no shape.
+    /// [`ShapeError`] for an invalid solid.
     pub fn new(solid: Solid, com_local: DVec3) -> Result<Self, ShapeError> {
         let shape = solid.to_shared_shape()?;
         let ball = shape.compute_local_bounding_sphere();
@@ -215,8 +216,8 @@ impl SolidForm {
 }
 
 impl Place {
-    /// Adds `sign` times the velocity of this point to what `slots` gather. The body's slots begin at `base`: its centre's
-    /// velocity and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
+    /// Adds `sign` times the velocity of this point to the sum in `slots`. The body's slots begin at `base`: the velocity of its centre
+    /// and its spin, a tube's nodes and segments in turn, or a soft body's vertices. `towards` is the unit normal out of this body's skin.
     pub fn join(&self, slots: &mut Slots, base: u32, centre: DVec3, (towards, sign): (DVec3, f64)) {
         match *self {
             Self::Point(point) => {

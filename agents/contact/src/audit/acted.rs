@@ -1,13 +1,13 @@
-//! What owners have given a body on springs by a certain time, as it takes it: evenly, through each owner's whole step.
+//! Impulses that owners have given a spring-held body by a certain time, spread evenly over each owner's step, as the body takes them.
 //!
-//! In: what everybody published last. Out: dJ, and how far it has carried by the body's own time. Never here: how the body answers.
+//! In: what all agents published last. Out: dJ, and the displacement it has caused by the body's own time. Never here: the body's response.
 //! Theory: docs/theory/coupling.md, eq. 4c.
 
 use super::Member;
 use metachron_core::SimTime;
 use metachron_core::{Ahead, Impulse, Ledger, Site};
 
-/// dJ and t dJ − dS, at the body's own time, of all that acts by `at` and is not yet in its state.
+/// dJ and t dJ − dS, at the body's own time, of all impulses that act by `at` and are not yet in its state.
 pub(super) fn acted(member: &Member<'_>, members: &[Member<'_>], at: SimTime) -> [Impulse; 2] {
     let now = member.snapshot.time;
     let mut all = [Impulse::ZERO; 2];
@@ -28,14 +28,14 @@ pub(super) fn acted(member: &Member<'_>, members: &[Member<'_>], at: SimTime) ->
     all
 }
 
-/// What it took evenly since the owner's last known time, or since `at` where that comes first, with the opposite sign.
+/// The impulse taken evenly since the owner's last known time, or since `at` if that is earlier, with the opposite sign.
 fn taken_back(ahead: &Ahead, now: SimTime, at: SimTime) -> [Impulse; 2] {
     let since_s = now.secs_after(ahead.from.min(at));
     let sum = ahead.sum * (-since_s / (2.0 * ahead.middle_s));
     [sum, sum * (0.5 * since_s)]
 }
 
-/// The part by `at` of what an owner gave evenly between two of its times.
+/// The part that acts by `at` of an impulse given evenly between two of the owner's times.
 fn evenly(
     (given, taken): (&Ledger, Option<&Ledger>),
     (from, until): (SimTime, SimTime),
@@ -51,7 +51,7 @@ fn evenly(
     [sum, sum * (now.secs_after(from) - 0.5 * acting_s)]
 }
 
-/// What of a ledger is due by `at`.
+/// The part of a ledger that is due by `at`.
 fn due((given, taken): (&Ledger, Option<&Ledger>), now: SimTime, at: SimTime) -> [Impulse; 2] {
     let [mut sum, mut carried] = new(given, taken, now);
     for coming in given.coming.iter().filter(|coming| coming.acts > at) {
@@ -62,7 +62,7 @@ fn due((given, taken): (&Ledger, Option<&Ledger>), now: SimTime, at: SimTime) ->
     [sum, carried]
 }
 
-/// All of `given` that is not in `taken`.
+/// All of `given` that is not yet in `taken`.
 fn new(given: &Ledger, taken: Option<&Ledger>, now: SimTime) -> [Impulse; 2] {
     let mut all = [Impulse::ZERO; 2];
     given.beyond(taken, now, |site, sum, carried| {

@@ -1,7 +1,7 @@
-//! Laws of contact beside the ledger, for comparison and for links that need no inverse mass.
+//! Alternative laws of contact next to the ledger: for comparison, and for links that need no inverse mass.
 //!
-//! In: places, velocities, what the other side published. Out: forces on one side. Both sides act on themselves alone.
-//! Never here: who touches whom, any agent's state. Theory: docs/theory/coupling.md.
+//! In: places, velocities, the peer's published data. Out: forces on one side. Each side computes and applies only its own force.
+//! Never here: which agents touch, any agent's state. Theory: docs/theory/coupling.md.
 
 mod penalty;
 mod tlm;

@@ -1,16 +1,16 @@
-//! Penalty contact: a spring and a damper where skins overlap, as most engines have it.
+//! Penalty contact: a spring and a damper where skins overlap, as in most engines.
 //!
 //! In: a place and how its two sides move. Out: the force on one side. Stable only below k = 0.55 μ/τ² for data of age τ.
 
 use glam::DVec3;
 
-/// Below this slip friction grows in proportion to it, m/s.
+/// Below this slip speed, m/s, friction is proportional to the slip.
 const STICK_M_S: f64 = 1e-3;
 
 /// The force on the side that `normal` points to, newtons: `stiffness` (N/m) times the depth, less `damping` (N·s/m) times
-/// the speed of parting, never a pull; friction against the slip.
+/// the separation speed, never attractive; friction opposes the slip.
 ///
-/// `velocity` is that side's against the other, m/s; `gap_m` is below zero where the two overlap.
+/// `velocity` is that side's velocity relative to the other, m/s; `gap_m` is below zero where the two overlap.
 #[must_use]
 pub fn push_off_n(
     (gap_m, normal, velocity): (f64, DVec3, DVec3),

@@ -1,11 +1,11 @@
-//! Wave variables: an elastic line between two agents whose ends hear each other late, passive whatever the delay.
+//! Wave variables (transmission-line model): an elastic line between two agents with delayed exchange, passive for any delay.
 //!
-//! In: what the other end has sent. Out: what arrives during a step, and what this end sends. Never here: where the line is
-//! fixed. Theory: docs/theory/coupling.md.
+//! In: the waves that the other end has sent. Out: the wave that arrives during a step, and the wave that this end sends. Never here:
+//! where the line is attached. Theory: docs/theory/coupling.md.
 //!
-//! An end that pushes into the line by f and moves with v sends w = f + Z v; after the delay T the other end hears c = −w and
-//! has f = Z v + c. Z = k T, so the line has the mass k T² of its own. What was sent is published as its integral over time:
-//! readings that are lost or made twice take and repeat nothing, and means over a step only dissipate.
+//! An end that pushes into the line by f and moves with v sends w = f + Z v; after the delay T the other end receives c = −w and
+//! has f = Z v + c. Z = k T, so the line has a mass k T² of its own. Each end publishes the time integral of the wave it sent:
+//! lost readings lose nothing, double readings repeat nothing, and averages over a step only dissipate.
 
 use crate::beside::MEETS_S;
 use glam::{DMat3, DVec3};
@@ -16,30 +16,30 @@ use std::collections::VecDeque;
 /// One end of a link during a step.
 #[derive(Debug, Clone, Copy)]
 pub struct End {
-    /// When the step begins, and how long it lasts, seconds.
+    /// Start time of the step, and its length, seconds.
     pub step: (SimTime, f64),
     /// Its own velocity at the end of the step without the link, m/s.
     pub own: DVec3,
-    /// How the other end moves as far as is known, m/s.
+    /// Velocity of the other end as far as it is known, m/s.
     pub far: DVec3,
-    /// From here to the other end, metres.
+    /// Vector from here to the other end, metres.
     pub way: DVec3,
-    /// What arrives, N.
+    /// The arriving wave, N.
     pub arriving: DVec3,
-    /// The velocity that a force on this end causes by the end of the step, m/s a newton.
+    /// The velocity that a force on this end causes by the end of the step, m/s per newton.
     pub yields: DMat3,
-    /// The distance at which the link pulls nothing, metres, ≥ 0.
+    /// Rest length: the distance at which the link exerts no force, metres, ≥ 0.
     pub rest_m: f64,
-    /// Damping beside the line, N·s/m, ≥ 0.
+    /// Damping parallel to the line, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
 }
 
-/// What a link does at one end.
+/// The forces of a link at one end.
 #[derive(Debug, Clone, Copy)]
 pub struct Drawn {
     /// The force on this end, N.
     pub force: DVec3,
-    /// What of the wave that arrived the line answers, N: its part along the link where that has a length at rest.
+    /// The part of the arriving wave that the line reflects, N: the part along the link where that has a rest length.
     pub arriving: DVec3,
     /// The force into the line, N.
     pub into_line: DVec3,
@@ -52,16 +52,16 @@ pub struct Line {
     delay_s: f64,
     /// (time, ∫ w dt) of the other end, by rising times.
     heard: VecDeque<(SimTime, DVec3)>,
-    /// How much of the other's integral has arrived here.
+    /// How much of the other end's integral has arrived here.
     arrived: DVec3,
     sent: DVec3,
     start: DVec3,
     since: SimTime,
 }
 
-/// The most states of the other end that are kept: those of one delay, at a hundred times this end's rate.
+/// The most states of the other end that are stored: those of one delay, at a hundred times this end's rate.
 const HEARD_MAX: usize = 256;
-/// The delay is this many of the longer of both sides' steps: one to be published, one to be lost or late.
+/// The delay is this many of the longer of both sides' steps: one for publication, one for a lost or late message.
 const DELAY_STEPS: f64 = 2.0;
 
 impl Line {
@@ -71,8 +71,8 @@ impl Line {
         Self { stiffness_n_m, ..Self::default() }
     }
 
-    /// Takes in what the other end published at its time `at`. The end that `decides` chooses the delay, from its own step of
-    /// `dt_s` and the other's; the other end takes it over.
+    /// Stores the wave that the other end published at its time `at`. The end that `decides` chooses the delay from its own step of
+    /// `dt_s` and the other's step; the other end adopts it.
     pub fn hear(&mut self, at: SimTime, wave: Option<Wave>, (decides, dt_s): (bool, f64)) {
         let wave = wave.unwrap_or_default();
         let sane = wave.sent.is_finite() && wave.start.is_finite();
@@ -81,7 +81,7 @@ impl Line {
             return;
         }
         if back_s > MEETS_S {
-            // no old message: the other end calls its time another now
+            // not an old message: the other end has renamed its time
             self.heard.clear();
         }
         if self.delay_s == 0.0 {
@@ -92,7 +92,7 @@ impl Line {
                 _ => wave.delay_s,
             };
             if decides {
-                // by then the other end has heard of it
+                // by then the other end has received the delay
                 self.since += SimSpan::from_secs_f64(2.0 * self.delay_s).unwrap_or(SimSpan::ZERO);
             } else {
                 (self.start, self.since) = (-wave.start, wave.since);
@@ -106,17 +106,17 @@ impl Line {
         self.heard.push_back((at, wave.sent));
     }
 
-    /// The end that decides notes where the other end is, `way` metres from it, when the line is made: in its step from `at` on.
+    /// At the end that decides: stores `way`, the vector to the other end in metres, when the line is made, in its step from `at` on.
     pub fn begin(&mut self, way: DVec3, at: SimTime) {
         if self.delay_s == 0.0 {
             (self.start, self.since) = (way, at);
         }
     }
 
-    /// What a link on this line does at one end, implicit in its own motion.
+    /// The forces of a link on this line at one end, implicit in its own motion.
     ///
-    /// The line carries what has changed since it was made; what it was stretched by then pulls as it is. Without a length at
-    /// rest the link is the same in all directions, else it acts along itself.
+    /// The line carries the changes since it was made; its stretch at that time acts as a constant force. Without a rest
+    /// length the link is isotropic, else it acts along itself.
     #[must_use]
     pub fn draw(&self, end: &End) -> Drawn {
         let along = end.way.normalize_or_zero();
@@ -137,9 +137,9 @@ impl Line {
         Drawn { force, arriving, into_line }
     }
 
-    /// What arrives on the average of the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
+    /// The average of the wave that arrives in the `h` seconds from `at` on, N: c of the line. Zero before the delay is known.
     ///
-    /// Where nothing that late is known yet the last of it goes on; the integral makes up for it later.
+    /// Where the wave of that time is not known yet, the last known value is held; the integral makes up for it later.
     pub fn arriving(&mut self, at: SimTime, h: f64) -> DVec3 {
         if self.delay_s == 0.0 {
             return DVec3::ZERO;
@@ -150,12 +150,12 @@ impl Line {
         mean
     }
 
-    /// Sends the answer to `arriving`, where this end pushed into the line by `force` (N) for `h` seconds.
+    /// Sends the response to `arriving`, where this end pushed into the line by `force` (N) for `h` seconds.
     pub fn send(&mut self, arriving: DVec3, force: DVec3, h: f64) {
         self.sent += (force * 2.0 - arriving) * h;
     }
 
-    /// What this end publishes.
+    /// The data that this end publishes.
     #[must_use]
     pub const fn wave(&self) -> Wave {
         Wave { sent: self.sent, delay_s: self.delay_s, start: self.start, since: self.since }
@@ -167,16 +167,16 @@ impl Line {
         self.stiffness_n_m * self.delay_s
     }
 
-    /// The mass that the line has of its own, kg: k T².
+    /// The line's own mass, kg: k T².
     #[must_use]
     pub const fn parasitic_kg(&self) -> f64 {
         self.stiffness_n_m * self.delay_s * self.delay_s
     }
 
-    /// The other's ∫ w dt at `after_s` seconds after `at`, between what was heard.
+    /// The other end's ∫ w dt at `after_s` seconds after `at`, interpolated between received values.
     fn integral(&self, at: SimTime, after_s: f64) -> DVec3 {
         let Some(&(first, start)) = self.heard.front() else { return self.arrived };
-        let when = |t: SimTime| t.secs_after(at) - after_s; // seconds past the wanted moment
+        let when = |t: SimTime| t.secs_after(at) - after_s; // seconds past the requested time
         if when(first) >= 0.0 || self.heard.len() == 1 {
             return start;
         }
@@ -217,7 +217,7 @@ mod tests {
 
     #[test]
     fn a_line_swings_at_the_frequency_of_its_spring_and_mass() {
-        // k T² = 0.004² · 100 = 1.6e-3 kg beside 1 kg
+        // k T² = 0.004² · 100 = 1.6e-3 kg, small against 1 kg
         let path = swing(100.0, [0.002, 0.002], 1.0);
         let turned = path.windows(2).find(|w| w[1].1 < w[0].1).unwrap()[0].0;
         let quarter = std::f64::consts::FRAC_PI_2 / (2.0_f64 * 100.0).sqrt();

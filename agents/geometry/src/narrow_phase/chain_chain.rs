@@ -1,7 +1,7 @@
-//! Strands against strands: tubes, capsules and balls, in double precision.
+//! Contacts of strands with strands: tubes, capsules and balls, in double precision.
 //!
-//! In: two strands. Out: the places where their spans face each other. Which spans are worth a look is found in linear time by a
-//! grid. Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
+//! In: two strands. Out: the places where their spans face each other. A grid finds candidate pairs of spans in linear time.
+//! Never here: blocks. Theory: `docs/theory/contact.md`, eq. 16 and 18.
 
 use super::primitives::Strand;
 use crate::Touch;
@@ -11,37 +11,37 @@ use crate::signed_distance::Ball;
 use crate::{Grid, near_segments};
 use glam::DVec3;
 
-/// Up to this many spans of the shorter strand every pair is looked at: a capsule against a tube needs no grid.
+/// Up to this many spans of the shorter strand all pairs are tested: a capsule against a tube needs no grid.
 const FEW: usize = 4;
-/// Between tubes a crossing counts beside the feet of nodes if it is nearer by this share of the radii: strands side by side
-/// are told by their nodes, which stay where they are while a crossing jumps from end to end.
+/// Between tubes a crossing counts in addition to the feet of nodes if it is nearer by this share of the radii: parallel strands
+/// are represented by their nodes, which stay where they are while a crossing jumps from end to end.
 const CROSSING_SHARE: f64 = 1e-3;
 /// The place of a crossing in keys, after those of nodes.
 const CROSSING: u64 = 4;
-/// Rounds of the search for the nearest places of spans that taper, at most: of spans that are nearly parallel each brings them only a
-/// little nearer.
+/// Maximum number of rounds of the search for the nearest places of tapered spans: for nearly parallel spans each round brings them only
+/// a little nearer.
 const TAPER_ROUNDS: usize = 200;
-/// It ends where a round moves them by less than this share.
+/// The search ends where a round moves them by less than this share.
 const TAPER_SHARE: f64 = 1e-9;
-/// The search for a gap looks first this many times the radii around, and then this many times farther each time.
+/// The search for a gap starts within this many times the radii, and widens by this factor each time.
 const WIDENING: f64 = 4.0;
 
-/// Storage for the pairs that are worth a look.
+/// Storage for candidate pairs.
 #[derive(Default)]
 pub(super) struct ChainRoom {
     grid: Grid,
     spots: Vec<Spot>,
-    /// Span of the first strand above, of the second below.
+    /// Span of the first strand in the upper half, of the second in the lower half.
     pairs: Vec<u64>,
-    /// How many pairs were looked at in the last search.
+    /// How many pairs the last search tested.
     #[cfg(test)]
     pub tried: usize,
 }
 
-/// A span as the grid sees it.
+/// A span as the grid stores it.
 struct Spot {
     middle: DVec3,
-    /// Radius of the ball that holds it.
+    /// Radius of the ball that encloses it.
     ball_m: f64,
     span: u32,
     second: bool,
@@ -127,7 +127,7 @@ struct Meeting<'a> {
     reach_m: f64,
 }
 
-/// The places of one pair of spans, so that none is told twice: the first and last node of either, and a crossing.
+/// The places of one pair of spans, so that none is added twice: the first and last node of either, and a crossing.
 #[derive(Default)]
 struct Told {
     shares: [[f64; 2]; 5],
@@ -136,7 +136,7 @@ struct Told {
 }
 
 impl Meeting<'_> {
-    /// Visits the places of the pair (eq. 18): nodes over the other's span, and the crossing where it is nearer.
+    /// Adds the places of the pair (eq. 18): nodes over the other's span, and the crossing where it is nearer.
     fn visit(&self, into: &mut Vec<Touch>) {
         let ([a, b], [i, j]) = (self.strands, self.spans);
         let (ends_a, ends_b) = (a.ends(i), b.ends(j));
@@ -165,7 +165,7 @@ impl Meeting<'_> {
         }
     }
 
-    /// Adds a place, unless it is too far or was told already.
+    /// Adds a place, unless it is too far or already added.
     fn tell(&self, place: u64, shares: [f64; 2], told: &mut Told, into: &mut Vec<Touch>) {
         let ([a, b], [i, j], [s, t]) = (self.strands, self.spans, shares);
         if told.shares[..told.count].contains(&shares) {
@@ -188,14 +188,14 @@ impl Meeting<'_> {
     }
 }
 
-/// The nodes that a span tells: its first, and the last of the strand, with the even one of their two places.
+/// The nodes that a span reports: its first, and for the last span also the strand's last, with the even one of their two place numbers.
 fn own_nodes(strand: &Strand<'_>, span: usize) -> impl Iterator<Item = (u64, usize)> {
     let is_last = strand.count() > 1 && span + 1 == strand.spans();
     [(0, span), (2, span + 1)].into_iter().take(1 + usize::from(is_last))
 }
 
-/// Whether a node over a span tells of a place of its own: past an end of the other strand that end tells it, if its own foot
-/// is beside the node.
+/// Whether a node over a span is a place of its own: past an end of the other strand that end is the place, if its own foot
+/// is at this node.
 fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, (span, share): (usize, f64)) -> bool {
     let end = match share {
         0.0 if span == 0 => 0,
@@ -207,7 +207,7 @@ fn speaks(strand: &Strand<'_>, node: usize, other: &Strand<'_>, (span, share): (
     beside.into_iter().flatten().all(|next| (point - here).dot(strand.ball(next).centre - here) <= 0.0)
 }
 
-/// A lower bound of the gap between two spans that taper: the gap is a convex function of both shares, so it lies nowhere below
+/// A lower bound of the gap between two tapered spans: the gap is a convex function of both shares, so it is nowhere below
 /// its tangent plane at the nearest places.
 fn bound(a: [Ball; 2], b: [Ball; 2]) -> signed_distance::Touch {
     let (mut s, mut t) = near_segments(a.map(|e| e.centre), b.map(|e| e.centre));

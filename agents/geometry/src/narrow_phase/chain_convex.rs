@@ -1,6 +1,6 @@
-//! Strands against blocks: nodes and spans in the block's field of distances, in double precision.
+//! Contacts of strands with blocks: nodes and spans in the block's distance field, in double precision.
 //!
-//! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the edges of where a span lies flat.
+//! In: a strand and a block. Out: touching nodes, the lowest place of each span, and the ends of the stretch where a span lies flat.
 //! Never here: parry. Theory: `docs/theory/contact.md`, eq. 12–14.
 
 use super::primitives::{Block, Strand};
@@ -9,7 +9,7 @@ use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
 use glam::DVec3;
 
-/// A span lies on a block wherever its gap is above the lowest by at most this share of its radius.
+/// A span counts as flat on a block wherever its gap is above the lowest by at most this share of its radius.
 const FLAT_SHARE: f64 = 2e-3;
 /// The edges of a flat stretch count if they are at least this many radii from other places.
 const APART_RADII: f64 = 0.25;
@@ -41,7 +41,7 @@ pub(super) fn touches(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64, into
 /// The nearest place: its normal from the block towards the strand, and a lower bound of the gap.
 pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Option<(DVec3, f64)> {
     let field = block.field?;
-    // a hull or mesh is searched as deep as it may be
+    // search depth: a hull or mesh is searched down to its whole size
     let look_m = reach_m.max(2.0 * block.around.radius_m);
     let mut nearest: Option<signed_distance::Touch> = None;
     for span in 0..strand.spans() {
@@ -55,7 +55,7 @@ pub(super) fn gap(strand: &Strand<'_>, block: &Block<'_>, reach_m: f64) -> Optio
     nearest.map(|near| (block.rotation * near.normal, near.distance_m))
 }
 
-/// A strand in front of a block.
+/// A strand and a block that may touch.
 struct Meeting<'a> {
     strand: &'a Strand<'a>,
     block: &'a Block<'a>,
@@ -64,12 +64,12 @@ struct Meeting<'a> {
 }
 
 impl Meeting<'_> {
-    /// Visits the places of a node; returns the nearest.
+    /// Adds the places of a node; returns the nearest.
     fn node(&self, node: usize, into: &mut Vec<Touch>) -> Option<signed_distance::Touch> {
         let ball = self.block.inward(self.strand.ball(node));
         let mut places = self.field.touches(ball.centre, ball.radius_m + self.reach_m);
         if places.iter().next().is_none() {
-            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
+            // a hull or mesh is searched as deep as the reach; for a node deeper inside the nearest way out is added
             let deep = self.field.touches(ball.centre, 2.0 * self.block.around.radius_m).iter().next();
             deep.filter(|touch| touch.distance_m < 0.0).into_iter().for_each(|touch| places.push(touch));
         }
@@ -82,7 +82,7 @@ impl Meeting<'_> {
         places.iter().next()
     }
 
-    /// Visits the lowest place of a span and the edges of its flat stretch.
+    /// Adds the lowest place of a span and the edges of its flat stretch.
     fn span(&self, span: usize, near: [Option<signed_distance::Touch>; 2], into: &mut Vec<Touch>) {
         let ends = self.strand.ends(span).map(|end| self.block.inward(end));
         let lowest = self.field.touches_span(ends, self.reach_m).filter(|(share, touch)| {
@@ -114,8 +114,8 @@ impl Meeting<'_> {
         }
     }
 
-    /// Where a span that lies flat at the share `from` leaves the block on its way to `to`: its place there, if that is apart
-    /// from both.
+    /// The edge of a flat stretch: where a span that is flat on the block at the share `from` leaves it towards `to`, if that place is
+    /// apart from both.
     fn edge(&self, ends: [Ball; 2], (from, to): (f64, f64), least_m: f64) -> Option<(f64, signed_distance::Touch)> {
         let length_m = ends[0].centre.distance(ends[1].centre);
         let radius_m = ends[0].radius_m.max(ends[1].radius_m);

@@ -1,4 +1,4 @@
-//! Blocks against blocks: the gap of convex parts in double precision, and the corners and edges on which they rest.
+//! Contacts of blocks with blocks: the gap of convex parts in double precision, and the corners and edges on which they rest.
 //!
 //! In: two blocks. Out: contacts, the nearest gap. Never here: strands.
 //! The normal and the gap are [`crate::narrow_phase::gjk`]'s; parry clips the features that face each other along that normal, in single
@@ -14,9 +14,9 @@ use rapier3d::parry::math::{Pose, Rotation};
 use rapier3d::parry::query::{ContactManifold, TrackedContact};
 use rapier3d::parry::shape::{PackedFeatureId, PolygonalFeature};
 
-/// What single precision may get wrong of a place, as a share of the sizes: ten roundings.
+/// Error of a place in single precision, as a share of the sizes: ten roundings.
 const SINGLE_SHARE: f64 = 1e-6;
-/// Points of a manifold nearer to each other than this share of the sizes are one.
+/// Points of a manifold closer to each other than this share of the sizes count as one.
 const SAME_SHARE: f64 = 1e-4;
 /// Bits of a feature and of a part in keys.
 const FEATURE_BITS: u32 = 24;
@@ -52,7 +52,7 @@ impl BlockRoom {
             let Some(apart) = apart.filter(|apart| apart.gap_m <= reach_m) else { return };
             nearest = Some((apart.normal, apart.gap_m));
         });
-        // the corners are known in single precision only
+        // the corners are available in single precision only
         let rounding_m = 0.5 * f64::from(f32::EPSILON) * (a.around.radius_m + b.around.radius_m);
         nearest.map(|(normal, gap_m)| (normal, if gap_m > 0.0 { (gap_m - rounding_m).max(0.0) } else { gap_m }))
     }
@@ -121,8 +121,8 @@ struct Facing<'a> {
 }
 
 impl Facing<'_> {
-    /// Adds the points of a manifold, the lowest of which gets the gap of double precision, and the nearest place if none
-    /// is there.
+    /// Adds the points of a manifold, the lowest of which gets the gap of double precision, and the nearest place if the manifold
+    /// does not contain it.
     fn tell(&self, manifold: &ContactManifold<(), ()>, into: &mut Vec<Touch>) {
         let least_m = manifold.points.iter().map(|point| f64::from(point.dist)).fold(f64::INFINITY, f64::min);
         let shift_m = self.apart.gap_m - least_m;
@@ -140,7 +140,7 @@ impl Facing<'_> {
         }
     }
 
-    /// Adds a place of the first part, unless it is too far or told already.
+    /// Adds a place of the first part, unless it is too far or already listed.
     fn add(&self, (key, gap_m): (u64, f64), place: DVec3, from: usize, into: &mut Vec<Touch>) {
         let on_a = self.first.origin + place;
         let within_m = SAME_SHARE * self.size_m;
@@ -152,10 +152,10 @@ impl Facing<'_> {
         }
     }
 
-    /// The name of a point: the parts, and the corners, edges or faces that meet in it.
+    /// The key of a point: the parts, and the corners, edges or faces that meet in it.
     fn key(&self, one: PackedFeatureId, two: PackedFeatureId) -> u64 {
         let part = |part: &Part<'_>| part.number & ((1 << PART_BITS) - 1);
-        // parry keeps the kind of a feature in the two highest bits
+        // parry stores the kind of a feature in the two highest bits
         let feature = |PackedFeatureId(id): PackedFeatureId| {
             let (kind, number) = (u64::from(id >> 30), u64::from(id) & ((1 << (FEATURE_BITS - 2)) - 1));
             kind << (FEATURE_BITS - 2) | number

@@ -1,19 +1,19 @@
 //! The shortest way out of an overlap: the face of the difference of two convex parts that is nearest to the origin (EPA).
 //!
 //! In: the difference as corners by direction. Out: the normal and the depth. Never here: parts that are apart.
-//! The hull grows from any tetrahedron, the face that is nearest to the origin first, and one that the origin is in front of before all.
+//! The hull grows from any tetrahedron: the face nearest to the origin first, and before all a face that has the origin in front of it.
 
 use super::gjk::{Apart, Corner, Difference};
 use glam::DVec3;
 
-/// Rounds of growing; the difference of two boxes is whole after thirty, that of round things is right to 1e-6 of its size.
+/// Rounds of growing; the difference of two boxes is complete after thirty, that of round shapes is accurate to 1e-6 of its size.
 const ROUNDS: usize = 96;
-/// A face is the difference's own if no corner lies farther than this share of the sizes in front of it.
+/// A face belongs to the true difference if no corner is farther than this share of the sizes in front of it.
 const OWN_SHARE: f64 = 1e-10;
 /// A face with an area below this share of the sizes squared has no normal.
 const AREA_SHARE: f64 = 1e-14;
 
-/// The growing hull; its storage is used again.
+/// The growing hull; its storage is reused.
 #[derive(Default)]
 pub(super) struct Hull {
     corners: Vec<Corner>,
@@ -26,12 +26,12 @@ struct Face {
     corners: [usize; 3],
     /// Outward.
     normal: DVec3,
-    /// Of the origin behind it, metres; infinite for a face without area.
+    /// Depth of the origin behind it, metres; infinite for a face without area.
     depth_m: f64,
 }
 
 impl Hull {
-    /// How two overlapping parts are parted soonest; `None` where the numbers are no numbers.
+    /// The shortest separation of two overlapping parts; `None` where the numbers are not finite.
     pub fn way_out(&mut self, difference: &Difference<'_>) -> Option<Apart> {
         self.start(difference)?;
         let size_m = self.corners.iter().map(|c| c.way.length()).fold(0.0, f64::max);
@@ -51,7 +51,7 @@ impl Hull {
             }
             self.grow(corner, size_m);
             if self.faces.len() > 2 * self.corners.len() {
-                break; // rounding has torn it: a closed hull has twice as many faces as corners, less four
+                break; // rounding has broken it: a closed hull has twice as many faces as corners, less four
             }
         }
         best
@@ -90,7 +90,7 @@ impl Hull {
         self.faces.push(Face { corners, normal, depth_m });
     }
 
-    /// Takes a corner in: faces that see it go, their rim is joined to it.
+    /// Adds a corner: faces that see it are removed, their rim is joined to it.
     fn grow(&mut self, corner: Corner, size_m: f64) {
         let number = self.corners.len();
         self.corners.push(corner);

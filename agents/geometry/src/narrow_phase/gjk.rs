@@ -1,6 +1,6 @@
-//! How far two convex parts are apart, and along which normal, in double precision (GJK, then EPA where they overlap).
+//! Distance between two convex parts and its normal, in double precision (GJK, then EPA where they overlap).
 //!
-//! In: two parts where they stand. Out: the normal, the gap and the facing points. Never here: manifolds, lists of parts.
+//! In: two placed parts. Out: the normal, the gap and the facing points. Never here: manifolds, lists of parts.
 //! Theory: (ERI05, ch. 9). Where they overlap, [`crate::narrow_phase::epa`] takes over.
 
 use super::epa::Hull;
@@ -12,7 +12,7 @@ use rapier3d::parry::shape::Shape;
 pub(super) struct Part<'a> {
     /// Its number in the block.
     pub number: u64,
-    /// What parry knows of it.
+    /// Its parry shape.
     pub shape: &'a dyn Shape,
     /// Where its axes' origin is.
     pub origin: DVec3,
@@ -20,7 +20,7 @@ pub(super) struct Part<'a> {
     pub rotation: DQuat,
 }
 
-/// How two parts are to each other.
+/// Separation of two parts.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Apart {
     /// Unit normal, from the second to the first.
@@ -40,13 +40,13 @@ pub(super) struct Corner {
     pub on: [DVec3; 2],
 }
 
-/// Rounds of the search; boxes take six, round things more.
+/// Maximum rounds of the search; boxes take six, round shapes more.
 const ROUNDS: usize = 64;
-/// The gap is found when it lies this share above its lower bound.
+/// The gap is found when it is this share above its lower bound.
 const GAP_SHARE: f64 = 1e-10;
 /// Rounding of sums of coordinates, as a share of them.
 const ROUNDING: f64 = 1e-15;
-/// Nearer than this share of the sizes parts overlap: the way between them has no direction any more.
+/// Closer than this share of the sizes, parts count as overlapping: the vector between them has no direction any more.
 const TOUCHING_SHARE: f64 = 1e-12;
 
 /// The difference of two parts: it holds the origin where they overlap.
@@ -86,7 +86,7 @@ impl<'a> Difference<'a> {
         Corner { way: on[0] - on[1], on }
     }
 
-    /// How the parts are to each other; `None` farther than `reach_m` apart.
+    /// Separation of the parts; `None` farther than `reach_m` apart.
     pub fn apart(&self, reach_m: f64, hull: &mut Hull) -> Option<Apart> {
         let start = self.parts[0].origin - self.parts[1].origin;
         let mut simplex = Simplex::of(self.support(-start.normalize_or(DVec3::X)));
@@ -137,7 +137,7 @@ impl Simplex {
         self.corners[..self.count].iter().map(|c| c.way.length() + c.on[0].length()).fold(0.0, f64::max)
     }
 
-    /// Adds a corner, keeps what the nearest point needs; false for a corner that was there before.
+    /// Adds a corner and drops those that the nearest point does not need; false for a corner that was there before.
     fn add(&mut self, corner: Corner) -> bool {
         if self.corners[..self.count].iter().any(|known| known.way == corner.way) {
             return false;
@@ -202,10 +202,10 @@ fn on_face(ways: [DVec3; 4], [i, j, k]: [usize; 3]) -> [f64; 4] {
     nearest_of([[i, j], [j, k], [k, i]].map(|edge| on_edge(ways, edge)), ways)
 }
 
-/// The same of a tetrahedron, and whether it holds the origin.
+/// The same for a tetrahedron, and whether it contains the origin.
 fn inside(ways: [DVec3; 4]) -> ([f64; 4], bool) {
     let faces = [[1, 2, 3, 0], [0, 2, 3, 1], [0, 1, 3, 2], [0, 1, 2, 3]];
-    // the origin is on the same side of each face as the corner against it
+    // the origin is on the same side of each face as the opposite corner
     let holds = faces.iter().all(|&[i, j, k, against]| {
         let normal = (ways[j] - ways[i]).cross(ways[k] - ways[i]);
         -ways[i].dot(normal) * (ways[against] - ways[i]).dot(normal) > 0.0

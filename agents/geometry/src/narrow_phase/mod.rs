@@ -1,12 +1,12 @@
-//! Where two agents touch: the contacts between the shapes of any two forms.
+//! Narrow phase: the contacts between the shapes of any two forms.
 //!
-//! In: two forms where they stand. Out: contacts with normals, gaps and places, each with a name that lasts; the nearest gap.
-//! Never here: velocities, forces, whose contact it is. Theory: `docs/theory/contact.md`, eq. 12–18.
+//! In: two placed forms. Out: contacts with normals, gaps and places, each with a key that persists; the nearest gap.
+//! Never here: velocities, forces, contact ownership. Theory: `docs/theory/contact.md`, eq. 12–18.
 //!
-//! Everything is taken apart into strands (balls joined by spans: a ball, a capsule, a tube), the surfaces of soft bodies, and
+//! Each form is decomposed into strands (balls joined by spans: a ball, a capsule, a tube), the surfaces of soft bodies, and
 //! blocks (all the rest).
 //! All gaps are found in double precision; where blocks rest on blocks the corners and edges are clipped by parry.
-//! A half space belongs to the fixed solids: a block does not feel it, a strand does.
+//! A half space belongs to the static solids: blocks ignore it here, strands do not.
 
 mod chain_chain;
 mod chain_convex;
@@ -32,10 +32,10 @@ use shape_cache::Known;
 use surface::SurfaceRoom;
 pub use voronoi_regions::Fans;
 
-/// What a step of a segment's number is in the key of a contact between chains: of the second chain, and of the first.
+/// The key difference between neighbouring segments in a contact between chains: of the second chain, and of the first.
 pub const KEY_STEPS: [u64; 2] = [1 << 4, 1 << 28];
 
-/// Storage that a search for contacts uses again and again: one an agent.
+/// Reusable storage for contact searches: one for each agent.
 #[derive(Default)]
 pub struct TouchRoom {
     known: Known,
@@ -44,7 +44,7 @@ pub struct TouchRoom {
     surfaces: SurfaceRoom,
 }
 
-/// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; what `into` held before is gone.
+/// Every contact with a gap of at most `reach_m` (metres, ≥ 0), by rising keys; the previous contents of `into` are dropped.
 ///
 /// Nothing is allocated once the numbers of nodes and contacts settle.
 /// Forms without a shape and places that are not finite touch nothing.
@@ -63,7 +63,7 @@ pub fn touches(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoo
                     chain_convex::touches(b, a, reach_m, into);
                     into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
                 }
-                // what is clipped depends on who is first: the larger, whoever asks
+                // clipping depends on the order: the larger block is first, whichever agent calls
                 (Piece::Block(a), Piece::Block(b)) if a.around.radius_m < b.around.radius_m => {
                     blocks.touches(b, a, reach_m, into);
                     into[from..].iter_mut().for_each(|touch| *touch = flipped(*touch));
@@ -91,7 +91,7 @@ fn flipped(touch: Touch) -> Touch {
 /// Keys inside a pair of pieces stay below this bit.
 const PAIR_SHIFT: u32 = 58;
 
-/// Sorts contacts by their keys and makes equal ones differ.
+/// Sorts contacts by their keys and makes equal keys differ.
 fn name(touches: &mut [Touch]) {
     touches.sort_unstable_by_key(|touch| touch.key);
     for i in 1..touches.len() {
@@ -126,7 +126,7 @@ pub fn gap(a: &Placed<'_>, b: &Placed<'_>, reach_m: f64, room: &mut TouchRoom) -
     nearest.filter(|&(_, gap_m)| gap_m <= reach_m)
 }
 
-/// The point of a ball's surface that lies against `normal`'s way.
+/// The point of a ball's surface opposite to `normal`.
 fn skin(ball: Ball, normal: DVec3) -> DVec3 {
     ball.centre - normal * ball.radius_m
 }

@@ -1,4 +1,4 @@
-//! What a form is made of when it touches: strands and blocks where they stand.
+//! The pieces of a form for contact: placed strands and blocks.
 //!
 //! In: a form and its place. Out: at most [`PARTS`] pieces with bounds. Never here: contacts.
 
@@ -15,7 +15,7 @@ use rapier3d::parry::shape::SharedShape;
 #[derive(Default)]
 pub(super) struct Pieces<'a>([Option<Piece<'a>>; PARTS]);
 
-/// One of them.
+/// A piece of a form.
 pub(super) enum Piece<'a> {
     Strand(Strand<'a>),
     Block(Block<'a>),
@@ -48,9 +48,9 @@ enum Nodes<'a> {
 
 /// A solid that is no strand.
 pub(super) struct Block<'a> {
-    /// Its distances, in its own axes; `None` where no strand is near.
+    /// Its distance field, in its own axes; `None` where no strand is near.
     pub field: Option<&'a Field>,
-    /// What parry knows of it, in its own axes.
+    /// Its parry shape, in its own axes.
     pub shape: &'a SharedShape,
     /// Where its axes' origin is.
     pub origin: DVec3,
@@ -58,12 +58,12 @@ pub(super) struct Block<'a> {
     pub rotation: DQuat,
     /// A ball around it.
     pub around: Ball,
-    /// Whether it is a part of a tool: thin, and led with force.
+    /// Whether it is a part of a tool: thin, and driven with force.
     pub pierces: bool,
 }
 
 impl<'a> Pieces<'a> {
-    /// Takes a form apart.
+    /// Decomposes a form.
     pub fn of(placed: &Placed<'a>, known: &'a Known) -> Self {
         let mut pieces = Self::default();
         match (&placed.form.kind, placed.view) {
@@ -151,7 +151,7 @@ impl Piece<'_> {
         }
     }
 
-    /// The box around it; a surface's and a strand's own thickness counted.
+    /// The box around it, including the thickness of a surface or strand.
     pub fn bounds(&self) -> (DVec3, DVec3) {
         let (low, high, radius_m) = match self {
             Self::Strand(strand) => (strand.bounds.0, strand.bounds.1, strand.widest_m),
@@ -195,7 +195,7 @@ impl Strand<'_> {
         [self.ball(span), self.ball((span + 1).min(self.count() - 1))]
     }
 
-    /// Where a point has its foot on a span, if this span tells it ([`foot`]).
+    /// The share of a span at which a point has its foot, if this span reports it ([`foot`]).
     pub fn foot(&self, point: DVec3, span: usize) -> Option<f64> {
         if self.count() == 1 { Some(0.0) } else { foot(point, self.positions(), span) }
     }

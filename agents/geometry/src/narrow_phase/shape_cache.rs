@@ -1,4 +1,4 @@
-//! What was worked out once of the forms that were met: fields of solids, and the solids that a tool is made of.
+//! Cache of per-form geometry: fields of solids, and the solids that make up a tool.
 //!
 //! In: forms. Out: their fields and parts, in their own axes. Never here: where they are.
 
@@ -14,7 +14,7 @@ pub(super) const PARTS: usize = 6;
 /// The level of the jaw's mesh whose hull touches: past it the hull grows by less than a hundredth of the jaw's thickness.
 const JAW_LEVEL: u8 = 2;
 
-/// What is known of forms; it grows with the number of different ones.
+/// The cached geometry of forms; it grows with the number of different ones.
 #[derive(Default)]
 pub(super) struct Known {
     fields: Vec<(Solid, Option<Field>)>,
@@ -31,7 +31,7 @@ pub(super) struct ToolSolid {
 }
 
 impl Known {
-    /// Takes up what a search between `a` and `b` needs.
+    /// Caches the data that a search between `a` and `b` needs.
     pub fn learn(&mut self, a: &Form, b: &Form) {
         for (form, other) in [(a, b), (b, a)] {
             match &form.kind {
@@ -68,31 +68,31 @@ impl Known {
         }
     }
 
-    /// The field of a solid that was learnt.
+    /// The cached field of a solid.
     pub fn field(&self, solid: &Solid) -> Option<&Field> {
         self.fields.iter().find(|(known, _)| is_same(known, solid))?.1.as_ref()
     }
 
-    /// What a solid collides with: its shape, or the hull of a mesh that was not divided into convex parts.
+    /// The shape used for collisions of a solid: its own, or the hull of a mesh that was not divided into convex parts.
     pub fn shape<'a>(&'a self, SolidForm { solid, shape, .. }: &'a SolidForm) -> &'a SharedShape {
         let hull = self.hulls.iter().find(|(known, _)| shape.as_trimesh().is_some() && is_same(known, solid));
         hull.and_then(|(_, hull)| hull.as_ref()).unwrap_or(shape)
     }
 
-    /// The solids of a tool that was learnt.
+    /// The cached solids of a tool.
     pub fn tool(&self, shape: &ToolShape) -> Option<&[ToolSolid; PARTS]> {
         self.tools.iter().find(|(known, _)| known == shape)?.1.as_ref()
     }
 }
 
-/// Whether a form is made of points and spans that are looked for in the fields of others.
+/// Whether a form consists of points and spans that are looked up in the fields of others.
 fn is_strand(kind: &FormKind) -> bool {
     let round = |solid: &Solid| matches!(solid, Solid::Ball { .. } | Solid::Capsule { .. });
     matches!(kind, FormKind::Chain { .. } | FormKind::Surface(_))
         || matches!(kind, FormKind::Solid(SolidForm { solid, .. }) if round(solid))
 }
 
-/// The field of a body: an open mesh counts as its hull, as its mass does.
+/// The field of a body: an open mesh is represented by its hull, as for its mass.
 fn field(solid: &Solid) -> Result<Field, ShapeError> {
     if let Solid::Mesh { points_m, triangles } = solid
         && !is_closed(&mesh_triangles(points_m, triangles)?)
@@ -102,7 +102,7 @@ fn field(solid: &Solid) -> Result<Field, ShapeError> {
     Field::of(solid)
 }
 
-/// Whether two solids are one: meshes and hulls by where their points are kept, which costs the same for every size.
+/// Whether two solids are the same: meshes and hulls are compared by the address of their points, at the same cost for every size.
 fn is_same(a: &Solid, b: &Solid) -> bool {
     match (a, b) {
         (Solid::Hull { points_m: a }, Solid::Hull { points_m: b }) => Arc::ptr_eq(a, b),

@@ -1,4 +1,4 @@
-//! The skins of soft bodies against all else: their vertices, edges and triangles.
+//! Contacts of soft bodies' skins with any other piece: their vertices, edges and triangles.
 //!
 //! In: a surface and another piece. Out: touching places, with the normal towards the surface; a lower bound of the gap.
 //! Never here: a surface against itself. Theory: docs/theory/soft.md, eq. 15, 16.
@@ -19,19 +19,19 @@ use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use surface_surface::Skins;
 
-/// Axes nearer than this cross: no way leads from one to the other, metres.
+/// Axes closer than this cross, metres: the vector from one to the other has no direction.
 const CROSSING_M: f64 = 1e-9;
-/// Two soft skins that have passed each other by more than this share of an edge are left alone: they came from elsewhere.
+/// Two soft skins that have passed each other by more than this share of an edge are ignored: they came from elsewhere.
 const DEEP_SHARE: f64 = 0.5;
-/// What a place is of, in its key: a vertex of the surface, an edge, a triangle, a vertex of another surface.
+/// Kinds of places in keys: a vertex of the surface, an edge, a triangle, a vertex of another surface.
 const KINDS: [u64; 4] = [0, 1 << 40, 2 << 40, 3 << 40];
-/// Where the number of the part stands in its key.
+/// Shift of the part's number in its key.
 const PART_SHIFT: u32 = 20;
 
-/// Room for searches.
+/// Scratch storage for searches.
 #[derive(Default)]
 pub(super) struct SurfaceRoom {
-    /// Of a closed surface, out of it at each vertex; of any length. Of the other one too.
+    /// For a closed surface the outward normal at each vertex, of any length; `others` holds those of the other surface.
     normals: Vec<DVec3>,
     others: Vec<DVec3>,
 }
@@ -52,7 +52,7 @@ impl Spot {
         Self { vertices: [a, b, b], shares: [1.0 - share, share, 0.0] }
     }
 
-    /// Out of a closed surface there, from the normals of its vertices; of any length. `None` where it is open.
+    /// The outward normal of a closed surface there, from the normals of its vertices; of any length. `None` where it is open.
     fn out(self, normals: &[DVec3]) -> Option<DVec3> {
         let of = |vertex: u32| normals.get(vertex as usize).copied();
         let terms = self.vertices.into_iter().zip(self.shares).map(|(vertex, share)| of(vertex).map(|n| n * share));
@@ -91,7 +91,7 @@ impl Surface<'_> {
         all.filter(move |(_, at)| at.cmple(high).all() && at.cmpge(low).all())
     }
 
-    /// The spot of a triangle nearest to `point`, and where it is; `None` unless it lies inside.
+    /// The spot of a triangle nearest to `point`, and its position; `None` unless it is inside.
     fn inside(&self, triangle: [u32; 3], [a, b, c]: [DVec3; 3], point: DVec3) -> Option<(Spot, DVec3)> {
         let near = near_triangle(point, [a, b, c]);
         let shares = shares(near, [a, b, c])?;
@@ -100,7 +100,7 @@ impl Surface<'_> {
     }
 }
 
-/// What each corner counts at a point of a triangle; `None` for one without area.
+/// The weight of each corner at a point of a triangle; `None` for one without area.
 fn shares(p: DVec3, [a, b, c]: [DVec3; 3]) -> Option<[f64; 3]> {
     let normal = (b - a).cross(c - a);
     let area2 = normal.length_squared();
@@ -135,7 +135,7 @@ impl SurfaceRoom {
     }
 }
 
-/// Works out the normals of the vertices of a closed surface; none for an open one.
+/// Computes the normals of the vertices of a closed surface; none for an open one.
 fn learn_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
     into.clear();
     if !surface.form.closed {
@@ -149,7 +149,7 @@ fn learn_normals(surface: &Surface<'_>, into: &mut Vec<DVec3>) {
     }
 }
 
-/// A lower bound of the gap by the boxes around both, and a way from the other to the surface.
+/// A lower bound of the gap by the boxes around both, and a direction from the other to the surface.
 pub(super) fn gap(surface: &Surface<'_>, other: &Piece<'_>) -> (DVec3, f64) {
     let ((low, high), (there_low, there_high)) = (surface.bounds, other.bounds());
     let apart = (low - there_high).max(DVec3::ZERO) - (there_low - high).max(DVec3::ZERO);
@@ -158,7 +158,7 @@ pub(super) fn gap(surface: &Surface<'_>, other: &Piece<'_>) -> (DVec3, f64) {
     (normal, apart.length() - surface.form.radius_m)
 }
 
-/// A surface in front of something else.
+/// A surface and another piece that may touch.
 struct Meeting<'a> {
     surface: &'a Surface<'a>,
     reach_m: f64,
@@ -172,7 +172,7 @@ impl Meeting<'_> {
         for (vertex, at) in self.surface.vertices_in(self.region) {
             let (span, share) = nearest_span(strand, at);
             let core = on_span(strand, span, share).centre;
-            // what is behind the skin of a closed body is its triangles' to push out
+            // a point behind the skin of a closed body is pushed out by its triangles
             let outside = self.normals.get(vertex as usize).is_none_or(|normal| normal.dot(core - at) >= 0.0);
             if outside && Ridge::Vertex(vertex).is_nearest(self.surface, core - at) {
                 into.extend(self.tell(KINDS[0] | u64::from(vertex), (Spot::vertex(vertex), at), strand, (span, share)));
@@ -216,13 +216,13 @@ impl Meeting<'_> {
         let ball = on_span(strand, span, share);
         let way = point - ball.centre;
         let out = if spot.shares[2] > 0.0 && self.surface.form.closed { self.out_of(spot) } else { None };
-        // a core that lies in the skin of a closed body is outside it
+        // a core that lies exactly in the skin of a closed body counts as outside it
         let inward = || spot.out(self.normals).and_then(DVec3::try_normalize).map(|out| -out);
         let across = || self.out_of(spot).or_else(inward).unwrap_or(DVec3::Z);
         let length = way.length();
         let (mut normal, mut distance) = if length > CROSSING_M { (way / length, length) } else { (across(), 0.0) };
         if out.is_some_and(|out| out.dot(normal) > 0.0) {
-            // the core is behind the skin: it has to come out where it went in, and under a thin plate it never did
+            // the core is behind the skin: it has to come out where it went in, and under a thin plate it never went in
             if length > 2.0 * ball.radius_m || self.is_before(ball.centre, length) {
                 return None;
             }
@@ -258,7 +258,7 @@ fn on_span(strand: &Strand<'_>, span: usize, share: f64) -> Ball {
     a.toward(b, share)
 }
 
-/// The span that a point is nearest to by its skin, and the share of it.
+/// The span whose skin is nearest to a point, and the share along it.
 fn nearest_span(strand: &Strand<'_>, at: DVec3) -> (usize, f64) {
     let mut best = (0, 0.0, f64::INFINITY);
     for span in 0..strand.spans() {

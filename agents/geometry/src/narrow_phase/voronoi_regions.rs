@@ -1,16 +1,16 @@
-//! What lies around each vertex and edge of a skin, and which ways out of it belong to them.
+//! Neighbourhoods of each vertex and edge of a skin, and which directions out of it belong to them.
 //!
-//! In: edges and triangles. Out: whether the way from a spot to what it touches leads out of it, and not along the skin.
-//! Never here: where the vertices are. Theory: docs/theory/soft.md, eq. 15a (the regions of Voronoi of (ERI05, ch. 5)).
+//! In: edges and triangles. Out: whether the vector from a spot to the touching point leads out of the skin, and not along it.
+//! Never here: where the vertices are. Theory: docs/theory/soft.md, eq. 15a (the Voronoi regions of (ERI05, ch. 5)).
 
 use super::primitives::Surface;
 use glam::DVec3;
 
-/// No triangle lies there.
+/// No triangle on that side.
 const NONE: u32 = u32::MAX;
-/// How far a way may lean over the skin and still belong to the spot, as a share of the edge that it leans over.
+/// How far a vector may lean over a neighbouring edge and still belong to the spot, as a share of that edge.
 pub(super) const LEAN_SHARE: f64 = 1e-3;
-/// What is left of a way that leads along the skin, when that is taken off, is no way out below this share.
+/// A vector is no way out when removing its parts along the skin leaves less than this share of it.
 const OUT_SHARE: f64 = 0.5;
 
 /// The neighbours of every vertex and edge of a skin; it never changes.
@@ -25,7 +25,7 @@ pub struct Fans {
 }
 
 impl Fans {
-    /// Of a skin of these edges and triangles.
+    /// The neighbourhoods of a skin with these edges and triangles.
     pub fn of(edges: &[[u32; 2]], triangles: &[[u32; 3]]) -> Self {
         let vertices = edges.iter().flatten().max().map_or(0, |last| *last as usize + 1);
         let mut starts = vec![0_u32; vertices + 1];
@@ -49,14 +49,14 @@ impl Fans {
         Self { opposite: opposite.collect(), starts, neighbours }
     }
 
-    /// From a vertex along the edges that meet there.
+    /// Vectors from a vertex along the edges that meet there.
     fn at_vertex(&self, surface: &Surface<'_>, vertex: u32) -> impl Iterator<Item = DVec3> {
         let from = surface.positions[vertex as usize];
         let range = self.starts[vertex as usize] as usize..self.starts[vertex as usize + 1] as usize;
         self.neighbours[range].iter().map(move |next| surface.positions[*next as usize] - from)
     }
 
-    /// Along an edge both ways, and across it into the triangles that meet there.
+    /// Vectors along an edge both ways, and across it into the triangles that meet there.
     fn at_edge(&self, surface: &Surface<'_>, number: u64, [a, b]: [DVec3; 2]) -> impl Iterator<Item = DVec3> {
         let along = (b - a).normalize_or_zero();
         let corners = self.opposite[number as usize].into_iter().filter(|corner| *corner != NONE);
@@ -65,7 +65,7 @@ impl Fans {
     }
 }
 
-/// A vertex or an edge of a skin, with its number and, of an edge, its ends.
+/// A vertex or an edge of a skin, with its number and, for an edge, its ends.
 #[derive(Clone, Copy)]
 pub(super) enum Ridge {
     Vertex(u32),
@@ -73,7 +73,7 @@ pub(super) enum Ridge {
 }
 
 impl Ridge {
-    /// Calls `each` with every way along the skin from here.
+    /// Calls `each` with every vector along the skin from here.
     fn along(self, surface: &Surface<'_>, mut each: impl FnMut(DVec3)) {
         let fans = &surface.form.fans;
         match self {
@@ -82,14 +82,14 @@ impl Ridge {
         }
     }
 
-    /// Whether nothing of the skin around it is nearer to what lies at the end of `way`: else that tells the place.
+    /// Whether no neighbouring part of the skin is nearer to the point at the end of `way`; otherwise that part reports the place.
     pub fn is_nearest(self, surface: &Surface<'_>, way: DVec3) -> bool {
         let mut nearest = true;
         self.along(surface, |along| nearest &= way.dot(along) <= LEAN_SHARE * along.length_squared());
         nearest
     }
 
-    /// The unit way out of the skin that is near to `way`: what leads along the skin is taken off. `None` if that was most of it.
+    /// The unit vector out of the skin that is close to `way`: its parts along the skin are removed. `None` if they were most of it.
     pub fn out(self, surface: &Surface<'_>, way: DVec3) -> Option<DVec3> {
         let mut out = way;
         for _ in 0..2 {

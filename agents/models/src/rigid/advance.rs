@@ -1,4 +1,4 @@
-//! How a body gets through a part of a step: it flies, takes blows, and stays in contact.
+//! A part of a rigid body's step: flight, impacts and lasting contact.
 //!
 //! In: the body, a span, gravity. Out: its motion after the span, and what it gave to others. Never here: how a touch is
 //! foreseen ([`crate::rigid::conservative_advancement`], [`super::company`]) or solved ([`super::world`], [`super::meeting`]), springs.
@@ -9,17 +9,17 @@ use super::meeting::{Me, Scope, Strike};
 use glam::DVec3;
 use metachron_core::Twist;
 
-/// A touching body has left when it would fly for at least this long, seconds.
+/// A touching body has left contact when it would fly for at least this long, seconds.
 const LEAVE_S: f64 = 4e-3;
 /// A flight shorter than this is a touch, seconds.
 pub(super) const TOUCH_S: f64 = 1e-7;
-/// A blow of fixed solids that changes the velocity by less changes nothing, m/s.
+/// An impact of static solids that changes the velocity by less than this counts as no change, m/s.
 const CHANGED_M_S: f64 = 1e-3;
-/// After this many flights and blows within one part the contact solver carries the body to the part's end.
+/// After this many flights and impacts within one part the contact solver carries the body to the part's end.
 const EVENTS_MAX: u32 = 64;
 
 impl RigidBody {
-    /// Flies, takes blows and stays in contact for `h` seconds in all.
+    /// Alternates flight, impacts and lasting contact for `h` seconds in all.
     pub(super) fn advance(&mut self, h: f64, gravity: DVec3) -> Result<(), &'static str> {
         let mut left = h;
         for _ in 0..EVENTS_MAX {
@@ -32,7 +32,7 @@ impl RigidBody {
                 if coming < TOUCH_S && self.take_blow(ahead[1].coming_s < ahead[0].coming_s) {
                     continue;
                 }
-                // until then it stays in touch with what does not bounce, and with what a blow did not send away
+                // until then it stays in contact with solids that do not bounce, and with those that an impact did not send away
                 let here = coming < TOUCH_S;
                 let span = if here { left } else { coming.min(left) };
                 let within = horizon.min(span.max(LEAVE_S));
@@ -60,19 +60,19 @@ impl RigidBody {
         self.linger(left, gravity, near)
     }
 
-    /// What lies ahead of a flight of `horizon` seconds: fixed solids, and everybody that can bounce.
+    /// Contacts ahead of a flight of `horizon` seconds: with static solids, and with agents that can bounce.
     fn ahead(&mut self, gravity: DVec3, horizon: f64) -> [Ahead; 2] {
         let fall = Fall { gravity, spin_max: self.motion.spin_max(&self.spread) };
         let fixed = self.world.ahead(&self.motion, fall, horizon);
         [fixed, self.company.ahead(&self.world.mover, &self.motion, fall, horizon)]
     }
 
-    /// Whether nothing is touched for `h` seconds.
+    /// Whether no contact occurs for `h` seconds.
     pub(super) fn is_free(&mut self, gravity: DVec3, h: f64) -> bool {
         self.ahead(gravity, h).iter().all(|side| side.free_s() >= h)
     }
 
-    /// The blow of a touch, with others where `met`. Whether it changed anything.
+    /// Solves the impact of a touch, with peers where `met`. Returns whether it changed anything.
     fn take_blow(&mut self, met: bool) -> bool {
         self.steady = false;
         let before = self.motion.velocity;
@@ -80,7 +80,7 @@ impl RigidBody {
         approached && (met || self.motion.velocity.distance(before) > CHANGED_M_S)
     }
 
-    /// A blow; whether anything approached.
+    /// Solves an impact; returns whether any contact approached.
     fn strike(&mut self, strike: Strike) -> bool {
         let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
         let approached = meeting.blow(&mut Me { motion, spread, mover: &world.mover }, company, obstacles, strike);
@@ -88,16 +88,16 @@ impl RigidBody {
         approached
     }
 
-    /// What the body was given while it stood has pressed it on the ground all the time: the ground has taken it, before a world
-    /// that it shares moves anybody.
+    /// Lets the ground take the impulses received while the body was supported, as they have pressed it there all the time: before
+    /// its island moves any body.
     pub(super) fn stand_fast(&mut self) {
         if self.received[0] != DVec3::ZERO && (self.touching || self.stand.is_some()) {
             self.strike(Strike { met: false, pressed: self.received, stood: true });
         }
     }
 
-    /// What of the velocity and the spin received in this step others press it by: all of it where it stands, else what it received in
-    /// the step before too, for a blow comes once.
+    /// The part of the velocity and spin received in this step that keeps pressing it: all of it where it is supported, otherwise
+    /// only as far as the step before received it too, as an impact comes once.
     fn pressed(&self) -> Twist {
         let [now, before] = [self.received[0], self.received_before];
         let lasts = (before.dot(now) / now.length_squared().max(f64::MIN_POSITIVE)).clamp(0.0, 1.0);
@@ -105,7 +105,7 @@ impl RigidBody {
         self.received.map(|all| all * share)
     }
 
-    /// Stays in contact for `h` seconds with what is `near`; flies where nothing is.
+    /// Stays in contact for `h` seconds with the groups that are `near`; flies if none is.
     fn stay(&mut self, h: f64, gravity: DVec3, near: [bool; 2]) -> Result<(), &'static str> {
         if near == [false; 2] {
             self.travel(h, gravity);
@@ -114,7 +114,7 @@ impl RigidBody {
         self.linger(h, gravity, near)
     }
 
-    /// Flies for `h` seconds; tubes on the way are pressed on.
+    /// Flies for `h` seconds; presses on tubes in the way.
     fn travel(&mut self, h: f64, gravity: DVec3) {
         if !self.press(h, gravity, Scope { solids: false, fixed: true }) {
             self.steady = false;
@@ -124,7 +124,7 @@ impl RigidBody {
         self.world.moved();
     }
 
-    /// Stays in contact for `h` seconds: with fixed solids where they are near, with others where `met`, or with both.
+    /// Stays in contact for `h` seconds: with static solids where they are near, with peers where `met`, or with both.
     fn linger(&mut self, h: f64, gravity: DVec3, [fixed, met]: [bool; 2]) -> Result<(), &'static str> {
         if self.press(h, gravity, Scope { solids: met, fixed: true }) {
             self.world.moved();
@@ -132,7 +132,7 @@ impl RigidBody {
             self.company.go_on(h);
             return self.world.contact(&mut self.motion, &self.spread, h, gravity);
         } else {
-            // others came near, but not near enough to touch
+            // peers came near, but not near enough to touch
             self.motion.fly(&self.spread, gravity, h);
             self.company.go_on(h);
             self.world.moved();
@@ -140,7 +140,7 @@ impl RigidBody {
         if self.motion.is_sane(&self.spread) { Ok(()) } else { Err("it was thrown out of reach") }
     }
 
-    /// Presses on whatever may touch within `h` seconds, and moves; `false`, and nothing done, where nothing may.
+    /// Solves contact with all bodies that may touch within `h` seconds, and moves; `false`, with no change, if there are none.
     fn press(&mut self, h: f64, gravity: DVec3, scope: Scope) -> bool {
         let Self { motion, spread, world, company, meeting, obstacles, .. } = self;
         if company.guests().is_empty() || !(scope.solids || company.has_tubes()) {
@@ -152,7 +152,7 @@ impl RigidBody {
         self.coupled += self.motion.velocity - before - gravity * h - pressed.fixed / self.spread.mass_kg;
         self.held_up |= pressed.fixed != DVec3::ZERO;
         self.motion.fly(&self.spread, DVec3::ZERO, h);
-        // the velocity is that of the end; what it is pressed on goes along a parabola, so the body does too
+        // the velocity is that of the end; the support moves along a parabola, so the body does too
         self.motion.position -= pressed.carried * (0.5 * h * h);
         self.company.go_on(h);
         true

@@ -1,6 +1,6 @@
-//! The agent: one step of a rigid body, told as a contents page.
+//! The rigid body agent: the sequence of one step.
 //!
-//! In: a span and what is around. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
+//! In: a span and the surroundings. Out: a new [`Motion`] and a snapshot. Never here: how a contact or a spring is solved.
 
 use super::borne::Borne;
 use super::company::Company;
@@ -35,90 +35,90 @@ use metachron_geometry::{Obstacle, Solid};
 use std::any::Any;
 use std::sync::Arc;
 
-/// A rigid body that lives by its own steps.
+/// A rigid body with its own clock.
 pub struct RigidBody {
     pub(super) spread: Spread,
     pub(super) gravity: DVec3,
     pub(super) may_sleep: bool,
     pub(super) motion: Motion,
-    /// The fixed solids, for flights and for contact with them alone.
+    /// The static solids, for flights and for contact with them alone.
     pub(super) world: World,
-    /// The same as forms, for contact with them and others at once.
+    /// The same as forms, for simultaneous contact with them and other agents.
     pub(super) obstacles: Obstacles,
-    /// Whom it meets.
+    /// The neighbours that it meets.
     pub(super) company: Company,
     pub(super) meeting: Meeting,
     pub(super) sided: Sided,
     /// Whether the last event was a touch that has not ended.
     pub(super) touching: bool,
-    /// Whether nothing but contact happened since the step began.
+    /// Whether only contact has acted since the step began.
     pub(super) steady: bool,
-    /// Whether something fixed, or a world that it shares, has held it up since the step began.
+    /// Whether a static solid or its island has supported it since the step began.
     pub(super) held_up: bool,
-    /// The velocity after what was received at the step's start, and what couplings of its own have added since, m/s.
+    /// The velocity after the impulses received at the step's start, and the changes by its own couplings since, m/s.
     pub(super) begun: DVec3,
     pub(super) coupled: DVec3,
-    /// Where it then was, metres, and its angular momentum, kg·m²/s.
+    /// Its position at that time, metres, and its angular momentum, kg·m²/s.
     pub(super) begun_at: (DVec3, DVec3),
-    /// The velocity and the spin that were received at the step's start, m/s and rad/s.
+    /// The changes of velocity and spin by impulses received at the step's start, m/s and rad/s.
     pub(super) received: Twist,
-    /// The velocity that was received at the start of the step before, m/s.
+    /// The change of velocity received at the start of the step before, m/s.
     pub(super) received_before: DVec3,
-    /// What fixed solids gave lately.
+    /// Recent impulses of static solids.
     pub(super) borne: Borne,
-    /// What others may expect, m/s².
+    /// The published acceleration, m/s².
     pub(super) acceleration: DVec3,
     pub(super) stand: Option<Stand>,
-    /// How it tips.
+    /// The published state of tipping over an edge or corner, if it tips.
     pub(super) tips: Option<Tips>,
-    /// On whom it lies.
+    /// The agent that it rests on.
     pub(super) lies: Option<LiesOn>,
-    /// Its inverse mass among those whose world it shares, where that is known, about its centre.
+    /// Its inverse mass within its island, where that is known, about its centre.
     pub(super) within: Option<Six>,
-    /// How far what it was given late has carried it, kg·m and kg·m², until its world takes that.
+    /// Displacement by late impulses, kg·m and kg·m², until its island applies it.
     pub(super) late: Option<Impulse>,
-    /// In how many seconds of free flight something fixed may be in its way, where others have to know.
+    /// Time of free flight until a static solid may be in its way, seconds, where peers need it.
     pub(super) lands_s: Option<f64>,
-    /// For how long it has stood, seconds.
+    /// How long it has been supported (`stand`), seconds.
     pub(super) stood_s: f64,
-    /// How springs hold it in contact that others own.
+    /// The state published while springs hold it in contacts that peers own.
     pub(super) hold: Hold,
     pub(super) at_rest: bool,
     pub(super) calm_s: f64,
     pub(super) steps: u64,
-    /// What it did lately.
+    /// Its recent contact history.
     pub(super) lately: Lately,
     pub(super) grips: Vec<Grip>,
     pub(super) ties: Ties,
-    /// The tools that pressed it in the last part of a world that it shares.
+    /// The tools that pressed it in the last part of an island's step.
     pub(super) leant: Vec<Leant>,
-    /// The fixed solids and the joints of the scene, for the world that it may share.
+    /// The static solids and the joints of the scene, for its island.
     pub(super) scenery: (Arc<[Obstacle]>, Arc<[Joint]>),
-    /// That world, where this body leads it or a joint holds it.
+    /// The island, where this body leads it or a joint holds it.
     pub(super) island: Option<Box<Island>>,
     /// Whether a joint of the scene holds the body; known from its first step on.
     jointed: Option<bool>,
-    /// How deep it sank into anything in the last step of its island, metres; `None` alone.
+    /// How deep it sank into any body in the last step of its island, metres; `None` without an island.
     pub(super) sunk_m: Option<f64>,
-    /// What its steps in contact and under springs do wrong in a tenth of a second, metres.
+    /// Error of its steps in contact and under springs over a tenth of a second, metres.
     drift_m: f64,
 }
 
-/// A stretch of contact or of a spring's pull is solved in parts no longer than this, seconds.
+/// The longest part of a step in contact or under a spring, seconds.
 const PART_MAX_S: f64 = 1.0 / 240.0;
-/// A body that touches something and moves slower than this everywhere is calm, m/s: above the solver's own jitter
-/// (measured: below 1e-4 m/s for a box of 1 m at rest), below what an eye sees.
+/// A body in contact that moves slower than this everywhere is calm, m/s: above the solver's own jitter
+/// (measured: below 1e-4 m/s for a box of 1 m at rest), below the visible.
 const CALM_M_S: f64 = 2e-3;
 /// A body that was calm for this long of its own time is at rest, seconds.
 const REST_S: f64 = 0.5;
-/// A step shorter than this share of [`PART_MAX_S`] too long is not split once more.
+/// A step longer than [`PART_MAX_S`] by less than this factor is not split once more.
 const SPLIT_SLACK: f64 = 1.01;
 
 impl RigidBody {
     /// Builds the body of `spec` in its own world.
     ///
     /// # Errors
-    /// [`RigidError`] for a shape without volume, a plane, a number outside its range and an obstacle that is no shape.
+    /// [`RigidError`] for a shape without volume, a plane, a number outside its range and an invalid obstacle shape.
     pub fn new(spec: RigidSpec) -> Result<Self, RigidError> {
         spec.check()?;
         let spread = Spread::of(&spec.solid, spec.mass_kg)?;
@@ -180,20 +180,20 @@ impl RigidBody {
 
     /// The centre of mass in the shape's own axes, metres.
     ///
-    /// A snapshot tells where the centre of mass is: a point `p` of the shape is at `position + rotation * (p − com_local)`.
+    /// A snapshot holds the position of the centre of mass: a point `p` of the shape is at `position + rotation * (p − com_local)`.
     #[must_use]
     pub fn com_local(&self) -> DVec3 {
         self.spread.com
     }
 
-    /// Advances by `h` seconds, springs first: pull, then fly and touch.
+    /// Advances by `h` seconds: springs first, then flight and contact.
     fn part(&mut self, h: f64) -> Result<(), &'static str> {
         let pulled = self.pull(h)?;
-        // the spring's solution has the gravity of this part in its velocity already
+        // the solution of the spring already has the gravity of this part in its velocity
         self.advance(h, if pulled.is_some() { DVec3::ZERO } else { self.gravity })
     }
 
-    /// Begins a step of `dt` seconds: takes what others gave, and what pulls; `fellows`, by rising ids, share its world.
+    /// Begins a step of `dt` seconds: takes impulses of peers, and gathers springs; `fellows`, by rising ids, are in the same island.
     pub(super) fn begin(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
         self.receive(around, fellows, dt);
         self.push_alone(around, dt);
@@ -201,7 +201,7 @@ impl RigidBody {
         self.grips.clear();
     }
 
-    /// The springs' part of `h` seconds, gravity with it; how they resist what else happens in it, where there is one.
+    /// Applies springs and gravity for `h` seconds; returns their resistance to further changes in this part, if there are springs.
     pub(super) fn pull(&mut self, h: f64) -> Result<Option<Six>, &'static str> {
         self.ties.aim(&self.company);
         let under = self.hold.under(h, self.gravity);
@@ -218,8 +218,8 @@ impl RigidBody {
         if self.motion.is_sane(&self.spread) { Ok(resistance) } else { Err("a spring threw it out of reach") }
     }
 
-    /// Books what the springs of the last part, which took `h` seconds, and the tools that press the body gave besides because a shared
-    /// world changed the velocities by so much within it.
+    /// Books the additional impulses of the springs and pressing tools in the last part, of `h` seconds, that follow from the `change` of
+    /// the velocities by the island within it.
     pub(super) fn give_way(&mut self, change: Twist, h: f64) {
         linear_spring::give_way(&self.motion, &self.spread, &mut self.ties.all, (change, h));
         for (grip, tie) in self.grips.iter_mut().zip(&self.ties.all) {
@@ -231,20 +231,20 @@ impl RigidBody {
         self.coupled += (self.ties.linked() + pushed) / self.spread.mass_kg;
     }
 
-    /// Ends a step in which a shared world has moved it.
+    /// Ends a step in which its island has moved it.
     pub(super) fn led(&mut self, around: &Surroundings<'_>, dt: f64, (touching, sunk_m): (bool, f64)) {
         (self.touching, self.sunk_m, self.calm_s) = (touching, Some(sunk_m), 0.0);
-        // the world that it shares moves it by parts at the speed of their ends
+        // the island moves it by parts at the speed of their ends
         self.drift_m = drifting(PART_MAX_S.min(dt), self.motion.velocity.distance(self.begun), dt);
         self.steps += 1;
         self.world.moved();
         self.hold.forget();
         self.borne.forget();
         self.settle(around, dt);
-        self.lies = None; // others in that world hold it too
+        self.lies = None; // other bodies of the island hold it too
     }
 
-    /// How many parts a step of `dt` seconds takes: one in free flight, more in contact or under a spring.
+    /// The number of parts in a step of `dt` seconds: one in free flight, more in contact or under a spring.
     fn parts(&mut self, dt: f64) -> u32 {
         let alone = self.ties.is_empty() && !self.company.has_tubes();
         let free = alone && self.is_free(self.gravity, dt);
@@ -257,7 +257,7 @@ impl RigidBody {
         *self.jointed.get_or_insert_with(|| joints.iter().any(|joint| joint.holds(me)))
     }
 
-    /// Counts calm time, and brings a body that has been calm long enough to a stop.
+    /// Counts calm time, and stops a body that has been calm long enough.
     fn rest(&mut self, dt: f64) -> bool {
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
         let still = self.motion.velocity == DVec3::ZERO && self.motion.angular == DVec3::ZERO;
@@ -274,8 +274,8 @@ impl RigidBody {
         self.at_rest
     }
 
-    /// Takes in what a step of `dt` seconds in so many parts did wrong. Flight and blows are exact; in lasting contact and
-    /// under a spring a part's way is made at the speed of its end.
+    /// Estimates the error of a step of `dt` seconds in so many parts. Flight and impacts are exact; in lasting contact and
+    /// under a spring a part's displacement is computed with the speed at its end.
     fn doubt(&mut self, before: &Motion, touched: bool, (dt, parts): (f64, u32)) {
         let pulled = !self.ties.is_empty();
         let part_s = dt / f64::from(parts) / if pulled { 1.0 } else { PASSES as f64 };
@@ -287,8 +287,8 @@ impl RigidBody {
     }
 }
 
-/// What parts of so many seconds at the speed of their ends do wrong in [`DRIFT_S`], where a step of `dt` seconds changed the
-/// velocity by so much: ½ h Δv each (docs/theory/control.md, eq. 33).
+/// The error over [`DRIFT_S`] of parts of this length that use the speed at their ends, where a step of `dt` seconds changed the
+/// velocity by `gain_m_s`: ½ h Δv each (docs/theory/control.md, eq. 33).
 fn drifting(part_s: f64, gain_m_s: f64, dt: f64) -> f64 {
     0.5 * part_s * gain_m_s * DRIFT_S / dt
 }
@@ -298,7 +298,7 @@ impl Agent for RigidBody {
         "rigid"
     }
 
-    /// Advances the body by `dt`: parts of at most 1/240 s where something touches or pulls, one part in free flight.
+    /// Advances the body by `dt`: parts of at most 1/240 s in contact or under springs, one part in free flight.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         if self.is_jointed(around.me) {
@@ -330,7 +330,7 @@ impl Agent for RigidBody {
         Ok(StepReport { work: 1.0, substeps: parts, at_rest })
     }
 
-    /// Tells how springs hold it before it has moved.
+    /// Publishes how springs hold it before it has moved.
     fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
         if let (Ok(dt_s), false) = (check_span(dt), self.is_jointed(around.me)) {
             self.company.gather(around, (&self.world.mover, &self.motion), &[]);
@@ -340,11 +340,11 @@ impl Agent for RigidBody {
         }
     }
 
-    /// What a body that bends is squeezed by on something fixed nobody foresees: neither the one that bends nor this one. Nor does a
-    /// rigid one foresee what the ground makes of its blows on this one, nor this one what it makes of a tool's drive.
+    /// Shortens the step where predictions fail: neither a deformable nor this body can predict how the deformable squeezes it on a static
+    /// solid. Nor can a rigid peer predict the ground's reaction to its impacts on this body, nor this body the effect of a tool's drive.
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
-        // what is caught this step may fall in the next
+        // a body caught in this step may fall in the next
         let soon_s = 2.0 * dt.as_secs_f64();
         let lands = || self.world.free_time(&self.motion, fall, soon_s) < soon_s;
         let owners = around.neighbours.iter().filter(|n| !n.owned && bends(n)).count();
@@ -377,7 +377,7 @@ impl Agent for RigidBody {
         None
     }
 
-    /// A rigid body has no samples to spread: nothing changes.
+    /// A rigid body has no nodes to redistribute: nothing changes.
     fn retune(&mut self, _wanted: Resolution) {}
 
     fn form(&self) -> Option<Arc<Form>> {
@@ -425,8 +425,8 @@ impl Agent for RigidBody {
 }
 
 impl RigidBody {
-    /// What the body knows of its own error: the rounding of its coordinates, what contact and springs do
-    /// wrong in a tenth of a second, and in contact how deep it sank in.
+    /// The body's estimate of its own error: the rounding of its coordinates, the drift of contact and springs
+    /// in a tenth of a second, and in contact its penetration depth.
     fn residual_m(&self) -> f64 {
         let size = self.motion.position.abs().max_element() + self.world.mover.radius_m;
         if self.touching {
@@ -438,7 +438,7 @@ impl RigidBody {
     }
 }
 
-/// The shape of `spec` as others touch it: what its own contact solver collides with.
+/// The shape of `spec` as peers touch it: the one that its own contact solver uses.
 fn form_of(spec: &RigidSpec, spread: &Spread, world: &World) -> Form {
     let (shape, radius_m) = (world.mover.shape.clone(), world.mover.radius_m);
     let solid = match &spec.solid {

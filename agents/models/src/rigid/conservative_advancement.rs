@@ -1,6 +1,6 @@
-//! How long a body can fly before it may touch a fixed solid: conservative advancement (MIR96).
+//! Lower bound of the time until a flying body may touch a static solid: conservative advancement (MIR96).
 //!
-//! In: a [`Motion`], a gravity and a span. Out: seconds of certainly free flight. Never here: what happens at the touch.
+//! In: a [`Motion`], a gravity and a span. Out: seconds of certainly free flight. Never here: contact response.
 //!
 //! A point of the body approaches along the normal n no faster than a = −n·v + |ω|R, and gravity adds b = −n·g at most, so
 //! a gap d lasts at least the first root of ½ b t² + a t = d. Between convex solids the plane through the nearest point
@@ -21,11 +21,11 @@ pub(super) struct Fixed {
     position: DVec3,
     rotation: DQuat,
     convex: bool,
-    /// Lowest and highest corner in world axes; `None` for a plane, which has no end.
+    /// Lowest and highest corner in world axes; `None` for a plane, which is unbounded.
     bounds: Option<(DVec3, DVec3)>,
 }
 
-/// The moving shape as the bound needs it.
+/// The moving shape with the measures that the bound needs.
 pub(super) struct Mover {
     /// The shape, in its own axes.
     pub shape: SharedShape,
@@ -38,49 +38,49 @@ pub(super) struct Mover {
     pub swing_m: f64,
 }
 
-/// What lies ahead of a flight: seconds of it that are certainly free.
+/// Contacts ahead of a flight: seconds of it that are certainly free.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Ahead {
-    /// Until something is touched that does not bounce, or that hardly comes nearer.
+    /// Time until contact with a solid that does not bounce, or that hardly approaches.
     pub near_s: f64,
-    /// Until something is touched that comes at the body and bounces off it.
+    /// Time until contact with an approaching solid that bounces.
     pub coming_s: f64,
 }
 
-/// How far off something is: seconds of free flight until it may be touched, and how fast it comes nearer along the normal, m/s.
+/// An approaching solid: seconds of free flight until it may be touched, and its approach speed along the normal, m/s.
 pub(super) type Approach = (f64, f64);
 
-/// What comes nearer more slowly than this does not bounce, m/s: from the ground it would be back within 4 ms.
+/// Contacts that approach more slowly than this do not bounce, m/s: off the ground the body would be back within 4 ms.
 const BOUNCE_M_S: f64 = 0.02;
 
 impl Ahead {
-    /// Nothing for `horizon` seconds.
+    /// No contact for `horizon` seconds.
     pub(super) const fn clear(horizon: f64) -> Self {
         Self { near_s: horizon, coming_s: horizon }
     }
 
-    /// Takes in something whose contact with the body has this restitution.
+    /// Adds a solid whose contact with the body has this restitution.
     pub(super) fn add(&mut self, (free_s, closing_m_s): Approach, restitution: f64) {
         let ahead = if restitution > 0.0 && closing_m_s > BOUNCE_M_S { &mut self.coming_s } else { &mut self.near_s };
         *ahead = ahead.min(free_s);
     }
 
-    /// Seconds until anything may be touched.
+    /// Seconds until any contact.
     pub(super) const fn free_s(&self) -> f64 {
         self.near_s.min(self.coming_s)
     }
 }
 
 /// The gap at which a body counts as touching, as a share of its radius: far above the 1e-6 that single-precision queries
-/// resolve, far below what can be seen. At most [`SKIN_MAX_M`].
+/// resolve, far below the visible. At most [`SKIN_MAX_M`].
 const SKIN_SHARE: f64 = 2e-4;
 /// The widest gap that counts as touching, metres.
 const SKIN_MAX_M: f64 = 1e-4;
-/// A mesh whose hull holds at most this much more volume counts as convex.
+/// A mesh whose hull has at most this many times its volume counts as convex.
 const HULL_EXCESS: f64 = 1.02;
 
 impl Mover {
-    /// The shape that a moving solid collides with, and its measures.
+    /// The collision shape of a moving solid, and its measures.
     ///
     /// A closed mesh that is not convex is divided into convex parts (V-HACD, 64³ voxels, concavity 0.01): corners in
     /// hollows are rounded by about a sixty-fourth of its size. An open mesh counts as its hull.
@@ -119,7 +119,7 @@ impl Mover {
         self.swing_m == 0.0
     }
 
-    /// Where the origin of the shape's axes is, for a body in this motion.
+    /// Position of the origin of the shape's axes, for a body in this motion.
     pub(super) fn origin(&self, motion: &Motion) -> DVec3 {
         motion.position - motion.rotation * self.com
     }
@@ -130,7 +130,7 @@ impl Mover {
     }
 }
 
-/// The distance from the centre of mass to the farthest point, and that to the farthest point that swings.
+/// The distance from the centre of mass to the farthest point, and to the farthest point that the spin moves along a normal.
 fn extents(solid: &Solid, com: DVec3) -> (f64, f64) {
     let both = |r: f64| (r, r);
     match solid {
@@ -146,7 +146,7 @@ fn extents(solid: &Solid, com: DVec3) -> (f64, f64) {
 }
 
 impl Fixed {
-    /// A solid standing at `position`.
+    /// A solid fixed at `position`.
     pub(super) fn new(solid: &Solid, position: DVec3, rotation: DQuat) -> Result<Self, metachron_geometry::ShapeError> {
         let shape = solid.to_shared_shape()?;
         let rotation = rotation.normalize();
@@ -162,7 +162,7 @@ impl Fixed {
         (self.shape.clone(), pose(self.position, self.rotation))
     }
 
-    /// How far off this solid is: at most `horizon` seconds.
+    /// The approach of the body to this solid: at most `horizon` seconds.
     pub(super) fn approach(&self, mover: &Mover, motion: &Motion, fall: Fall, horizon: f64) -> Approach {
         let reach = fall.reach(motion, mover, horizon);
         if self.bounds.is_some_and(|(low, high)| {
@@ -180,9 +180,9 @@ impl Fixed {
         (first_root(a, b, gap - mover.skin_m()).min(horizon), closing)
     }
 
-    /// How high the body's lowest point is above this plane, metres.
+    /// Height of the body's lowest point above this plane, metres.
     ///
-    /// Asked of the parts themselves: parry 0.31.1 answers for a compound over a half space with the pose turned round.
+    /// Each convex part is queried itself: parry 0.31.1 answers for a compound over a half space with the pose inverted.
     fn height(&self, mover: &Mover, relative: &Pose) -> Option<f32> {
         let lowest = |part: &dyn Shape, pose: Pose| {
             let lowest = part.as_support_map()?.support_point_toward(&pose, -Vec3::Z);
@@ -199,7 +199,7 @@ impl Fixed {
 
     /// The outward normal at the nearest point, and the gap there (negative inside); `None` beyond `reach`.
     fn gap(&self, mover: &Mover, motion: &Motion, reach: f64) -> Option<(DVec3, f64)> {
-        // relative in double precision first: single precision then only sees small numbers where it matters
+        // relative in double precision first: single precision then only handles small numbers where it matters
         let back = self.rotation.conjugate();
         let relative = pose(back * (mover.origin(motion) - self.position), back * motion.rotation);
         if self.bounds.is_none() {
@@ -221,17 +221,17 @@ impl Fixed {
     }
 }
 
-/// What pulls a flying body and how fast it can turn.
+/// Acceleration and maximum spin of a flying body.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fall {
     /// Acceleration, m/s².
     pub gravity: DVec3,
-    /// The fastest it can come to spin, rad/s.
+    /// The largest spin it can reach, rad/s.
     pub spin_max: f64,
 }
 
 impl Fall {
-    /// How far any point of the body can get in `t` seconds.
+    /// Upper bound of the distance travelled by any point of the body in `t` seconds.
     fn reach(&self, motion: &Motion, mover: &Mover, t: f64) -> f64 {
         (motion.velocity.length() + self.spin_max * mover.swing_m) * t + 0.5 * self.gravity.length() * t * t
     }

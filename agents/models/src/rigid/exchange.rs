@@ -1,7 +1,7 @@
-//! What a body takes from others and shows to them.
+//! Coupling of a rigid body to its peers: the impulses it takes and the data it publishes.
 //!
-//! In: ledgers of those who own a contact with it. Out: its motion with their impulses in it, contacts of its own solved for a
-//! world that moves it, and the part of its snapshot that others couple by. Never here: how contacts are solved
+//! In: ledgers of the owners of contacts with it. Out: its motion with their impulses applied, its own contacts solved for an
+//! island that moves it, and the coupling part of its snapshot. Never here: how contacts are solved
 //! ([`super::meeting`]). Theory: docs/theory/coupling.md.
 
 use super::RigidBody;
@@ -19,18 +19,18 @@ use metachron_core::snapshot::STANDING_M_S;
 use metachron_core::{AgentId, Body, Bounds, Inertia, LiesOn, SimSpan, SimTime, Snapshot, Stand, Upheld};
 use metachron_core::{Impulse, Six, Twist};
 
-/// What a body says of its acceleration stays this near to gravity, in multiples of it: what it stands on can hold it up,
-/// a single hard step must not send it flying in others' eyes.
+/// Limit of the published acceleration's difference from gravity, in multiples of gravity: its support can hold it up, but
+/// a single hard step must not make peers predict that it flies off.
 const EXPECTED_G: f64 = 3.0;
 
-/// What may be in the way of a free flight is looked for so far ahead, seconds: three steps of 10 Hz, and slower clocks are rare.
+/// Look-ahead for static solids in the way of a free flight, seconds: three steps of 10 Hz; slower clocks are rare.
 const LANDS_S: f64 = 0.3;
 
 impl RigidBody {
-    /// Begins a step of `dt` seconds: takes what the owners of its contacts gave, and brings everybody that it meets to its
+    /// Begins a step of `dt` seconds: takes the impulses of the owners of its contacts, and brings each agent that it meets to its
     /// own time.
     ///
-    /// `fellows`, by rising ids, share a world with this body: what is between them is not coupled.
+    /// `fellows`, by rising ids, are in the same island as this body: contacts between them are not coupled.
     pub fn receive(&mut self, around: &Surroundings<'_>, fellows: &[AgentId], dt: f64) {
         let before = [self.motion.velocity, self.motion.spin(&self.spread)];
         self.company.exchange.open(around);
@@ -46,7 +46,7 @@ impl RigidBody {
         }
         self.received_before = self.received[0];
         self.received = [self.motion.velocity - before[0], self.motion.spin(&self.spread) - before[1]];
-        // what bends holds it by what it gives
+        // a deformable supports it through the impulses that it gives
         let given = self.received[0] != DVec3::ZERO;
         let held = given || self.touching || self.held_up || self.stand.is_some() || !self.ties.is_empty();
         self.company.span = Span { dt_s: dt, gravity: self.gravity, held };
@@ -56,7 +56,7 @@ impl RigidBody {
         self.held_up = !fellows.is_empty();
     }
 
-    /// Takes what owners gave, and what acts in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
+    /// Takes owners' impulses, including those that act in a step of `dt` seconds, where no springs hold the body (eq. 3, 4).
     fn take(&mut self, around: &Surroundings<'_>, dt: f64) {
         let until = around.time + SimSpan::from_secs_f64(dt).unwrap_or(SimSpan::ZERO);
         let Self { motion, spread, company, .. } = self;
@@ -70,7 +70,7 @@ impl RigidBody {
         if let Some((given, carried)) = taken {
             let since_s = carried.linear.length() / given.linear.length();
             let [left, carried] = self.spare([given, carried], (around.time, unread_s));
-            // what the ground bears carries nothing, and what is still to act lifts nothing off it
+            // impulses that the ground carries displace nothing, and impulses still to act lift nothing off it
             let carried = match self.stand {
                 Some(stand) if stand.bears(self.motion.position, given) => stand.leaves(carried),
                 Some(stand) => self.rise(&stand, (left, carried), since_s.min(self.stood_s)),
@@ -85,15 +85,15 @@ impl RigidBody {
         }
     }
 
-    /// Moves by a `way` that its world has for it, metres and radians.
+    /// Moves the body by a displacement that its island computed, metres and radians.
     pub(super) fn go_by(&mut self, [way, turn]: Twist) {
         self.motion.position += way;
         self.motion.rotation = (DQuat::from_scaled_axis(turn) * self.motion.rotation).normalize();
         self.world.moved();
     }
 
-    /// Takes back what the ground carried of the weight of a body that was lifted off it `since_s` seconds ago, by what is left
-    /// of an impulse; as much of the way (eq. 7f).
+    /// Removes the weight that the ground carried from a body that was lifted off it `since_s` seconds ago by the remainder of an
+    /// impulse, and the corresponding displacement (eq. 7f).
     fn rise(&mut self, stand: &Stand, (left, carried): (Impulse, Impulse), since_s: f64) -> Impulse {
         let mass = self.spread.mass_kg;
         let all = [left.linear, carried.linear].map(|impulse| impulse / mass);
@@ -102,8 +102,8 @@ impl RigidBody {
         Impulse { linear: way * mass, ..carried }
     }
 
-    /// Takes back what fixed solids gave in place of impulses that came late, and as much of the way; what is left of both. They were given
-    /// at most so many seconds before now.
+    /// Takes back the impulses that static solids gave in place of impulses that came late, and the corresponding displacement; returns the
+    /// remainder of both. They acted at most so many seconds before now.
     fn spare(&mut self, [given, carried]: [Impulse; 2], since: (SimTime, f64)) -> [Impulse; 2] {
         let inverse = self.motion.inverse_inertia(&self.spread);
         let [back, way] = self.borne.in_place_of([given, carried], since, inverse);
@@ -112,7 +112,7 @@ impl RigidBody {
         [given - back, carried - way]
     }
 
-    /// Pushes the body off others by laws that act on one side alone, for a step of `dt` seconds.
+    /// Applies contact laws that act on one side alone (penalty, wave variables), for a step of `dt` seconds.
     pub fn push_alone(&mut self, around: &Surroundings<'_>, dt: f64) {
         let Self { motion, spread, company, sided, gravity, stand, .. } = self;
         if company.guests().is_empty() {
@@ -126,9 +126,9 @@ impl RigidBody {
         }
     }
 
-    /// Solves the contacts that this body owns over the next `h` seconds for a world that moves it and has its gravity: the
-    /// velocities change, nothing moves but the others. Comes after [`Self::receive`], as often as the step has parts. How tools resist
-    /// what else happens in it, where some press the body.
+    /// Solves the contacts that this body owns over the next `h` seconds for an island that moves it and applies its gravity: the
+    /// velocities change, no position of the body does. Call it after [`Self::receive`], once for each part of the step. Returns the
+    /// resistance of pressing tools to further changes in it, if any press the body.
     pub fn meet(&mut self, h: f64) -> Option<Six> {
         self.leant.clear();
         if self.company.guests().is_empty() {
@@ -147,7 +147,7 @@ impl RigidBody {
         leant::resistance(&self.leant)
     }
 
-    /// Ends a step of `dt` seconds: what was given is booked, and the acceleration that others may expect is known.
+    /// Ends a step of `dt` seconds: books the impulses given and computes the acceleration to publish.
     pub fn settle(&mut self, around: &Surroundings<'_>, dt: f64) {
         let beyond = self.support(dt).clamp_length_max(EXPECTED_G * self.gravity.length());
         self.acceleration = if self.at_rest { DVec3::ZERO } else { self.gravity + beyond };
@@ -173,21 +173,21 @@ impl RigidBody {
         self.company.settle(around, dt, (self.gravity, held));
     }
 
-    /// Says what others may expect of a body that has not stepped yet: it stands where it was put down, and does not fall into
+    /// Sets the published state of a body that has not stepped yet: it is supported where it was placed, and does not fall into
     /// the ground.
     pub(super) fn put_down(&mut self) {
         (self.stand, self.tips) = self.footing();
         self.bear();
     }
 
-    /// What it stands on lets it fall no further, also where it has only just come down on it.
+    /// Removes the acceleration into its support, also where it has only just come down on it.
     fn bear(&mut self) {
         if let Some(Stand { normal, .. }) = self.stand {
             self.acceleration -= normal * self.acceleration.dot(normal).min(0.0);
         }
     }
 
-    /// On whom it lies, where one alone says that something fixed holds it up under the body (eq. 7l).
+    /// The agent that it rests on, where exactly one neighbour reports that it supports the body on something fixed (eq. 7l).
     fn upheld(&self, around: &Surroundings<'_>) -> Option<LiesOn> {
         if self.hold.is_known() || !self.ties.is_empty() || self.island.is_some() {
             return None;
@@ -197,12 +197,12 @@ impl RigidBody {
             Some(LiesOn { on: n.id, at: n.snapshot.time, step_s: n.step_s, upheld })
         });
         let lies = all.next().filter(|_| all.next().is_none())?;
-        // what pushes it along, or turns it, the one that bears it tells too late
+        // the supporting agent would report a push along it, or a turn, too late
         let Upheld { stand, velocity, .. } = lies.upheld;
         let otherwise = self.motion.velocity - velocity;
         let along = otherwise - stand.normal * stand.normal.dot(otherwise);
         let swing = self.world.mover.radius_m * self.motion.spin(&self.spread).length();
-        // two that bear it together divide it among them (eq. 6c)
+        // two supporting agents divide the body between them (eq. 6c)
         let lifts = |n: &Neighbour| {
             let given = n.snapshot.given.iter().find(|ledger| ledger.with == around.me);
             n.id != lies.on && given.is_some_and(|ledger| ledger.force.linear.dot(stand.normal) > 0.0)
@@ -210,20 +210,20 @@ impl RigidBody {
         (along.length() + swing < STANDING_M_S && !around.neighbours.iter().any(lifts)).then_some(lies)
     }
 
-    /// In how many seconds of free flight something fixed may be in its way, where that is soon.
+    /// Time of free flight until a static solid may be in its way, seconds, where that is soon.
     fn land(&self) -> Option<f64> {
         let fall = Fall { gravity: self.gravity, spin_max: self.motion.spin_max(&self.spread) };
         let free_s = self.world.free_time(&self.motion, fall, LANDS_S);
         (free_s < LANDS_S).then_some(free_s)
     }
 
-    /// What holds a body up in lasting contact, beside gravity and couplings, m/s²; nothing in flight.
+    /// The support acceleration in lasting contact, beyond gravity and couplings, m/s²; zero in flight.
     ///
-    /// What merely took back the impulses that were received in this step is left out: it will take back the next ones too,
+    /// The part that merely took back the impulses received in this step is left out: the support will take back the next ones too,
     /// but only those.
     fn support(&self, dt: f64) -> DVec3 {
         if let Some(within) = self.within {
-            // the world that it shares takes what it is given, too
+            // the island also takes back part of the received impulses
             let [linear, angular] = self.received;
             let given = [linear * self.spread.mass_kg, self.motion.inertia_times(&self.spread, angular)];
             let changed = self.motion.velocity - (self.begun - linear) - self.coupled - within.times(given)[0];
@@ -239,13 +239,13 @@ impl RigidBody {
         if taken_back > 0.0 { measured + received * taken_back.min(1.0) } else { measured }
     }
 
-    /// Moves the body by what impulses have carried it meanwhile; not through a fixed solid.
+    /// Moves the body by the displacement that late impulses have caused; not through a static solid.
     pub(super) fn shift(&mut self, carried: Impulse) {
         let Self { motion, spread, world, gravity, touching, tips, .. } = self;
         let way = carried.linear / spread.mass_kg;
         let mut moved = Motion { velocity: way, angular: carried.angular, ..*motion };
         let turn = moved.spin_max(spread);
-        // what lifts it off one side turns it over its feet on the other
+        // an impulse that lifts one side turns the body over its feet on the other
         let lifts = tips.filter(|tips| tips.normal.dot(way) > 0.0);
         let clear_m = FEET_M + 2.0 * world.mover.skin_m() + world.mover.radius_m * turn;
         let raised = lifts.map_or(DVec3::ZERO, |tips| tips.normal * clear_m);
@@ -259,7 +259,7 @@ impl RigidBody {
         }
     }
 
-    /// Keeps only a `share` of the way on which impulses that came late have carried it from where it was `before`.
+    /// Keeps only a `share` of the displacement by late impulses since the state `before`.
     pub(super) fn go_part(&mut self, before: &Motion, share: f64) {
         let Self { motion, gravity, .. } = self;
         let way = motion.position - before.position;
@@ -282,12 +282,12 @@ impl RigidBody {
         }
     }
 
-    /// Whether what it stands on will hold it up: nobody lifts it.
+    /// Whether its support will hold it up: no received impulse lifts it.
     pub(super) fn stays(&self) -> bool {
         self.stand.is_some_and(|stand| stand.normal.dot(self.received[0]) <= 0.0)
     }
 
-    /// Writes what others couple by.
+    /// Writes the data that peers need for coupling.
     pub(super) fn write_coupling(&self, into: &mut Snapshot) {
         let (inverse_mass, inverse_inertia) = self.motion.inverse_inertia(&self.spread);
         into.inertia = Inertia::Rigid { inverse_mass, inverse_inertia };
@@ -311,7 +311,7 @@ impl RigidBody {
     }
 }
 
-/// Whether a rigid body may touch the one that looks around.
+/// Whether a rigid neighbour may touch this body.
 fn seen_rigid(around: &Surroundings<'_>) -> bool {
     around.neighbours.iter().any(|n| n.form.is_some() && matches!(n.snapshot.body, Body::Rigid(_)))
 }

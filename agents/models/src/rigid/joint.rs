@@ -1,4 +1,4 @@
-//! Joints between rigid bodies: what a scene gives, and what is wrong with it.
+//! Joints between rigid bodies: the data a scene gives, and their checks.
 //!
 //! In: two bodies, two anchors and a kind. Out: a checked [`Joint`]. Never here: how a joint is solved (`island/`).
 
@@ -12,37 +12,37 @@ pub struct Joint {
     pub a: AgentId,
     /// The second body; `None` is the world.
     pub b: Option<AgentId>,
-    /// What it leaves free.
+    /// The degrees of freedom it leaves free.
     pub kind: JointKind,
-    /// Where it holds `a`, metres, in the axes of a's shape.
+    /// Anchor on `a`, metres, in the axes of a's shape.
     pub anchor_a_m: DVec3,
-    /// Where it holds `b`, metres, in the axes of b's shape; in world axes where `b` is the world.
+    /// Anchor on `b`, metres, in the axes of b's shape; in world axes where `b` is the world.
     pub anchor_b_m: DVec3,
-    /// How b's shape is turned against a's where the joint is at its zero: `a⁻¹ b` of both rotations at the start.
+    /// Rotation of b's shape relative to a's where the joint is at its zero: `a⁻¹ b` of both rotations at the start.
     pub rest: DQuat,
     /// Whether the two bodies also collide with each other.
     pub collide: bool,
 }
 
-/// What a joint holds and what it leaves free. Axes are in a's shape, of any length above zero.
+/// The degrees of freedom that a joint locks and leaves free. Axes are in a's shape, of any length above zero.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum JointKind {
-    /// Nothing is free.
+    /// All locked.
     Fixed,
-    /// Turning about one axis, like a hinge.
+    /// Rotation about one axis, like a hinge.
     Revolute {
         /// The hinge's axis.
         axis: DVec3,
-        /// How far b may turn against a about the axis, radians about the zero of `rest`, within −π … π.
+        /// Range of b's rotation relative to a about the axis, radians about the zero of `rest`, within −π … π.
         range_rad: Option<[f64; 2]>,
     },
-    /// Turning about every axis, like a ball in its socket.
+    /// Rotation about every axis, like a ball in its socket.
     Spherical,
-    /// Sliding along one axis.
+    /// Translation along one axis.
     Prismatic {
         /// The slide's axis.
         axis: DVec3,
-        /// How far b's anchor may be from a's along the axis, metres.
+        /// Range of b's anchor relative to a's along the axis, metres.
         range_m: Option<[f64; 2]>,
     },
     /// A spring between the anchors.
@@ -61,7 +61,7 @@ pub enum JointKind {
     },
 }
 
-/// Why a joint cannot be.
+/// Why a joint is invalid.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum JointError {
@@ -92,7 +92,7 @@ pub enum JointError {
         /// Where it ends.
         high: f64,
     },
-    /// The bodies start where the joint cannot hold.
+    /// The bodies start where the joint cannot hold them.
     #[error("the bodies start {apart_m} m away from where the joint can hold them; at most {limit_m} m are taken")]
     Apart {
         /// How far, metres.
@@ -102,17 +102,17 @@ pub enum JointError {
     },
 }
 
-/// A joint may start this far from where it holds, metres: rounding of a scene's numbers. The first step closes it.
+/// Largest initial violation of a joint, metres: rounding of a scene's numbers. The first step closes it.
 pub const JOINT_GAP_MAX_M: f64 = 1e-3;
 
 impl Joint {
-    /// A joint of `kind` that collides with nothing it joins, anchored in both shapes' origins.
+    /// A joint of `kind` without collision between its bodies, anchored in both shapes' origins.
     #[must_use]
     pub fn new(a: AgentId, b: Option<AgentId>, kind: JointKind) -> Self {
         Self { a, b, kind, anchor_a_m: DVec3::ZERO, anchor_b_m: DVec3::ZERO, rest: DQuat::IDENTITY, collide: false }
     }
 
-    /// The same joint with its zero where the two shapes are at the start: rotations to the world's axes.
+    /// The same joint with its zero at the initial rotations of the two shapes: rotations to the world's axes.
     #[must_use]
     pub fn at_rest_in(self, rotation_a: DQuat, rotation_b: DQuat) -> Self {
         Self { rest: (rotation_a.conjugate() * rotation_b).normalize(), ..self }
@@ -150,7 +150,7 @@ impl Joint {
         }
     }
 
-    /// Whether bodies that start there can be held: the shapes' origins and rotations, the world's zero for no body.
+    /// Whether bodies with this start satisfy the joint: the shapes' origins and rotations, zero for the world.
     ///
     /// # Errors
     /// [`JointError::Apart`] where the anchors are more than [`JOINT_GAP_MAX_M`] from where the joint holds them.
@@ -177,7 +177,7 @@ impl Joint {
     }
 }
 
-/// Past this no number of a joint is taken.
+/// The largest number accepted in a joint.
 const NUMBER_MAX: f64 = 1e9;
 
 fn number(what: &'static str, value: f64, least: f64) -> Result<(), JointError> {

@@ -1,11 +1,11 @@
-//! Springs that pull a rigid body: linearly implicit, stable at any stiffness, whatever the other end weighs.
+//! Springs on a rigid body: linearly implicit, stable at any stiffness and for any mass of the other end.
 //!
 //! In: the motion, the springs, a step. Out: the velocities after the step and the force of each spring; all springs together
 //! as others have to know them. Never here: contacts; positions stay; how jaws turn a body ([`crate::rigid::orientation_spring`]).
 //!
 //! With the generalised velocity u = (v, ω), the point Jacobian G = (1, −r×) and the spring's force at the *end* of the step,
-//! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The turning of r under
-//! a force f adds the stiffness max(r·f, 0)(1 − r̂ r̂ᵀ) against turning, taken at the force of a first pass. A stiff spring
+//! M (u⁺ − u) = h M g + Σ Gᵀ h (k (x + h ẋ − p − h G u⁺) + c (ẋ − G u⁺)): one symmetric 6×6 system. The rotation of r under
+//! a force f adds the stiffness max(r·f, 0)(1 − r̂ r̂ᵀ) against rotation, taken at the force of a first pass. A stiff spring
 //! therefore never blows up: past k ≈ m/h² it simply carries its point to the target within the step.
 
 use super::mass_properties::Spread;
@@ -16,28 +16,28 @@ use metachron_contact::Pull;
 use metachron_core::{Anchor, Grip};
 use metachron_core::{Six, Sprung, Twist};
 
-/// A spring on this body, and how its other end yields.
+/// A spring on this body, and the compliance of its other end.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tie {
-    /// The spring; its target is where the other end is now.
+    /// The spring; its target is the present position of the other end.
     pub pull: Pull,
-    /// The distance at which it pulls nothing, metres, ≥ 0.
+    /// Rest length, metres, ≥ 0.
     pub rest_m: f64,
-    /// Inverse mass of the other end, 1/kg; zero where that end is led.
+    /// Inverse mass of the other end, 1/kg; zero where that end is driven.
     pub yields: DMat3,
     /// The impulse it gave this body in the last part, N·s.
     pub impulse: DVec3,
-    /// How it keeps the body from turning, where jaws hold it.
+    /// The torsional spring that keeps the body from turning, where jaws grasp it.
     pub turn: Option<Turn>,
 }
 
 impl Tie {
-    /// A spring whose other end is led.
+    /// A spring whose other end is driven.
     pub(super) const fn led(pull: Pull) -> Self {
         Self { pull, rest_m: 0.0, yields: DMat3::ZERO, impulse: DVec3::ZERO, turn: None }
     }
 
-    /// By how much it is stretched where its ends are `away` from each other, metres, and the directions in which it pulls.
+    /// Its stretch where its ends are `away` from each other, metres, and the projection on the directions in which it pulls.
     fn stretch(&self, away: DVec3) -> (DVec3, DMat3) {
         if self.rest_m == 0.0 {
             return (away, DMat3::IDENTITY);
@@ -47,7 +47,7 @@ impl Tie {
         (along * (away.length() - self.rest_m), pass)
     }
 
-    /// Where on the body it pulls, from the centre of mass: only an anchor in the body's own axes is a point of it.
+    /// Point of attack relative to the centre of mass: only an anchor in the body's own axes is a point of it.
     pub(super) fn arm(&self, motion: &Motion) -> Option<DVec3> {
         match self.pull.anchor {
             Anchor::Local(local) => Some(motion.rotation * local),
@@ -61,27 +61,27 @@ impl Tie {
 pub(super) struct Under {
     /// Its length, seconds.
     pub h: f64,
-    /// m/s².
+    /// Gravity, m/s².
     pub gravity: DVec3,
-    /// The impulse of what else acts evenly over the part, N·s and N·m·s.
+    /// The impulse of other loads that act evenly over the part, N·s and N·m·s.
     pub lasting: Twist,
-    /// What impulses received at its start did to the velocities while the springs gave way over so many seconds: theirs to
-    /// account for too.
+    /// Velocity changes by impulses received at the part's start, to which the springs reacted over so many seconds: this
+    /// reaction is counted in the impulses of the springs.
     pub bent: (Twist, f64),
 }
 
-/// What springs did in a part.
+/// Result of the springs in a part.
 pub(super) struct Pulled {
-    /// What was added to velocity and spin.
+    /// The change of velocity and spin.
     pub change: Twist,
-    /// How much of that what lasts did.
+    /// The part of it that is due to the lasting loads.
     pub lasting: Twist,
     /// The impulse with which all springs resist a further change of the velocities in this part, about the centre of mass.
     pub resistance: Six,
 }
 
-/// Changes the velocities by gravity, the springs and what else lasts over a part; writes each spring's impulse, and its force
-/// for those who hold the body.
+/// Changes the velocities by gravity, the springs and other lasting loads over a part; writes each spring's impulse, and its force
+/// for the agents that hold the body.
 ///
 /// Nothing is written and `None` returned where no spring holds a point of this body.
 pub(super) fn pull(
@@ -123,7 +123,7 @@ pub(super) fn pull(
     Some(Pulled { change, lasting, resistance })
 }
 
-/// Writes what a further `change` of the velocities in a part of `h` seconds adds to each spring's impulse.
+/// Writes the change of each spring's impulse due to a further `change` of the velocities in a part of `h` seconds.
 pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change, h): (Twist, f64)) {
     for tie in ties {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { continue };
@@ -134,8 +134,8 @@ pub(super) fn give_way(motion: &Motion, body: &Spread, ties: &mut [Tie], (change
     }
 }
 
-/// What springs whose far ends are led do to the body in this state, and how that changes as it moves (docs/theory/coupling.md,
-/// eq. 7b).
+/// The force on the body in this state of springs whose far ends are driven, and its derivatives as the body moves
+/// (docs/theory/coupling.md, eq. 7b).
 pub(super) fn lean(motion: &Motion, body: &Spread, ties: &[Tie], gravity: DVec3) -> Sprung {
     let mut all = Sprung {
         force: [gravity * body.mass_kg, DVec3::ZERO],
@@ -177,14 +177,14 @@ struct Spring {
 }
 
 impl Spring {
-    /// The spring of `tie` where it holds the body, and where that is from the centre of mass.
+    /// The spring of `tie` at its anchor on the body, and that anchor relative to the centre of mass.
     fn at(tie: &Tie, motion: &Motion, body: &Spread, h: f64) -> Option<(DVec3, Self)> {
         let r = tie.arm(motion)?;
         let velocity = motion.velocity + motion.spin(body).cross(r);
         Some((r, Self::new(tie, motion.position + r, velocity, h)))
     }
 
-    /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W makes R to (1 + R W)⁻¹ R.
+    /// The spring of `tie` on a point that moves with `velocity`. An end that yields by W turns R into (1 + R W)⁻¹ R.
     fn new(tie: &Tie, point: DVec3, velocity: DVec3, h: f64) -> Self {
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         let slip = tie.pull.target_velocity - velocity;
@@ -198,12 +198,12 @@ impl Spring {
         Self { impulse: softer * impulse, resistance: softer * resistance, pass }
     }
 
-    /// The impulse where the body's velocities change so, at a point `r` from its centre.
+    /// The impulse for a given change of the body's velocities, at a point `r` from its centre.
     fn after(&self, [linear, angular]: Twist, r: DVec3) -> DVec3 {
         self.impulse - self.resistance * (linear + angular.cross(r))
     }
 
-    /// The impulse with which a spring gave way over `span_s` seconds to a change of the body's velocities.
+    /// The impulse by which a spring reacted over `span_s` seconds to a change of the body's velocities.
     fn bent(&self, tie: &Tie, r: DVec3, ([linear, angular], span_s): (Twist, f64)) -> DVec3 {
         let (k, c) = (tie.pull.stiffness_n_m, tie.pull.damping_n_s_m);
         self.pass * (linear + angular.cross(r)) * (span_s * (span_s * k + c))
@@ -226,7 +226,7 @@ impl System {
         Self { matrix: Six::mass(body.mass_kg, inertia), right }
     }
 
-    /// Adds a spring; with `forces` of a first pass, the stiffness that its force has against turning across its arm too.
+    /// Adds a spring; with the velocity change of a `first` pass also the stiffness of its force against rotation across its arm.
     fn add(&mut self, tie: &Tie, (motion, body): (&Motion, &Spread), h: f64, first: Option<Twist>) {
         let Some((r, spring)) = Spring::at(tie, motion, body, h) else { return };
         self.matrix.add_point(r, spring.resistance);

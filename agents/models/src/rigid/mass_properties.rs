@@ -1,8 +1,8 @@
-//! How the mass of a solid is spread: centre of mass and principal moments of inertia, in double precision.
+//! Mass distribution of a solid: centre of mass and principal moments of inertia, in double precision.
 //!
-//! In: a [`Solid`] of even density. Out: [`Spread`]. Never here: where the body is, how it moves.
+//! In: a [`Solid`] of uniform density. Out: [`Spread`]. Never here: where the body is, how it moves.
 //! Primitives use the closed forms; hulls and closed meshes the integrals over the tetrahedra between the origin and every
-//! triangle, which are exact for flat faces. An open mesh has no inside: it weighs like its convex hull.
+//! triangle, which are exact for flat faces. An open mesh has no inside: it has the mass distribution of its convex hull.
 
 use super::RigidError;
 use glam::{DMat3, DQuat, DVec3};
@@ -22,7 +22,7 @@ pub(super) struct Spread {
 }
 
 impl Spread {
-    /// How `mass_kg` is spread over `solid`.
+    /// The distribution of `mass_kg` over `solid`.
     pub(super) fn of(solid: &Solid, mass_kg: f64) -> Result<Self, RigidError> {
         let centred = |moments: DVec3| Self { mass_kg, com: DVec3::ZERO, moments, axes: DQuat::IDENTITY };
         Ok(match solid {
@@ -43,7 +43,7 @@ impl Spread {
         })
     }
 
-    /// How `mass_kg` is spread over the inside of a closed surface.
+    /// The distribution of `mass_kg` over the inside of a closed surface.
     fn inside(surface: &Triangles, mass_kg: f64) -> Self {
         // moments about a point near the solid: far from the origin the differences would lose digits
         let near = surface.points[surface.triangles[0][0] as usize];
@@ -65,7 +65,7 @@ impl Spread {
     }
 }
 
-/// Whether a mesh is closed and its triangles face outwards: it has an inside that can weigh something.
+/// Whether a mesh is closed with outward triangles: only then it has an inside with mass.
 pub(super) fn encloses(mesh: &Triangles) -> bool {
     is_closed(mesh) && volume(mesh) > 0.0
 }
@@ -80,9 +80,9 @@ pub(super) fn volume(mesh: &Triangles) -> f64 {
         .sum()
 }
 
-/// The eigenvalues of a symmetric matrix and the rotation whose columns are its eigenvectors, by Jacobi's rotations.
+/// The eigenvalues of a symmetric matrix and the rotation whose columns are its eigenvectors, by Jacobi rotations.
 fn principal(mut matrix: DMat3) -> (DVec3, DQuat) {
-    /// Each sweep squares what is off the diagonal: from any start, double precision is reached in six.
+    /// Number of sweeps. Each squares the off-diagonal part: from any start, double precision is reached in six.
     const SWEEPS: usize = 8;
     let mut axes = DMat3::IDENTITY;
     for (p, q) in (0..SWEEPS).flat_map(|_| [(0, 1), (0, 2), (1, 2)]) {
@@ -190,7 +190,7 @@ mod tests {
         let got = sorted(Spread::inside(&mesh, 3.0).moments);
         let mut expected = capsule(3.0, r, h).to_array();
         expected.sort_by(f64::total_cmp);
-        // chords lie inside the arc by (angle step)²/8 ≈ 3e-4, its square enters the moments
+        // chords are inside the arc by (angle step)²/8 ≈ 3e-4, its square enters the moments
         let wrong = (got - DVec3::from_array(expected)).abs().max_element();
         assert!(wrong < 2e-3 * expected[2], "{got} is not {expected:?}");
     }

@@ -1,14 +1,15 @@
-//! A rigid body as an agent: exact flight in double precision, contacts in a rapier3d world of its own.
+//! Rigid body agents: exact flight in double precision, contacts in a rapier3d world per body.
 //!
-//! In: a [`RigidSpec`], steps, what is around. Out: the body's motion about its centre of mass, and what it gives to others.
-//! Never here: the state of another agent; a body meets others as they were last seen (docs/theory/coupling.md), but for
-//! those that share its world (`island/`).
+//! In: a [`RigidSpec`], steps, surroundings. Out: the body's motion about its centre of mass, and the impulses it gives.
+//! Never here: the state of another agent; a body meets peers as they were last published (docs/theory/coupling.md), except
+//! those in its island (`island/`).
 //!
-//! Between touches a body follows its parabola in closed form and turns by a splitting that keeps the angular momentum
-//! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds how long that may
-//! last. At a touch the blow is solved as if it took no time, so bounce heights do not depend on the step either: with all
-//! that is touched at once, in double precision (`meeting.rs`). A body that stays in touch with fixed solids is carried by
-//! the contact solver (`world.rs`, single precision, 4 small passes in at most 1/240 s), one that stays in touch with others by the solve of `meeting.rs`. Springs are implicit (`springs.rs`).
+//! Between contacts a body follows its parabola in closed form and rotates by a splitting that conserves the angular momentum
+//! (`motion.rs`), so free fall is exact to rounding at any step and for any time. `clearance.rs` bounds its duration.
+//! An impact is solved as instantaneous, so bounce heights do not depend on the step either: with all simultaneous
+//! contacts, in double precision (`meeting.rs`). In lasting contact with static solids a body is moved by
+//! the contact solver (`world.rs`, single precision, 4 small passes in at most 1/240 s), in lasting contact with other agents by the
+//! solve of `meeting.rs`. Springs are implicit (`springs.rs`).
 //!
 //! Two rules hold for every pair: friction is the geometric mean of both coefficients, restitution the larger of both.
 

@@ -1,15 +1,15 @@
-//! A free rigid body in double precision: where it is, how it moves, and how it flies.
+//! A free rigid body in double precision: its state and its flight.
 //!
 //! In: a span and a gravity. Out: the state after it, exact in translation. Never here: contacts, springs.
 //!
-//! Translation is a parabola, evaluated in closed form. Rotation keeps the angular momentum L in world axes to the bit and
+//! Translation is a parabola, evaluated in closed form. Rotation conserves the angular momentum L in world axes to the bit and
 //! turns the body about its three principal axes one after the other (DLM97), symmetrically, composed to fourth order (SUZ90):
-//! energy does not drift, whatever the length of the flight.
+//! energy does not drift, for flights of any length.
 
 use super::mass_properties::Spread;
 use glam::{DMat3, DQuat, DVec3};
 
-/// Where a rigid body is and how it moves, about its centre of mass.
+/// Position and motion of a rigid body, about its centre of mass.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Motion {
     /// Centre of mass, metres.
@@ -24,7 +24,7 @@ pub(super) struct Motion {
 
 /// A part of a flight turns the body by at most this, radians: fourth order then leaves about 1e-6 rad a turn.
 const TURN_MAX: f64 = 0.1;
-/// More parts than this are not spent on one flight (a body that spins 10⁴ rad/s through a second).
+/// The most parts of one flight (reached by a body that spins at 10⁴ rad/s for a second).
 const PARTS_MAX: f64 = 1e5;
 /// Suzuki's fourth-order composition of five symmetric parts (SUZ90): 1/(4 − 4^(1/3)) and its middle, 1 − 4p.
 const SUZUKI: [f64; 5] = [
@@ -59,12 +59,12 @@ impl Motion {
         (body.mass_kg.recip(), to_world * DMat3::from_diagonal(body.moments.recip()) * to_world.transpose())
     }
 
-    /// The fastest the body can come to spin with its angular momentum, rad/s.
+    /// The largest spin the body can reach with its angular momentum, rad/s.
     pub(super) fn spin_max(&self, body: &Spread) -> f64 {
         self.angular.length() / body.moments.min_element()
     }
 
-    /// Kinetic energy and gravity's, zero at the origin, joules.
+    /// Kinetic and gravitational energy, zero at the origin, joules.
     pub(super) fn energy_j(&self, body: &Spread, gravity: DVec3) -> f64 {
         0.5 * body.mass_kg * self.velocity.length_squared() + 0.5 * self.angular.dot(self.spin(body))
             - body.mass_kg * gravity.dot(self.position)
@@ -77,10 +77,10 @@ impl Motion {
         self.turn(body, t);
     }
 
-    /// Takes kinetic energy of `per_kg` J/kg out of the motion along `direction`, as far as there is any; gives some where it
+    /// Removes kinetic energy of `per_kg` J/kg from the motion along `direction`, as far as there is any; adds some where `per_kg`
     /// is below zero.
     ///
-    /// Who is kept from going down as far as its impulses would have carried it must not keep the height besides the speed.
+    /// A body that is kept from moving down as far as its impulses would have carried it must not keep both the height and the speed.
     pub(super) fn slow_by(&mut self, per_kg: f64, direction: DVec3) {
         let along = self.velocity.dot(direction.normalize_or_zero());
         if per_kg != 0.0 && along != 0.0 {

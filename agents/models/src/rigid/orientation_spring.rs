@@ -1,4 +1,4 @@
-//! How jaws keep a body from turning between them: a torsional spring to a frame that is led.
+//! Rotational hold of jaws on a rigid body: a torsional spring to a driven frame.
 //!
 //! In: what a tool says of its hold, the body's rotation and spin. Out: the torque over a step, linearly implicit, and how much it
 //! resists a change of the spin. Never here: the point that is held, and how the system is solved ([`crate::rigid::linear_spring`]).
@@ -9,23 +9,23 @@ use metachron_contact::Pull;
 use metachron_core::{Clasp, ToolState};
 use metachron_core::{Sprung, Twist};
 
-/// A torsional spring whose far end is led.
+/// A torsional spring whose far end is driven.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Turn {
-    /// The body's rotation in which it turns nothing, where the jaws are now.
+    /// The body's rotation at which the torque is zero, for the present rotation of the jaws.
     target: DQuat,
-    /// How that turns, rad/s.
+    /// Angular velocity of that target, rad/s.
     spin: DVec3,
-    /// N·m/rad.
+    /// Stiffness, N·m/rad.
     stiffness: f64,
-    /// N·m·s/rad.
+    /// Damping, N·m·s/rad.
     damping: f64,
     /// The angular impulse that it gave the body in the last part, N·m·s.
     pub impulse: DVec3,
 }
 
 impl Turn {
-    /// The hold of `tool`, whose state is `age_s` seconds old, on a body that it pulls by `pull`.
+    /// The grasp of `tool`, whose state is `age_s` seconds old, on a body that it pulls by `pull`.
     pub(super) fn of(tool: &ToolState, clasp: &Clasp, (pull, age_s): (&Pull, f64)) -> Self {
         let square = clasp.arm_m * clasp.arm_m;
         let mut turn = Self {
@@ -39,14 +39,14 @@ impl Turn {
         turn
     }
 
-    /// Lets `h` seconds pass for the jaws.
+    /// Advances the jaws by `h` seconds.
     pub(super) fn go_on(&mut self, h: f64) {
         if self.spin != DVec3::ZERO {
             self.target = (DQuat::from_scaled_axis(self.spin * h) * self.target).normalize();
         }
     }
 
-    /// The shortest way back, as a rotation vector in world axes.
+    /// The shortest rotation back to the target, as a rotation vector in world axes.
     fn away(&self, rotation: DQuat) -> DVec3 {
         let back = self.target * rotation.conjugate();
         if back.w < 0.0 { (-back).to_scaled_axis() } else { back.to_scaled_axis() }
@@ -57,20 +57,20 @@ impl Turn {
         self.away(rotation) * (self.stiffness * h) + (self.spin - spin) * self.resistance(h)
     }
 
-    /// How much of it a change of the spin takes back, kg·m².
+    /// The decrease of that impulse per change of the spin, kg·m².
     pub(super) fn resistance(&self, h: f64) -> f64 {
         h * (h * self.stiffness + self.damping)
     }
 
-    /// Notes what it gives over `h` seconds to a body in this state whose spin changes by `change`; `bent` is what impulses that
-    /// were received at the start did to the velocities while springs gave way over so many seconds.
+    /// Stores its impulse over `h` seconds on a body in this state whose spin changes by `change`; `bent` holds the velocity changes by
+    /// impulses received at the start and the time over which springs reacted to them.
     pub(super) fn give(&mut self, (rotation, spin): (DQuat, DVec3), (change, h): (DVec3, f64), bent: (Twist, f64)) {
         let ([_, bent], span_s) = bent;
         self.impulse =
             self.impulse_at(rotation, spin, h) - change * self.resistance(h) - bent * self.resistance(span_s);
     }
 
-    /// Adds what it does to a body in this state, and how that changes, to what others know of its springs.
+    /// Adds its torque on a body in this state, and the derivatives of it, to the published sum of springs.
     pub(super) fn lean(&self, rotation: DQuat, spin: DVec3, all: &mut Sprung) {
         all.force[1] += self.away(rotation) * self.stiffness + (self.spin - spin) * self.damping;
         all.rising[1] += self.spin * self.stiffness;

@@ -1,4 +1,4 @@
-//! What a rigid body is made of and how it starts: the numbers a scene gives, and what is wrong with them.
+//! Specification of a rigid body: its properties and initial state, the numbers a scene gives, and their checks.
 
 use super::{Joint, JointError};
 use glam::{DQuat, DVec3};
@@ -10,7 +10,7 @@ use std::sync::Arc;
 pub struct RigidSpec {
     /// Its shape; not a plane. An open mesh counts as its convex hull.
     pub solid: Solid,
-    /// Where the shape's axes start, metres.
+    /// Position of the origin of the shape's axes, metres.
     pub position: DVec3,
     /// Rotation from the shape's axes to the world's.
     pub rotation: DQuat,
@@ -38,21 +38,21 @@ pub struct RigidSpec {
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum RigidError {
-    /// The solid is no shape.
+    /// The solid is invalid.
     #[error("the body's shape is unusable: {0}")]
     Shape(#[from] ShapeError),
-    /// An obstacle is no shape.
+    /// An obstacle's solid is invalid.
     #[error("the shape of obstacle `{name}` is unusable: {source}")]
     Obstacle {
         /// The obstacle's name.
         name: String,
-        /// What is wrong with its shape.
+        /// The error of its shape.
         source: ShapeError,
     },
-    /// A joint cannot be.
+    /// A joint is invalid.
     #[error(transparent)]
     Joint(#[from] JointError),
-    /// A plane has no end, so it has no mass.
+    /// A plane is unbounded, so it has no mass.
     #[error("a plane cannot move: it must be a fixed obstacle")]
     MovingPlane,
     /// A number is outside its range.
@@ -73,12 +73,12 @@ pub enum RigidError {
     },
 }
 
-/// Past this no coordinate or speed is taken, metres or m/s: a contact solver in single precision would be blind there.
+/// The largest coordinate or speed accepted, metres or m/s: beyond it a contact solver in single precision would lose all resolution.
 pub(super) const REACH_MAX: f64 = 1e6;
 
 impl RigidSpec {
-    /// A solid of `mass_kg` at `position` that nothing acts on: still, no gravity, no obstacle, no joint, friction 0.5, no bounce;
-    /// it never rests.
+    /// A solid of `mass_kg` at `position` on which nothing acts: zero velocity, no gravity, no obstacle, no joint, friction 0.5, no bounce;
+    /// it never reports rest.
     #[must_use]
     pub fn free(solid: Solid, position: DVec3, mass_kg: f64) -> Self {
         Self {

@@ -1,4 +1,4 @@
-//! Who pulls a body, and whom it pulls in return.
+//! Springs on a rigid body from user springs, tools and links, and their reactions on the other ends.
 //!
 //! In: hands, tools that hold the body, links whose pair it owns. Out: springs aimed at where the other ends are now, and the
 //! impulses of those ends, booked. Never here: how springs are solved ([`crate::rigid::linear_spring`]).
@@ -18,9 +18,9 @@ use metachron_core::{PairKind, Slots};
 pub(super) struct Ties {
     /// The springs.
     pub all: Vec<Tie>,
-    /// Whom each pulls in return.
+    /// The agent at the other end of each.
     ends: Vec<Option<End>>,
-    /// Room for one answer.
+    /// Scratch storage for one response.
     room: Vec<DVec3>,
 }
 
@@ -29,30 +29,30 @@ pub(super) struct Ties {
 struct End {
     guest: usize,
     anchor: Anchor,
-    /// Whether a tool holds, or the scene links.
+    /// Whether it is a tool's grasp or a link of the scene.
     kind: PairKind,
 }
 
 impl Ties {
-    /// Whether nothing pulls.
+    /// Whether there are no springs.
     pub(super) fn is_empty(&self) -> bool {
         self.all.is_empty()
     }
 
-    /// What springs to others have given to this body in the last part, N·s; a hand or a tool is led and no coupling.
+    /// The impulse of springs to coupled peers on this body in the last part, N·s; user springs and tools are driven and do not count.
     pub(super) fn linked(&self) -> DVec3 {
         let linked = self.all.iter().zip(&self.ends).filter(|(tie, end)| end.is_some() && tie.yields != DMat3::ZERO);
         linked.map(|(tie, _)| tie.impulse).sum()
     }
 
-    /// Every spring of this step.
+    /// Gathers every spring of this step.
     pub(super) fn gather(&mut self, around: &Surroundings<'_>, company: &Company) {
         self.all.clear();
         self.ends.clear();
         for pull in around.pulls() {
             let by = pull.by.map(|by| company.guests().iter().position(|guest| guest.id() == Some(by)));
             if by == Some(None) {
-                continue; // a tool that is not finite holds nothing
+                continue; // a tool with a non-finite state holds nothing
             }
             let guest = by.flatten();
             let turn = guest.and_then(|guest| turn_of(&company.guests()[guest].other, (&pull, around)));
@@ -69,14 +69,14 @@ impl Ties {
         }
     }
 
-    /// Aims the springs at where their other ends are, and asks how those yield.
+    /// Aims the springs at the positions of their other ends, and queries the compliance of those ends.
     ///
-    /// Where several springs pull at one agent, each meets its inverse mass times their number: together they never pull
+    /// Where several springs pull at one agent, each sees its inverse mass times their number: together they never pull
     /// harder than it can follow.
     pub(super) fn aim(&mut self, company: &Company) {
         let Self { all, ends, room } = self;
         for (tie, end) in all.iter_mut().zip(ends.iter()) {
-            // a tool's end goes on its way by itself, as a hand's does
+            // a tool's end moves on by itself, as a user spring's does
             let Some(End { guest: i, anchor, .. }) = end.filter(|end| end.kind != PairKind::Grasp) else { continue };
             let other = &company.guests()[i].other;
             let Some((target, velocity)) = other.point(anchor) else { continue };
@@ -96,7 +96,7 @@ impl Ties {
         }
     }
 
-    /// Lets `h` seconds pass for hands and tools: they go on their way.
+    /// Advances the targets of user springs and tools by `h` seconds.
     pub(super) fn go_on(&mut self, h: f64) {
         for tie in &mut self.all {
             tie.pull.target += tie.pull.target_velocity * h;
@@ -104,7 +104,7 @@ impl Ties {
         }
     }
 
-    /// Gives the other ends what the springs gave to this one in `h` seconds from `after_s` seconds into the step on.
+    /// Gives the other ends the reactions to the springs' impulses in `h` seconds from `after_s` seconds into the step on.
     pub(super) fn give(&mut self, company: &mut Company, (after_s, h): (f64, f64)) {
         let Self { all, ends, room } = self;
         for (tie, end) in all.iter().zip(ends.iter()) {
@@ -130,7 +130,7 @@ impl Ties {
     }
 }
 
-/// How a tool, brought to the body's own time, keeps the body that it pulls from turning.
+/// The torsional spring by which a tool, brought to the body's own time, keeps the body that it pulls from turning.
 fn turn_of(tool: &Other, (pull, around): (&Pull, &Surroundings<'_>)) -> Option<Turn> {
     let seen = &tool.neighbour()?.snapshot;
     let Body::Tool(state) = &seen.body else { return None };
@@ -138,7 +138,7 @@ fn turn_of(tool: &Other, (pull, around): (&Pull, &Surroundings<'_>)) -> Option<T
     Some(Turn::of(state, &clasp, (pull, led_s(around.time, seen.time))))
 }
 
-/// A link as a spring; its target is aimed later.
+/// A link as a spring; its target is set later.
 const fn spring_of(link: &Link) -> Pull {
     Pull {
         by: Some(link.other),

@@ -1,10 +1,10 @@
-//! The fixed solids around a body, and where it touches them.
+//! The static solids around a body, and its contacts with them.
 //!
 //! In: the obstacles of a spec, the body where it is. Out: places on each. Never here: how long a flight past them lasts
 //! ([`crate::rigid::conservative_advancement`]), what a touch does.
 //!
-//! A plane is a slab under the body, larger than it and as high as the plane: so corners and edges stand on it as on any face.
-//! A mesh is touched triangle by triangle, as parry tells it: in single precision, relative to the mesh.
+//! A plane is represented by a slab under the body, larger than it, with its top at the plane: so corners and edges rest on it as on
+//! any face. A mesh is tested triangle by triangle with parry: in single precision, relative to the mesh.
 
 use super::company::placed;
 use super::conservative_advancement::{Mover, pose};
@@ -17,10 +17,10 @@ use rapier3d::parry::query::{
     ContactManifold, ContactManifoldsWorkspace, DefaultQueryDispatcher, PersistentQueryDispatcher,
 };
 
-/// All fixed solids.
+/// All static solids.
 pub(super) struct Obstacles(Vec<Standing>);
 
-/// One of them.
+/// One static solid.
 pub(super) struct Standing {
     /// Its shape and skin.
     pub form: Form,
@@ -28,11 +28,11 @@ pub(super) struct Standing {
     rotation: DQuat,
     /// Half the slab's height, for a plane, metres.
     slab_m: Option<f64>,
-    /// Where its triangles are touched, for a mesh.
+    /// Storage for triangle contacts, for a mesh.
     mesh: Option<MeshRoom>,
 }
 
-/// The body where it is.
+/// The body at its present place.
 pub(super) struct Mine<'a> {
     pub form: &'a Form,
     pub mover: &'a Mover,
@@ -55,7 +55,7 @@ impl Obstacles {
     /// The forms of `obstacles` for a body of `radius_m`.
     ///
     /// # Errors
-    /// [`ShapeError`] for a solid that is no shape.
+    /// [`ShapeError`] for an invalid solid.
     pub(super) fn new(obstacles: &[Obstacle], radius_m: f64) -> Result<Self, ShapeError> {
         let standing = obstacles.iter().map(|obstacle| {
             let slab_m = matches!(obstacle.solid, Solid::Plane).then_some(SLAB_RADII * radius_m);
@@ -70,14 +70,14 @@ impl Obstacles {
         Ok(Self(standing.collect::<Result<_, _>>()?))
     }
 
-    /// Each of them.
+    /// Each static solid.
     pub(super) fn iter_mut(&mut self) -> impl Iterator<Item = &mut Standing> {
         self.0.iter_mut()
     }
 }
 
 impl Standing {
-    /// Every place with a gap of at most `reach_m` (metres, ≥ 0) between the body and this; what `into` held before is gone.
+    /// Every place with a gap of at most `reach_m` (metres, ≥ 0) between the body and this; the previous contents of `into` are dropped.
     pub(super) fn touches(&mut self, mine: &Mine<'_>, reach_m: f64, room: &mut TouchRoom, into: &mut Vec<Touch>) {
         if self.mesh.is_some() {
             into.clear();
@@ -88,11 +88,12 @@ impl Standing {
         }
     }
 
-    /// The same for a mesh. Its inner edges are smoothed over: what slides on two triangles of one level feels no edge.
+    /// The same for a mesh. Its inner edges are smoothed over: a body that slides across two coplanar triangles is not caught by their
+    /// edge.
     fn touch_triangles(&mut self, mine: &Mine<'_>, reach_m: f64, into: &mut Vec<Touch>) {
         let (FormKind::Solid(SolidForm { shape, .. }), Some(room)) = (&self.form.kind, &mut self.mesh) else { return };
         let MeshRoom { manifolds, workspace } = room;
-        // what is left from before would be carried along, not looked for
+        // old points would be carried along instead of being recomputed
         manifolds.iter_mut().for_each(|manifold| manifold.points.clear());
         let Mine { mover, motion, .. } = mine;
         let back = self.rotation.conjugate();
@@ -116,7 +117,7 @@ impl Standing {
         }
     }
 
-    /// Where its middle is, for a body at `at`.
+    /// Position of its middle, for a body at `at`.
     fn place(&self, at: DVec3) -> DVec3 {
         let Some(half) = self.slab_m else { return self.position };
         let up = self.rotation * DVec3::Z;

@@ -1,6 +1,6 @@
-//! Springs from outside at vertices of a soft body: hands, tools, links. Implicit in the step.
+//! External springs at vertices of a soft body: user springs, tools, links. Implicit in the step.
 //!
-//! In: pulls and links. Out: forces and stiffness in the system, and what each gave. Never here: vertices that never move.
+//! In: pulls and links. Out: forces and stiffness in the system, and the impulse of each spring. Never here: vertices that never move.
 //! Theory: docs/theory/soft.md, eq. 3, 4; docs/theory/coupling.md, eq. 9.
 
 use super::system::System;
@@ -12,28 +12,28 @@ use metachron_core::{AgentId, Anchor};
 /// A spring on one vertex.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Tie {
-    /// Who pulls; `None` is the user's hand.
+    /// The pulling agent; `None` for a user spring.
     pub by: Option<AgentId>,
     /// Which vertex.
     pub vertex: usize,
-    /// The link that it is, if the other end gives way.
+    /// The link that it belongs to, if the other end yields.
     pub link: Option<Link>,
-    /// Where the other end is at the start of the substep, metres, and how it moves, m/s.
+    /// Position of the other end at the start of the substep, metres, and its velocity, m/s.
     target: DVec3,
     target_velocity: DVec3,
-    /// N/m and N·s/m.
+    /// Stiffness, N/m, and damping, N·s/m.
     stiffness: DMat3,
     damping: DMat3,
-    /// What is left of a force because the other end gives way.
+    /// Factor by which the force is reduced because the other end yields.
     ease: DMat3,
-    /// The impulse of the substep if the vertex stood still, N·s, and what its velocity takes away, kg.
+    /// The impulse of the substep for a vertex at rest, N·s, and its decrease per velocity of the vertex, kg.
     still: DVec3,
     eased: DMat3,
-    /// What a velocity of the far end adds to that impulse, kg, and how the far end yields to all links to the same agent as if
+    /// The increase of that impulse per velocity of the far end, kg, and the response of the far end to all links to the same agent as if
     /// they were at one point, 1/kg.
     reach: DMat3,
     yields: DMat3,
-    /// By how much the far end is expected to yield less than that, m/s.
+    /// Difference between that response and the expected motion of the far end, m/s.
     spared: DVec3,
     /// The impulse of the last substep, and of the step, N·s.
     pub given: DVec3,
@@ -49,7 +49,7 @@ impl Tie {
         finite.then_some(Self { by: pull.by, target, target_velocity, ..tie })
     }
 
-    /// The tie of a link, whose far end is told later ([`Tie::aim`]).
+    /// The tie of a link, whose far end is set later ([`Tie::aim`]).
     pub fn of_link(link: &Link, count: usize) -> Option<Self> {
         let tie = Self::at(link.here, (link.stiffness_n_m, link.damping_n_s_m), count)?;
         Some(Self { by: Some(link.other), link: Some(*link), ..tie })
@@ -78,8 +78,8 @@ impl Tie {
         })
     }
 
-    /// Takes in where the far end of a link is for a substep of `h` seconds that begins with this end at `point`; `shared`
-    /// links pull at that agent in all.
+    /// Sets the state of a link's far end for a substep of `h` seconds that begins with this end at `point`; `shared`
+    /// links in all pull at that agent.
     pub fn aim(&mut self, far: &Far, point: DVec3, (h, shared): (f64, usize)) {
         let Some(link) = self.link else { return };
         let spring = far.spring(&link, point);
@@ -90,18 +90,18 @@ impl Tie {
         self.ease = (DMat3::IDENTITY + resistance * self.yields).inverse();
     }
 
-    /// What it gave in the last substep; `None` where nobody feels it.
+    /// The impulse of the last substep; `None` where no agent receives it.
     pub fn pulled(&self) -> Option<Pulled> {
         self.by.map(|by| Pulled { by, link: self.link, given: self.given })
     }
 
-    /// By how much more the far end is spared than was expected, m/s, where the links to its agent make it `move_m_s` and this end
-    /// has this velocity (eq. 4a).
+    /// The error of `spared`, m/s, where the links to the far end's agent change its velocity by `move_m_s` and this end has this
+    /// velocity (eq. 4a).
     pub fn amiss(&self, move_m_s: DVec3, velocity: DVec3) -> DVec3 {
         move_m_s + self.yields * self.gives(velocity) - self.spared
     }
 
-    /// Expects the far end to be spared by `more`, m/s; the impulse that adds.
+    /// Increases `spared` by `more`, m/s; returns the additional impulse.
     pub fn spare(&mut self, more: DVec3) -> DVec3 {
         self.spared += more;
         let impulse = self.reach * more;
@@ -114,7 +114,7 @@ impl Tie {
         self.still - self.eased * velocity
     }
 
-    /// Adds what it does in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
+    /// Adds its force and stiffness in a substep of `h` seconds to a system whose unknown is the velocity at its end (eq. 3).
     pub fn add(&mut self, position: DVec3, h: f64, system: &mut System) {
         let eased = self.ease * (self.stiffness * (h * h) + self.damping * h);
         self.eased = (eased + eased.transpose()) * 0.5;
@@ -126,7 +126,7 @@ impl Tie {
         system.push(self.vertex as u32, force);
     }
 
-    /// Books what it gave in a substep of `h` seconds that ended with `velocity`, and lets a led end go on.
+    /// Books its impulse in a substep of `h` seconds that ended with `velocity`, and moves a driven end on.
     pub fn book(&mut self, velocity: DVec3, h: f64) {
         self.given = self.gives(velocity);
         self.impulse += self.given;

@@ -17,7 +17,7 @@ pub(super) struct Strut {
 }
 
 impl Strut {
-    /// Adds what it does at these positions.
+    /// Adds its forces and stiffness at these positions.
     pub fn add(&self, positions: &[DVec3], system: &mut System) {
         let [a, b] = self.ends;
         let way = positions[b as usize] - positions[a as usize];
@@ -30,7 +30,7 @@ impl Strut {
         let force = along * (k * (length - self.rest_m));
         system.push(a, force);
         system.push(b, -force);
-        // across it only tension is stiff: in compression it has less than none
+        // across the piece only tension adds stiffness: in compression it would be negative
         let across = k * (1.0 - self.rest_m / length).max(0.0);
         let outer = DMat3::from_cols(along * along.x, along * along.y, along * along.z);
         let stiffness = outer * (k - across) + DMat3::from_diagonal(DVec3::splat(across));
@@ -40,7 +40,7 @@ impl Strut {
         system.stiffen(b, a, -stiffness);
     }
 
-    /// Energy in it, J.
+    /// Elastic energy, J.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let [a, b] = self.ends.map(|end| positions[end as usize]);
         let longer = a.distance(b) - self.rest_m;

@@ -1,4 +1,4 @@
-//! A few vertices of a sheet that is flat at rest: they resist being bent out of the plane.
+//! Bending element of a sheet that is flat at rest: a few vertices that resist bending out of the plane.
 //!
 //! In: vertices in a row, a cross or a square. Out: forces and stiffness. Never here: stretching ([`super::membrane`]).
 //! Theory: docs/theory/soft.md, eq. 7, 8: second differences on the grid; their squares do not change when the sheet turns.
@@ -10,7 +10,7 @@ use glam::{DMat3, DVec3};
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Fold {
     vertices: [u32; 5],
-    /// What each vertex adds to the curvature, 1/m²; zero for those it does not need.
+    /// Weight of each vertex in the curvature, 1/m²; zero for unused ones.
     weights: [f64; 5],
     /// Stiffness of the squared curvature, N·m³.
     stiffness: f64,
@@ -30,7 +30,7 @@ impl Fold {
         self.vertices.into_iter().zip(self.weights).map(|(vertex, w)| positions[vertex as usize] * w).sum()
     }
 
-    /// Adds what it does at these positions (eq. 7).
+    /// Adds its forces and stiffness at these positions (eq. 7).
     pub fn add(&self, positions: &[DVec3], system: &mut System) {
         let bent = self.bent(positions);
         let terms = || self.vertices.into_iter().zip(self.weights).filter(|(_, w)| *w != 0.0);
@@ -42,12 +42,12 @@ impl Fold {
         }
     }
 
-    /// Energy in it, J.
+    /// Elastic energy, J.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         0.5 * self.stiffness * self.bent(positions).length_squared()
     }
 
-    /// Who it joins.
+    /// The vertices that it joins.
     pub fn vertices(&self) -> [u32; 5] {
         self.vertices
     }

@@ -1,7 +1,7 @@
-//! The soft body as an agent: vertices, what joins them, its rest.
+//! The soft body agent: vertices, springs and contacts, and its rest detection.
 //!
 //! In: a [`SoftSpec`], steps, pulls, neighbours. Out: snapshots ([`super::publish`]). Never here: how a step is solved
-//! ([`super::step`]), how others are met ([`super::company`]). Theory: docs/theory/soft.md.
+//! ([`super::step`]), coupling to peers ([`super::company`]). Theory: docs/theory/soft.md.
 
 use super::anchor_springs::Tie;
 use super::company::Company;
@@ -24,50 +24,50 @@ use metachron_core::{Body, Bounds, Grip, Resolution, SimSpan, Snapshot, SoftStat
 use metachron_geometry::{Form, FormKind, Placed, View, height_j_kg};
 use std::sync::Arc;
 
-/// A sheet, solid or rope that lives by its own steps.
+/// A sheet, solid or rope with its own clock.
 pub struct SoftBody {
     pub(super) spec: SoftSpec,
     pub(super) lattice: Lattice,
     pub(super) system: System,
     pub(super) positions: Vec<DVec3>,
     pub(super) velocities: Vec<DVec3>,
-    /// The velocities a substep would end with, if nothing were touched.
+    /// The velocities at the end of a substep without contact.
     pub(super) free: Vec<DVec3>,
-    /// What others gave since the last step, N·s a vertex, until it is taken in; empty for nothing.
+    /// Impulses of peers since the last step, N·s for each vertex, until they are applied; empty for none.
     pub(super) given: Vec<DVec3>,
     pub(super) ties: Vec<Tie>,
     pub(super) company: Company,
-    /// Who sleeps in its way.
+    /// Wake queries: the sleeping agents that it may hit.
     pub(super) knock: Knock,
     pub(super) contacts: Contacts,
     pub(super) grips: Vec<Grip>,
-    /// Of the centre of mass in the last step, without what others gave, m/s².
+    /// Acceleration of the centre of mass in the last step, without the impulses of peers, m/s².
     pub(super) acceleration: DVec3,
-    /// What it tells others of its next step.
+    /// The published prediction of its next step.
     pub(super) foretold: Foretold,
-    /// Where fixed solids carry it.
+    /// Its feet on static solids.
     pub(super) footing: Footing,
     pub(super) at_rest: bool,
     pub(super) doubling: Doubling,
     before: Vec<DVec3>,
     quiet_s: f64,
     pub(super) steps: u64,
-    /// What it did lately.
+    /// Its recent contact history.
     pub(super) lately: Lately,
 }
 
-/// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is not seen on any screen.
+/// A vertex is quiet below this speed, m/s: a tenth of a millimetre a second is invisible on any screen.
 const SPEED_MAX_M_S: f64 = 1e-4;
 /// A vertex is quiet below this change of speed, m/s²: a thousandth of gravity. A swing at its turning point is not quiet.
 const ACCELERATION_MAX_M_S2: f64 = 1e-2;
-/// For so long all vertices must have been quiet, seconds of the body's own time.
+/// All vertices must have been quiet for this long, seconds of the body's own time.
 const QUIET_S: f64 = 0.5;
 
 impl SoftBody {
     /// Builds the body of `spec` in its rest shape.
     ///
     /// # Errors
-    /// [`SoftError`] for a number outside its range, a side it does not have, an obstacle that is no shape.
+    /// [`SoftError`] for a number outside its range, a side it does not have, an invalid obstacle shape.
     pub fn new(spec: SoftSpec) -> Result<Self, SoftError> {
         spec.check()?;
         let lattice = Lattice::new(&spec);
@@ -106,13 +106,13 @@ impl SoftBody {
         })
     }
 
-    /// Its vertices as a snapshot shows them.
+    /// Its vertices in the form of a snapshot.
     #[must_use]
     pub fn start(&self) -> Body {
         Body::Soft(SoftState { positions: self.positions.clone(), velocities: self.velocities.clone() })
     }
 
-    /// What it was built from.
+    /// The specification it was built from.
     #[must_use]
     pub fn spec(&self) -> &SoftSpec {
         &self.spec
@@ -138,7 +138,7 @@ impl SoftBody {
         Bounds { low: low - radius_m, high: high + radius_m, speed_m_s: speed }
     }
 
-    /// Lists this step's springs: hands, tools that hold it, and links whose pair it owns.
+    /// Lists this step's springs: user springs, tools that grasp it, and links whose pair it owns.
     pub(super) fn take_ties(&mut self, around: &Surroundings<'_>) {
         let count = self.positions.len();
         self.ties.clear();
@@ -148,7 +148,7 @@ impl SoftBody {
         self.ties.extend(links.filter_map(|link| Tie::of_link(link, count)));
     }
 
-    /// Counts quiet time; whether it has been quiet for long enough.
+    /// Counts quiet time; returns whether it has been quiet for long enough.
     fn watch_rest(&mut self, dt: f64) -> bool {
         let Self { velocities, before, .. } = self;
         let pairs = velocities.iter().zip(before.iter());
@@ -160,20 +160,20 @@ impl SoftBody {
         let at_rest = self.quiet_s >= QUIET_S;
         if at_rest {
             self.doubling.watch.rest();
-            velocities.fill(DVec3::ZERO); // what is drawn of a sleeping body must not drift
+            velocities.fill(DVec3::ZERO); // the drawn state of a sleeping body must not drift
         }
         before.clone_from(velocities);
         at_rest
     }
 
-    /// Finds who sleeps in its way.
+    /// Finds the sleeping agents that it may hit.
     fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let bounds = self.bounds();
         let placed = Placed { form: &self.contacts.form, view: View::Surface(&self.positions) };
         self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
-    /// Ends a step of `dt` seconds: books, grips, what others may expect; how many substeps more that took.
+    /// Ends a step of `dt` seconds: books impulses, grips and the published prediction; returns the additional substeps that this took.
     fn settle(&mut self, around: &Surroundings<'_>, dt: f64) -> u32 {
         let mass_kg = self.mass_kg();
         let Self { company, system, .. } = self;
@@ -239,8 +239,8 @@ impl Agent for SoftBody {
 }
 
 impl SoftBody {
-    /// How far a neighbour may come towards it in a step, metres: farther than an edge is long it would turn cells inside out before it is
-    /// felt. Another soft body is to be foreseen, as long as neither has to divide its step ([`HASTE_MAX`]).
+    /// How far a neighbour may approach in a step, metres: beyond an edge length it would turn cells inside out before contact is detected.
+    /// Another soft body must stay predictable, which requires that neither has to divide its step ([`HASTE_MAX`]).
     fn unhurried_m(&self, neighbour: &Neighbour) -> Option<f64> {
         let edge_m = self.contacts.edge_m();
         match neighbour.form.as_deref().map(|form| &form.kind) {

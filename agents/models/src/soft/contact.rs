@@ -1,6 +1,6 @@
-//! Where contact meets a soft body's own step: between its solve and its move.
+//! Contact within a soft body's own step: between its solve and its move.
 //!
-//! In: free velocities, the factor, fixed solids, the company. Out: velocities that keep the skin apart.
+//! In: free velocities, the factor, static solids, neighbours. Out: velocities that keep the skins apart.
 //! Never here: where two forms touch ([`metachron_geometry::narrow_phase`]). Theory: docs/theory/contact.md, eq. 5–11.
 
 use super::company::Company;
@@ -14,15 +14,15 @@ use metachron_geometry::narrow_phase::{TouchRoom, touches};
 use metachron_geometry::{Form, FormKind, Placed, SolidForm, Touch, View};
 use std::sync::Arc;
 
-/// When contacts are good enough: 10 µm/s, a tenth of what counts as rest.
+/// Solver settings: 10 µm/s, a tenth of the limit for rest.
 const SETTINGS: Settings = Settings { iterations: 40, tolerance_m_s: 1e-5 };
-/// The same of a body that others press on something fixed: a vertex under one five hundred times as heavy takes so many.
+/// The same for a body that peers press on a static solid: a vertex under one five hundred times as heavy takes this many.
 const SQUEEZED: Settings = Settings { iterations: 300, ..SETTINGS };
-/// Contacts are foreseen this far beyond where they close within a substep, as a share of the mean edge.
+/// Contacts are predicted this far beyond where they close within a substep, as a share of the mean edge.
 const SLACK_SHARE: f64 = 0.02;
-/// Deeper than this share of the mean edge is through a solid, not beside it.
+/// Deeper than this share of the mean edge counts as through a solid, not next to it.
 const DEEP_SHARE: f64 = 0.5;
-/// Where the number of a fixed solid stands in a key, below [`WALLS_END`].
+/// Shift of a static solid's number in a key, below [`WALLS_END`].
 const WALL_SHIFT: u32 = 48;
 /// The keys of contacts with agents start here.
 const WALLS_END: u64 = 1 << 63;
@@ -35,18 +35,18 @@ pub(super) struct Contacts {
     list: Vec<Contact>,
     solver: Solver,
     touches: Vec<Touch>,
-    /// The size of the inverse mass of each slot, 1/kg: the body's own first.
+    /// Scale of the inverse mass of each slot, 1/kg: the body's own first.
     pub mobilities: Vec<f64>,
     room: TouchRoom,
     slack_m: f64,
 }
 
-/// A fixed solid where it stands.
+/// A static solid at its place.
 struct Wall {
     form: Form,
     position: DVec3,
     rotation: DQuat,
-    /// What of the body passes through.
+    /// The vertices of the body that pass through it.
     bores: Bores,
 }
 
@@ -54,7 +54,7 @@ impl Contacts {
     /// The contacts of a body of this skin, whose edges are `edge_m` long on average.
     ///
     /// # Errors
-    /// [`SoftError::Obstacle`] for a fixed solid that is no shape.
+    /// [`SoftError::Obstacle`] for an invalid static solid.
     pub fn new(spec: &SoftSpec, form: Arc<Form>, edge_m: f64) -> Result<Self, SoftError> {
         let wall = |obstacle: &metachron_geometry::Obstacle| {
             let solid = SolidForm::new(obstacle.solid.clone(), DVec3::ZERO)
@@ -76,7 +76,7 @@ impl Contacts {
         })
     }
 
-    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; they stay one a vertex.
+    /// Corrects the free `velocities` of a substep of `h` seconds that starts at `positions`; their number stays one for each vertex.
     pub fn act(
         &mut self,
         positions: &[DVec3],
@@ -107,7 +107,7 @@ impl Contacts {
         self.mobilities.truncate(own);
     }
 
-    /// Finds what may close within the substep, and says how well it is to be solved.
+    /// Finds the contacts that may close within the substep; returns the settings for their solve.
     fn find(&mut self, positions: &[DVec3], velocities: &[DVec3], company: &mut Company, h: f64) -> Settings {
         let deep_m = DEEP_SHARE * self.edge_m();
         let Self { form, walls, list, touches: places, room, slack_m, mobilities, .. } = self;
@@ -128,7 +128,7 @@ impl Contacts {
                     continue;
                 }
                 stands = true;
-                // where it is held it needs no contact to stay
+                // held vertices need no contact to stay
                 if slots.mobility(mobilities) > 0.0 {
                     let key = (number & 0x7fff) << WALL_SHIFT | place.key & ((1 << WALL_SHIFT) - 1);
                     let Touch { normal, gap_m, .. } = *place;
@@ -156,13 +156,13 @@ impl Contacts {
         self.slack_m / SLACK_SHARE
     }
 
-    /// Where fixed solids pressed in the last substep: what each place joins, and its normal.
+    /// Feet on static solids in the last substep: the velocities that each place joins, and its normal.
     pub fn footholds(&self) -> impl Iterator<Item = (Slots, DVec3)> {
         let fixed = self.impulses().filter(|(contact, _)| contact.key < WALLS_END);
         fixed.filter(|(c, impulse)| impulse.dot(c.normal) > 0.0).map(|(c, _)| (c.slots, c.normal))
     }
 
-    /// Whether something fixed pressed in the last substep.
+    /// Whether a static solid pressed in the last substep.
     pub fn is_grounded(&self) -> bool {
         self.footholds().next().is_some()
     }

@@ -1,6 +1,6 @@
-//! How a soft body is divided: vertices at rest, their masses, the elements between them, its skin.
+//! Division of a soft body: vertices at rest, their masses, the elements between them, its skin.
 //!
-//! In: a shape and its matter. Out: a [`Lattice`], fixed for the body's life. Never here: where the vertices are now.
+//! In: a shape and its material. Out: a [`Lattice`], fixed for the body's life. Never here: where the vertices are now.
 
 use super::bar::Strut;
 use super::bending::Fold;
@@ -16,18 +16,18 @@ use metachron_geometry::narrow_phase::Fans;
 /// A divided soft body.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Lattice {
-    /// Where the vertices are at rest, in the body's own axes, metres.
+    /// Positions of the vertices at rest, in the body's own axes, metres.
     pub rest: Vec<DVec3>,
-    /// What each weighs, kg.
+    /// Mass of each vertex, kg.
     pub mass_kg: Vec<f64>,
-    /// Which never move.
+    /// Whether each vertex is fixed.
     pub held: Vec<bool>,
     struts: Vec<Strut>,
     membranes: Vec<Membrane>,
     folds: Vec<Fold>,
     bricks: Vec<Brick>,
     kinds: Vec<BrickKind>,
-    /// Three vertices in a row, and how far the middle one is from the line at rest, metres.
+    /// Three vertices in a row, and the distance of the middle one from the line at rest, metres.
     rows: Vec<([u32; 3], f64)>,
     triangles: Vec<[u32; 3]>,
     edges: Vec<[u32; 2]>,
@@ -69,7 +69,7 @@ impl Lattice {
         let elastic = (matter.young_pa, matter.poisson);
         for (i, j) in (0..nx).flat_map(|i| (0..ny).map(move |j| (i, j))) {
             let [a, b, c, d] = [[i, j, 0], [i + 1, j, 0], [i + 1, j + 1, 0], [i, j + 1, 0]].map(|place| grid.at(place));
-            // diagonals that alternate favour no direction
+            // alternating diagonals favour no direction
             let halves = if (i + j) % 2 == 0 { [[a, b, c], [a, c, d]] } else { [[a, b, d], [b, c, d]] };
             for corners in halves {
                 let membrane = Membrane::new(corners, self.flat(corners), thickness_m, elastic);
@@ -89,7 +89,7 @@ impl Lattice {
         corners.map(|vertex| self.rest[vertex as usize].truncate())
     }
 
-    /// Lists what a flat grid of cells of `step` metres resists of bending: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
+    /// Lists the bending elements of a flat grid of cells of `step` metres: D (|κx|² + |κy|² + 2 ν κx·κy + 2 (1 − ν) |κxy|²)/2.
     fn bend(&mut self, grid: &Grid, step: DVec2, (rigidity_n_m, poisson): (f64, f64)) {
         let cell = step.x * step.y;
         let far = [1.0 / (step.x * step.x), 1.0 / (step.y * step.y)];
@@ -106,7 +106,7 @@ impl Lattice {
                     self.folds.push(Fold::new(&terms, share * rigidity_n_m * cell));
                 }
             } else if inner_x != inner_y {
-                // beside a free edge the sheet bends across as it likes
+                // at a free edge the sheet bends freely across it
                 let ([a, b], w) = if inner_x { (along_x(), far[0]) } else { (along_y(), far[1]) };
                 let stiffness = 0.5 * (1.0 - poisson * poisson) * rigidity_n_m * cell;
                 self.folds.push(Fold::new(&[(a, w), (b, w), (here, -2.0 * w)], stiffness));
@@ -149,7 +149,7 @@ impl Lattice {
         self.list_edges();
     }
 
-    /// The kind of a cell with these corners: one for all that look alike.
+    /// The kind of a cell with these corners: one for all of equal shape.
     fn kind_of(&mut self, corners: [DVec3; 8], elastic: (f64, f64)) -> usize {
         let kind = BrickKind::new(corners, elastic);
         let known = self.kinds.iter().position(|known| known.is_like(&kind));
@@ -195,7 +195,7 @@ impl Lattice {
         self.radius_m = radius_m;
     }
 
-    /// The system of this body: who of those that move is joined to whom.
+    /// The system of this body: its sparsity pattern over the moving vertices.
     pub fn system(&self) -> System {
         let mut first: Vec<u32> = (0..self.rest.len() as u32).collect();
         let mut join = |vertices: &[u32]| {
@@ -210,7 +210,7 @@ impl Lattice {
         System::new(&first, &self.held)
     }
 
-    /// Adds what all elements do at these positions; cells follow their turns.
+    /// Adds the forces and stiffness of all elements at these positions; updates the cells' rotations.
     pub fn add(&mut self, positions: &[DVec3], system: &mut System) {
         self.struts.iter().for_each(|strut| strut.add(positions, system));
         self.membranes.iter().for_each(|membrane| membrane.add(positions, system));
@@ -222,7 +222,7 @@ impl Lattice {
         }
     }
 
-    /// Elastic energy, J; cells follow their turns.
+    /// Elastic energy, J; uses updated rotations of the cells.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let struts: f64 = self.struts.iter().map(|strut| strut.energy_j(positions)).sum();
         let membranes: f64 = self.membranes.iter().map(|membrane| membrane.energy_j(positions)).sum();
@@ -235,9 +235,9 @@ impl Lattice {
         struts + membranes + folds + bricks.sum::<f64>()
     }
 
-    /// How far lines through three vertices in a row sag beyond what they do at rest, metres: the error of straight pieces.
+    /// The largest change of sag of three vertices in a row against rest, metres: the error of straight pieces.
     pub fn residual_m(&self, positions: &[DVec3]) -> f64 {
-        // a rope bends freely: a kink that has gone is no error
+        // a rope bends freely: the loss of a kink is no error
         let slack = self.membranes.is_empty() && self.bricks.is_empty();
         let sag = |(row, rest): &([u32; 3], f64)| {
             let now = sagitta(*row, positions).length();
@@ -247,7 +247,7 @@ impl Lattice {
         self.rows.iter().map(sag).fold(0.0, f64::max)
     }
 
-    /// The largest share of their lengths at rest by which edges change within `h` seconds at these velocities.
+    /// The largest change of an edge within `h` seconds at these velocities, as a share of its rest length.
     pub fn haste(&self, velocities: &[DVec3], h: f64) -> f64 {
         let share = |&[a, b]: &[u32; 2]| {
             let [a, b] = [a as usize, b as usize];
@@ -256,7 +256,7 @@ impl Lattice {
         self.edges.iter().map(share).fold(0.0, f64::max)
     }
 
-    /// The skin, as others touch it, of a body that starts at `height_j_kg` (see [`SurfaceForm`]).
+    /// The skin, as peers touch it, of a body that starts at `height_j_kg` (see [`SurfaceForm`]).
     pub fn surface(&self, height_j_kg: f32) -> SurfaceForm {
         let mut on = vec![false; self.rest.len()];
         self.edges.iter().flatten().for_each(|vertex| on[*vertex as usize] = true);
@@ -275,19 +275,19 @@ impl Lattice {
         }
     }
 
-    /// How many elements there are.
+    /// Number of elements.
     pub fn elements(&self) -> usize {
         self.struts.len() + self.membranes.len() + self.bricks.len()
     }
 }
 
-/// How far the middle of three points is from the line between the others, metres: an eighth of the second difference.
+/// Distance of the middle of three points from the line between the others, metres: an eighth of the second difference.
 fn sagitta([a, b, c]: [u32; 3], positions: &[DVec3]) -> DVec3 {
     let [a, b, c] = [a, b, c].map(|vertex| positions[vertex as usize]);
     (a - b * 2.0 + c) * 0.125
 }
 
-/// The point of the unit ball for the shares 0 … 1 of a cube: smooth, and one to one.
+/// The point of the unit ball for the shares 0 … 1 of a cube: a smooth one-to-one map.
 fn ball(share: DVec3) -> DVec3 {
     let p = share * 2.0 - DVec3::ONE;
     let q = p * p;

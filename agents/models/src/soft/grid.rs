@@ -1,11 +1,11 @@
 //! A regular grid of vertices: their numbers, and the sides a scene can name.
 //!
-//! In: cells along three axes. Out: numbers of vertices, lines of them, and who lies on a side. Never here: where they are.
+//! In: cells along three axes. Out: numbers of vertices, rows of them, and the vertices on a side. Never here: where they are.
 //! Vertices are numbered along the axis with the fewest cells first: the band of the matrix is then as narrow as it can be.
 
 use super::spec::SoftShape;
 
-/// A side of a soft body, in its own axes: of a rope its two ends, of a sheet four edges, of a box six faces.
+/// A side of a soft body, in its own axes: a rope has two ends, a sheet four edges, a box six faces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
     /// Where x is least; the start of a rope.
@@ -48,7 +48,7 @@ impl Side {
         }
     }
 
-    /// Whether a shape has it; a ball has none.
+    /// Whether a shape has this side; a ball has none.
     #[must_use]
     pub const fn of(self, shape: &SoftShape) -> bool {
         let axes = match shape {
@@ -64,7 +64,7 @@ impl Side {
 /// A grid of vertices.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Grid {
-    /// Cells along each axis; none along one that it does not have.
+    /// Cells along each axis; zero along an axis that the shape does not have.
     pub cells: [usize; 3],
     stride: [usize; 3],
 }
@@ -99,7 +99,7 @@ impl Grid {
         (0..3).map(|axis| place[axis] * self.stride[axis]).sum::<usize>() as u32
     }
 
-    /// The place of every vertex, in no order that matters.
+    /// The place of every vertex, in no particular order.
     pub fn places(&self) -> impl Iterator<Item = [usize; 3]> + use<> {
         let [x, y, z] = self.cells;
         (0..=x).flat_map(move |i| (0..=y).flat_map(move |j| (0..=z).map(move |k| [i, j, k])))

@@ -1,16 +1,16 @@
-//! A cell of a solid: eight vertices, linear elasticity in axes that turn with it.
+//! A cell of a solid: eight vertices, linear elasticity in corotated axes.
 //!
-//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the cell bends without
-//! locking by the incompatible modes of (TBW76), and its forces are the exact gradient of its energy, so that they do not turn it.
+//! In: corners at rest and now. Out: forces and stiffness. Theory: docs/theory/soft.md, eq. 10–14: the incompatible modes of (TBW76)
+//! let the cell bend without locking, and its forces are the exact gradient of its energy, so that they exert no net torque.
 
 use super::system::System;
 use glam::{DMat3, DQuat, DVec3};
 use metachron_core::skyline_cholesky::Envelope;
 
-/// What all cells of one rest shape share.
+/// Data common to all cells of one rest shape.
 #[derive(Debug, Clone)]
 pub(super) struct BrickKind {
-    /// Corners at rest from the first on, metres.
+    /// Corners at rest relative to the first, metres.
     rest: [DVec3; 8],
     /// Mean gradient of each corner's share, 1/m.
     gradients: [DVec3; 8],
@@ -25,17 +25,17 @@ pub(super) struct BrickKind {
 pub(super) struct Brick {
     /// Its corners: bit 0 of a corner's place says whether it is the far one in x, bit 1 in y, bit 2 in z.
     pub vertices: [u32; 8],
-    /// Which kind it is.
+    /// Index of its kind.
     pub kind: usize,
-    /// How far it has turned from rest.
+    /// Rotation from rest.
     pub turn: DQuat,
 }
 
 /// Corners and incompatible modes.
 const MODES: usize = 11;
-/// Where Gauss looks along each axis.
+/// Coordinate of the Gauss points along each axis.
 const GAUSS: f64 = 0.577_350_269_189_625_8;
-/// Turns that are followed by Newton's method in so many tries: it needs three, more where a cell is turned inside out.
+/// Most Newton iterations for a cell's rotation: it needs three, more where a cell is turned inside out.
 const TURN_TRIES: usize = 30;
 
 fn outer(a: DVec3, b: DVec3) -> DMat3 {
@@ -48,7 +48,7 @@ fn corner(i: usize) -> DVec3 {
     DVec3::new(sign(0), sign(1), sign(2))
 }
 
-/// How the share of each corner changes along the cell's own coordinates at `at`.
+/// Gradient of each corner's share in the cell's own coordinates at `at`.
 fn slopes(at: DVec3) -> [DVec3; 8] {
     std::array::from_fn(|i| {
         let c = corner(i);
@@ -94,14 +94,14 @@ impl BrickKind {
         Self { rest, gradients, stiffness: Box::new(condensed(&whole)), volumes_m3 }
     }
 
-    /// Whether two kinds are the same but for rounding.
+    /// Whether two kinds are equal up to rounding.
     pub fn is_like(&self, other: &Self) -> bool {
         let size = self.rest[7].length();
         self.rest.iter().zip(&other.rest).all(|(a, b)| a.distance(*b) <= 1e-12 * size)
     }
 }
 
-/// What is left of the stiffness where the incompatible modes are free (eq. 11).
+/// The stiffness with the incompatible modes condensed out (eq. 11).
 fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
     let mut inner = Envelope::<3>::default();
     inner.shape(&[0, 0, 0]);
@@ -112,7 +112,7 @@ fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
     }
     let mut left: [[DMat3; 8]; 8] = std::array::from_fn(|i| std::array::from_fn(|j| whole[i][j]));
     if !inner.factor() {
-        return left; // a cell without volume: its own stiffness says so
+        return left; // a cell without volume keeps its own stiffness
     }
     for j in 0..8 {
         let mut columns = [[0.0; 9]; 3];
@@ -130,19 +130,19 @@ fn condensed(whole: &[[DMat3; MODES]; MODES]) -> [[DMat3; 8]; 8] {
     left
 }
 
-/// What a cell is at one moment.
+/// The state of a cell at one moment.
 struct Bent {
-    /// How it is turned.
+    /// Its rotation.
     turn: DMat3,
-    /// How far each corner is displaced, in the axes of rest.
+    /// Displacement of each corner, in the axes of rest.
     by: [DVec3; 8],
-    /// What the stiffness makes of it, in the same axes, N.
+    /// Elastic force of the stiffness on these displacements, in the same axes, N.
     force: [DVec3; 8],
 }
 
 impl Brick {
-    /// Follows the turn of the cell, by Newton's method on the trace of RᵀF from the last turn on (eq. 12); returns the matrix by
-    /// which a change of F turns it further.
+    /// Updates the rotation of the cell, by Newton's method on the trace of RᵀF from the last rotation on (eq. 12); returns the matrix
+    /// that maps a change of F to a further rotation.
     pub fn follow(&mut self, kind: &BrickKind, positions: &[DVec3]) -> DMat3 {
         let mut f = DMat3::ZERO;
         for (vertex, gradient) in self.vertices.iter().zip(&kind.gradients) {
@@ -176,7 +176,7 @@ impl Brick {
         Bent { turn, by, force }
     }
 
-    /// Adds what it does at these positions; `firm` is what [`Self::follow`] told (eq. 13, 14).
+    /// Adds its forces and stiffness at these positions; `firm` is the result of [`Self::follow`] (eq. 13, 14).
     pub fn add(&self, kind: &BrickKind, positions: &[DVec3], firm: DMat3, system: &mut System) {
         let Bent { turn, force, .. } = self.bent(kind, positions);
         let origin = positions[self.vertices[0] as usize];
@@ -191,7 +191,7 @@ impl Brick {
         }
     }
 
-    /// Energy in it, J.
+    /// Elastic energy, J.
     pub fn energy_j(&self, kind: &BrickKind, positions: &[DVec3]) -> f64 {
         let Bent { by, force, .. } = self.bent(kind, positions);
         0.5 * by.iter().zip(force).map(|(u, f)| u.dot(f)).sum::<f64>()

@@ -1,23 +1,23 @@
-//! How a soft body answers impulses: its factor, as others may know it.
+//! Published response of a soft body to impulses: its factor.
 //!
-//! In: the factor of the substep that ended last. Out: the velocities that impulses cause. Never here: which impulses.
+//! In: the factor of the last substep. Out: the velocities that impulses cause. Never here: which impulses.
 
 use super::system::Factor;
 use glam::DVec3;
 use metachron_core::ImpulseResponse;
 use metachron_core::{Carried, Foot, Lies};
 
-/// A soft body's answer to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
+/// A soft body's response to impulses: A⁻¹ of its own step (docs/theory/soft.md, eq. 2), held vertices left out.
 #[derive(Debug, Clone, Default)]
 pub struct SoftInertia {
     factor: Factor,
-    /// Where something fixed carries it, and its answer there.
+    /// Its feet on supports, and its response there.
     standing: Carried<Factor>,
-    /// Of each vertex by itself, 1/kg.
+    /// Inverse mass of each vertex by itself, 1/kg.
     mobilities: Vec<f64>,
-    /// How each vertex will accelerate without what others give, m/s².
+    /// Predicted acceleration of each vertex without impulses of peers, m/s².
     pub accelerations: Vec<DVec3>,
-    /// The length of the substep that ended last, seconds: published velocities are the means over it.
+    /// The length of the last substep, seconds: published velocities are the means over it.
     pub span_s: f64,
     /// Mass of each vertex, kg, and damping, 1/s.
     pub(super) mass_kg: Vec<f64>,
@@ -25,14 +25,14 @@ pub struct SoftInertia {
 }
 
 impl SoftInertia {
-    /// Takes over a factor into the storage that is here.
+    /// Copies a factor into the existing storage.
     pub(super) fn copy_from(&mut self, factor: &Factor, mobilities: &[f64]) {
         self.factor.copy_from(factor);
         self.mobilities.clear();
         self.mobilities.extend_from_slice(mobilities);
     }
 
-    /// Takes over where it lies and how it will accelerate there.
+    /// Copies its feet and its predicted accelerations there.
     pub(super) fn stand(&mut self, lies: Lies<'_, Factor>, accelerations: &[DVec3]) {
         self.standing.take(lies, accelerations, Factor::copy_from);
     }

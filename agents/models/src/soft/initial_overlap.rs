@@ -1,22 +1,22 @@
-//! Where a soft body starts through a solid: there is no way out on which it would not be torn.
+//! Soft bodies that start through a solid: every way out would tear them.
 //!
-//! In: where a body meets a solid. Out: which of its places pass through untouched, until they have left the solid.
+//! In: the places where a body meets a solid. Out: the places that pass through without contact until they have left the solid.
 //! Never here: contacts. Theory: `docs/theory/contact.md`, eq. 25.
 
 use metachron_geometry::PARTED;
 use metachron_geometry::{Place, Touch};
 
-/// The vertices of a soft body that started through one solid and have not left it since, by rising number.
+/// The vertices of a soft body that started inside one solid, pass through it and have not left it since, by rising number.
 #[derive(Debug, Default)]
 pub(super) struct Bores {
-    /// Whether it is known where the body starts.
+    /// Whether the first places have been examined.
     begun: bool,
     through: Vec<u32>,
 }
 
 impl Bores {
-    /// Takes all places where a body meets the solid. One that is held, and starts deeper inside than `deep_m` in places whose
-    /// ways out part, passes through.
+    /// Processes all places where a body meets the solid. A held body that starts deeper inside than `deep_m`, at places whose
+    /// ways out diverge, passes through.
     pub fn follow(&mut self, places: &[Touch], held: bool, deep_m: f64) {
         let begins = !std::mem::replace(&mut self.begun, true);
         if begins && held && is_parted(places, deep_m) {
@@ -33,7 +33,7 @@ impl Bores {
     }
 }
 
-/// Whether those places that are deep inside have no way out in common.
+/// Whether the deep places have no common way out.
 fn is_parted(places: &[Touch], deep_m: f64) -> bool {
     let mut deep = places.iter().filter(|place| place.gap_m < -deep_m);
     let first = deep.next().map(|place| place.normal);

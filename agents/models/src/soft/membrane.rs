@@ -1,4 +1,4 @@
-//! A triangle of a sheet: it resists being stretched and sheared.
+//! Membrane element of a sheet: a triangle that resists stretch and shear.
 //!
 //! In: vertices. Out: forces and stiffness. Never here: bending ([`crate::soft::bending`]). Theory: docs/theory/soft.md, eq. 5, 6:
 //! St. Venant–Kirchhoff in the plane.
@@ -18,7 +18,7 @@ pub(super) struct Membrane {
     lame_pa: [f64; 2],
 }
 
-/// What the strain of a triangle is.
+/// The strain of a triangle.
 struct Strained {
     /// The two columns of F.
     columns: [DVec3; 2],
@@ -56,7 +56,7 @@ impl Membrane {
         [2.0 * mu * xx + spread, 2.0 * mu * yy + spread, 2.0 * mu * xy]
     }
 
-    /// Adds what it does at these positions (eq. 5, 6).
+    /// Adds its forces and stiffness at these positions (eq. 5, 6).
     pub fn add(&self, positions: &[DVec3], system: &mut System) {
         let Strained { columns: [x, y], strain } = self.strained(positions);
         let stress = self.stress(strain);
@@ -81,7 +81,7 @@ impl Membrane {
         }
     }
 
-    /// Energy in it, J.
+    /// Elastic energy, J.
     pub fn energy_j(&self, positions: &[DVec3]) -> f64 {
         let strain = self.strained(positions).strain;
         let stress = self.stress(strain);
@@ -97,7 +97,7 @@ fn times([xx, yy, xy]: [f64; 3], v: DVec2) -> DVec2 {
     DVec2::new(xx * v.x + xy * v.y, xy * v.x + yy * v.y)
 }
 
-/// The part of a stress that pulls: what pushes has less than no stiffness across.
+/// The tensile part of a stress: compression has negative stiffness across.
 fn tension([xx, yy, xy]: [f64; 3]) -> [f64; 3] {
     let (mean, half) = (0.5 * (xx + yy), 0.5 * (xx - yy));
     let radius = half.hypot(xy);

@@ -1,9 +1,9 @@
 //! Soft bodies: sheets, solids and ropes as finite elements in double precision. Theory: `docs/theory/soft.md`.
 //!
-//! In: a [`SoftSpec`]. Out: a [`SoftBody`], an agent. Never here: other agents' states, beyond what touches or pulls this one.
+//! In: a [`SoftSpec`]. Out: a [`SoftBody`], an agent. Never here: other agents' states, beyond those that touch or pull this one.
 //!
 //! Unknowns of a step are the velocities of the vertices, a slot each. One substep builds and factors A = M + h c M + h² K
-//! (`elements`, `system`), solves for the free velocities, lets contacts act through A⁻¹ (`contact`), and moves (`step`).
+//! (`elements`, `system`), solves for the free velocities, applies contacts through A⁻¹ (`contact`), and moves (`step`).
 
 mod anchor_springs;
 mod bar;

@@ -1,6 +1,6 @@
-//! What a soft body tells the world: its snapshot.
+//! Publication of a soft body: its snapshot.
 //!
-//! In: a body between two steps. Out: its vertices, and what others need to touch it. Never here: any change of its state.
+//! In: a body between two steps. Out: its vertices, and the data that peers need for contact. Never here: any change of its state.
 
 use super::body::SoftBody;
 use super::inertia::SoftInertia;

@@ -1,4 +1,4 @@
-//! What a soft body is made of and how it starts: the numbers a scene gives, and what is wrong with them.
+//! Specification of a soft body: its properties and initial state, the numbers a scene gives, and their checks.
 
 use super::grid::Side;
 use glam::{DQuat, DVec3};
@@ -10,9 +10,9 @@ use std::sync::Arc;
 pub struct SoftSpec {
     /// Its shape at rest, and how finely it is divided.
     pub shape: SoftShape,
-    /// What it is made of.
+    /// Its material.
     pub matter: SoftMatter,
-    /// Where its first corner starts, or a ball's centre, metres.
+    /// Position of its first corner, or of a ball's centre, at the start, metres.
     pub position: DVec3,
     /// Rotation from its own axes to the world's.
     pub rotation: DQuat,
@@ -30,7 +30,7 @@ pub struct SoftSpec {
     pub sleep: bool,
 }
 
-/// What a soft body is made of.
+/// The material of a soft body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SoftMatter {
     /// Young's modulus, Pa, 1 … 1e11.
@@ -71,7 +71,7 @@ pub enum SoftShape {
     },
     /// A rope along a path.
     Rope {
-        /// Points, metres, in the rope's own axes; equal lengths of it lie between vertices.
+        /// Points, metres, in the rope's own axes; vertices divide it into equal lengths.
         path_m: Vec<DVec3>,
         /// Radius, metres.
         radius_m: f64,
@@ -117,12 +117,12 @@ pub enum SoftError {
         /// The side's name.
         side: &'static str,
     },
-    /// An obstacle is no shape.
+    /// An obstacle's shape is invalid.
     #[error("the shape of obstacle `{name}` is unusable: {source}")]
     Obstacle {
         /// The obstacle's name.
         name: String,
-        /// What is wrong with its shape.
+        /// The error of its shape.
         source: ShapeError,
     },
 }

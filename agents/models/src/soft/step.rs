@@ -1,6 +1,6 @@
-//! One substep of a soft body, told as a contents page: linearly implicit Euler, contacts between solve and move.
+//! One substep of a soft body: linearly implicit Euler, contacts between solve and move.
 //!
-//! In: a state, and what is around. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
+//! In: a state and its surroundings. Out: the state a substep later. Never here: snapshots, rest. Theory: docs/theory/soft.md.
 
 use super::body::SoftBody;
 use glam::{DMat3, DVec3};
@@ -10,13 +10,13 @@ use metachron_core::foot::press;
 
 /// No edge may turn or stretch in a substep by more than this share of its length: past it the linear forces are far off.
 pub(super) const HASTE_MAX: f64 = 0.3;
-/// Past this no coordinate or speed is taken, metres or m/s: its square would soon be no number.
+/// The largest coordinate or speed accepted, metres or m/s: its square would soon overflow.
 const REACH_MAX: f64 = 1e9;
-/// A step is divided into no more substeps than this.
+/// The most substeps of a step.
 pub(super) const SUBSTEPS_MAX: u32 = 16;
 
 impl SoftBody {
-    /// Advances by `dt` seconds; into how many substeps it was divided, and how many more its error estimate took.
+    /// Advances by `dt` seconds; returns the number of substeps, and how many more its error estimate took.
     ///
     /// # Errors
     /// [`StepError::Diverged`] where the state stops being finite.
@@ -30,7 +30,7 @@ impl SoftBody {
             self.touch(h);
             if self.lattice.haste(&self.free, h) > HASTE_MAX && parts < SUBSTEPS_MAX {
                 (parts, left) = (2 * parts, 2 * left);
-                self.given.iter_mut().for_each(|given| *given *= 0.5); // it acts evenly through the step
+                self.given.iter_mut().for_each(|given| *given *= 0.5); // the impulse acts evenly through the step
                 continue;
             }
             if !self.free.iter().all(|v| v.is_finite() && v.abs().max_element() <= REACH_MAX) {
@@ -59,7 +59,7 @@ impl SoftBody {
         Ok(())
     }
 
-    /// Forms the system of a substep of `h` seconds from where it is.
+    /// Assembles the system of a substep of `h` seconds at the present positions.
     pub(super) fn assemble(&mut self, h: f64) {
         let Self { system, lattice, positions, spec, ties, company, contacts, .. } = self;
         company.aim(ties, positions, h);
@@ -75,13 +75,13 @@ impl SoftBody {
         contacts.mobilities.extend((0..positions.len()).map(|vertex| system.mobility(vertex)));
     }
 
-    /// Lets contact act on the foreseen velocities.
+    /// Applies contact to the predicted velocities.
     pub(super) fn touch(&mut self, h: f64) {
         let Self { system, positions, free, company, contacts, .. } = self;
         contacts.act(positions, free, (system, company), h);
     }
 
-    /// Moves along the foreseen velocities, and gives the others their part.
+    /// Moves with the predicted velocities, and gives the peers their impulses.
     fn act(&mut self, start: f64, h: f64) {
         let Self { positions, velocities, free, ties, company, contacts, foretold, .. } = self;
         std::mem::swap(velocities, free);
@@ -91,13 +91,13 @@ impl SoftBody {
         foretold.note(contacts, positions.len(), h);
     }
 
-    /// Takes in what others gave since the last step, and looks who is near.
+    /// Applies the impulses of peers since the last step, and collects the neighbours.
     fn receive(&mut self, around: &Surroundings<'_>, dt: f64) -> Result<(), StepError> {
         let Self { system, positions, velocities, given, company, foretold, footing, .. } = self;
         given.clear();
         company.open(around, positions.len(), dt);
         if let Some([sums, carried]) = company.received() {
-            // what acted through the step before is taken as that step would have; the rest acts through this one (eq. 16b)
+            // impulses that acted through the step before are applied as that step would have; the rest acts through this one (eq. 16b)
             let borne = footing.stance.bears(sums.iter().sum());
             let answer = footing.under(borne, system.answer());
             given.extend_from_slice(sums);

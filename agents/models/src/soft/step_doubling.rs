@@ -1,4 +1,4 @@
-//! A soft body's own estimate of its error in time, metres: now and then steps are made a second time, in twice the substeps.
+//! A soft body's own estimate of its error in time, metres: from time to time steps are repeated with twice the substeps.
 //!
 //! In: the body before a step and after it. Out: what the steps of a tenth of a second do wrong. Never here: errors in space
 //! ([`crate::soft::fe_mesh`]), any change of its state, impulses on others. Theory: docs/theory/control.md, eq. 31, 32.
@@ -13,18 +13,19 @@ use metachron_core::step_doubling::{Watch, farthest};
 #[derive(Debug, Default)]
 pub(super) struct Doubling {
     pub watch: Watch,
-    /// Places and velocities in twice the substeps.
+    /// Positions and velocities with twice the substeps.
     finer: [Vec<DVec3>; 2],
     /// The springs of the step.
     ties: Vec<Tie>,
-    /// Into how many substeps the step was divided the second time, and the last one the first time.
+    /// Number of substeps of the repeated step; `last` is that of the last ordinary step.
     parts: u32,
     last: u32,
 }
 
 impl SoftBody {
-    /// Makes the step of `dt` seconds that comes in twice the substeps of the last one, where it is the turn of the body `me`, beside
-    /// the state; in how many. Steps that others press on are made once: what they give is given once.
+    /// Repeats the coming step of `dt` seconds with twice the substeps of the last one, in parallel to the state, where it is the turn
+    /// of the body `me`; returns the number of substeps. Steps under contact or impulses of peers are made once, as their impulses are
+    /// given once.
     pub(super) fn rehearse(&mut self, me: AgentId, dt: f64) -> u32 {
         let Self { doubling, positions, velocities, ties, .. } = self;
         if doubling.watch.begins(self.steps, me) {
@@ -50,14 +51,14 @@ impl SoftBody {
         parts
     }
 
-    /// Puts the state in twice the substeps in the place of the state, or back.
+    /// Swaps the state with that of twice the substeps.
     fn swap(&mut self) {
         let Self { doubling, positions, velocities, .. } = self;
         std::mem::swap(&mut doubling.finer[0], positions);
         std::mem::swap(&mut doubling.finer[1], velocities);
     }
 
-    /// One of its substeps, of which nobody is told; whether there was an answer.
+    /// One substep of the repetition, which is not published; returns whether it could be solved.
     fn half(&mut self, h: f64) -> bool {
         if self.foresee(h).is_err() {
             return false;

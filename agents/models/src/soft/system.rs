@@ -1,6 +1,6 @@
 //! The linear system of one substep: forces, stiffness and mass of all vertices, and its factor.
 //!
-//! In: what each element adds. Out: velocities. Never here: what an element is. Theory: docs/theory/soft.md, eq. 1, 2.
+//! In: the contributions of each element. Out: velocities. Never here: the elements themselves. Theory: docs/theory/soft.md, eq. 1, 2.
 
 use glam::{DMat3, DVec3};
 use metachron_core::skyline_cholesky::Envelope;
@@ -13,20 +13,20 @@ pub(super) struct System {
     first: Vec<u32>,
     /// Force on each vertex at the start of the substep, N.
     pub forces: Vec<DVec3>,
-    /// h², s²: what a stiffness counts.
+    /// h², s²: the factor of every stiffness.
     square: f64,
 }
 
-/// The matrix of the vertices that move, and then its factor.
+/// The matrix of the moving vertices, and then its factor.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Factor {
     matrix: Envelope<3>,
-    /// The row of each vertex; none for those that are held. Rows rise with the vertices.
+    /// The row of each vertex; none for held ones. Rows rise with the vertices.
     rows: Vec<Option<u32>>,
 }
 
 impl System {
-    /// A system in which vertex i, where it moves, is joined to none lower than `first[i]` of those that move.
+    /// A system in which each moving vertex i is joined to no moving vertex lower than `first[i]`.
     pub fn new(first: &[u32], held: &[bool]) -> Self {
         let mut next = 0..;
         let rows: Vec<Option<u32>> = held.iter().map(|&held| if held { None } else { next.next() }).collect();
@@ -37,7 +37,7 @@ impl System {
         Self { matrix: Factor { matrix, rows }, first, forces: vec![DVec3::ZERO; held.len()], square: 0.0 }
     }
 
-    /// How many vertices there are.
+    /// Number of vertices.
     pub const fn vertices(&self) -> usize {
         self.forces.len()
     }
@@ -62,7 +62,7 @@ impl System {
         }
     }
 
-    /// Adds what joins the velocities of two vertices, `i` not below `j`, kg.
+    /// Adds an inertia that couples the velocities of two vertices, `i` not below `j`, kg.
     pub fn join(&mut self, (i, j): (u32, u32), inertia: DMat3) {
         self.add((i as usize, j as usize), inertia);
     }
@@ -89,37 +89,37 @@ impl System {
         &self.matrix
     }
 
-    /// Turns impulses, one a vertex (N·s), into the velocities they cause (m/s) by the factor (eq. 2).
+    /// Replaces impulses, one for each vertex (N·s), by the velocities they cause (m/s) by the factor (eq. 2).
     pub fn respond(&self, impulses: &mut [DVec3]) {
         self.matrix.respond(impulses);
     }
 
-    /// The size of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
+    /// The scale of the inverse mass of a vertex by itself, 1/kg, before the matrix is factored.
     pub fn mobility(&self, vertex: usize) -> f64 {
         let Factor { matrix, rows } = &self.matrix;
         let trace = |row: u32| (0..3).map(|axis| matrix.diagonal(3 * row as usize + axis)).sum::<f64>();
         rows[vertex].map_or(0.0, |row| 3.0 / trace(row))
     }
 
-    /// What a factorisation costs, multiplications.
+    /// Cost of a factorisation, multiplications.
     pub fn work(&self) -> usize {
         Envelope::<3>::work(&self.first)
     }
 }
 
 impl Factor {
-    /// How many vertices there are; none before the first step.
+    /// Number of vertices; zero before the first step.
     pub const fn vertices(&self) -> usize {
         self.rows.len()
     }
 
-    /// Takes over `other` into the storage that is here.
+    /// Copies `other` into the existing storage.
     pub fn copy_from(&mut self, other: &Self) {
         self.matrix.copy_from(&other.matrix);
         self.rows.clone_from(&other.rows);
     }
 
-    /// A⁻¹ on impulses, one a vertex; those that are held stay still.
+    /// A⁻¹ on impulses, one for each vertex; held vertices stay still.
     pub fn respond(&self, impulses: &mut [DVec3]) {
         let rows = || self.rows.iter().enumerate().filter_map(|(vertex, row)| Some((vertex, (*row)? as usize)));
         rows().for_each(|(vertex, row)| impulses[row] = impulses[vertex]);

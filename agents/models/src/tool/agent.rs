@@ -1,10 +1,10 @@
-//! The agent: one step of a tool, told as a contents page.
+//! The tool agent: the sequence of one step.
 //!
-//! In: a span, the hand, what can be held. Out: a [`ToolState`]. Never here: forces; who is held or touched solves them.
+//! In: a span, the user spring, graspable neighbours. Out: a [`ToolState`]. Never here: forces; the grasped or touched agent solves them.
 //!
-//! The tip is led by a target: the script, or the hand while one holds the tool. What separates it from its target dies out
-//! like a critically damped spring, solved exactly, so that being taken, let go or put off by lost time never makes it jump.
-//! What touches the tip moves it off the led point as far as the drive is strong ([`super::drive`]).
+//! The tip follows a commanded point: the script, or the user spring while one holds the tool. The offset from that target decays
+//! like a critically damped spring, solved exactly, so that being taken, released or put off by lost time never makes it jump.
+//! Contact moves the tip off the commanded point as far as the force limit of the drive allows ([`super::drive`]).
 
 use super::drive::{Drive, Led};
 use super::force_sensor::Felt;
@@ -24,22 +24,22 @@ use metachron_geometry::{Form, FormKind, Placed, View};
 use std::fmt;
 use std::sync::Arc;
 
-/// A driven tool that lives by its own steps.
+/// A driven tool with its own clock.
 #[derive(Clone)]
 pub struct Instrument {
     spec: ToolSpec,
     script: Script,
     tool: ToolState,
-    /// Where the tip is led, and how fast: where it is, if nothing pushes it.
+    /// The commanded point and its velocity: the tip is there if no contact pushes it.
     led: Led,
     drive: Drive,
-    /// How far the tip is from where the script or the hand wants it, metres.
+    /// Distance of the tip from the target of the script or the user spring, metres.
     lag_m: f64,
     jaws: Jaws,
     felt: Felt,
     knock: Knock,
     form: Arc<Form>,
-    /// How fast any of its points went in the last step, m/s.
+    /// Speed of its fastest point in the last step, m/s.
     speed_m_s: f64,
     at_rest: bool,
     steps: u64,
@@ -54,25 +54,25 @@ impl fmt::Debug for Instrument {
 /// Coulomb friction coefficient of wet steel.
 const FRICTION: f64 = 0.2;
 
-/// How fast the tip closes up to a hand, 1/s: nine tenths of the way in 65 ms, the tremor of a mouse is gone.
+/// Rate at which the tip closes up to a user spring, 1/s: nine tenths of the distance in 65 ms; the tremor of a mouse is filtered out.
 const HAND_RATE_PER_S: f64 = 60.0;
-/// How fast it returns to its script after a hand, 1/s: nine tenths of the way in a second.
+/// Rate at which it returns to its script after a user spring, 1/s: nine tenths of the distance in a second.
 const RETURN_RATE_PER_S: f64 = 4.0;
-/// How fast jaws open and close where no script says, 1/s.
+/// Rate at which jaws open and close where no script sets them, 1/s.
 const JAW_RATE_PER_S: f64 = 4.0;
-/// In the hand, jaws close on what has its skin is nearer than this share of their reach.
+/// Under a user spring, jaws close on a body whose skin is nearer than this share of their reach.
 const CATCH_SHARE: f64 = 0.5;
-/// A tip nearer than this to its script has arrived, metres (and m/s).
+/// A tip closer than this to its script has arrived, metres (and m/s).
 const ARRIVED: f64 = 1e-7;
-/// A tool on which others sleep keeps still below this, m/s.
+/// A tool on which sleeping bodies rest keeps still below this speed, m/s.
 const LAIN_M_S: f64 = 2e-3;
-/// Near others steps are no longer than a rigid body's there, seconds.
+/// With agents near, steps are no longer than a rigid body's in that case, seconds.
 const PART_MAX_S: f64 = 1.0 / 240.0;
 /// Rotations whose dot product is within this of one are the same.
 const SAME_TURN: f64 = 1e-14;
 
 impl Instrument {
-    /// Builds the tool of `spec`, in its first keyframe or as far off as it says.
+    /// Builds the tool of `spec`, in its first keyframe or at the given offset from it.
     ///
     /// # Errors
     /// [`ToolError`] for a script without keyframes, times that do not rise, and any number outside its range.
@@ -104,13 +104,13 @@ impl Instrument {
         })
     }
 
-    /// Where the hand wants the tip, and how fast it moves there.
+    /// Target of the user spring for the tip, and its velocity.
     fn hand_target(&self, hand: &Pull) -> (DVec3, DVec3) {
         let local = if let Anchor::Local(local) = hand.anchor { local } else { DVec3::ZERO };
         (hand.target - self.tool.rotation * local, hand.target_velocity)
     }
 
-    /// Follows the hand: the tip goes where it is wanted, the rotation stays, the jaws close on what is near.
+    /// Follows the user spring: the tip goes to its target, the rotation stays, the jaws close on a body that is near.
     fn follow_hand(&self, hand: &Pull, dt: f64, around: &Surroundings<'_>) -> ToolState {
         let (target, target_velocity) = self.hand_target(hand);
         let now = (self.led.0 - target, self.led.1 - target_velocity);
@@ -123,7 +123,7 @@ impl Instrument {
         ToolState { tip, velocity: target_velocity + off_velocity, jaw, ..self.tool }
     }
 
-    /// Follows the script; what separates the tool from it dies out.
+    /// Follows the script; the offset from it decays.
     fn follow_script(&self, from: &Pose, to: &Pose, dt: f64) -> ToolState {
         let now = (self.led.0 - from.tip, self.led.1 - from.velocity);
         let (off, off_velocity) = die_out(now, RETURN_RATE_PER_S, dt);
@@ -145,13 +145,13 @@ impl Instrument {
         }
     }
 
-    /// Whether the tool holds a neighbour or is linked to it: they see it as led, and so it is to them.
+    /// Whether the tool grasps a neighbour or is linked to it: such neighbours see it as driven, and it takes their impulses so.
     fn is_held_by(&self, other: &Neighbour, around: &Surroundings<'_>) -> bool {
         let held = self.tool.grasp.is_some_and(|grasp| grasp.target == other.id);
         held || around.links.iter().any(|link| link.other == other.id)
     }
 
-    /// The drive takes the tip along, against what others gave it in contact.
+    /// Moves the tip by the drive, against the impulses it received in contact.
     fn drive_on(&mut self, led: ToolState, around: &Surroundings<'_>, dt_s: f64) -> ToolState {
         let mut felt = std::mem::take(&mut self.felt);
         let given = felt.read(around, |other| self.is_held_by(other, around), dt_s);
@@ -168,7 +168,7 @@ impl Instrument {
         if open { let_in(&self.spec, self.tool.tip, (around, reach_m)) } else { None }
     }
 
-    /// Finds who sleeps in its way.
+    /// Finds the sleeping agents that it may hit.
     fn wake_others(&mut self, around: &Surroundings<'_>, dt_s: f64) {
         let ToolState { tip, rotation, jaw, .. } = self.tool;
         let bounds = bounds(&self.tool, self.speed_m_s);
@@ -176,14 +176,14 @@ impl Instrument {
         self.knock.find(&placed, &bounds, (around, dt_s));
     }
 
-    /// Whether the led point has come to where the script ends: what stands in the way of a drive that gives all it can holds it back.
+    /// Whether the commanded point has reached the end of the script: an obstacle that saturates the drive holds it back.
     fn has_led_to(&self, end: &Pose) -> bool {
         (self.led.0 - end.tip).length() < ARRIVED && self.led.1.length() < ARRIVED
     }
 
     /// Whether the tool has come to the end of its script and waits there, empty.
     fn rests(&mut self, end: &Pose) -> bool {
-        // who sleeps on it gives no more: it keeps still as well, or it would rise into them
+        // a body that sleeps on it gives no more force: the tool keeps still as well, or it would rise into that body
         let still = self.drive.is_there() || (self.felt.is_lain_on() && self.tool.velocity.length() < LAIN_M_S);
         let rests = still && !self.jaws.holds() && self.tool.jaw == end.jaw;
         if rests {
@@ -200,7 +200,7 @@ fn shape() -> ToolShape {
     ToolShape::default()
 }
 
-/// The ends of a tool in its own axes, and how far it reaches sideways of the line between them, metres.
+/// The ends of a tool in its own axes, and its sideways extent from the line between them, metres.
 fn reach() -> (DVec3, DVec3, f64) {
     let ToolShape { shaft_radius_m: r, shaft_length_m } = shape();
     // jaws: 2 radii before the tip and 6 behind it, 4 to the side when they are wide open; clevis and ring, then the shaft
@@ -214,21 +214,21 @@ fn bounds(tool: &ToolState, speed_m_s: f64) -> Bounds {
     Bounds { low: front.min(back) - side_m, high: front.max(back) + side_m, speed_m_s }
 }
 
-/// How fast the fastest point of a tool went between two states `dt` seconds apart, m/s.
+/// Speed of a tool's fastest point between two states `dt` seconds apart, m/s.
 fn speed(before: &ToolState, after: &ToolState, dt: f64) -> f64 {
     let (front, back, side_m) = reach();
     let way = |end: DVec3| (after.tip + after.rotation * end).distance(before.tip + before.rotation * end);
     (way(front).max(way(back)) + (after.jaw - before.jaw).abs() * side_m) / dt
 }
 
-/// The angular velocity that leads from one rotation to another in `dt` seconds, world axes, rad/s.
+/// The angular velocity that turns one rotation into another in `dt` seconds, world axes, rad/s.
 fn spin(from: DQuat, to: DQuat, dt: f64) -> DVec3 {
     let turned = to * from.conjugate();
     let shorter = if turned.w < 0.0 { -turned } else { turned };
     if from == to { DVec3::ZERO } else { shorter.to_scaled_axis() / dt }
 }
 
-/// A deviation and its rate after `t` seconds of critical damping: exact, whatever the step.
+/// A deviation and its rate after `t` seconds of critical damping: exact for any step.
 fn die_out((off, rate): (DVec3, DVec3), damping_s: f64, t: f64) -> (DVec3, DVec3) {
     let left = libm::exp(-damping_s * t);
     let push = rate + off * damping_s;
@@ -240,9 +240,9 @@ impl Agent for Instrument {
         "instrument"
     }
 
-    /// Leads the tip by `dt`, moves the jaws, reads what is felt.
+    /// Moves the tip by `dt`, moves the jaws, reads the forces felt.
     ///
-    /// Of a hand's spring only the target counts: a tool is led, so stiffness and damping mean nothing to it.
+    /// Only the target of a user spring counts: a tool is driven, so stiffness and damping have no effect on it.
     fn step(&mut self, dt: SimSpan, around: &Surroundings<'_>) -> Result<StepReport, StepError> {
         let dt_s = check_span(dt)?;
         let (start_s, end_s) = (around.time.as_secs_f64(), (around.time + dt).as_secs_f64());
@@ -274,13 +274,13 @@ impl Agent for Instrument {
         Ok(StepReport { work: 1.0, substeps: 1, at_rest: self.at_rest })
     }
 
-    /// What its drive and a body that it pushes together make of each other neither foresees; and what it hears of once in several
-    /// steps of who pushes it would go on through all of its own.
+    /// Shortens the step near agents that it may push: neither the tool nor such an agent can predict the joint effect of drive and body,
+    /// and an impulse received once in several steps of a peer would go on through all of the tool's steps.
     fn longest_step(&self, dt: SimSpan, around: &Surroundings<'_>) -> SimSpan {
         let spared = |n: &Neighbour| self.tool.lets_in == Some(n.id) || self.is_held_by(n, around);
         let bounds = || bounds(&self.tool, self.speed_m_s);
         let part = beside::longest_step(dt, around, bounds, |n| !spared(n));
-        // what it comes to catch it will let in
+        // a body that it comes to grasp will be let in between the jaws
         let catches = |n: &Neighbour| self.tool.jaw > GRASP_BELOW && self.spec.graspable.contains(&n.id);
         let pushes = |n: &Neighbour| !(spared(n) || catches(n));
         beside::no_longer(part, around, bounds, |n| pushes(n).then_some(n.step_s.min(PART_MAX_S)))
@@ -294,12 +294,12 @@ impl Agent for Instrument {
         None
     }
 
-    /// Tells how long a step is before it has made one: others foresee its drive over that.
+    /// Publishes the length of a step before the first one: peers predict the drive over that span.
     fn look(&mut self, dt: SimSpan, around: &Surroundings<'_>) {
         self.drive.look(self.longest_step(dt, around).as_secs_f64());
     }
 
-    /// A tool has no samples to spread: nothing changes.
+    /// A tool has no nodes to redistribute: nothing changes.
     fn retune(&mut self, _wanted: Resolution) {}
 
     fn write_snapshot(&self, into: &mut Snapshot) {
@@ -323,7 +323,7 @@ impl Agent for Instrument {
         Some(self.form.clone())
     }
 
-    /// A tool is led from outside and weighs nothing here.
+    /// A tool is driven from outside and has no mass here.
     fn momentum(&self) -> (DVec3, DVec3) {
         (DVec3::ZERO, DVec3::ZERO)
     }

@@ -1,7 +1,8 @@
-//! What drives a tool: its tip is a mass on a spring to the point that is led, and the spring gives way at the force of the drive.
+//! The drive of a tool: its tip is a mass on a spring to the commanded point, and the spring yields at the force limit of the drive.
 //!
-//! In: how the led point goes, what the tip was given in contact. Out: where the tip is, and the led point, which the tip holds
-//! back where the drive is not strong enough; what others need to foresee both. Never here: where the path leads, holds.
+//! In: the motion of the commanded point, the impulses that the tip received in contact. Out: the state of the tip, and of the
+//! commanded point, which the tip holds back where the drive is not strong enough; the data by which peers predict both. Never here:
+//! the path, grasps.
 //! Theory: docs/theory/coupling.md, eq. 9d–9f: the god-object of haptics (ZS95), its coupling limited in force.
 
 use glam::{DMat3, DVec3};
@@ -11,50 +12,50 @@ use metachron_core::{Six, Sprung};
 /// A point and its velocity, metres and m/s.
 pub(super) type Led = (DVec3, DVec3);
 
-/// What the tip was given in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
+/// The impulses that the tip received in contact, as forces that go on (eq. 2, 4c), N·s and N·m·s² a metre.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Given {
-    /// What is new: dJ, and t dJ − dS.
+    /// The new impulse: dJ, and t dJ − dS.
     pub sum: DVec3,
     /// See [`Self::sum`].
     pub carried: DVec3,
-    /// What acts evenly over the step.
+    /// The impulse that acts evenly over the step.
     pub lasting: DVec3,
 }
 
 /// The drive of one tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Drive {
-    /// The most that it can give, newtons.
+    /// Force limit, newtons.
     limit_n: f64,
-    /// From the led point to the tip, and how that changes.
+    /// Vector from the commanded point to the tip, and its rate of change.
     off: DVec3,
     rate: DVec3,
-    /// What it gives, newtons, while the tip holds the led point back.
+    /// The force, newtons, while the tip holds the commanded point back.
     slips: Option<DVec3>,
-    /// The tip's acceleration in the last step without what it was given, m/s².
+    /// The tip's acceleration in the last step without the impulses it received, m/s².
     past: DVec3,
-    /// How long that step was, seconds.
+    /// Length of that step, seconds.
     span_s: f64,
 }
 
-/// How far the tip gives way to the drive's full force, metres: a tool that pushes with a tenth of it is half a millimetre off.
+/// Deflection of the tip at the drive's full force, metres: a tool that pushes with a tenth of it is half a millimetre off.
 const GIVE_M: f64 = 5e-3;
-/// How fast tip and drive swing, rad/s, damped critically: with [`GIVE_M`] the full force moves the tip by 16 g and no faster.
+/// Frequency of tip and drive, rad/s, critically damped: with [`GIVE_M`] the full force accelerates the tip by 16 g and no more.
 const SWING_PER_S: f64 = 180.0;
-/// A tip nearer than this to the led point, that nothing pushes, is there, metres; and m/s.
+/// A tip closer than this to the commanded point, in metres and m/s, and without contact forces, counts as having reached it.
 const THERE: f64 = 1e-7;
-/// Nothing turns a tool: 1/(kg·m²).
+/// Contact torques do not turn a tool: its inverse inertia is this small, 1/(kg·m²).
 const TURNS_PER_KG_M2: f64 = 1e-9;
 
 impl Drive {
-    /// A drive of so many newtons whose tip is where it is led.
+    /// A drive with this force limit, newtons, whose tip is at the commanded point.
     pub(super) fn new(limit_n: f64) -> Self {
         let none = DVec3::ZERO;
         Self { limit_n, off: none, rate: none, slips: None, past: none, span_s: 0.0 }
     }
 
-    /// Stiffness, N/m, and damping, N·s/m, as others know them: a drive that gives all it can still resists what changes its velocity
+    /// Stiffness, N/m, and damping, N·s/m, as published: a drive at its force limit still resists changes of its velocity
     /// within a step.
     fn spring(&self) -> [f64; 2] {
         let stiffness_n_m = if self.slips.is_some() { 0.0 } else { self.stiffness_n_m() };
@@ -73,20 +74,20 @@ impl Drive {
         self.stiffness_n_m() / (SWING_PER_S * SWING_PER_S)
     }
 
-    /// Steps will last so many seconds.
+    /// Sets the length of the steps to come, seconds.
     pub(super) const fn look(&mut self, dt: f64) {
         self.span_s = dt;
     }
 
-    /// Whether the tip is where it is led.
+    /// Whether the tip is at the commanded point.
     pub(super) fn is_there(&self) -> bool {
         self.off == DVec3::ZERO && self.rate == DVec3::ZERO
     }
 
-    /// Goes on for `dt` seconds in which the path would lead the led point `from` … `to`: the led point and the tip after it.
+    /// Advances by `dt` seconds in which the path would move the commanded point `from` … `to`; returns the commanded point and the tip.
     ///
-    /// As a body on springs goes on (eq. 7d). Where the spring would have to give more than the drive can, it gives that and the led
-    /// point stays where it does (eq. 9f).
+    /// The tip moves like a body on springs (eq. 7d). Where the spring force would exceed the limit, it equals the limit and the
+    /// commanded point stays that far from the tip (eq. 9f).
     pub(super) fn go_on(&mut self, [from, to]: [Led; 2], given: &Given, dt: f64) -> [Led; 2] {
         let [k, c] = self.spring();
         let known = (self.mass_kg() + self.span_s * (c + self.span_s * k)).recip();
@@ -102,7 +103,8 @@ impl Drive {
         [led, (led.0 + self.off, led.1 + self.rate)]
     }
 
-    /// The spring pulls the tip to a point that goes on as it is led; the mean force that it lacks, where that is too much for it.
+    /// Moves the tip by the spring while the commanded point follows the path; the mean force needed, clamped to the limit, as an error
+    /// where it is too much.
     fn pull(&mut self, to: Led, lasting: DVec3, dt: f64) -> Result<Led, DVec3> {
         let (m, k, c) = (self.mass_kg(), self.stiffness_n_m(), self.damping_n_s_m());
         let yields = (m + dt * (c + dt * k)).recip();
@@ -118,7 +120,7 @@ impl Drive {
         Ok(to)
     }
 
-    /// The drive gives all its `force`, and the led point is as far from the tip as that stretches the spring.
+    /// The drive gives its full `force`; the commanded point is at the distance from the tip that this force stretches the spring to.
     fn slip(&mut self, from: Led, (force, lasting): (DVec3, DVec3), dt: f64) -> Led {
         let yields = (self.mass_kg() + dt * self.damping_n_s_m()).recip();
         let change = (force * dt + lasting) * yields;
@@ -129,7 +131,7 @@ impl Drive {
         (tip - self.off, velocity + change)
     }
 
-    /// How the tip answers what it is given beside its spring.
+    /// The tip's response to impulses apart from its spring.
     pub(super) fn inertia(&self) -> Inertia {
         Inertia::Rigid {
             inverse_mass: self.mass_kg().recip(),
@@ -137,7 +139,7 @@ impl Drive {
         }
     }
 
-    /// What others need to foresee the tip, whose led point goes on with `velocity` (eq. 7b, 7c).
+    /// The data by which peers predict the tip, whose commanded point moves on with `velocity` (eq. 7b, 7c).
     pub(super) fn sprung(&self, velocity: DVec3) -> Sprung {
         let [k, c] = self.spring();
         let all_ways = |x: f64| {

@@ -1,9 +1,9 @@
-//! What a tool feels: the impulses that others gave it, as a force; and what of it moves the tool.
+//! Forces felt by a tool: the impulses that peers gave it, as a force, and the part of them that moves the tool.
 //!
-//! In: the ledgers of those who touch it or are held by it. Out: a force, and what contact gives the drive ([`super::drive`]).
-//! Never here: where the tool goes.
+//! In: the ledgers of the agents that touch it or are held by it. Out: a force, and the contact impulses for the drive ([`super::drive`]).
+//! Never here: the path of the tool.
 //!
-//! Whom the tool holds, and who is linked to it, sees it as led; it takes what they give without yielding.
+//! Agents that the tool grasps or is linked to see it as driven; it takes their impulses without yielding.
 
 use super::drive::Given;
 use glam::DVec3;
@@ -16,10 +16,10 @@ use metachron_core::{AgentId, SimTime, Snapshot};
 #[derive(Debug, Clone, Default)]
 pub(super) struct Felt {
     exchange: Exchange,
-    /// Everybody who holds on to it, by rising ids: who gives nothing yet is read too, so that it is known since when its first
-    /// impulses count.
+    /// Every agent to which the tool is driven, by rising ids: agents that give nothing yet are read too, so that it is known since
+    /// when their first impulses count.
     from: Vec<From>,
-    /// Those who see the tool as led, and the others, while it reads.
+    /// The agents that see the tool as driven, and the others (`touching`), during a reading.
     held: Vec<Neighbour>,
     touching: Vec<Neighbour>,
     /// The force of contact, newtons.
@@ -32,7 +32,7 @@ pub(super) struct Felt {
 #[derive(Debug, Clone, Copy)]
 struct From {
     id: AgentId,
-    /// How far its account has been read.
+    /// Up to which time its ledger has been read.
     until: SimTime,
     /// Given since then, N·s.
     given: DVec3,
@@ -42,8 +42,8 @@ struct From {
 }
 
 impl Felt {
-    /// Reads what was given since the last reading, by those to whom the tool `is_led` and by the others, and what the others
-    /// give in a step of `dt` seconds.
+    /// Reads the impulses given since the last reading, by the agents to which the tool `is_led` and by the others; returns those that the
+    /// others give in a step of `dt` seconds.
     pub(super) fn read(&mut self, around: &Surroundings<'_>, is_led: impl Fn(&Neighbour) -> bool, dt: f64) -> Given {
         self.exchange.open(around);
         let [mut held, mut touching] = [&mut self.held, &mut self.touching].map(std::mem::take);
@@ -58,7 +58,7 @@ impl Felt {
         given
     }
 
-    /// Takes what contact gives, as forces that go on.
+    /// Takes contact impulses, as forces that go on.
     fn touch(&mut self, around: &Surroundings<'_>, dt: f64) -> Given {
         let (mut given, mut awake) = (Given::default(), false);
         self.exchange.follow(around, dt, |id, [sum, carried, lasting]| {
@@ -73,7 +73,7 @@ impl Felt {
         given
     }
 
-    /// Reads what those gave to whom the tool is led: a force is the mean over the giver's own time between two readings.
+    /// Reads the impulses of the agents to which the tool is driven: a force is the mean over the giver's own time between two readings.
     fn hold(&mut self, around: &Surroundings<'_>) {
         let Self { exchange, from, .. } = self;
         from.iter_mut().for_each(|f| (f.here, f.given) = (false, DVec3::ZERO));
@@ -84,7 +84,7 @@ impl Felt {
             }
         }
         from.retain(|f| f.here);
-        // all of it, what is still to act too: the mean is over all of the giver's time
+        // all of it, including impulses that are still to act: the mean is over all of the giver's time
         let newest = around.neighbours.iter().map(|other| other.snapshot.time).fold(around.time, SimTime::max);
         exchange.take(around, newest, |id, _, Impulse { linear, .. }, _| {
             if let Ok(at) = from.binary_search_by_key(&id, |f| f.id) {
@@ -105,19 +105,19 @@ impl Felt {
         (self.from.iter().map(|f| f.force_n).sum::<DVec3>() + self.pushed_n).length()
     }
 
-    /// Whether only agents at rest push it: they lie on it.
+    /// Whether only agents at rest push it: they rest on it.
     pub(super) const fn is_lain_on(&self) -> bool {
         self.lain_on
     }
 
-    /// Writes what was taken.
+    /// Writes the ledgers of taken impulses.
     pub(super) fn write(&self, into: &mut Snapshot) {
         self.exchange.write(into);
     }
 }
 
 impl From {
-    /// Who is seen for the first time: what it has given already counts from when it began the page that it writes on.
+    /// An agent seen for the first time: the impulses it has already given count from the origin of the ledger page in use.
     fn new(other: &Neighbour, me: AgentId) -> Self {
         let account = other.snapshot.given.iter().find(|ledger| ledger.with == me);
         let since = account.and_then(|ledger| ledger.pages.last()).map(|page| page.origin);

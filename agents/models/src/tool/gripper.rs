@@ -1,9 +1,9 @@
-//! What the jaws catch: the nearest point of a tube, soft or rigid body within reach, held by a spring that comes on smoothly.
+//! Grasping: the nearest point of a tube, soft or rigid body within reach, held by a spring whose stiffness ramps up smoothly.
 //!
-//! In: an opening, where the jaws are, the snapshots around. Out: a [`Grasp`]. Never here: where the tip goes.
+//! In: an opening, the pose of the jaws, neighbouring snapshots. Out: a [`Grasp`]. Never here: the path of the tip.
 //!
-//! What bends is held at a point: it turns about it as its own stiffness lets it. A rigid body is kept from turning as well: jaws
-//! are plates and no point, and bear on it along all that they reach.
+//! A deformable is held at a point: it turns about it as its own stiffness allows. A rigid body is kept from turning as well: jaws
+//! are plates and not a point, and press on it over their whole reach.
 
 use super::ToolSpec;
 use glam::{DQuat, DVec3};
@@ -11,14 +11,14 @@ use metachron_contact::{Neighbour, Surroundings};
 use metachron_core::{AgentId, Anchor, Body, Clasp, CurveState, GRASP_BELOW, Grasp, RigidState, SoftState};
 use metachron_geometry::{FormKind, SolidForm};
 
-/// Jaws that pass above this opening let go.
+/// Jaws that open past this opening release.
 pub(super) const RELEASE_ABOVE: f64 = 0.3;
-/// The hold reaches its full stiffness in this time, seconds: the tube is not torn to the tip at once.
+/// Time in which the grasp reaches its full stiffness, seconds: otherwise the tube would be pulled abruptly to the tip.
 const RAMP_S: f64 = 0.15;
-/// The share of its stiffness that a hold begins with: a spring must have some.
+/// The share of its stiffness with which a grasp begins: a spring must have some.
 const RAMP_START: f64 = 1e-3;
 
-/// Jaws and what they hold.
+/// Jaws and the grasped body.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Jaws {
     held: Option<Held>,
@@ -30,29 +30,29 @@ pub(super) struct Jaws {
 struct Held {
     target: AgentId,
     anchor: Anchor,
-    /// From a rigid body's axes to the tool's, when it was caught.
+    /// Rotation from a rigid body's axes to the tool's, when it was grasped.
     rotation: Option<DQuat>,
     for_s: f64,
 }
 
-/// What lies near the jaws.
+/// The nearest graspable point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Near {
     target: AgentId,
     anchor: Anchor,
     /// From the tip to its skin, metres; a tube's is below zero inside.
     pub gap_m: f64,
-    /// How a rigid body is turned.
+    /// Rotation of a rigid body.
     rotation: Option<DQuat>,
 }
 
 impl Jaws {
-    /// Empty jaws, ready to catch.
+    /// Empty jaws, ready to grasp.
     pub(super) fn new() -> Self {
         Self { held: None, armed: true }
     }
 
-    /// Whether they hold something.
+    /// Whether they hold a body.
     pub(super) fn holds(&self) -> bool {
         self.held.is_some()
     }
@@ -76,12 +76,12 @@ impl Jaws {
                 let rotation = body.map(|body| (rotation.conjugate() * body).normalize());
                 Held { target, anchor, rotation, for_s: 0.0 }
             });
-            // jaws that have come to a stop catch nothing any more
+            // jaws that have come to a stop grasp nothing any more
             self.armed = self.held.is_none() && now < was;
         }
     }
 
-    /// The hold as others see it.
+    /// The grasp as published.
     pub(super) fn grasp(&self, spec: &ToolSpec) -> Option<Grasp> {
         let held = self.held?;
         let u = (held.for_s / RAMP_S).min(1.0);
@@ -96,18 +96,18 @@ impl Jaws {
     }
 }
 
-/// The nearest point within reach of what may be grasped.
+/// The nearest graspable point within reach.
 pub(super) fn nearest(spec: &ToolSpec, tip: DVec3, around: &Surroundings<'_>) -> Option<Near> {
     nearest_of(spec, tip, (around, spec.reach_m), |_| true)
 }
 
-/// The rigid body that open jaws may take, or have just let go: the nearest within `reach_m` of the tip.
+/// The rigid body that open jaws may grasp, or have just released: the nearest within `reach_m` of the tip.
 pub(super) fn let_in(spec: &ToolSpec, tip: DVec3, (around, reach_m): (&Surroundings<'_>, f64)) -> Option<AgentId> {
     let rigid = |other: &Neighbour| matches!(other.snapshot.body, Body::Rigid(_));
     nearest_of(spec, tip, (around, reach_m), rigid).map(|near| near.target)
 }
 
-/// The nearest point within `reach_m` of those that may be grasped and are `wanted`.
+/// The nearest point within `reach_m` on graspable agents that are `wanted`.
 fn nearest_of(
     spec: &ToolSpec,
     tip: DVec3,
@@ -119,7 +119,7 @@ fn nearest_of(
     near.min_by(|a, b| a.gap_m.total_cmp(&b.gap_m))
 }
 
-/// The nearest point of what can be held.
+/// The nearest point of an agent, if it can be held.
 fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
     let ((anchor, gap_m), rotation) = match &other.snapshot.body {
         Body::Curve(curve) => (nearest_on(curve, tip).map(|(arc_m, gap_m)| (Anchor::Arc(arc_m), gap_m))?, None),
@@ -133,7 +133,7 @@ fn point_of(other: &Neighbour, tip: DVec3) -> Option<Near> {
     Some(Near { target: other.id, anchor, gap_m, rotation })
 }
 
-/// The point of a solid that is nearest, and how far it is: none inside.
+/// The nearest point of a solid, and its distance: zero inside.
 fn nearest_in(form: &SolidForm, state: &RigidState, tip: DVec3) -> Option<(Anchor, f64)> {
     let local = state.rotation.conjugate() * (tip - state.position);
     let place = (local + form.com_local).as_vec3();
@@ -148,7 +148,7 @@ fn nearest_in(form: &SolidForm, state: &RigidState, tip: DVec3) -> Option<(Ancho
     Some((Anchor::Local(point), point.distance(local)))
 }
 
-/// The nearest vertex of a soft body, and how far it is.
+/// The nearest vertex of a soft body, and its distance.
 fn nearest_vertex(soft: &SoftState, tip: DVec3) -> Option<(Anchor, f64)> {
     let apart = (0..).zip(&soft.positions).map(|(vertex, at)| (Anchor::Vertex(vertex), at.distance(tip)));
     apart.min_by(|a, b| a.1.total_cmp(&b.1))

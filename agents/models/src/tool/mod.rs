@@ -1,10 +1,10 @@
-//! A driven tool: follows keyframes or a hand, opens, closes, grasps a tube, a soft or a rigid body and drags it.
+//! A driven tool: follows keyframes or a user spring, opens, closes, grasps a tube, a soft or a rigid body and drags it.
 //!
-//! In: a [`ToolSpec`], steps, the user's hand, the snapshots of what it can grasp. Out: a tip, jaws, a hold.
-//! Never here: the force of the hold. What is held solves it in its own step and books it in a ledger (`felt.rs` reads it).
+//! In: a [`ToolSpec`], steps, the user spring, the snapshots of graspable agents. Out: a tip, jaws, a grasp.
+//! Never here: the grasp force. The held agent solves it in its own step and books it in a ledger (`felt.rs` reads it).
 //!
-//! `script.rs` says where the keyframes lead, `drive.rs` how far the tip gets there against what it touches, `jaws.rs` what the
-//! jaws catch, `tool.rs` is the agent.
+//! `script.rs` evaluates the keyframes, `drive.rs` computes how far the tip gets there against contact, `jaws.rs` the
+//! grasp, `tool.rs` is the agent.
 
 mod agent;
 mod drive;

@@ -1,4 +1,4 @@
-//! A tool's script and hold: the numbers a scene gives, and what is wrong with them.
+//! Specification of a tool: script and grasp, the numbers a scene gives, and their checks.
 
 use glam::{DQuat, DVec3};
 use metachron_core::AgentId;
@@ -6,28 +6,28 @@ use metachron_core::AgentId;
 /// A tool before it is built.
 #[derive(Debug, Clone)]
 pub struct ToolSpec {
-    /// Its motion: at least one keyframe, times rising. One keyframe is a tool that waits there for a hand.
+    /// Its motion: at least one keyframe, times rising. A tool with one keyframe waits there for a user spring.
     pub keyframes: Vec<Keyframe>,
     /// Whether the motion starts again after the last keyframe. A script that does not end where it began first goes back
     /// there, in as long as its last leg took.
     pub repeat: bool,
-    /// How far from the tip the jaws reach, metres, > 0: from the tip to the skin of what they catch. A rigid body is kept
+    /// How far the jaws reach from the tip, metres, > 0: from the tip to the skin of the grasped body. A rigid body is kept
     /// from turning as by springs at this distance.
     pub reach_m: f64,
-    /// Stiffness of the hold, N/m, > 0.
+    /// Stiffness of the grasp, N/m, > 0.
     pub stiffness_n_m: f64,
-    /// Damping of the hold, N·s/m, ≥ 0.
+    /// Damping of the grasp, N·s/m, ≥ 0.
     pub damping_n_s_m: f64,
-    /// The most that its drive pushes with, newtons, 1e-6 … 1000: what is stronger holds the tip back from its path. Past that what is
-    /// light is pressed into what it stands on.
+    /// Force limit of its drive, newtons, 1e-6 … 1000: a stronger resistance holds the tip back from its path. Above that range light
+    /// bodies are pressed into their supports.
     pub max_force_n: f64,
-    /// What it can grasp: tubes, soft and rigid bodies.
+    /// The agents it can grasp: tubes, soft and rigid bodies.
     pub graspable: Vec<AgentId>,
-    /// From the first keyframe to where its tip starts, metres: it goes to its path from there as after a hand.
+    /// Offset of the tip's start from the first keyframe, metres: it approaches its path from there as after a user spring.
     pub starts_off_m: DVec3,
 }
 
-/// Where a tool is at one time of its script.
+/// Pose of a tool at one time of its script.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Keyframe {
     /// Seconds from the start of the script, ≥ 0.
@@ -36,7 +36,7 @@ pub struct Keyframe {
     pub tip_m: DVec3,
     /// Rotation from the tool's axes (shaft along −z, so the jaws point along +z) to the world's.
     pub rotation: DQuat,
-    /// Opening of the jaws: 0 shut … 1 wide open. Jaws that pass below 0.2 grasp; above 0.3 they let go.
+    /// Opening of the jaws: 0 shut … 1 wide open. Jaws that close past 0.2 grasp; above 0.3 they release.
     pub jaw: f64,
 }
 
@@ -81,11 +81,11 @@ pub enum ToolError {
     },
 }
 
-/// Past this no tool goes, metres.
+/// The largest coordinate of a tool, metres.
 pub(super) const REACH_MAX_M: f64 = 1e6;
-/// The strongest drive, newtons: its tip weighs 6 kg.
+/// The strongest drive, newtons: its tip has a mass of 6 kg.
 const FORCE_MAX_N: f64 = 1e3;
-/// A script is no longer than this, seconds (11 days).
+/// The longest script, seconds (11 days).
 const SCRIPT_MAX_S: f64 = 1e6;
 
 impl ToolSpec {

@@ -1,15 +1,15 @@
-//! Where the keyframes lead: a smooth curve through all of them.
+//! The path through the keyframes: a smooth curve through all of them.
 //!
-//! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: hands, jaws that catch.
+//! In: keyframes and a time. Out: a [`Pose`] and its velocity. Never here: user springs, grasping jaws.
 //!
 //! Tip and jaw are monotone cubics (FB84): once continuously differentiable, and between two keyframes no coordinate leaves
-//! the range of both, so a tool never dips below the place it was sent to. Rotation turns by slerp along 3u² − 2u³, at rest
+//! the range of both, so a tool never dips below the place it was sent to. Rotation is a slerp along 3u² − 2u³, at rest
 //! in every keyframe. A script that repeats is one closed curve.
 
 use super::Keyframe;
 use glam::{DQuat, DVec3, DVec4};
 
-/// Where the script wants the tool.
+/// The pose that the script commands.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pose {
     pub tip: DVec3,
@@ -33,7 +33,7 @@ struct Knot {
 pub(super) struct Script {
     knots: Vec<Knot>,
     repeat: bool,
-    /// At which time the script's own begins, seconds.
+    /// Time at which the script starts, seconds.
     begin_s: f64,
 }
 
@@ -57,12 +57,12 @@ impl Script {
         Self { knots, repeat, begin_s: 0.0 }
     }
 
-    /// Its time begins later by so many seconds, earlier where that is below zero.
+    /// Shifts the start of the script by so many seconds, later if positive.
     pub(super) fn begin_later(&mut self, by_s: f64) {
         self.begin_s += by_s;
     }
 
-    /// Where the script leads at `time_s`: it waits in its first keyframe before it and in its last after it.
+    /// The pose at `time_s`: before its first keyframe the script waits in it, after its last it waits in that.
     pub(super) fn at(&self, time_s: f64) -> Pose {
         let time_s = time_s - self.begin_s;
         let (first, last) = (self.knots[0], self.knots[self.knots.len() - 1]);
@@ -79,13 +79,13 @@ impl Script {
         }
     }
 
-    /// Whether nothing moves any more from `time_s` on.
+    /// Whether the script no longer moves from `time_s` on.
     pub(super) fn is_over(&self, time_s: f64) -> bool {
         !self.repeat && time_s - self.begin_s >= self.knots[self.knots.len() - 1].at_s
     }
 }
 
-/// Ends the script where it began, so that it can start again without a jump.
+/// Appends a keyframe that returns to the start, so that the script can repeat without a jump.
 fn close(knots: &mut Vec<Knot>) {
     let (first, before, last) = (knots[0], knots[knots.len() - 2], knots[knots.len() - 1]);
     let same = first.value == last.value && first.rotation.dot(last.rotation).abs() >= 1.0 - 1e-12;

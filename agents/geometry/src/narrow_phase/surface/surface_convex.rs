@@ -1,6 +1,6 @@
-//! The skins of soft bodies against blocks: which of their places are nearest, and which way that pushes.
+//! Contacts of soft bodies' skins with blocks: which of their places are nearest, and in which direction they push.
 //!
-//! In: a surface in front of a block. Out: touching places. Never here: what is round, other surfaces.
+//! In: a surface and a block that may touch. Out: touching places. Never here: round pieces, other surfaces.
 //! Theory: docs/theory/soft.md, eq. 15a.
 
 use super::super::primitives::Block;
@@ -13,18 +13,19 @@ use crate::signed_distance;
 use crate::signed_distance::{Ball, Field};
 use glam::DVec3;
 
-/// Deeper than this share of an edge a place comes out of the block the nearest way.
+/// Deeper than this share of an edge a place is pushed out of the block by the shortest way.
 const BETTER_SHARE: f64 = 0.02;
-/// What tells a place from the corners beside it: rounding, as a share of the size.
+/// The least difference of gap between a place and the adjacent corners: rounding, as a share of the size.
 const ROUNDING_SHARE: f64 = 1e-6;
 /// The normal of a face is the same this share of an edge farther on; that of an edge, a corner or a round side is not.
 const BESIDE_SHARE: f64 = 0.1;
 /// Normals whose cosine is above this are the same: a side with a radius of 100 m turns by more in 5 mm.
 const FLAT: f64 = 1.0 - 1e-9;
-/// Projections to and fro between a triangle and a block: both are convex, so the two points approach each other.
+/// Alternating projections between a triangle and a block: both are convex, so the two points approach each other.
 const PROJECTIONS: usize = 8;
-/// What touches a skin from outside pushes it inwards. A tool that would push it aside or outwards is through it, and touches it no more
-/// until it is out again: the cosine of its normal with the skin's. At the edge of a box it is 0.7, at a corner 0.6.
+/// Limit of the cosine of a tool's normal with the skin's. A body that touches a skin from outside pushes it inwards. A tool that would
+/// push it aside or outwards has pierced it, and touches it no more until it is out again. At the edge of a box the cosine is 0.7, at a
+/// corner 0.6.
 const PIERCED: f64 = -0.5;
 
 impl Meeting<'_> {
@@ -33,7 +34,7 @@ impl Meeting<'_> {
         let inward = |centre: DVec3| block.inward(Ball { centre, radius_m });
         let nearest = |at: DVec3| {
             let near = field.touches(inward(at).centre, radius_m + self.reach_m).iter().next();
-            // a hull or mesh is searched as deep as the reach; deeper inside the nearest way out is told
+            // a hull or mesh is searched as deep as the reach; for a point deeper inside the nearest way out is used
             near.or_else(|| {
                 field
                     .touches(inward(at).centre, 2.0 * block.around.radius_m)
@@ -75,8 +76,8 @@ impl Meeting<'_> {
         }
     }
 
-    /// The place as a vertex or an edge of the skin has it, which it pushes out of the skin and not along it; `None` where what lies
-    /// around is nearer. What is deep in the block comes out as it can.
+    /// The place as reported by a vertex or an edge of the skin, with a push out of the skin and not along it; `None` where a neighbouring
+    /// part is nearer. A place deep in the block is pushed out by the shortest way.
     fn out(&self, ridge: Ridge, block: &Block<'_>, touch: signed_distance::Touch) -> Option<signed_distance::Touch> {
         if touch.distance_m < -BETTER_SHARE * self.surface.form.edge_m {
             return Some(touch);
@@ -87,7 +88,7 @@ impl Meeting<'_> {
         if ridge.is_nearest(self.surface, way * touch.distance_m.max(0.0)) {
             return Some(signed_distance::Touch { normal: local, ..touch });
         }
-        // a face goes on beside: the vertex may be what comes to it, wherever that is nearer now
+        // the face continues there: the vertex may be the one that reaches it, whichever part is nearer now
         let Ridge::Vertex(vertex) = ridge else { return None };
         let field = block.field?;
         let here = block.inward(Ball { centre: self.surface.at(vertex), radius_m: 0.0 }).centre;
@@ -96,7 +97,7 @@ impl Meeting<'_> {
         (there.normal.dot(touch.normal) > FLAT).then_some(touch)
     }
 
-    /// The corners of a block over a triangle; whether there are any.
+    /// Adds the corners of a block over a triangle; returns whether there are any.
     fn corners(
         &self,
         (number, triangle, corners): (u64, [u32; 3], [DVec3; 3]),
@@ -105,7 +106,7 @@ impl Meeting<'_> {
     ) -> bool {
         let (a, Some(out)) = (corners[0], self.facing(corners, block)) else { return false };
         let local = block.rotation.conjugate() * out;
-        // of a thin body its far side is not meant
+        // for a thin body its far side does not count
         let ahead = out.dot(block.around.centre - a) > 0.0;
         let deep_m =
             self.surface.form.radius_m + if ahead { DEEP_SHARE } else { BETTER_SHARE } * self.surface.form.edge_m;
@@ -137,7 +138,7 @@ impl Meeting<'_> {
         Some(if turned { -across } else { across })
     }
 
-    /// Where a triangle is nearest to a block, inside it, and the size of the triangle.
+    /// The point of a triangle that is nearest to a block, if it is inside the triangle, and the size of the triangle.
     fn project(
         &self,
         (triangle, corners): ([u32; 3], [DVec3; 3]),

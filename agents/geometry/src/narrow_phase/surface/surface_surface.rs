@@ -1,6 +1,6 @@
-//! The skins of two soft bodies: which of their places are nearest, and which way that pushes.
+//! Contacts between the skins of two soft bodies: which of their places are nearest, and in which direction they push.
 //!
-//! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, what is round.
+//! In: two surfaces. Out: touching places, with normals from the other towards the surface. Never here: blocks, round pieces.
 //! Theory: docs/theory/soft.md, eq. 15a, 15b.
 
 use super::super::voronoi_regions::{LEAN_SHARE, Ridge};
@@ -10,14 +10,14 @@ use crate::{near_segments, near_triangle};
 use glam::DVec3;
 use std::ops::RangeInclusive;
 
-/// A way whose cosine with the normal of a triangle is above this comes from its face.
+/// A direction whose cosine with the normal of a triangle is above this comes from its face.
 const FACE: f64 = 0.999;
-/// What a vertex came in by faced it by this cosine at least.
+/// A face by which a vertex has entered was opposed to its normal by this cosine at least.
 const FACING: f64 = 0.1;
-/// Edges between whose directions the sine is below this have no one place where they are nearest.
+/// Edges whose directions have a sine below this have no unique nearest place.
 const PARALLEL: f64 = 1e-4;
-/// What has gone through a skin comes out as it went in, unless some face is nearer than this share of that way: beside the edge of a
-/// box it is 0.7.
+/// A place that has passed through a skin is pushed out as it came in, unless some face is nearer than this share of that distance: next
+/// to the edge of a box it is 0.7.
 const HALF: f64 = 0.5;
 
 /// The place of a skin that is nearest to a point.
@@ -29,18 +29,18 @@ struct Near {
     face: Option<DVec3>,
 }
 
-/// Where a place of one skin touches another one: the spot there, the normal from there, and how far the two are apart, metres.
+/// A contact of a place of one skin with another skin: the spot there, the normal from there, and the distance, metres.
 struct Met {
     spot: Spot,
     normal: DVec3,
     distance_m: f64,
 }
 
-/// Two skins in front of each other.
+/// Two skins that may touch.
 pub(super) struct Skins<'a> {
     here: &'a Meeting<'a>,
     there: &'a Meeting<'a>,
-    /// Both half thicknesses, and how deep they may be in each other, metres.
+    /// Sum of both half thicknesses, and how deep the two may overlap (`deep_m`), metres.
     thick_m: f64,
     deep_m: f64,
 }
@@ -98,7 +98,7 @@ impl<'a> Skins<'a> {
         }
     }
 
-    /// Nothing farther from a place is looked at, metres.
+    /// Search radius: nothing farther from a place is tested, metres.
     fn within_m(&self) -> f64 {
         let closed = self.here.surface.form.closed || self.there.surface.form.closed;
         self.here.reach_m.max(if closed { self.deep_m } else { 0.0 }) + self.thick_m
@@ -109,7 +109,7 @@ impl<'a> Skins<'a> {
         let out = Spot::vertex(vertex).out(a.normals).and_then(DVec3::try_normalize);
         let near = b.nearest(at, self.within_m(), None)?;
         if b.is_behind(near, at) {
-            // it comes out by a face that it can have come in by
+            // it is pushed out through a face that it can have come in by
             let Near { spot, at: foot, face } = b.nearest(at, self.deep_m, out)?;
             let distance_m = at.distance(foot);
             let normal = if distance_m > CROSSING_M { (foot - at) / distance_m } else { face? };
@@ -120,14 +120,14 @@ impl<'a> Skins<'a> {
         if distance_m <= CROSSING_M {
             let Near { spot, face, .. } = b.nearest(at, distance_m + CROSSING_M, out)?;
             let away = out.map(|out| -out);
-            // of an open skin either side may be meant
+            // an open skin may be meant from either side
             let normal = face.map(|face| if away.is_some_and(|away| face.dot(away) < 0.0) { -face } else { face });
             return Some(Met { spot, normal: normal.or(away)?, distance_m: 0.0 });
         }
         let normal = (at - foot) / distance_m;
         let is_face = face.is_some_and(|face| face.dot(normal).abs() > FACE);
         if out.is_some_and(|out| out.dot(normal) > 0.0) {
-            // it turns away: an open skin has gone into it, or it is on the far side
+            // the normal points away: an open skin has gone into it, or it is on the far side
             let least_m = if is_face { 0.0 } else { HALF * distance_m };
             let passed = !b.surface.form.closed
                 && distance_m <= self.deep_m
@@ -145,8 +145,8 @@ impl<'a> Skins<'a> {
         nearest.then_some(Met { spot, normal: -out_here, distance_m: -out_here.dot(normal) * distance_m })
     }
 
-    /// The normal where two edges cross, towards the first, and how far they are apart; `None` where what lies around is nearer, and for
-    /// edges in one direction, whose ends tell the same.
+    /// The normal where two edges cross, towards the first, and their distance; `None` where a neighbouring part is nearer, and for
+    /// parallel edges, whose ends report the same contact.
     fn crossing(&self, spots: [Spot; 2], [a, b]: [DVec3; 2], ridges: [Ridge; 2]) -> Option<(DVec3, f64)> {
         let [here, there] = [self.here, self.there];
         let out = [spots[0].out(here.normals), spots[1].out(there.normals)];
@@ -181,7 +181,7 @@ fn along(ridge: Ridge) -> DVec3 {
 }
 
 impl Meeting<'_> {
-    /// The place of the skin that is nearest to a point within `within_m`; `facing` a normal, if one is given.
+    /// The place of the skin that is nearest to a point within `within_m`; only of faces opposed to the normal `facing`, if one is given.
     fn nearest(&self, point: DVec3, within_m: f64, facing: Option<DVec3>) -> Option<Near> {
         let region = (point - within_m, point + within_m);
         let faces = self.surface.triangles_in(region).filter_map(|(_, triangle, corners)| {
@@ -210,7 +210,7 @@ impl Meeting<'_> {
         near.spot.out(self.normals).is_some_and(|out| out.dot(point - near.at) < 0.0)
     }
 
-    /// Whether a point is inside the skin, and so far from it, metres; any is in an open one.
+    /// Whether a point is inside the skin, at a depth in this range, metres; for an open skin always true.
     fn holds(&self, point: DVec3, deep_m: RangeInclusive<f64>) -> bool {
         let deep = |near: Near| near.at.distance(point) >= *deep_m.start() && self.is_behind(near, point);
         !self.surface.form.closed || self.nearest(point, deep_m.end() + CROSSING_M, None).is_some_and(deep)
