@@ -1,7 +1,7 @@
 //! Set of agents whose state has changed since the run's single reader last looked.
 //!
 //! In: numbers of agents, from the threads that make their turns. Out: each of them once. Scanning a hundred thousand agents without news
-//! is as fast as one with news. Never here: the states themselves.
+//! takes as little time as reading one agent with news. Never here: the states themselves.
 
 use super::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::utils::CachePadded;
