@@ -1,9 +1,9 @@
 //! An agent's own time relative to the scene's: the only place where wall time and simulated time are related.
 //!
 //! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state that is on time
-//! covers the present and pictures need no delay. A late agent steps again immediately until it has caught up; an agent in contact makes
-//! longer steps while it is behind, so that its contact keeps its time. Past the lag cap its time jumps to the present without a step: the
-//! gap is dropped and counted, so that an overloaded agent runs at the rate it can reach, and never falls further behind.
+//! covers the present and pictures need no delay. A late agent steps again immediately until it has caught up; an agent that may touch
+//! peers makes longer steps while it is behind, so that its contact keeps its time. Past the lag cap its time jumps to the present without
+//! a step: the gap is dropped and counted, so that an overloaded agent runs at the rate it can reach, and never falls further behind.
 //! Near peers time never jumps: it is postponed ("put off"), and the interaction continues unchanged, but slower.
 //! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
 
@@ -191,8 +191,8 @@ impl Pace {
         timeline.sim_at(wall).since(self.scene_time()).as_nanos() > steps
     }
 
-    /// Begins a turn at wall time `wall`: measures how late it is and drops the lag past the cap. Its time then jumps to the present; if it
-    /// is `near` peers its time is postponed instead, and continues from where it is.
+    /// Begins a turn at wall time `wall`: measures how late it is. Past the lag cap its time jumps to the present and the lag is dropped;
+    /// if it is `near` peers its time is postponed by the excess instead, and continues from where it is.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration, near: bool) -> Start {
         let cap = if near { LAG_CAP_NEAR } else { LAG_CAP };
         let now = timeline.sim_at(wall);
@@ -214,8 +214,8 @@ impl Pace {
         Start { late, dropped }
     }
 
-    /// The step to make instead of `wanted` by an agent in contact, at wall time `wall`: a quarter longer with each turn that finds it more
-    /// than two steps behind, slowly shorter again when it has caught up.
+    /// The step to make instead of `wanted` by an agent that may touch peers, at wall time `wall`: a quarter longer with each turn that
+    /// finds it more than two steps behind, slowly shorter again when it has caught up.
     ///
     /// Time that it dropped later would be time that its peers simulate without it; and steps of one length disturb its motion less than
     /// single long ones.

@@ -1,5 +1,4 @@
-//! Prediction for scenes with a bounded lag: cameras are extrapolated by the lag, and levels are chosen while the previous frame is drawn
-//! (GB99).
+//! Prediction for scenes with a bounded lag: extrapolates cameras, chooses levels while the previous frame is drawn (GB99).
 //!
 //! In: cameras as they are read. Out: predicted cameras, and the next frame's levels. Never here: a policy, drawing.
 //! Theory: `docs/theory/control.md`, section 6.
