@@ -1,7 +1,7 @@
-//! The loop that joins the rooms: gather, choose, draw, measure.
+//! The frame loop that connects runtime, control and compositor: gather, choose, draw, measure.
 //!
-//! In: a checked [`crate::scene::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that says how it went.
-//! A [`Session`] is a scene in play; [`play_headless`] and [`play_in_window`] drive it. Never here: a law of control, physics.
+//! In: a checked [`crate::scene::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
+//! A [`Session`] is a running scene; [`play_headless`] and [`play_in_window`] drive it. Never here: a control law, physics.
 
 mod calibrate;
 mod cast;

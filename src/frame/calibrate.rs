@@ -1,7 +1,7 @@
-//! What drawing costs on this adapter: measured once, and kept in the user's cache.
+//! Drawing costs on this adapter: measured once and stored in the user's cache.
 //!
 //! In: an adapter. Out: prices for control. Never here: a fit (control has it), drawing (the compositor has it).
-//! A file that cannot be read, is of another version, another adapter or no file at all is measured anew and says nothing.
+//! A cache file that is missing, unreadable, of another version or of another adapter is silently measured anew.
 
 use crate::compositor::{self, Drawn, Gpu, RendererOptions};
 use crate::control::{AREAS_PX, Areas, Measured, Prices, Shading, Stages};
@@ -9,10 +9,10 @@ use serde::{Deserialize, Serialize};
 use std::hash::{DefaultHasher, Hash, Hasher};
 use std::path::{Path, PathBuf};
 
-/// Another number wherever the benchmark or what it draws with changes.
+/// Version of the cache files; changes whenever the benchmark or the renderer that it measures changes.
 const VERSION: u32 = 4;
 
-/// Files of the cache: prices, and pictures that are too few for prices.
+/// Kinds of cache files: finished prices, and measured pictures that are still too few for prices.
 const DRAWING: &str = "drawing";
 const BEGUN: &str = "begun";
 
@@ -23,13 +23,13 @@ struct Kept {
     adapter: String,
     frame_s: f64,
     pixel_s: f64,
-    /// Of each shading: setup, polygon, vertex, pixel.
+    /// Per shading: setup, polygon, vertex, pixel.
     shading: [[f64; 4]; 4],
-    /// Of each shading by area: setup, and a triangle at every one of [`AREAS_PX`].
+    /// Per shading, by area: setup, and a triangle at each of [`AREAS_PX`].
     areas: Option<[(f64, [f64; AREAS_PX.len()]); 4]>,
 }
 
-/// Pictures that were measured and are too few for prices.
+/// Measured pictures that are still too few for prices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 struct Begun {
     version: u32,
@@ -38,9 +38,9 @@ struct Begun {
     pictures: Vec<[f64; 6]>,
 }
 
-/// Prices of the adapter of this name: from the cache, else measured on the device that `open` gives, and put there; `None` where
-/// there is no such device or it cannot be measured. What was measured too slowly for prices is gone on with the next time.
-/// `tell` hears of it where anything is measured.
+/// Prices of the adapter of this name: from the cache, else measured on the device that `open` returns, and stored; `None` if there is no
+/// such device or it cannot be measured. If a slow adapter leaves too few measurements for prices, the next run continues from them. `tell`
+/// receives a line if anything is measured.
 pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, tell: fn(&str)) -> Option<Prices> {
     let folder = folder();
     if let Some(known) = folder.as_deref().and_then(|folder| read(folder, adapter)) {
@@ -57,7 +57,7 @@ pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, tell: fn
     match (folder, &prices) {
         (Some(folder), Some(prices)) => {
             keep(&folder, adapter, prices);
-            // nothing is begun any more
+            // the partial measurement is no longer needed
             let _ = std::fs::remove_file(file(&folder, adapter, BEGUN));
         }
         (Some(folder), None) => keep_begun(&folder, adapter, &pictures),
@@ -66,7 +66,7 @@ pub(super) fn prices(adapter: &str, open: impl FnOnce() -> Option<Gpu>, tell: fn
     prices
 }
 
-/// What measuring takes at most, seconds.
+/// Longest duration of the measurement, seconds.
 const LONGEST_S: f64 = 3.0;
 
 fn measured(drawn: &Drawn) -> Measured {
@@ -74,14 +74,14 @@ fn measured(drawn: &Drawn) -> Measured {
         compositor::Shading::Flat => Shading::Flat,
         compositor::Shading::Gouraud => Shading::Gouraud,
         compositor::Shading::PerPixel => Shading::PerPixel,
-        // nothing is measured in soft shadow
+        // the benchmark draws no soft shadows
         compositor::Shading::Textured | compositor::Shading::Shadowed => Shading::Textured,
     };
     let Drawn { picture_px, polygons, pixels, seconds, .. } = *drawn;
     Measured { picture_px, objects: f64::from(drawn.objects), polygons, pixels, shading, seconds }
 }
 
-/// Where caches of this user are.
+/// The cache folder of this user.
 fn folder() -> Option<PathBuf> {
     let named = |name: &str| std::env::var_os(name).filter(|value| !value.is_empty()).map(PathBuf::from);
     let home = || named("HOME").map(|home| home.join(".cache"));
@@ -105,7 +105,7 @@ fn read(folder: &Path, adapter: &str) -> Option<Prices> {
     (sound && kept.version == VERSION && kept.adapter == adapter).then_some(prices)
 }
 
-/// Keeps the prices; where that fails they are measured again the next time.
+/// Stores the prices; if that fails they are measured again in the next run.
 fn keep(folder: &Path, adapter: &str, prices: &Prices) {
     let stages = |s: Stages| [s.setup, s.polygon, s.vertex, s.pixel];
     let Prices { frame_s, pixel_s, shading, areas } = *prices;
@@ -115,7 +115,7 @@ fn keep(folder: &Path, adapter: &str, prices: &Prices) {
     write(&file(folder, adapter, DRAWING), &kept);
 }
 
-/// The pictures that are measured already, as many as are sound.
+/// The pictures measured so far, up to the first invalid one.
 fn read_begun(folder: &Path, adapter: &str) -> Vec<Measured> {
     let text = std::fs::read(file(folder, adapter, BEGUN)).unwrap_or_default();
     let Ok(begun) = serde_json::from_slice::<Begun>(&text) else { return Vec::new() };
@@ -134,7 +134,7 @@ fn keep_begun(folder: &Path, adapter: &str, pictures: &[Measured]) {
     write(&file(folder, adapter, BEGUN), &Begun { version: VERSION, adapter: adapter.to_owned(), pictures });
 }
 
-/// Writes a file in one go, so that nobody reads half of it.
+/// Writes a file atomically, so that no reader sees half of it.
 fn write(path: &Path, what: &impl Serialize) {
     let (Some(folder), Ok(text)) = (path.parent(), serde_json::to_vec_pretty(what)) else { return };
     let unfinished = path.with_extension(format!("{}.tmp", std::process::id()));
@@ -162,7 +162,7 @@ mod tests {
         keep_begun(folder.path(), "one", &pictures);
         assert_eq!(read_begun(folder.path(), "one"), pictures);
         assert_eq!(read_begun(folder.path(), "two"), []);
-        // what follows a picture that is none is measured anew
+        // pictures after an invalid one are measured anew
         keep_begun(folder.path(), "one", &[at(1e-3), at(-1.0), at(3e-3)]);
         assert_eq!(read_begun(folder.path(), "one"), [at(1e-3)]);
         std::fs::write(file(folder.path(), "one", BEGUN), "{").unwrap();

@@ -1,4 +1,4 @@
-//! From a scene's cast to running agents and to what is seen of them.
+//! Converts a scene into agents for the runtime and into what the compositor draws.
 //!
 //! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
 //! Never here: time passing.
@@ -35,7 +35,7 @@ use std::sync::Arc;
 /// The agents of `scene`, ready to run.
 ///
 /// # Errors
-/// [`SessionError::Build`] where a model refuses its object.
+/// [`SessionError::Build`] if a model rejects its object.
 pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Steered), SessionError> {
     let share = fair_share(machine(scene).cores, scene.agents.len());
     let mut ties = Ties::of(scene);
@@ -45,16 +45,16 @@ pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Steered), Sessio
     Ok((spawns?, steered))
 }
 
-/// What the controllers of agents tell the frame loop.
+/// Data that the agents' controllers share with the frame loop.
 #[derive(Debug, Default)]
 pub(super) struct Steered {
-    /// Those that keep a rate.
+    /// Controllers that keep a rate.
     pub tallies: Vec<Arc<Tally>>,
-    /// Those that hold an error.
+    /// Controllers that hold an error.
     pub holdings: Vec<Arc<Holding>>,
 }
 
-/// Who runs the agents of `scene`: where it leaves that open, by their number.
+/// The executor of `scene`; if the scene leaves it open, chosen by the number of agents.
 pub(super) fn executor(scene: &Scene) -> ExecutorKind {
     match scene.executor {
         ExecutorKind::Auto if scene.agents.len() <= AUTO_THREADS_MAX => ExecutorKind::Threads,
@@ -63,7 +63,7 @@ pub(super) fn executor(scene: &Scene) -> ExecutorKind {
     }
 }
 
-/// How the system is to rank the threads of agents.
+/// The scheduling priority of the agents' threads.
 pub(super) const fn priority(scene: &Scene) -> Priority {
     match scene.priority {
         PriorityKind::Normal => Priority::Normal,
@@ -71,14 +71,14 @@ pub(super) const fn priority(scene: &Scene) -> Priority {
     }
 }
 
-/// The share of its period that one agent's work may take, so that all find room on `cores` beside the frame loop.
+/// The share of its period that one agent's work may take, so that all agents fit on `cores` next to the frame loop.
 fn fair_share(cores: u32, agents: usize) -> f64 {
     (ROOM * f64::from(cores) / agents.max(1) as f64).min(SHARE_MAX)
 }
 
-/// Share of all cores that agents together may plan with: the frame loop wants the rest.
+/// Share of all cores that the agents together may plan with; the rest is reserved for the frame loop.
 pub(super) const ROOM: f64 = 0.75;
-/// Share of its period that an agent may take however many cores are idle: past it every hiccup makes it late.
+/// Largest share of its period that an agent may take even if cores are idle: past it every hiccup makes the agent late.
 const SHARE_MAX: f64 = 0.6;
 
 fn spawn(
@@ -116,13 +116,13 @@ fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<
         Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
         Spec::Synthetic(synthetic) => {
             let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
-            // where costs are declared nobody needs them burnt
+            // lockstep charges declared costs, so no CPU time has to be burnt
             Box::new(if executor == ExecutorKind::Lockstep { agent.declared_only() } else { agent })
         }
     })
 }
 
-/// Who steers the agent's dt and ε; nobody where the scene fixes both.
+/// The governor of the agent's dt and ε; none where the scene fixes both.
 fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
     let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
     if let Some(tolerance_m) = member.tolerance_m {
@@ -144,7 +144,7 @@ fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dy
     Some(Box::new(RateGovernor(control, tally)))
 }
 
-/// Who holds the error of an agent that is to hold one.
+/// The governor of an agent with an error tolerance.
 fn error_governor(
     member: &Member,
     (tolerance_m, meshed): (f64, bool),
@@ -163,7 +163,7 @@ fn error_governor(
     Some(Box::new(ErrorGovernor(control, holding)))
 }
 
-/// The machine that `scene` declares.
+/// The machine declared by `scene`.
 pub(super) fn machine(scene: &Scene) -> Machine {
     let wish = &scene.machine;
     let mut machine = Machine::preset(&wish.preset).unwrap_or_else(Machine::two_cores_software);
@@ -197,7 +197,7 @@ pub(super) fn machine(scene: &Scene) -> Machine {
     machine
 }
 
-/// Everything that can be seen: agents, then scenery, then what stands for groups.
+/// All drawable objects: agents, then scenery, then the proxies of groups.
 pub(super) fn stage(scene: &Scene) -> Stage {
     let agents =
         scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
@@ -232,7 +232,7 @@ fn form(spec: &Spec) -> Form {
     }
 }
 
-/// A rope is drawn as a tube, all else as its skin; nothing where it cannot be built, which is told elsewhere.
+/// A rope is drawn as a tube, any other soft body as its skin; nothing if it cannot be built, which is reported elsewhere.
 fn soft_form(spec: &SoftSpec) -> Form {
     if let SoftShape::Rope { radius_m, .. } = spec.shape {
         return Form::Rope { radius_m };
@@ -254,7 +254,7 @@ const fn look(wish: &scene::Look) -> Look {
     Look { colour: wish.colour, material }
 }
 
-/// The controller of the picture that `scene` asks for.
+/// The picture controller configured by `scene`.
 pub(super) fn picture_control(scene: &Scene) -> PictureControl {
     let target = &scene.target;
     let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
@@ -270,7 +270,7 @@ pub(super) fn picture_control(scene: &Scene) -> PictureControl {
     control
 }
 
-/// Control's word for a policy: scenes and control call them alike.
+/// Control's type for a policy; scenes and control use the same names.
 pub(super) fn policy(kind: PolicyKind) -> Policy {
     Policy::named(kind.name()).unwrap_or_default()
 }
@@ -285,7 +285,7 @@ const fn value(kind: ValueKind) -> Value {
     }
 }
 
-/// The declared prices of drawing as control wants them.
+/// The declared drawing prices in control's units.
 pub(super) fn prices(draw: &DrawPrice) -> Prices {
     let object = |price: &ObjectPrice| Stages {
         setup: price.setup_us * 1e-6,
@@ -301,7 +301,7 @@ pub(super) fn prices(draw: &DrawPrice) -> Prices {
     }
 }
 
-/// The feedback law that a target asks for.
+/// The feedback law configured by a target.
 pub(super) fn law(target: &scene::Target) -> Law {
     let gains = &target.gains;
     match target.law {
@@ -320,8 +320,7 @@ pub(super) fn law(target: &scene::Target) -> Law {
     }
 }
 
-/// Brings `views`, everything on the stage as control wants to know it in the order of its actors, up to date with those that were
-/// `looked` at.
+/// Updates `views`, control's description of every object on the stage in the order of its actors, for the objects in `looked`.
 pub(super) fn renew(views: &mut Vec<ObjectView>, seen: &[Seen], looked: &[usize], scene: &Scene) {
     if views.len() != seen.len() {
         views.clear();
@@ -358,7 +357,7 @@ fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
     }
 }
 
-/// The cheapest and the best shading that an object may have on which nothing is painted.
+/// The cheapest and the best allowed shading of an object without a texture.
 const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
     use control::Shading::{Flat, Gouraud, PerPixel, Textured};
     match kind {
@@ -394,7 +393,7 @@ fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &scene::Lo
     }
 }
 
-/// What control demands, as the compositor wants to know it.
+/// Converts control's demand to the compositor's type.
 pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
     let shading = match demand.shading {
         control::Shading::Flat => compositor::Shading::Flat,
@@ -403,12 +402,12 @@ pub(super) fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
         control::Shading::Textured => compositor::Shading::Textured,
         control::Shading::Shadowed => compositor::Shading::Shadowed,
     };
-    // a cast of floats saturates; the detail colours what is seen
+    // a cast of floats saturates; the detail sets the colour of visible objects
     let detail = if view.visible { control::detail(view, demand) as f32 } else { 0.0 };
     Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
 }
 
-/// Triangles of an object that is one mesh a level, at every level.
+/// Triangles at every level, for an object that is one mesh per level.
 fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
     let of_tool = |n: u8| ToolShape::default().parts(0.0).iter().map(|part| part.primitive.triangles(n)).sum();
     std::array::from_fn(|n| {
@@ -422,7 +421,7 @@ fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
     })
 }
 
-/// Triangles of a soft body's picture: a sheet has two faces and a rim, a rope is drawn as a tube.
+/// Triangles drawn for a soft body: a sheet has two faces and a rim, a rope is drawn as a tube.
 fn soft_triangles(shape: &SoftShape) -> u32 {
     match *shape {
         SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
@@ -442,7 +441,7 @@ fn solid_triangles(solid: &Solid, n: u8) -> u32 {
     }
 }
 
-/// The scene's camera `seconds` after the start; one that sees everything from the front where the scene has none.
+/// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
 pub(super) fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
     match &scene.camera {
         Some(camera) => {
@@ -453,7 +452,7 @@ pub(super) fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
     }
 }
 
-/// Vertical angle of view of a camera that nobody placed, radians.
+/// Vertical angle of view of the default camera, radians.
 const OVERVIEW_FOV_RAD: f64 = 0.7;
 
 fn overview(stage: &Stage) -> Camera {

@@ -1,8 +1,8 @@
-//! What agents did to each other in a run, kept from what they publish.
+//! Couplings between agents in a run, collected from the states that they publish.
 //!
-//! In: the newest states, gathering by gathering, and whose have changed. Out: a [`Coupling`] for every pair and kind that was ever
-//! there. What two say of each other is read again when one of them has news: a heap at rest is not. Never here: forces; only their
-//! owners know them.
+//! In: the newest states at each gathering, and which agents have new ones. Out: a [`Coupling`] for every pair and kind that ever occurred.
+//! A pair is read again only when one of its agents has a new state: a heap at rest costs nothing. Never here: forces; only the owners of
+//! the pairs know them.
 
 use crate::scene::Scene;
 use glam::DVec3;
@@ -11,18 +11,18 @@ use metachron_core::{PairKind, PairState};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// What two agents did to each other.
+/// The interaction of two agents.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coupling {
-    /// Who holds, or who owns the pair; of an island the lower number.
+    /// The grasping tool, or the owner of the pair; in an island the lower number.
     pub a: AgentId,
-    /// The other.
+    /// The peer.
     pub b: AgentId,
-    /// How they are coupled: `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `island`, `grasp`, `attach`.
+    /// The kind of coupling: `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `island`, `grasp`, `attach`.
     pub kind: &'static str,
-    /// Contacts or holds at the end of the run.
+    /// Contacts or attachments at the end of the run.
     pub contacts: u32,
-    /// Force at the end of the run, newtons; zero in an island, whose inner forces nobody publishes.
+    /// Force at the end of the run, newtons; zero in an island, whose inner forces are not published.
     pub force_n: f64,
     /// Largest force seen by a frame, newtons.
     pub force_max_n: f64,
@@ -32,35 +32,35 @@ pub struct Coupling {
     pub penetration_max_m: f64,
     /// Impulses exchanged, magnitudes summed, N·s.
     pub impulse_n_s: f64,
-    /// What has been given and was not yet taken when it was last seen, N·s.
+    /// Impulse given and not yet taken at the last reading, N·s.
     pub in_flight_n_s: f64,
-    /// Largest difference of the two sides' accounts seen where both were of the same reading, as a share of the impulse
-    /// exchanged; where they never were, what the newest differ by beyond what the owner says is on its way.
-    /// `None` where there are no two accounts to compare.
+    /// Largest difference between the ledgers of both sides at equal revisions, as a share of the impulse exchanged; if the revisions never
+    /// were equal, the difference of the newest ledgers beyond what the owner reports as in flight. `None` where there are no two ledgers
+    /// to compare.
     pub momentum_error: Option<f64>,
-    /// Whether both accounts were ever seen at the same reading.
+    /// Whether both ledgers were ever seen at the same revision.
     pub(super) met: bool,
-    /// How easily `a` and `b` gave way along the normal at the contact that bore most, 1/kg, when they last pressed on each other; `None`
-    /// where no contact was solved between the two: in an island, whose world is one solve, and for links, penalties and lines.
+    /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
+    /// other; `None` where no contact was solved between the two: in an island, which is one solve, and for links, penalties and lines.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// What was left in the energy tank, joules; `None` where the law keeps none.
+    /// Energy left in the energy tank, joules; `None` where the law has none.
     pub tank_j: Option<f64>,
-    /// The mass that the law added, kilograms.
+    /// Mass added by the law, kilograms.
     pub parasitic_kg: f64,
 }
 
-/// Every coupling of a run so far.
+/// All couplings of a run so far.
 #[derive(Debug, Default)]
 pub(super) struct Couplings {
-    /// Pairs that lie against each other from the start: they have no time to bond, they are together already.
+    /// Pairs in resting contact from the start: they share an island already, without having formed a bond.
     resting: Vec<(AgentId, AgentId)>,
     all: Vec<Coupling>,
-    /// Joints between the two of each.
+    /// Number of joints of each coupling.
     joints: Vec<u32>,
     known: BTreeMap<(AgentId, AgentId, &'static str), usize>,
-    /// The numbers of each agent's couplings.
+    /// Indices of each agent's couplings.
     of: Vec<Vec<usize>>,
-    /// Who has news, each once, and those with a coupling to one of them.
+    /// Agents with a new state, each once, and the agents coupled to them.
     heard: Vec<AgentId>,
     is_heard: Vec<bool>,
 }
@@ -113,7 +113,7 @@ impl Coupling {
         self.met = true;
     }
 
-    /// Compares the accounts of both sides, which differ by `apart_n_s`.
+    /// Compares the ledgers of both sides, which differ by `apart_n_s`.
     fn compare(&mut self, apart_n_s: f64, same_reading: bool) {
         if self.impulse_n_s <= 0.0 {
             return;
@@ -127,7 +127,7 @@ impl Coupling {
 }
 
 impl Couplings {
-    /// What is there before the first step: jointed bodies share a clock from the start.
+    /// The couplings before the first step: jointed bodies share a clock from the start.
     pub(super) fn of(scene: &Scene) -> Self {
         let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
         for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
@@ -138,12 +138,12 @@ impl Couplings {
         couplings
     }
 
-    /// All of them, in the order in which they were first seen.
+    /// All couplings, in the order in which they were first seen.
     pub(super) fn all(&self) -> &[Coupling] {
         &self.all
     }
 
-    /// There is a new state of `id`.
+    /// Reports a new state of `id`.
     pub(super) fn hear(&mut self, id: AgentId) {
         let at = id.0 as usize;
         if self.is_heard.len() <= at {
@@ -154,7 +154,8 @@ impl Couplings {
         }
     }
 
-    /// Keeps what the `newest` states say of those who were heard of, agent by agent; `leader` says in whose world one steps.
+    /// Updates the couplings of the agents reported by [`Self::hear`] from the `newest` states; `leader` gives the leader of an agent's
+    /// island.
     pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
         self.open_anew();
         self.note_resting(&leader);
@@ -165,7 +166,7 @@ impl Couplings {
             for state in &snapshot.pairs {
                 self.note_pair(id, state, newest);
             }
-            // both sides say so while they share a clock: the lower number counts it
+            // both sides publish the bond while they share a clock: the lower number records it
             for other in snapshot.bonds.iter().filter(|other| **other > id) {
                 let coupling = self.at(id, *other, ISLAND);
                 coupling.contacts = coupling.contacts.max(1);
@@ -177,7 +178,7 @@ impl Couplings {
         self.heard.clear();
     }
 
-    /// Forgets what is now between those who were heard of and others, and asks these as well.
+    /// Clears the current contacts, force and overlap of the couplings of all reported agents, and adds their peers to the list.
     fn open_anew(&mut self) {
         let of = std::mem::take(&mut self.of);
         for k in 0..self.heard.len() {
@@ -208,7 +209,8 @@ impl Couplings {
         self.resting = resting;
     }
 
-    /// Who shares a world and has not said with whom: called before it touched anybody, it is told beside its leader.
+    /// Records an agent that shares an island without having published a bond (it joined before it touched any body) as coupled to its
+    /// leader.
     fn note_led(&mut self, id: AgentId, leader: AgentId) {
         let told = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
         if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(told)) {
@@ -216,7 +218,7 @@ impl Couplings {
         }
     }
 
-    /// What a tool says of its hold.
+    /// Records the grasp of a tool.
     fn note_grasp(&mut self, holder: AgentId, snapshot: &Snapshot) {
         let Body::Tool(tool) = &snapshot.body else { return };
         let Some(grasp) = tool.grasp else { return };
@@ -232,7 +234,7 @@ impl Couplings {
         let held_by_tool = state.kind == PairKind::Grasp && matches!(theirs.body, Body::Tool(_));
         let (a, b) = if held_by_tool { (other, owner) } else { (owner, other) };
         if let Some(back) = both_sides(state, theirs, owner) {
-            // each side of a penalty force has its own idea of it: one coupling, and how far the two are apart
+            // each side of a penalty force computes its own value: one coupling, and the difference of the two
             let greatest = state.impulse_n_s.max(back.impulse_n_s);
             let (a, b) = (a.min(b), a.max(b));
             let coupling = self.at(a, b, state.kind.name());
@@ -259,7 +261,7 @@ impl Couplings {
         &mut self.all[at]
     }
 
-    /// The number of a coupling among all; a new one where it is not known.
+    /// The index of a coupling; a new one if it is unknown.
     fn number(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> usize {
         if let Some(&at) = self.known.get(&(a, b, kind)) {
             return at;
@@ -278,17 +280,17 @@ impl Couplings {
     }
 }
 
-/// The state of the same pair as its other side publishes it, where both sides push.
+/// The state of the same pair as its peer publishes it, where both sides apply forces.
 fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Option<&'s PairState> {
     theirs.pairs.iter().find(|back| state.kind.is_penalty() && back.with == owner && back.kind == state.kind)
 }
 
-/// By how much the accounts of what `owner` gave and what `other` took differ, N·s, and whether both are of the same reading.
+/// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
 fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<(f64, bool)> {
     let given = mine.given.iter().find(|ledger| ledger.with == other)?;
     let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
     let mut apart = DVec3::ZERO;
-    // a force that is taken to go on is given in the owner's next step: no account is wrong for that
+    // a force that is assumed to continue is given in the owner's next step: neither ledger is wrong because of it
     given.beyond(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
     Some((apart.length(), given.revision == taken.revision && taken.coming.is_empty()))
 }
@@ -306,7 +308,7 @@ mod tests {
         Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
     }
 
-    /// Hears of all `states`, of agents that step in worlds of their own.
+    /// Reports all `states`, of agents without a shared island.
     fn note(couplings: &mut Couplings, states: &[Arc<Snapshot>]) {
         (0..).map(AgentId).take(states.len()).for_each(|id| couplings.hear(id));
         couplings.note(states, |id| id);
@@ -316,7 +318,7 @@ mod tests {
         Impulse { linear: DVec3::X * x, angular: DVec3::ZERO }
     }
 
-    /// The states of an owner that has given `given` and of another that has taken what `taken` says.
+    /// The states of an owner with the ledger `given` and of a peer with the ledger `taken`.
     fn states(given: &Ledger, taken: Ledger, state: PairState) -> Vec<Arc<Snapshot>> {
         let owner = Snapshot { given: vec![given.clone()], pairs: vec![state], ..Snapshot::default() };
         let other = Snapshot { taken: vec![Ledger { with: AgentId(0), ..taken }], ..Snapshot::default() };
@@ -339,15 +341,15 @@ mod tests {
         let scene = two_balls();
         let mut couplings = Couplings::of(&scene);
         note(&mut couplings, &states(&given, early.clone(), state));
-        // two of four newton seconds are not taken yet, and the owner knows of one and a half
+        // two of four newton seconds are not taken yet, and the owner reports one and a half in flight
         assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
         note(&mut couplings, &states(&given, given.clone(), state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
-        // what goes on has been taken ahead
+        // the continuing force has been taken ahead
         let ahead = Some(Ahead { sum: pushed(1.0), from: SimTime::ZERO, middle_s: 0.1 });
         note(&mut couplings, &states(&given, Ledger { ahead, ..given.clone() }, state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
-        // a reader that lost half of it and does not know
+        // a peer that lost half of it without noticing
         note(&mut couplings, &states(&given, Ledger { revision: given.revision, ..early }, state));
         assert_eq!(couplings.all()[0].momentum_error, Some(0.5));
         assert_eq!(
@@ -433,10 +435,10 @@ mod tests {
         let mut couplings = Couplings::of(&two_balls());
         let touching = [state(vec![pair(3)]), Arc::default()];
         note(&mut couplings, &touching);
-        // nobody has changed: nothing is read
+        // no agent has a new state: nothing is read
         couplings.note(&[], |id| id);
         assert_eq!(couplings.all()[0].contacts, 3);
-        // the other one has: the owner is asked again
+        // the peer has a new state: the owner is read again
         couplings.hear(AgentId(1));
         couplings.note(&touching, |id| id);
         assert_eq!(couplings.all()[0].contacts, 3);

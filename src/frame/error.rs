@@ -1,18 +1,18 @@
-//! Why a run ends before its end. Each error is shown once, by the command line or the window.
+//! Errors that end a run early. Each is shown once, by the command line or the window.
 
 use crate::compositor::GpuError;
 use crate::runtime;
 
-/// Why a scene could not be played, or not to its end.
+/// Reason why a scene could not be played, or not to its end.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SessionError {
-    /// A model refused its object.
+    /// A model rejected its object.
     #[error("object \"{name}\": {reason}")]
     Build {
         /// The object's name.
         name: String,
-        /// What the model said.
+        /// The model's message.
         reason: String,
     },
     /// The agents could not be started.

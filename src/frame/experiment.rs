@@ -1,9 +1,10 @@
-//! A scene drawn at resolutions that a design chooses, to see how its frames answer.
+//! A scene drawn at prescribed resolutions, to identify how its frame times respond.
 //!
-//! In: a session, what draws; or a [`Design`] for whoever draws the frames. Out: what was in view, the polygons and the time of every
-//! frame. The controller learns nothing meanwhile. Never here: what the numbers mean ([`crate::tune`] says).
-//! The design: steps over the whole range, then a pseudo-random binary sequence around its middle, so that both the line and the
-//! delay can be told apart from a drift of the scene.
+//! In: a session and the means of drawing; or a [`Design`] for a caller that draws the frames itself. Out: the objects in view, the
+//! polygons and the time of every frame.
+//! The controller does not learn from these frames. Never here: what the numbers mean ([`crate::tune`] says).
+//! The design: steps over the whole range, then a pseudo-random binary sequence around its middle, so that both the line and the delay can
+//! be separated from a drift of the scene.
 
 use super::error::SessionError;
 use super::headless::{Drawing, one_frame};
@@ -19,11 +20,11 @@ pub struct Experiment {
     pub frames: u64,
     /// Size of the picture in pixels.
     pub size: Size,
-    /// What draws it.
+    /// The means of drawing.
     pub drawing: Drawing,
 }
 
-/// What an experiment has shown.
+/// Result of an experiment.
 pub struct Experimented {
     /// Its frames, without those of the warm-up.
     pub observed: Vec<Observed>,
@@ -33,17 +34,17 @@ pub struct Experimented {
     pub interrupted: bool,
 }
 
-/// Frames that only warm up.
+/// Warm-up frames, not recorded.
 const WARM_UP: u64 = 6;
-/// Levels of the steps, as shares of the way from the finest to the coarsest ln ε̂, and frames on each.
+/// Levels of the steps, as fractions of the range from the finest to the coarsest ln ε̂, and frames per level.
 const STEPS: [f64; 7] = [1.0, 0.5, 0.0, 0.75, 0.25, 0.6, 0.4];
 const STEP_FRAMES: u64 = 6;
 /// Levels of the binary sequence.
 const BINARY: [f64; 2] = [0.35, 0.65];
-/// Taps of the shift register behind it: x⁷ + x⁶ + 1, 127 frames before it comes again.
+/// Taps of its shift register: x⁷ + x⁶ + 1, a period of 127 frames.
 const TAPS: u32 = 0b110_0000;
 
-/// Draws `session` at the resolutions of the design. `go_on` is told of the share that is done; on its `false` the experiment ends.
+/// Draws `session` at the resolutions of the design. `go_on` receives the share that is done; if it returns `false` the experiment ends.
 ///
 /// # Errors
 /// [`SessionError::Draw`] where the adapter fails.
@@ -77,26 +78,26 @@ pub(super) struct Design {
     frames: u64,
     frame: u64,
     register: u32,
-    /// Its frames so far, without those of the warm-up.
+    /// The recorded frames so far, without those of the warm-up.
     pub observed: Vec<Observed>,
 }
 
 impl Design {
-    /// An experiment of so many frames beside the warm-up; `control` is brought to the law whose range it goes over.
+    /// An experiment of `frames` frames after the warm-up; `control` switches to the law whose range it covers.
     pub fn begin(control: &mut PictureControl, frames: u64) -> Self {
         control.set_policy(Policy::Feedback);
         control.set_law(Law::CORRECTED);
         Self { frames, frame: 0, register: 1, observed: Vec::with_capacity(frames as usize) }
     }
 
-    /// Brings `control` to where the next frame is to be drawn.
+    /// Sets `control` to the resolution of the next frame.
     pub fn choose(&mut self, control: &mut PictureControl) {
         if let Some(share) = level(self.frame, &mut self.register) {
             control.seek(share);
         }
     }
 
-    /// Writes down the frame that was drawn, and what it took.
+    /// Records the frame that was drawn, and its work.
     pub fn note(&mut self, session: &mut Session, work_s: f64) {
         if self.frame >= WARM_UP {
             let polygons = session.control().last_plan().polygons;
@@ -111,7 +112,7 @@ impl Design {
     }
 }
 
-/// Where in the range frame `frame` is drawn; `None`: where the last one was.
+/// Position in the range at which frame `frame` is drawn; `None`: as the last one.
 fn level(frame: u64, register: &mut u32) -> Option<f64> {
     let at = frame.checked_sub(WARM_UP)?;
     if at < STEPS.len() as u64 * STEP_FRAMES {

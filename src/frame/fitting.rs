@@ -1,9 +1,9 @@
-//! A scene played at chosen steps, divisions and integrators, to see where its points go and what that costs.
+//! A scene played at chosen steps, divisions and integrators, to record the paths of its points and the cost.
 //!
 //! In: a scene, a [`Setting`] for every object. Out: the paths of its points, the declared and the measured cost of every agent.
 //! Never here: which settings are tried ([`crate::fit`] decides), words about them.
 //!
-//! Runs are in virtual time, and what steps cost delays nothing: an answer is that of its settings, whatever the machine.
+//! Runs are in virtual time, and steps take none of it: the result depends on the settings only, not on the machine.
 
 use super::cast;
 use super::error::SessionError;
@@ -24,10 +24,10 @@ use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 use std::f64::consts::PI;
 use std::time::Duration;
 
-/// A point that is watched: whose, and where on it.
+/// A recorded point: its agent, and where on it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Point {
-    /// Whose point.
+    /// The agent.
     pub agent: AgentId,
     /// Share of its rest length.
     pub at: f64,
@@ -36,24 +36,24 @@ pub struct Point {
 /// A scene played to its end.
 #[derive(Debug, Clone)]
 pub struct Played {
-    /// Where the points were, in their order.
+    /// Paths of the points, in their order.
     pub paths: Vec<Path>,
-    /// What each agent costs by the declared machine, seconds of one core a simulated second; a solve of every integrator alike.
+    /// Cost of each agent on the declared machine, seconds of one core per simulated second; solves of all integrators count alike.
     pub costs_s: Vec<f64>,
-    /// CPU time of each agent's turns, seconds a simulated second, as measured.
+    /// Measured CPU time of each agent's turns, seconds per simulated second.
     pub cpu_s: Vec<f64>,
     /// Steps of each agent.
     pub steps: Vec<u64>,
     /// Pairs of agents that acted on each other.
     pub pairs: Vec<(AgentId, AgentId)>,
-    /// Who gave up, and why.
+    /// The first agent that was parked, and the reason.
     pub parked: Option<(AgentId, String)>,
 }
 
-/// Points are looked at no more often than this, seconds, and at least so many times in a run.
+/// Shortest sampling interval of points, seconds, and least number of samples in a run.
 const SAMPLE_MIN_S: f64 = 1e-3;
 const SAMPLES_LEAST: f64 = 100.0;
-/// So often a run looks whether it is to stop, seconds.
+/// Interval at which a run checks whether to stop, seconds.
 const LOOK_S: f64 = 0.02;
 
 /// The present setting of an agent.
@@ -67,13 +67,13 @@ pub fn setting_of(member: &Member) -> Setting {
     Setting { dt_s: member.pace.dt.as_secs_f64(), pieces, method }
 }
 
-/// The number of an integrator among all.
+/// The index of an integrator in [`Integrator::ALL`].
 #[must_use]
 pub fn method_of(integrator: Integrator) -> usize {
     Integrator::ALL.iter().position(|one| *one == integrator).unwrap_or(0)
 }
 
-/// The scene with this setting for one agent.
+/// Applies this setting to one agent of the scene.
 pub fn apply(scene: &mut Scene, agent: AgentId, setting: &Setting) {
     let member = &mut scene.agents[agent.0 as usize];
     let dt = SimSpan::from_secs_f64(setting.dt_s).unwrap_or(member.pace.dt);
@@ -93,12 +93,12 @@ pub fn apply(scene: &mut Scene, agent: AgentId, setting: &Setting) {
     }
 }
 
-/// Turns a tube that is nothing but a rope would be into one; `false` where it is held or shaped as no rope can be.
+/// Replaces a tube by a rope where the tube has nothing that a rope lacks; `false` where it is attached or shaped as no rope can be.
 pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
     let member = &mut scene.agents[agent.0 as usize];
     let Spec::Tube(tube) = &member.spec else { return false };
     let plain = tube.attachments.is_empty() && tube.peristalsis.is_none() && tube.pressure_pa == 0.0;
-    // what holds a tube by a wall holds a rope by a point
+    // a link attaches to a tube at its wall, but to a rope at a point
     if !plain || !member.links.is_empty() {
         return false;
     }
@@ -153,7 +153,7 @@ fn cells(shape: &SoftShape) -> Vec<u32> {
     }
 }
 
-/// Divides a body so that it has so many cells where it has most, and elsewhere in proportion.
+/// Divides a body into `most` cells along its most divided axis, and in proportion along the others.
 fn divide(shape: &mut SoftShape, most: u32) {
     let greatest = cells(shape).into_iter().max().unwrap_or(1).max(1);
     let scaled = |count: u32| (f64::from(count * most) / f64::from(greatest)).round().max(1.0) as u32;
@@ -164,16 +164,16 @@ fn divide(shape: &mut SoftShape, most: u32) {
     }
 }
 
-/// How a soft body is divided after [`apply`], along each of its axes; empty for what is none.
+/// Division of a soft body after [`apply`], along each of its axes; empty for other bodies.
 #[must_use]
 pub fn cells_of(member: &Member) -> Vec<u32> {
     if let Spec::Soft(soft) = &member.spec { cells(&soft.shape) } else { Vec::new() }
 }
 
-/// Plays `scene` for so many simulated seconds; `None` where `go_on` said no.
+/// Plays `scene` for so many simulated seconds; `None` if `go_on` returned `false`.
 ///
 /// # Errors
-/// [`SessionError`] where a model refuses its object.
+/// [`SessionError`] if a model rejects its object.
 pub fn play_points(
     scene: &Scene,
     points: &[Point],
@@ -213,7 +213,7 @@ pub fn play_points(
     }))
 }
 
-/// The scene in virtual time with `points` watched, in which work takes no time and nothing goes wrong on purpose.
+/// The scene in virtual time with `points` recorded, with free steps and without injected faults.
 fn watched(scene: &Scene, points: &[Point], seconds: f64) -> Scene {
     let mut scene = scene.clone();
     let every = |agent: AgentId| {

@@ -1,4 +1,4 @@
-//! The seam between the runtime, which measures an agent's turns, and control, which knows what to demand.
+//! Adapters between the runtime, which measures an agent's turns, and control, which computes the demands.
 //!
 //! In: a turn's measure. Out: a demand on dt and on the simulation's ε. Never here: the law.
 
@@ -9,7 +9,7 @@ use crate::runtime::{Demand, Governor, TurnMeasure};
 use metachron_core::{Resolution, SimSpan};
 use std::sync::Arc;
 
-/// An agent's own rate control as the runtime wants it, and what it and the frame loop tell each other.
+/// An agent's rate control as a governor of the runtime, and the data it shares with the frame loop.
 pub(super) struct RateGovernor(pub RateControl, pub Arc<Tally>);
 
 impl Governor for RateGovernor {
@@ -31,7 +31,7 @@ impl Governor for RateGovernor {
     }
 }
 
-/// An agent's error control as the runtime wants it, and what it tells the frame loop.
+/// An agent's error control as a governor of the runtime, and the data it publishes for the frame loop.
 pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<Holding>);
 
 impl Governor for ErrorGovernor {
@@ -46,7 +46,7 @@ impl Governor for ErrorGovernor {
     }
 }
 
-/// A demand in the runtime's words, at the level of the primitive that is held.
+/// Converts control's demand to the runtime's type; the primitive level n stays as it is.
 fn demanded(demand: Option<RateDemand>, measure: &TurnMeasure) -> Demand {
     let Some(demand) = demand else { return Demand::default() };
     let n = measure.resolution.map_or(0, |held| held.n);

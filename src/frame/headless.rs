@@ -1,7 +1,7 @@
 //! Plays a scene without a window: for reports, pictures and tests.
 //!
-//! In: a session, an end, what draws. Out: an [`Outcome`], and a picture file where one is wanted.
-//! Never here: arguments, progress bars (the caller is told of every frame).
+//! In: a session, an end, the means of drawing. Out: an [`Outcome`], and a picture file if one is requested.
+//! Never here: arguments, progress bars (the caller is called back at every frame).
 
 use super::error::SessionError;
 use super::outcome::{FrameRecord, Outcome};
@@ -20,11 +20,11 @@ pub enum End {
 
 /// What draws the frames.
 pub enum Drawing {
-    /// Nothing: a frame costs what the declared machine says, or nothing on real time.
+    /// Nothing: a frame costs its declared time, or nothing in real time.
     Nothing,
     /// Every frame is drawn, in real time.
     Every(Box<Offscreen>),
-    /// Only the last frame is drawn, for its picture, with all the time it takes; costs are declared.
+    /// Only the last frame is drawn, for its picture, without a time limit; costs are declared.
     Last(Box<Offscreen>),
 }
 
@@ -34,16 +34,16 @@ pub struct Headless {
     pub end: End,
     /// Size of the picture in pixels.
     pub size: Size,
-    /// How it shows things.
+    /// How it is drawn.
     pub style: Style,
-    /// What draws it.
+    /// The means of drawing.
     pub drawing: Drawing,
-    /// Where the last frame's picture goes.
+    /// File for the picture of the last frame.
     pub png: Option<PathBuf>,
 }
 
-/// Plays `session` to its end. `go_on` is told of every frame and of the share of the run that is done, 0 … 1; on its `false`
-/// the run ends.
+/// Plays `session` to its end. `go_on` receives every frame and the share of the run that is done, 0 … 1; if it returns `false` the run
+/// ends.
 ///
 /// # Errors
 /// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where the picture cannot be written.
@@ -66,7 +66,7 @@ pub fn play_headless(
         interrupted = !go_on(&record, done);
         due = (due + period).max(session.now());
     }
-    // the picture shows the end of the run, however long it takes
+    // the picture shows the state at the end of the run, however long drawing takes
     session.hold();
     write_picture(&mut session, &mut plan)?;
     let adapter = match &plan.drawing {
@@ -76,8 +76,8 @@ pub fn play_headless(
     Ok(session.end(adapter, interrupted))
 }
 
-/// Nothing happens before it can be drawn: prices are known and a first picture, which makes pipelines and buffers, is finished
-/// before real time begins. Virtual time stands still meanwhile by itself.
+/// Holds real time until drawing is ready: prices are known and a first picture, which creates pipelines and buffers, is finished. Virtual
+/// time does not pass meanwhile anyway.
 fn prepare(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
     session.hold();
     if let Drawing::Every(screen) = &mut plan.drawing {
@@ -99,7 +99,7 @@ fn share_done(session: &Session, end: End) -> f64 {
     }
 }
 
-/// Gathers, chooses, draws and learns, unless the frame must not teach (`skip`).
+/// Gathers, chooses, draws and updates the controller, unless it must not learn from this frame (`skip`).
 pub(super) fn one_frame(
     session: &mut Session,
     (size, style): (Size, Style),
@@ -111,7 +111,7 @@ pub(super) fn one_frame(
     frame_seen_by(session, &camera, (size, style), (drawing, skip))
 }
 
-/// The same, as another camera than the scene's own sees it.
+/// As [`one_frame`], seen by `camera` instead of the scene's camera.
 pub(super) fn frame_seen_by(
     session: &mut Session,
     camera: &Camera,
@@ -137,7 +137,7 @@ pub(super) fn frame_seen_by(
     Ok(session.finish(started, Finished { work, draw, gpu, skip }))
 }
 
-/// The last frame once more, with all the time it takes.
+/// Draws the last frame once more, without a time limit.
 fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
     let Some(path) = &plan.png else { return Ok(()) };
     let mut fresh;

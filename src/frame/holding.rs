@@ -1,14 +1,14 @@
-//! Agents that hold an error: what their controllers say of that, for the end of a run.
+//! Agents with an error tolerance: the final state of their controllers, for the report of a run.
 //!
-//! In: where a controller rests. Out: one sentence where an agent cannot hold what it is to hold. Never here: the law
-//! ([`crate::control::ErrorControl`]).
+//! In: the range end at which a controller rests. Out: a [`Held`] per agent, which shows where the tolerance cannot be met. Never here: the
+//! law ([`crate::control::ErrorControl`]).
 
 use metachron_budget::Bound;
 use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 
-/// What the controller of one agent tells. Nobody waits for it.
+/// Published state of one agent's controller; lock-free.
 #[derive(Debug)]
 pub(super) struct Holding {
     agent: AgentId,
@@ -16,22 +16,22 @@ pub(super) struct Holding {
     rests: AtomicU8,
 }
 
-/// Whether an agent holds the error that it is to hold.
+/// Whether an agent meets its error tolerance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
-    /// The error that it is to hold, metres.
+    /// The tolerance, metres.
     pub tolerance_m: f64,
-    /// The end of its ranges at which it rested; `None` between them.
+    /// The end of its ranges at which the controller rested; `None` between the ends.
     pub rests: Option<Bound>,
 }
 
 impl Holding {
-    /// Of an agent that rests nowhere yet.
+    /// Of an agent whose controller rests at neither end yet.
     pub fn new(agent: AgentId, tolerance_m: f64) -> Arc<Self> {
         Arc::new(Self { agent, tolerance_m, rests: AtomicU8::new(0) })
     }
 
-    /// The controller rests here.
+    /// Publishes where the controller rests.
     pub fn tell(&self, rests: Option<Bound>) {
         let number = match rests {
             None => 0,
@@ -51,7 +51,7 @@ impl Holding {
     }
 }
 
-/// Whether this agent holds what it is to hold; `None` of one that holds no error.
+/// Whether this agent meets its tolerance; `None` for an agent without one.
 pub(super) fn held(all: &[Arc<Holding>], agent: AgentId) -> Option<Held> {
     all.iter().find(|one| one.agent == agent).map(|one| one.held())
 }

@@ -1,10 +1,10 @@
-//! The coupling error of a run: the same scene once more on one tiny common clock, and what the clocks changed.
+//! The coupling error of a run: the same scene once more on one very short common step, and the differences.
 //!
 //! In: a scene and the [`Trace`] of its run. Out: an [`Oracle`]. Never here: arguments, progress bars.
 //!
-//! In the second run every agent makes the same steps, a quarter of the shortest that any of them wants, in virtual time at no
-//! cost, without faults and without control of rates and resolutions. What both runs differ by is the error of different
-//! clocks, of longer steps, of coarser divisions and of late frames together.
+//! In the second run every agent makes the same steps, a quarter of the shortest requested by any agent, in virtual time at no cost,
+//! without faults and without control of rates and resolutions. The difference of both runs is the error of different clocks, of longer
+//! steps, of coarser divisions and of late frames together.
 
 use super::couplings::Coupling;
 use super::error::SessionError;
@@ -18,48 +18,48 @@ use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use std::collections::BTreeMap;
 use std::time::Duration;
 
-/// The common clock ticks this many times in the shortest step that any agent wants.
+/// Common steps per shortest step requested by any agent.
 const DIVISION: f64 = 4.0;
-/// The common clock's shortest step, seconds.
+/// Shortest common step, seconds.
 const STEP_MIN_S: f64 = 2e-6;
-/// The common clock's longest step, seconds: a scene of slow agents is still to be right.
+/// Longest common step, seconds: a scene of slow agents still has to be accurate.
 const STEP_MAX_S: f64 = 2e-3;
 
-/// What different clocks changed.
+/// Effect of different clocks.
 #[derive(Debug, Clone)]
 pub struct Oracle {
     /// Step of the common clock, seconds.
     pub dt_s: f64,
-    /// Simulated seconds that both runs have played: all of the run, unless the comparison was ended before its end.
+    /// Simulated seconds that both runs have played: the whole run, unless the comparison was ended early.
     pub sim_s: f64,
     /// States compared.
     pub states: u64,
     /// Every pair that was coupled in either run.
     pub pairs: Vec<PairError>,
-    /// Whether the comparison was ended before its end.
+    /// Whether the comparison was ended early.
     pub interrupted: bool,
 }
 
-/// What different clocks changed for two coupled agents.
+/// Effect of different clocks on two coupled agents.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PairError {
     /// The first agent.
     pub a: AgentId,
     /// The second.
     pub b: AgentId,
-    /// Root mean square distance of the points of both from where the common clock has them, metres.
+    /// Root mean square distance of the points of both from their positions on the common clock, metres.
     pub position_rms_m: f64,
     /// Largest such distance, metres.
     pub position_max_m: f64,
-    /// Largest difference of either one's momentum, N·s.
+    /// Largest difference of momentum of either agent, N·s.
     pub momentum_max_n_s: f64,
-    /// Impulse exchanged in the run, N·s; `None` where an island kept it to itself.
+    /// Impulse exchanged in the run, N·s; `None` where some of it stayed inside an island, which does not publish it.
     pub impulse_n_s: Option<f64>,
     /// Impulse exchanged on the common clock, N·s.
     pub impulse_oracle_n_s: Option<f64>,
 }
 
-/// How far one agent's states are from the common clock's.
+/// Distance of one agent's states from those on the common clock.
 #[derive(Debug, Clone, Copy, Default)]
 struct Distance {
     points: u64,
@@ -68,8 +68,8 @@ struct Distance {
     momentum_max_n_s: f64,
 }
 
-/// Plays `scene` on one tiny common clock and compares it with the run that left `outcome`. `go_on` is told of the share that
-/// is done, 0 … 1; on its `false` the comparison ends.
+/// Plays `scene` on one very short common step and compares it with the run that left `outcome`. `go_on` receives the share that is done, 0
+/// … 1; if it returns `false` the comparison ends.
 ///
 /// # Errors
 /// As [`Session::open`].
@@ -100,7 +100,7 @@ fn consult(
     for (at, state) in states.iter().enumerate() {
         session.wait_until(Duration::from_nanos(state.moment.as_nanos()));
         compare(&session, state, distances);
-        // couplings are published for a second after they end: looking every frame misses none
+        // couplings are published for a second after they end: reading every frame misses none
         if session.now() >= looked {
             session.look();
             looked = session.now() + session.period();
@@ -111,7 +111,7 @@ fn consult(
         }
     }
     session.look();
-    // who has not played as long has not exchanged as much
+    // a shorter run has exchanged less: compare up to the same time
     let run = cut.map(|time| trace.couplings_by(time, &outcome.couplings));
     let pairs = pairs(run.as_ref().unwrap_or(&outcome.couplings), session.couplings(), distances);
     let sim_s = cut.map_or(outcome.sim_s, SimTime::as_secs_f64);
@@ -119,7 +119,7 @@ fn consult(
     Ok(Oracle { dt_s, sim_s, states, pairs, interrupted: cut.is_some() })
 }
 
-/// The same scene with one clock for all, and nothing in the way of it.
+/// The same scene with one clock for all agents, free steps and no faults.
 fn common_clock(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
     let shortest = scene.agents.iter().map(|m| m.pace.dt.as_secs_f64()).fold(f64::INFINITY, f64::min);
@@ -141,7 +141,7 @@ fn common_clock(scene: &Scene) -> Scene {
     scene
 }
 
-/// Adds how far the common clock has an agent from where it was in the run at the same time.
+/// Adds the distance of an agent on the common clock from its position in the run at the same time.
 fn compare(session: &Session, state: &Traced, distances: &mut [Distance]) {
     let at = state.agent.0 as usize;
     let (Some(agent), Some(distance)) = (session.agents().get(at), distances.get_mut(at)) else { return };
@@ -159,7 +159,7 @@ fn compare(session: &Session, state: &Traced, distances: &mut [Distance]) {
     distance.momentum_max_n_s = distance.momentum_max_n_s.max((there - state.momentum).length());
 }
 
-/// Every pair that was coupled in either run, with what it differs by.
+/// Every pair that was coupled in either run, with its differences.
 fn pairs(run: &[Coupling], common: &[Coupling], distances: &[Distance]) -> Vec<PairError> {
     let (run, common) = (impulses(run), impulses(common));
     let mut all: Vec<_> = run.keys().chain(common.keys()).copied().collect();
@@ -182,7 +182,7 @@ fn pairs(run: &[Coupling], common: &[Coupling], distances: &[Distance]) -> Vec<P
     all.into_iter().map(pair).collect()
 }
 
-/// The impulse that every pair exchanged, by whatever kinds of coupling; `None` where an island kept some of it to itself.
+/// The impulse that every pair exchanged, summed over the kinds of coupling; `None` where some of it stayed inside an island.
 fn impulses(couplings: &[Coupling]) -> BTreeMap<(AgentId, AgentId), Option<f64>> {
     let mut sums = BTreeMap::new();
     for coupling in couplings {
@@ -255,7 +255,7 @@ mod tests {
         let (sim_s, interrupted, pairs) = until(0.4);
         assert!(interrupted && (0.3..0.5).contains(&sim_s), "{sim_s} s");
         let [pair] = &pairs[..] else { panic!("only one pair has met: {pairs:?}") };
-        // equal masses that bounce without loss change their 1 m/s
+        // equal masses that bounce without loss exchange their 1 m/s
         let exchanged = [pair.impulse_n_s, pair.impulse_oracle_n_s].map(Option::unwrap);
         assert!(
             (pair.a, pair.b) == (AgentId(0), AgentId(1)) && exchanged.iter().all(|j| (j - 1.0).abs() < 1e-6),
@@ -287,7 +287,7 @@ mod tests {
             told += 1;
             true
         });
-        // the balls fly their parabola exactly at any step; between ticks of 0.5 ms it is drawn straight: g dt²/2 = 1.2 µm
+        // free flight is exact at any step; between ticks of 0.5 ms it is interpolated linearly: g dt²/2 = 1.2 µm
         let states = oracle.unwrap().states;
         assert!(states > 40 && told > 5 && !distances.is_empty(), "{states} states, told {told} times");
         for distance in distances {

@@ -1,4 +1,4 @@
-//! The numbers of the viewer's panels, out of a session.
+//! Fills the viewer's panels with the numbers of a session.
 //!
 //! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
 
@@ -12,11 +12,11 @@ use crate::scene::format::PolicyKind;
 use metachron_core::{Body, SimTime, Snapshot};
 use std::time::Duration;
 
-/// Mass at which the user's hand takes hold of something that has none of its own, kilograms.
+/// Mass assumed for the user spring on an object without a mass of its own, kilograms.
 const HAND_MASS_KG: f64 = 0.1;
 /// Frames over which the budget bar is smoothed.
 const SHARES_FRAMES: usize = 30;
-/// A hand moves a stretch of a tube, not all of it: no more than this mass of it, kilograms.
+/// The user spring moves a part of a tube, not all of it: at most this mass of it, kilograms.
 const STRETCH_MASS_KG: f64 = 0.1;
 
 /// The panels of a session that has just begun.
@@ -37,7 +37,7 @@ pub(super) fn first(session: &Session) -> Status {
     }
 }
 
-/// What is read off differences of counters, over windows long enough for them to mean something.
+/// Values derived from differences of counters, over windows long enough to be meaningful.
 pub(super) struct Meter {
     since: (Duration, SimTime),
     cpu_s: Vec<f64>,
@@ -46,11 +46,11 @@ pub(super) struct Meter {
     real_time: f64,
 }
 
-/// Over how long a time shares and the flow of time are measured: an agent's CPU time is counted about this often.
+/// Window over which CPU shares and the flow of time are measured: an agent's CPU time is updated about this often.
 const METER_EVERY: Duration = Duration::from_millis(500);
 
 impl Meter {
-    /// A meter that begins now.
+    /// A meter that starts now.
     pub fn new(session: &Session) -> Self {
         let agents = session.agents().len();
         let since = (session.now(), session.sim_now());
@@ -77,13 +77,13 @@ impl Meter {
             self.shares[at] = ((cpu_s - self.cpu_s[at]) / wall_s).clamp(0.0, 1.0);
             self.cpu_s[at] = cpu_s;
         }
-        // time that an agent drops passes on the clock and not for it
+        // dropped time passes on the scene's clock but is not simulated
         self.real_time = (sim.since(self.since.1).as_secs_f64() - most_s).max(0.0) / wall_s;
         self.since = (now, sim);
     }
 }
 
-/// Brings the numbers up to date; gives a line for each agent that has given up since the last time.
+/// Updates the numbers; returns a line for each agent that was parked since the last call.
 pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
     meter.read(session);
     status.real_time_factor = meter.real_time;
@@ -121,14 +121,14 @@ pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter
     news
 }
 
-/// Where the time went in the newest frames.
+/// Shares of the frame time over the newest frames.
 fn shares(session: &Session, meter: &Meter) -> Shares {
     let newest = session.newest_frames(SHARES_FRAMES);
     let target_ms = session.period().as_secs_f64() * 1e3;
     let mean =
         |of: fn(&FrameRecord) -> f64| newest.iter().map(of).sum::<f64>() / (newest.len().max(1) as f64 * target_ms);
     Shares {
-        // begun at 0: the sum of no numbers at all is −0
+        // starts at 0.0, because an empty sum is −0
         simulation: meter.shares.iter().fold(0.0, |sum, share| sum + share) / f64::from(session.cores()),
         cull: mean(|row| row.cull_ms),
         select: mean(|row| row.select_ms),
@@ -137,7 +137,7 @@ fn shares(session: &Session, meter: &Meter) -> Shares {
     }
 }
 
-/// The couplings of all agents, each told by the agent that owns it.
+/// The couplings of all agents, each reported by the agent that owns it.
 fn fill_couplings(status: &mut Status, session: &Session) {
     let Status { couplings, agents, .. } = status;
     couplings.clear();
@@ -174,7 +174,7 @@ fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
     };
 }
 
-/// The mass that the user's hand feels, kilograms.
+/// The mass for which the user spring is scaled, kilograms.
 pub(super) fn mass_kg(spec: &Spec) -> f64 {
     match spec {
         Spec::Tube(tube) => {
@@ -187,7 +187,7 @@ pub(super) fn mass_kg(spec: &Spec) -> f64 {
     }
 }
 
-/// The viewer's word for a law.
+/// The viewer's type for a law.
 const fn viewer_law(law: control::Law) -> Law {
     match law {
         control::Law::Printed { alpha, beta } => Law::Printed { alpha, beta },
@@ -195,7 +195,7 @@ const fn viewer_law(law: control::Law) -> Law {
     }
 }
 
-/// Control's word for a law.
+/// Control's type for a law.
 pub(super) const fn control_law(law: Law) -> control::Law {
     match law {
         Law::Printed { alpha, beta } => control::Law::Printed { alpha, beta },

@@ -1,6 +1,6 @@
-//! What a solve of each integrator of the tube costs beside one of implicit Euler, on this machine.
+//! Measures what a solve of each integrator of the tube costs relative to implicit Euler on this machine.
 //!
-//! Out: a factor for every integrator, measured. Never here: how many solves a step takes; tubes count them as their work.
+//! Out: a factor for every integrator. Never here: how many solves a step takes; tubes count them as their work.
 
 use cpu_time::ThreadTime;
 use glam::DVec3;
@@ -10,17 +10,17 @@ use metachron_models::rod::Integrator;
 use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
 
-/// Every integrator carries it.
+/// A step that every integrator can take.
 const DT: SimSpan = SimSpan::from_nanos(100_000);
 const SEGMENTS: usize = 64;
 /// Steps of a batch.
 const STEPS: u32 = 40;
-/// Batches of each, taken in turn; the fastest counts, for what a shared machine adds is never negative.
+/// Batches per integrator, interleaved; the fastest counts, because other load on the machine only ever adds time.
 const BATCHES: u32 = 9;
 
 /// The price of a solve by every integrator, in the order of [`Integrator::ALL`], where one of implicit Euler costs 1.
 ///
-/// Takes some hundredths of a second. An integrator that cannot be measured has no number.
+/// Takes some hundredths of a second. An integrator that cannot be measured yields NaN.
 #[must_use]
 pub fn solve_prices() -> Vec<f64> {
     let mut tubes = Integrator::ALL.map(swinging);
@@ -36,7 +36,7 @@ pub fn solve_prices() -> Vec<f64> {
     least_s.iter().map(|least_s| least_s / plain_s).collect()
 }
 
-/// A soft cable that was just let go.
+/// A soft cable, just released.
 fn swinging(integrator: Integrator) -> Option<Tube> {
     let material = Material { young_pa: 1e5, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 0.5 };
     let path_m = vec![DVec3::ZERO, DVec3::X];
@@ -45,7 +45,7 @@ fn swinging(integrator: Integrator) -> Option<Tube> {
     Tube::new(TubeSpec { integrator, gravity, pin: [true, false], self_contact: false, ..free }).ok()
 }
 
-/// CPU seconds of a unit of work, over some steps.
+/// CPU seconds per unit of work, over some steps.
 fn batch_s(tube: &mut Tube) -> Option<f64> {
     let (start, mut work) = (ThreadTime::now(), 0.0);
     for _ in 0..STEPS {

@@ -1,9 +1,9 @@
-//! Agents' steps and the picture's levels bought at one price, where both come out of one processor.
+//! The CPU budget: shares one processor between agents' steps and the picture's levels at one price.
 //!
-//! In: what agents would take at their finest, what the picture wants and its λ. Out: a share for every agent, and what the picture may
-//! take. Never here: the market's law (`metachron_budget::adaptive::joint` has it), steps, drawing. Theory: `docs/theory/budget.md`, eq. 54 … 59.
+//! In: the agents' load at their finest, the picture's demand and its λ. Out: a share for every agent, and the time budget of the picture.
+//! Never here: the market's law (`metachron_budget::adaptive::joint` has it), steps, drawing. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 //!
-//! Agents tell and are told through numbers that nobody waits for.
+//! Agents and the frame loop exchange these numbers through atomics, without waiting.
 
 use super::cast::ROOM;
 use crate::control::ObjectView;
@@ -12,52 +12,52 @@ use metachron_core::AgentId;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What an agent that can be steered and the frame loop tell each other.
+/// Numbers exchanged between a steered agent and the frame loop.
 #[derive(Debug)]
 pub(super) struct Tally {
-    /// Whose it is.
+    /// The agent.
     id: AgentId,
-    /// The rate at which the scene wants its steps, a second.
+    /// Its requested step rate, Hz.
     rate_hz: f64,
-    /// The least part of its full work that it can do with.
+    /// The least fraction of its full work that it can run with.
     least: f64,
-    /// Its share where there is time for all.
+    /// Its share when the budget suffices for all.
     fair: f64,
-    /// What it would take of a core at its finest, and the share of its period that its work may take; bits of f64.
+    /// Its load at its finest as a share of one core, and the share of its period that its work may take; bits of f64.
     full: AtomicU64,
     share: AtomicU64,
-    /// The ε that is as fine as anybody can see, metres, +∞ where nobody looks; bits of f64.
+    /// The finest ε that makes a visible difference, metres, +∞ out of view; bits of f64.
     plain: AtomicU64,
 }
 
 impl Tally {
-    /// Nothing is told yet.
+    /// Nothing is reported yet.
     pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
         let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
         Self { id, rate_hz, least, fair, full, share, plain }
     }
 
-    /// Whose it is.
+    /// The agent.
     pub fn id(&self) -> AgentId {
         self.id
     }
 
-    /// The frame loop tells the ε that is as fine as anybody can see, metres.
+    /// The frame loop sets the finest ε that makes a visible difference, metres.
     pub fn show(&self, plain_m: f64) {
         self.plain.store(plain_m.to_bits(), Ordering::Relaxed);
     }
 
-    /// The ε that is as fine as anybody can see, metres, +∞ where nobody looks; 0 until it is told.
+    /// The finest ε that makes a visible difference, metres, +∞ out of view; 0 until it is set.
     pub fn plain_m(&self) -> f64 {
         f64::from_bits(self.plain.load(Ordering::Relaxed))
     }
 
-    /// The agent tells what it would take of a core at its finest.
+    /// The agent reports its load at its finest, as a share of one core.
     pub fn tell(&self, full: f64) {
         self.full.store(full.to_bits(), Ordering::Relaxed);
     }
 
-    /// What the agent's work may take of its period.
+    /// The share of its period that the agent's work may take.
     pub fn share(&self) -> f64 {
         f64::from_bits(self.share.load(Ordering::Relaxed))
     }
@@ -71,7 +71,7 @@ impl Tally {
     }
 }
 
-/// The processor that agents and pictures share.
+/// The processor shared by agents and pictures.
 #[derive(Debug, Default)]
 pub(super) struct Purse {
     tallies: Vec<Arc<Tally>>,
@@ -80,19 +80,19 @@ pub(super) struct Purse {
     open: bool,
 }
 
-/// Pixels that an agent counts as which nobody sees: it will be seen again.
+/// Pixels assumed for an agent out of view: it will come into view again.
 const UNSEEN_PX: f64 = 100.0;
-/// The part of its pixels that an agent at its finest draws wrong, however slowly it moves.
+/// Fraction of its pixels that an agent at its finest draws wrong, however slowly it moves.
 const ERROR_LEAST: f64 = 0.01;
 
 impl Purse {
-    /// The purse of these agents.
+    /// The CPU budget of these agents.
     pub fn new(tallies: Vec<Arc<Tally>>) -> Self {
         Self { tallies, ..Self::default() }
     }
 
-    /// Shares the processor out for the next frame of `period_s` on so many cores; the seconds that the picture may take of it, `None`
-    /// where there is enough for all. `weight` is what an object in view is worth to the picture, pixels.
+    /// Shares the processor for the next frame of `period_s` on so many cores; returns the seconds that the picture may take, `None` if
+    /// there is enough for all. `weight` is the weight of an object in view in the picture's value, pixels.
     pub fn settle(
         &mut self,
         (cores, period_s): (u32, f64),
@@ -106,7 +106,7 @@ impl Purse {
             let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), tally.rate_hz));
             Worker { full: period_s * tally.full(), least: tally.least, loss }
         }));
-        // agents' work is told with what they wait for a core: the picture's own is on top of what they may plan with
+        // the agents' reported work includes waiting for a core: the picture's own core comes on top of their share
         let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
         let settled = self.market.settle(&self.workers, capacity, drawing);
         if settled.is_some() || self.open {
@@ -119,7 +119,7 @@ impl Purse {
         settled.map(|(_, limit_s)| limit_s)
     }
 
-    /// Nothing is shared out any more: everybody has the share that is fair.
+    /// Ends the sharing: every agent returns to its fair share.
     pub fn close(&mut self) {
         if std::mem::take(&mut self.open) {
             self.tallies.iter().for_each(|tally| tally.allow(tally.fair));
@@ -128,8 +128,8 @@ impl Purse {
     }
 }
 
-/// Pixels that an agent's own error makes wrong at its finest: it is off by what it moves in half a step along an outline of twice the
-/// root of its area.
+/// Pixels drawn wrong because of an agent's own error at its finest: the offset of half a step's motion, along an outline of twice the root
+/// of its area.
 fn loss(view: &ObjectView, weight: f64, rate_hz: f64) -> f64 {
     if !view.visible || view.pixels.is_nan() || view.pixels < 1.0 {
         return ERROR_LEAST * UNSEEN_PX * view.importance;

@@ -1,7 +1,7 @@
-//! A scene pushed away from its target, to see how its own frames come back.
+//! Measures the step response of the frame loop: the picture is pushed away from its target, and the frames after it are recorded.
 //!
-//! In: a session, a law, how many polygons each push leaves. Out: time and work of the frames after every push, the median over its
-//! repetitions. Never here: what was predicted of them ([`crate::tune`] does that).
+//! In: a session, a law, the polygons left by each push. Out: time and work of the frames after every push, the median over its
+//! repetitions. Never here: their prediction ([`crate::tune`] does that).
 
 use super::error::SessionError;
 use super::headless::{Drawing, one_frame};
@@ -11,25 +11,25 @@ use crate::control::{Law, Policy};
 
 /// Pushes to be made.
 pub struct Pushes {
-    /// The law that brings the picture back.
+    /// The law that restores the picture.
     pub law: Law,
-    /// Polygons that each push leaves, > 0.
+    /// Polygons left by each push, > 0.
     pub polygons: Vec<f64>,
-    /// How often each is made, ≥ 1; the median of noisy frames says more than one of them.
+    /// Repetitions of each push, ≥ 1; the median over noisy frames is more reliable than one of them.
     pub times: usize,
-    /// For how long it may come to rest before a push, and for how long it is watched afterwards, seconds, > 0.
+    /// Time to settle before a push, and time of observation after it, seconds, > 0.
     pub watch_s: f64,
     /// Size of the picture in pixels.
     pub size: Size,
-    /// What draws it.
+    /// The means of drawing.
     pub drawing: Drawing,
 }
 
-/// A frame after a push: seconds since it, and its work in seconds.
+/// A frame after a push: seconds since the push, and its work in seconds.
 pub type After = (f64, f64);
 
-/// Makes `pushes` on `session`: the frames after each, in their order. `go_on` is told of the share that is done; on its `false` there
-/// are none.
+/// Applies `pushes` to `session`: the frames after each, in their order. `go_on` receives the share that is done; if it returns `false` the
+/// result is empty.
 ///
 /// # Errors
 /// [`SessionError::Draw`] where the adapter fails.
@@ -59,7 +59,7 @@ pub fn push(
     Ok(medians)
 }
 
-/// The frames of one watch.
+/// The frames of one period of observation.
 fn watch(session: &mut Session, pushes: &mut Pushes) -> Result<Vec<After>, SessionError> {
     let start = session.now();
     let mut due = start;
@@ -73,7 +73,7 @@ fn watch(session: &mut Session, pushes: &mut Pushes) -> Result<Vec<After>, Sessi
     Ok(frames)
 }
 
-/// The median of several runs frame by frame, as far as the shortest goes.
+/// The median of several runs frame by frame, up to the length of the shortest.
 #[must_use]
 pub fn median(runs: &[Vec<After>]) -> Vec<After> {
     let shortest = runs.iter().map(Vec::len).min().unwrap_or(0);

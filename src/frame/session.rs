@@ -1,6 +1,6 @@
-//! A scene in play: the runtime, the controller and the stage of one run, joined.
+//! A running scene: the runtime, the controller and the stage of one run, connected.
 //!
-//! A frame is [`Session::compose`] (gather, survey, choose), drawing by whoever drives, and [`Session::finish`] (measure, learn).
+//! A frame is [`Session::compose`] (gather, survey, choose), drawing by the caller, and [`Session::finish`] (measure, learn).
 //! Never here: windows, files, arguments.
 
 mod ahead;
@@ -26,11 +26,11 @@ use metachron_core::{AgentId, Body, SimTime};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// A scene in play.
+/// A running scene.
 pub struct Session {
     scene: Scene,
     machine: Machine,
-    /// What drawing costs on the declared machine.
+    /// Drawing costs on the declared machine.
     declared: Prices,
     run: Box<dyn Run>,
     stage: Stage,
@@ -48,70 +48,70 @@ pub struct Session {
     records: Vec<FrameRecord>,
     chosen: Chosen,
     last_start: Option<Duration>,
-    /// Where the camera was when it was last read, and when.
+    /// Time and position of the camera at its last reading.
     lens: Option<(Duration, Camera)>,
-    /// Where the next frame's camera will be when its picture is finished, as far as that can be known.
+    /// Predicted camera of the next frame at the time when its picture is finished.
     next_eye: Option<Camera>,
-    /// From reading the camera to the finished picture, seconds, smoothed.
+    /// Time from reading the camera to the finished picture, seconds, smoothed.
     lag_s: f64,
     /// When real time began to pass.
     begun: Duration,
     warm_up: usize,
     finished: u64,
     keep: usize,
-    /// Whether the usual prices of drawing stand in for the adapter's.
+    /// Whether default drawing prices replace those of the adapter.
     unpriced: bool,
-    /// Hears a line where the start takes its time.
+    /// Receives a line if start-up takes long.
     tell: fn(&str),
 }
 
-/// What a finished frame took.
+/// Times of a finished frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Finished {
     /// All work of the frame until its picture was finished.
     pub work: Duration,
-    /// Of it the drawing of the composed picture.
+    /// The part of it spent drawing the composed picture.
     pub draw: Duration,
-    /// The adapter's own time on the newest frame it has told of; `None` where it has no time stamps.
+    /// The adapter's own time for the newest frame that it has reported; `None` where it has no time stamps.
     pub gpu: Option<Duration>,
     /// Whether the controller must not learn from it.
     pub skip: bool,
 }
 
-/// What the last composition asks of the adapter, and what it took.
+/// Load of the last composition on the adapter, and its times.
 #[derive(Debug, Clone, Copy, Default)]
 struct Chosen {
     sim: SimTime,
     triangles: u64,
     more_triangles: f64,
-    /// Gathering states and finding what is seen.
+    /// Gathering states and finding visible objects.
     cull: Duration,
     /// Choosing levels before the picture is made.
     select: Duration,
-    /// Choosing the next frame's beside the drawing of this one.
+    /// Choosing those of the next frame during the drawing of this one.
     beside: Option<Duration>,
     /// Making the picture at these levels.
     build: Duration,
-    /// Triangles that nobody chose: fixed solids, the floor, the caps of tubes.
+    /// Triangles without a chosen level: fixed solids, the floor, the caps of tubes.
     other_triangles: f64,
     objects: u64,
-    /// What the chosen objects take on the declared machine, seconds.
+    /// Time of the chosen objects on the declared machine, seconds.
     objects_s: f64,
     /// Mean level.
     n: f64,
 }
 
-/// Frames at the start, in real time, that teach the controller nothing: shaders are compiled, caches are cold.
+/// First frames in real time, from which the controller does not learn: shaders are compiled, caches are cold.
 const WARM_UP_FRAMES: u64 = 3;
 
-/// The share of a new measurement in the smoothed lag.
+/// The weight of a new measurement in the smoothed lag.
 const LAG_NEWS: f64 = 0.2;
 
-/// Frames over which meshes change their level.
+/// Frames over which meshes blend to a new level.
 const GLIDE_FRAMES: u8 = 6;
 
 impl Session {
-    /// Makes the agents of `scene`; real time waits for [`Session::begin`].
+    /// Creates the agents of `scene`; real time is held until [`Session::begin`].
     ///
     /// # Errors
     /// [`SessionError::Build`] and [`SessionError::Run`]; nothing runs then.
@@ -158,7 +158,7 @@ impl Session {
         })
     }
 
-    /// The scene that is played.
+    /// The scene being played.
     #[must_use]
     pub const fn scene(&self) -> &Scene {
         &self.scene
@@ -188,7 +188,7 @@ impl Session {
         self.finished
     }
 
-    /// The newest frames that are remembered, at most `count`.
+    /// The newest stored frames, at most `count`.
     pub(super) fn newest_frames(&self, count: usize) -> &[FrameRecord] {
         &self.records[self.records.len().saturating_sub(count)..]
     }
@@ -199,12 +199,12 @@ impl Session {
         if self.is_virtual() { self.machine.cores.max(1) } else { real() }
     }
 
-    /// Remembers at least the newest `frames` frames from now on, and never twice as many: for runs without an end.
+    /// Stores at least the newest `frames` frames from now on, and fewer than twice as many: for runs without an end.
     pub const fn keep_frames(&mut self, frames: usize) {
         self.keep = frames;
     }
 
-    /// Wanted time between frames.
+    /// Target time between frames.
     #[must_use]
     pub fn period(&self) -> Duration {
         Duration::from_secs_f64(1.0 / self.control.target_hz())
@@ -221,13 +221,13 @@ impl Session {
         &mut self.control
     }
 
-    /// Says a line by `tell` where the start takes its time; else it says nothing.
+    /// Reports a long start-up through `tell`; without it nothing is reported.
     pub fn tell_by(&mut self, tell: fn(&str)) {
         self.tell = tell;
     }
 
-    /// Takes the prices of the adapter that draws, where they are known or can be measured; declared costs stay as they are.
-    /// `on_processor`: it is a processor that draws.
+    /// Applies the prices of the adapter that draws, if they are known or can be measured; declared costs stay as they are. `on_processor`:
+    /// the adapter draws on the processor.
     pub(super) fn calibrate(&mut self, (adapter, on_processor): (&str, bool), open: impl FnOnce() -> Option<Gpu>) {
         self.shares_processor |= on_processor;
         if self.control.policy().predicts() && !self.is_virtual() {
@@ -237,20 +237,20 @@ impl Session {
         }
     }
 
-    /// The name of the policy that chooses levels, as scenes write it.
+    /// The name of the policy that chooses levels, as written in scenes.
     #[must_use]
     pub fn policy_name(&self) -> &'static str {
         self.control.policy().name()
     }
 
-    /// Lets the policy of this name choose levels; an unknown name changes nothing.
+    /// Selects the policy by name; an unknown name changes nothing.
     pub fn set_policy(&mut self, name: &str) {
         if let Some(policy) = Policy::named(name) {
             self.control.set_policy(policy);
         }
     }
 
-    /// The name of the feedback law, as scenes write it.
+    /// The name of the feedback law, as written in scenes.
     #[must_use]
     pub fn law_name(&self) -> &'static str {
         match self.control.law() {
@@ -259,25 +259,25 @@ impl Session {
         }
     }
 
-    /// Says that the controller rests on a limit, and on which; `None` where it does not.
+    /// Message if the controller rests on a limit: which one; `None` if it does not.
     #[must_use]
     pub fn clamp(&self) -> Option<String> {
         let status = self.control.status();
         matches!(status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed).then(|| status.to_string())
     }
 
-    /// The force that the user's hand feels of an agent, newtons.
+    /// The force between the user spring and an agent, newtons.
     #[must_use]
     pub fn hand_force_n(&self, on: AgentId) -> f64 {
         let Some(state) = self.reader.newest().get(on.0 as usize) else { return 0.0 };
-        // nothing resists the leading of a tool; what the hand feels is what the tool holds
+        // nothing resists the driving of a tool; the force shown is its grasp force
         if let Body::Tool(tool) = &state.body {
             return tool.force_n;
         }
         state.grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()
     }
 
-    /// What can be seen.
+    /// All drawable objects.
     #[must_use]
     pub const fn stage(&self) -> &Stage {
         &self.stage
@@ -289,7 +289,7 @@ impl Session {
         self.stage.picture()
     }
 
-    /// What control was last told to be in view.
+    /// The objects last reported to control.
     #[must_use]
     pub(super) fn views(&self) -> &[ObjectView] {
         &self.views
@@ -301,7 +301,7 @@ impl Session {
         &self.levels
     }
 
-    /// The scene's own camera at this moment.
+    /// The scene's own camera now.
     #[must_use]
     pub fn scene_camera(&self) -> Camera {
         self.camera_at(self.sim_now().as_secs_f64())
@@ -313,19 +313,19 @@ impl Session {
         cast::camera(&self.scene, &self.stage, seconds)
     }
 
-    /// Waits until the wall time `until`, the agents going on meanwhile.
+    /// Waits until the wall time `until`, while the agents run.
     pub fn wait_until(&mut self, until: Duration) {
         self.run.wait_until(until);
     }
 
-    /// Lets real time wait for [`Session::begin`] again. Virtual time passes only where somebody waits for it.
+    /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
     pub fn hold(&mut self) {
         if !self.is_virtual() {
             self.run.drive(Drive::Pause);
         }
     }
 
-    /// Lets real time pass.
+    /// Starts real time.
     pub fn begin(&mut self) {
         if !self.is_virtual() {
             self.begun = self.now();
@@ -333,12 +333,12 @@ impl Session {
         }
     }
 
-    /// Changes the flow of time.
+    /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&mut self, drive: Drive) {
         self.run.drive(drive);
     }
 
-    /// Lets the user's hand pull at an agent, or let go. An agent that is gone takes no hand.
+    /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
     pub fn hand(&self, to: AgentId, pull: Option<Pull>) -> Result<(), runtime::SendError> {
         self.run.send(to, Command::Hand(pull))
     }
@@ -359,7 +359,7 @@ impl Session {
         record
     }
 
-    /// Ends a frame that counts for nothing: neither the report nor the controller hears of it.
+    /// Ends a frame that is not counted: it enters neither the report nor the controller.
     pub const fn pass_over(&mut self) {
         self.last_start = None;
     }
@@ -414,18 +414,18 @@ impl Session {
         }
     }
 
-    /// Takes the newest states without a frame: for their couplings.
+    /// Reads the newest states without a frame: for their couplings.
     pub(super) fn look(&mut self) {
         self.gather();
     }
 
-    /// What agents have done to each other so far.
+    /// Couplings between agents so far.
     #[must_use]
     pub fn couplings(&self) -> &[Coupling] {
         self.couplings.all()
     }
 
-    /// Writes down from now on where every agent is, to be compared with another run.
+    /// Records the states of all agents from now on, for comparison with another run.
     pub fn keep_trace(&mut self) {
         self.trace.get_or_insert_default();
     }

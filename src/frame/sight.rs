@@ -1,43 +1,43 @@
-//! How fine an agent's simulation need be for who looks at it.
+//! Resolution that an agent's simulation needs for the current view.
 //!
-//! In: what the camera sees of every actor. Out: for each agent that can be steered, the ε below which nobody can tell a difference.
-//! Never here: what the agent makes of it ([`crate::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
+//! In: what the camera sees of every actor. Out: for each steered agent, the ε below which no difference is visible. Never here: the
+//! agent's reaction to it ([`crate::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
 
 use super::purse::Tally;
 use crate::compositor::{Camera, Seen, Size};
 use std::sync::Arc;
 use std::time::Duration;
 
-/// Who looks at the agents that can be steered.
+/// Visibility of the steered agents.
 #[derive(Debug)]
 pub(super) struct Sight {
     watched: Vec<Watched>,
 }
 
-/// One of them, and when it was last in view.
+/// A steered agent, and when it was last in view.
 #[derive(Debug)]
 struct Watched {
     tally: Arc<Tally>,
     seen_at: Duration,
 }
 
-/// An object is out of sight when it has not been in view for so long: cameras turn back.
+/// An object counts as out of sight after it has not been in view for this long: cameras turn back.
 const GONE: Duration = Duration::from_secs(1);
 
 impl Sight {
-    /// Nobody has looked yet.
+    /// No agent has been in view yet.
     pub fn new(tallies: &[Arc<Tally>]) -> Self {
         let watch = |tally: &Arc<Tally>| Watched { tally: Arc::clone(tally), seen_at: Duration::ZERO };
         Self { watched: tallies.iter().map(watch).collect() }
     }
 
-    /// Takes what `camera` sees of all actors at the time `now`.
+    /// Takes the actors as `camera` sees them at the time `now`.
     pub fn look(&mut self, now: Duration, seen: &[Seen], camera: &Camera, size: Size) {
         if size.is_empty() {
             return;
         }
         for Watched { tally, seen_at } in &mut self.watched {
-            // what has no shape is not hidden: it is never shown
+            // an agent without a shape is never drawn, so it is not out of view either
             let Some(seen) = seen.get(tally.id().0 as usize).filter(|seen| seen.radius_m > 0.0) else { continue };
             if seen.visible {
                 *seen_at = now;
@@ -49,7 +49,7 @@ impl Sight {
     }
 }
 
-/// How wide a pixel is at the nearest point of an actor, metres.
+/// Width of a pixel at the nearest point of an actor, metres.
 fn pixel_m(seen: &Seen, camera: &Camera, size: Size) -> f64 {
     let depth_m = (seen.centre_m - camera.eye()).dot(camera.forward()) - seen.radius_m;
     1.0 / camera.pixels_per_metre(depth_m, size)

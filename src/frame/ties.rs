@@ -1,6 +1,6 @@
-//! The joints, couplings and faults of a scene as agents and the runtime want them.
+//! Converts the joints, couplings and faults of a scene for agents and the runtime.
 //!
-//! In: a [`Scene`]. Out: for each agent its laws, links, faults, and in whose world it begins. Never here: forces.
+//! In: a [`Scene`]. Out: for each agent its laws, links, faults, and the leader of the island in which it begins. Never here: forces.
 
 use crate::runtime::Faults;
 use crate::scene::ties::{Coupling, CouplingKind};
@@ -9,7 +9,7 @@ use metachron_contact::{Law, Link};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
-/// What ties every agent of a scene to others.
+/// The ties of all agents of a scene.
 pub(super) struct Ties {
     laws: BTreeMap<AgentId, Vec<(AgentId, Law)>>,
     attached: BTreeMap<AgentId, Vec<Link>>,
@@ -30,29 +30,29 @@ impl Ties {
         Self { laws, attached, leaders: leaders(scene) }
     }
 
-    /// By which laws contact of `id` and others goes, where that is not the ledger; one side of a pair has it.
+    /// The contact laws between `id` and its peers that are not the ledger; returned for one side of a pair.
     pub(super) fn laws(&mut self, id: AgentId) -> Vec<(AgentId, Law)> {
         self.laws.remove(&id).unwrap_or_default()
     }
 
-    /// The lasting couplings of `id`; one side of a pair has it.
+    /// The permanent links of `id`; returned for one side of a pair.
     pub(super) fn attached(&mut self, id: AgentId) -> Vec<Link> {
         self.attached.remove(&id).unwrap_or_default()
     }
 
-    /// In whose world `id` begins, where joints hold it to others or it lies against them: that of the lowest number among them.
+    /// The leader of the island in which `id` begins, if joints or resting contact connect it to others: the lowest number among them.
     pub(super) fn together(&self, id: AgentId) -> Option<AgentId> {
         self.leaders.get(id.0 as usize).copied().filter(|leader| *leader != id)
     }
 }
 
-/// What goes wrong on purpose, in the runtime's words.
+/// Converts injected faults to the runtime's type.
 pub(super) const fn faults(faults: crate::scene::ties::Faults) -> Faults {
     let crate::scene::ties::Faults { jitter, loss, seed } = faults;
     Faults { jitter, loss, seed }
 }
 
-/// Every pair with a law of its own; in a scene without contacts that is every pair of what has matter.
+/// Every pair with a law of its own; in a scene without contacts that is every pair of material objects.
 fn contact_laws(scene: &Scene) -> Vec<(AgentId, AgentId, Law)> {
     let contacts = scene.couplings.iter().filter(|c| c.kind == CouplingKind::Contact);
     let named: BTreeMap<_, _> = contacts.map(|c| ((c.a.min(c.b), c.a.max(c.b)), c.law)).collect();
@@ -71,13 +71,12 @@ fn link(coupling: &Coupling) -> Option<(AgentId, Link)> {
     Some((coupling.a, Link { other: coupling.b, here: at_a, there: at_b, stiffness_n_m, damping_n_s_m, rest_m, law }))
 }
 
-/// More bodies than this that are near each other begin in one world: below, an island solves them directly, and they come to
-/// it one by one.
+/// More bodies than this near each other begin in one island; with fewer, an island solves them directly, and they join it one by one.
 const HEAP_MIN: usize = 128;
 
-/// For each agent the lowest number among those that joints hold together with it, that it lies against at rest or that it
-/// makes a heap with: its own where there are none. A stack that starts standing must not first be dropped on itself, and
-/// a thousand bodies that will lie on each other in a moment must not first look at each other one by one.
+/// For each agent the lowest number among those that are connected to it by joints, by resting contact or as a heap: its own if there are
+/// none. A stack that starts at rest must not first be dropped on itself, and a thousand bodies about to touch must not first detect each
+/// other one by one.
 fn leaders(scene: &Scene) -> Vec<AgentId> {
     let mut above: Vec<usize> = (0..scene.agents.len()).collect();
     let jointed = scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?)));
@@ -85,7 +84,7 @@ fn leaders(scene: &Scene) -> Vec<AgentId> {
     (0..above.len()).map(|at| AgentId(root(&mut above, at) as u32)).collect()
 }
 
-/// The pairs of rigid bodies near each other of which more than [`HEAP_MIN`] hang together.
+/// The pairs of rigid bodies near each other that belong to clusters of more than [`HEAP_MIN`].
 fn heaps(scene: &Scene) -> Vec<(AgentId, AgentId)> {
     let mut pairs = scene.near_pairs();
     let mut above: Vec<usize> = (0..scene.agents.len()).collect();
@@ -96,13 +95,13 @@ fn heaps(scene: &Scene) -> Vec<(AgentId, AgentId)> {
     pairs
 }
 
-/// Both hang together from now on.
+/// Merges the clusters of both.
 fn join(above: &mut [usize], (a, b): (AgentId, AgentId)) {
     let (a, b) = (root(above, a.0 as usize), root(above, b.0 as usize));
     above[a.max(b)] = a.min(b);
 }
 
-/// Follows `above` to the top, and shortens the way.
+/// Finds the root in the union-find forest `above`, and shortens the path.
 fn root(above: &mut [usize], mut at: usize) -> usize {
     while above[at] != at {
         above[at] = above[above[at]];

@@ -1,4 +1,4 @@
-//! Where agents were in a run, state by state, to be compared with another run of the same scene.
+//! Records the states of agents in a run, for comparison with another run of the same scene.
 //!
 //! In: the newest states. Out: a [`Trace`]. Never here: the comparison.
 
@@ -9,17 +9,17 @@ use metachron_core::{AgentId, Body, CurveState, SimTime, Snapshot};
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Material points of a tube that are written down, evenly from start to end.
+/// Recorded material points of a tube, evenly from start to end.
 const TUBE_POINTS: u32 = 9;
 
-/// Where agents were in a run.
+/// States of the agents in a run.
 #[derive(Debug, Clone, Default)]
 pub struct Trace {
     pub(super) states: Vec<Traced>,
     last: Vec<Option<SimTime>>,
-    /// Impulses that pairs had exchanged in all, by the coupling's number and the time of the run, each time that one had grown.
+    /// Total impulses exchanged, with the time of the run and the index of the coupling, whenever one has grown.
     exchanged: Vec<(SimTime, usize, f64)>,
-    /// The newest of them, coupling by coupling.
+    /// The newest of them, per coupling.
     newest: Vec<f64>,
 }
 
@@ -27,7 +27,7 @@ pub struct Trace {
 #[derive(Debug, Clone)]
 pub(super) struct Traced {
     pub(super) agent: AgentId,
-    /// The moment of the scene that it belongs to, which is the agent's own time unless it has been put off.
+    /// Its moment in scene time: the agent's own time plus the time it was put off.
     pub(super) moment: SimTime,
     pub(super) points_m: Vec<DVec3>,
     /// Linear momentum, N·s.
@@ -35,8 +35,8 @@ pub(super) struct Traced {
 }
 
 impl Trace {
-    /// Writes down every state that is of a later moment of the scene than the last one of its agent; the agent's own time may go back,
-    /// when it takes another one for its own.
+    /// Records every state whose scene time is later than the last one of its agent; the agent's own time may go back when it adopts
+    /// another.
     pub(super) fn note(&mut self, scene: &Scene, newest: &[Arc<Snapshot>]) {
         self.last.resize(newest.len(), None);
         for ((member, snapshot), last) in scene.agents.iter().zip(newest).zip(&mut self.last) {
@@ -51,7 +51,7 @@ impl Trace {
         }
     }
 
-    /// Writes down what couplings, always in the same order, have exchanged by `now`.
+    /// Records the impulses exchanged by `now`, for couplings that are always in the same order.
     pub(super) fn note_couplings(&mut self, now: SimTime, all: &[Coupling]) {
         for (at, coupling) in all.iter().enumerate() {
             if self.newest.get(at) != Some(&coupling.impulse_n_s) {
@@ -62,7 +62,7 @@ impl Trace {
         }
     }
 
-    /// Those of `all` that were there by `time`, with the impulses that they had exchanged by then.
+    /// The couplings of `all` that existed by `time`, with the impulses exchanged by then.
     pub(super) fn couplings_by(&self, time: SimTime, all: &[Coupling]) -> Vec<Coupling> {
         let mut by_then = BTreeMap::new();
         by_then.extend(self.exchanged.iter().take_while(|one| one.0 <= time).map(|&(_, at, impulse)| (at, impulse)));
@@ -71,13 +71,13 @@ impl Trace {
     }
 }
 
-/// The material points of a body that are compared, and their velocities.
+/// The compared material points of a body, and their velocities.
 pub(super) fn points(body: &Body) -> impl Iterator<Item = (DVec3, DVec3)> {
     let count = if matches!(body, Body::Curve(_)) { TUBE_POINTS } else { 1 };
     (0..count).filter_map(move |k| body.probe(f64::from(k) / f64::from(TUBE_POINTS - 1)))
 }
 
-/// Linear momentum of an agent in the state `body`, N·s; zero for what has no mass.
+/// Linear momentum of an agent in the state `body`, N·s; zero for an agent without mass.
 pub(super) fn momentum(spec: &Spec, body: &Body) -> DVec3 {
     match (spec, body) {
         (Spec::Rigid(spec), Body::Rigid(state)) => state.velocity * spec.mass_kg,
@@ -121,7 +121,7 @@ mod tests {
             ..Snapshot::default()
         };
         let mut trace = Trace::default();
-        // on time; put off by 0.3 s, told twice; the next step; on time again
+        // on time; put off by 0.3 s, published twice; the next step; on time again
         for one in [(1000, 0), (710, 300), (710, 300), (720, 300), (1030, 0)] {
             trace.note(&scene, &[Arc::new(state(one))]);
         }

@@ -1,7 +1,7 @@
-//! Tuning while a window shows the scene: an experiment on its own frames, then a search on a thread of its own.
+//! Tuning while a window shows the scene: an experiment on its own frames, then a search on its own thread.
 //!
-//! In: frames of a session, one after the other. Out: how far it is, and in the end gains or a reason why there are none. Until then the
-//! session is as it was before, but for the experiment's frames. Never here: a window, what good gains are ([`crate::tune`] says).
+//! In: frames of a session, one after the other. Out: the progress, and finally gains or a reason why there are none. Until then the
+//! session stays as it was, except during the experiment's frames. Never here: a window, what good gains are ([`crate::tune`] says).
 
 use super::experiment::Design;
 use super::session::Session;
@@ -14,14 +14,14 @@ use std::thread::JoinHandle;
 
 /// Frames of the experiment: five seconds at thirty a second.
 const FRAMES: u64 = 150;
-/// The share of the whole that the experiment is told as.
+/// The share of the total progress assigned to the experiment.
 const EXPERIMENT: f64 = 0.4;
-/// What a search beside a running scene plays: one thread, the rest is the agents'.
+/// Extent of a search while the scene runs: one thread, the rest is left to the agents.
 const EXTENT: Extent = Extent { threads: NonZero::new(1), ..Extent::QUICK };
 
-/// A tuning under way.
+/// A tuning in progress.
 pub(super) struct Tuning {
-    /// What held the picture before.
+    /// Policy and law before the tuning.
     before: (Policy, Law),
     target_hz: f64,
     stage: Stage,
@@ -30,7 +30,7 @@ pub(super) struct Tuning {
 enum Stage {
     /// Frames are drawn at many resolutions.
     Drawing(Design),
-    /// Gains are looked for.
+    /// Gains are searched.
     Searching(Searching),
 }
 
@@ -40,7 +40,7 @@ struct Searching {
     news: Arc<News>,
 }
 
-/// What the search and the window tell each other.
+/// Data shared by the search and the window.
 #[derive(Default)]
 struct News {
     stopped: AtomicBool,
@@ -48,37 +48,37 @@ struct News {
     told: Mutex<(f64, String)>,
 }
 
-/// What came of it.
+/// Result of a tuning.
 pub(super) enum Tuned {
-    /// These gains are the best that were found.
+    /// The best gains found.
     Found(Verdict),
-    /// There are none, for this reason.
+    /// No gains, for this reason.
     Refused(String),
 }
 
 impl Tuning {
-    /// Begins with the experiment.
+    /// Starts with the experiment.
     pub fn begin(control: &mut PictureControl) -> Self {
         let (before, target_hz) = ((control.policy(), control.law()), control.target_hz());
         Self { before, target_hz, stage: Stage::Drawing(Design::begin(control, FRAMES)) }
     }
 
-    /// Whether the frames belong to the experiment, and must not teach the controller.
+    /// Whether the frames belong to the experiment; the controller must not learn from them.
     pub const fn draws(&self) -> bool {
         matches!(self.stage, Stage::Drawing(_))
     }
 
-    /// Brings the controller to where the next frame is to be drawn.
+    /// Sets the controller to the resolution of the next frame.
     pub fn choose(&mut self, control: &mut PictureControl) {
         if let Stage::Drawing(design) = &mut self.stage {
             design.choose(control);
         }
     }
 
-    /// Writes down a frame of the experiment; after its last the search begins and the session is as before.
+    /// Records a frame of the experiment; after its last frame the search starts and the session is restored.
     ///
     /// # Errors
-    /// Where no thread can be had.
+    /// If no thread can be created.
     pub fn note(&mut self, session: &mut Session, work_s: f64) -> std::io::Result<()> {
         let Stage::Drawing(design) = &mut self.stage else { return Ok(()) };
         design.note(session, work_s);
@@ -91,22 +91,22 @@ impl Tuning {
         Ok(())
     }
 
-    /// Puts back what held the picture before.
+    /// Restores the previous policy and law.
     fn restore(&self, control: &mut PictureControl) {
         control.set_law(self.before.1);
         control.set_policy(self.before.0);
     }
 
-    /// Stops; the session is as before.
+    /// Stops; the session is restored.
     pub fn stop(self, control: &mut PictureControl) {
         match &self.stage {
             Stage::Drawing(_) => self.restore(control),
-            // it ends with its candidate, by itself
+            // the search ends by itself after its present candidate
             Stage::Searching(searching) => searching.news.stopped.store(true, Ordering::Relaxed),
         }
     }
 
-    /// The share that is done, and words beside it.
+    /// The share that is done, and a description.
     pub fn progress(&self) -> (f64, String) {
         match &self.stage {
             Stage::Drawing(design) => (EXPERIMENT * design.done(), "drawing at many resolutions".to_owned()),
@@ -117,12 +117,12 @@ impl Tuning {
         }
     }
 
-    /// Whether the search is over.
+    /// Whether the search has ended.
     pub fn is_over(&self) -> bool {
         matches!(&self.stage, Stage::Searching(searching) if searching.hand.is_finished())
     }
 
-    /// What came of it; waits for a search that is not over.
+    /// The result; waits for a search that has not ended.
     pub fn end(self) -> Tuned {
         let Stage::Searching(searching) = self.stage else { return Tuned::Refused("it was not over".to_owned()) };
         match searching.hand.join() {
@@ -143,7 +143,7 @@ impl Searching {
     }
 }
 
-/// The best gains of the corrected law for what was observed.
+/// The best gains of the corrected law for the observed frames.
 fn find(observed: &[Observed], target_hz: f64, news: &News) -> Result<Verdict, String> {
     let plant = Plant::identify(observed).map_err(|why| why.to_string())?;
     if let Some(why) = refusal(&plant, target_hz) {
@@ -157,7 +157,7 @@ fn find(observed: &[Observed], target_hz: f64, news: &News) -> Result<Verdict, S
     search(&mut setting, Family::Corrected).map(|found| found.best).ok_or_else(|| "nothing could be judged".to_owned())
 }
 
-/// Gains and what they are worth, in one line.
+/// Gains and their performance, in one line.
 pub(super) fn told(verdict: &Verdict) -> String {
     let settles = verdict.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
     let late = 100.0 * verdict.miss_share;

@@ -1,8 +1,8 @@
-//! A scene seen along its camera's path, frame by frame: each frame at its own place, however long the one before took.
+//! A scene seen along its camera's path, frame by frame: each frame at its own place, however long the previous one took.
 //!
-//! In: a scene, what draws. Out: a record and a picture of every frame. Never here: what the numbers mean.
-//! Time stands still for agents; only the camera moves. So all policies see the same frames, on any machine.
-//! In lockstep a frame takes what it is declared to, and who draws draws only the pictures that are asked for.
+//! In: a scene, the means of drawing. Out: a record and a picture of every frame. Never here: what the numbers mean.
+//! Agents are paused; only the camera moves. So all policies see the same frames, on any machine.
+//! In lockstep a frame takes its declared time, and only the requested pictures are drawn.
 
 use super::error::SessionError;
 use super::headless::{Drawing, frame_seen_by};
@@ -18,7 +18,7 @@ pub struct Walk {
     drawing: Drawing,
     size: Size,
     length_s: f64,
-    /// Who saw the last frame.
+    /// Camera of the last frame.
     camera: Camera,
 }
 
@@ -39,12 +39,12 @@ impl Walk {
         Ok(Self { session, drawing, size, length_s, camera })
     }
 
-    /// The scene in play: for another policy, another target.
+    /// The session: to change its policy or target.
     pub const fn session(&mut self) -> &mut Session {
         &mut self.session
     }
 
-    /// Plays what is seen at a part of the path, 0 … 1; the controller learns from it.
+    /// Plays the frame at a fraction of the path, 0 … 1; the controller learns from it.
     ///
     /// # Errors
     /// [`SessionError::Draw`] where the adapter fails.

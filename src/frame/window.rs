@@ -1,4 +1,4 @@
-//! A session in a window: what the viewer asks for reaches the rooms, what the rooms say reaches the viewer.
+//! A session in a window: passes the viewer's actions to the session, and its state to the viewer.
 //!
 //! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
 
@@ -23,13 +23,13 @@ use std::time::{Duration, Instant};
 
 /// A run in a window.
 pub struct WindowPlan {
-    /// Where the scene came from, so that it can be read again.
+    /// The source of the scene, so that it can be read again.
     pub source: Source,
-    /// Values that were laid over it.
+    /// Values that override those of the scene.
     pub overrides: Vec<(String, String)>,
-    /// Width and height of the window, points; `None` opens it as it was closed last time.
+    /// Width and height of the window, points; `None` restores the size at its last closing.
     pub size: Option<[f32; 2]>,
-    /// Where screenshots go.
+    /// Folder for screenshots.
     pub screenshots: PathBuf,
     /// Simulated seconds after which the window closes by itself.
     pub seconds: Option<f64>,
@@ -37,24 +37,24 @@ pub struct WindowPlan {
     pub frames: Option<u64>,
 }
 
-/// Why a window could not be shown; the session is given back where it can go on without one.
+/// Reason why a window could not be shown; the session is returned if it can continue without one.
 pub enum WindowFailure {
     /// There is no display or no adapter for one.
     NoWindow(Box<Session>, WindowError),
-    /// The window was open, and its display is gone: what the run came to until then.
+    /// The window was open, and its display is gone: the outcome of the run until then.
     Gone(Box<Outcome>, WindowError),
-    /// A scene could not be started again.
+    /// A scene could not be restarted.
     Session(SessionError),
 }
 
-/// Shows `session` in a window until it is closed, or until `go_on`, asked many times a second whether or not anything is
-/// drawn, says no. It is told of the last frame, and of how much of the run is done where the run has an end.
+/// Shows `session` in a window until it is closed, or until `go_on`, called many times a second whether or not anything is drawn, returns
+/// `false`. `go_on` receives the last frame, and the share of the run that is done if the run has an end.
 ///
-/// The outcome is that of the last start: a reset begins a new run. Frames drawn while time stands still or the window is
-/// hidden are no part of it, and of a run without an end at least the newest [`FRAMES_KEPT`] are.
+/// The outcome is that of the last start: a reset begins a new run. Frames drawn while time is paused or the window is hidden are left out,
+/// and of a run without an end at least the newest [`FRAMES_KEPT`] are included.
 ///
 /// # Errors
-/// [`WindowFailure::NoWindow`] gives the session back, its time standing still, [`WindowFailure::Gone`] the outcome.
+/// [`WindowFailure::NoWindow`] returns the session with its time paused, [`WindowFailure::Gone`] the outcome.
 pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
     let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
     let mut show = WindowShow::new(session, plan, go_on);
@@ -67,7 +67,7 @@ pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Re
     }
 }
 
-/// Told of the last frame and of the share that is done, 0 … 1, of a run that has an end; answers whether to go on.
+/// Receives the last frame and the share that is done, 0 … 1, of a run that has an end; returns whether to continue.
 pub type GoOn<'a> = &'a mut dyn FnMut(&FrameRecord, Option<f64>) -> bool;
 
 /// A session as the viewer sees it.
@@ -83,7 +83,7 @@ struct WindowShow<'a> {
     hand: Option<Hand>,
     tuning: Option<Tuning>,
     started: Duration,
-    /// What drawing took of the declared frame.
+    /// Drawing time within the declared frame.
     declared_draw: Duration,
     refreshed: Option<Duration>,
     last: FrameRecord,
@@ -92,21 +92,21 @@ struct WindowShow<'a> {
     running: bool,
 }
 
-/// Frames that a run without an end remembers: an hour at 30 frames a second, some 10 MB.
+/// Frames stored of a run without an end: an hour at 30 frames a second, some 10 MB.
 pub const FRAMES_KEPT: usize = 108_000;
-/// Panels are filled anew this often: faster, nobody reads them.
+/// Update period of the panels: faster is not readable.
 const PANELS_EVERY: Duration = Duration::from_millis(100);
-/// A message stays this long: time to read a long line twice.
+/// How long a message stays: time to read a long line twice.
 const MESSAGE_STAYS: Duration = Duration::from_secs(12);
-/// How fast a held body swings on the user's spring, rad/s: firm, and slow enough for every agent's step.
+/// Angular frequency of a body on the user spring, rad/s: firm, and slow enough for every agent's step.
 const HAND_RAD_S: f64 = 25.0;
-/// Share of critical damping of the user's spring.
+/// Fraction of critical damping of the user spring.
 const HAND_DAMPING: f64 = 0.7;
 
 impl<'a> WindowShow<'a> {
     fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
         session.keep_frames(kept(&plan));
-        // nothing happens before there is somebody to see it
+        // time is paused until the window shows the scene
         session.drive(Drive::Pause);
         let mut show = Self {
             go_on,
@@ -131,7 +131,7 @@ impl<'a> WindowShow<'a> {
         show
     }
 
-    /// Plays `scene` from its beginning instead; speed and pause stay.
+    /// Restarts with `scene`; speed and pause are kept.
     fn restart(&mut self, scene: Scene) {
         match Session::open(scene) {
             Ok(session) => self.replace(session),
@@ -161,7 +161,7 @@ impl<'a> WindowShow<'a> {
         self.refresh();
     }
 
-    /// The same scene from its beginning, under the target, policy, law and sliders that the user has set.
+    /// Restarts the same scene, under the target, policy, law and sliders set by the user.
     fn reset(&mut self) {
         let policy = self.session.policy_name();
         let control = self.session.control();
@@ -176,7 +176,7 @@ impl<'a> WindowShow<'a> {
         self.refresh();
     }
 
-    /// Lets time pass for the first time, unless the user has said otherwise.
+    /// Starts time, unless the user has paused it.
     fn begin(&mut self) {
         match (self.running, self.session.is_virtual()) {
             (true, true) => self.session.drive(Drive::Run),
@@ -251,14 +251,14 @@ impl<'a> WindowShow<'a> {
         self.tuning = Some(Tuning::begin(self.session.control()));
     }
 
-    /// Stops looking for gains, where anybody does: what holds the picture is as it was.
+    /// Stops a tuning in progress: policy and law are restored.
     fn stop_tuning(&mut self) {
         if let Some(tuning) = self.tuning.take() {
             tuning.stop(self.session.control());
         }
     }
 
-    /// Takes the gains of a search that is over.
+    /// Applies the gains of a search that has ended.
     fn take_gains(&mut self) {
         let Some(tuning) = self.tuning.take_if(|tuning| tuning.is_over()) else { return };
         match tuning.end() {
@@ -273,7 +273,7 @@ impl<'a> WindowShow<'a> {
         }
     }
 
-    /// Lets the experiment have its frame.
+    /// Passes the frame to the experiment.
     fn note_frame(&mut self) {
         let Some(tuning) = &mut self.tuning else { return };
         if let Err(error) = tuning.note(&mut self.session, 1e-3 * self.last.frame_ms) {
@@ -282,14 +282,14 @@ impl<'a> WindowShow<'a> {
         }
     }
 
-    /// How much of a run that ends by itself is done, 0 … 1.
+    /// The share that is done of a run that ends by itself, 0 … 1.
     fn share_done(&self) -> Option<f64> {
         let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
         let seconds = self.plan.seconds.map(|all| self.session.sim_now().as_secs_f64() / all);
         frames.or(seconds)
     }
 
-    /// Fills the panels anew where their time has come.
+    /// Updates the panels when they are due.
     fn refresh(&mut self) {
         let now = self.session.now();
         if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
@@ -300,7 +300,7 @@ impl<'a> WindowShow<'a> {
         self.refreshed = Some(now);
     }
 
-    /// Lets the time of one frame pass where it does not pass by itself.
+    /// Lets virtual time pass by one frame; real time passes by itself.
     fn pass_time(&mut self) {
         let now = self.session.now();
         let next = self.started + self.session.period();
@@ -309,7 +309,7 @@ impl<'a> WindowShow<'a> {
     }
 }
 
-/// What is wrong with a scene in one line: where it begins, and how much more there is.
+/// The problems of a scene in one line: the first one, and how many more there are.
 fn first_problem(error: &SceneError) -> String {
     let Some(first) = error.problems.first() else { return error.to_string() };
     let line = if first.line == 0 { String::new() } else { format!(", line {}", first.line) };
@@ -320,7 +320,7 @@ fn first_problem(error: &SceneError) -> String {
     format!("{}{line}: {first}{more}", error.name)
 }
 
-/// Frames that a run of this plan remembers: all where it ends by itself.
+/// Frames stored in a run of this plan: all if it ends by itself.
 const fn kept(plan: &WindowPlan) -> usize {
     if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
 }
@@ -415,7 +415,7 @@ impl Show for WindowShow<'_> {
 
     fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
         self.adapter = Some(adapter.to_owned());
-        // the same adapter without a window: the benchmark needs a device that nobody else draws with
+        // the same adapter without a window: the benchmark needs a device of its own
         self.session.calibrate((adapter, on_processor), || Gpu::headless().ok());
     }
 

@@ -1,7 +1,7 @@
-//! What an agent's life costs and how well it keeps its time: numbers any thread reads at any moment.
+//! Metrics of an agent: the cost of its turns and how well it keeps its time, readable from any thread at any moment.
 //!
-//! In: turns, from the one who makes them. Out: [`AgentStats`]. Each number is one atomic word: whole in itself, and as new as
-//! the last turn. Never here: locks on the side of the agent, printing.
+//! In: turns, from the thread that makes them. Out: [`AgentStats`]. Each number is one atomic word: consistent in itself, and as new as the
+//! last turn. Never here: locks on the agent's side, printing.
 
 use super::pace::Pace;
 use super::times::Times;
@@ -10,32 +10,32 @@ use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, OnceLock};
 use std::time::Duration;
 
-/// What an agent does now.
+/// State of an agent's execution.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum AgentState {
     /// It steps.
     Running,
-    /// It has come to rest and takes no steps until it is woken.
+    /// It is at rest and takes no steps until it is woken.
     Resting,
-    /// It gave up, for this reason; its last snapshot stands.
+    /// It was parked for this reason; its last snapshot remains.
     Parked(String),
 }
 
-/// Two percentiles and the largest of some times, seconds.
+/// Two percentiles and the maximum of a set of times, seconds.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Spread {
-    /// Half of them are at most this, to 2 %.
+    /// The median, to 2 %.
     pub p50_s: f64,
-    /// 99 in 100 are at most this, to 2 %.
+    /// The 99th percentile, to 2 %.
     pub p99_s: f64,
-    /// None is above this; 16.8 s stands for all that is longer.
+    /// The maximum; longer times than 16.8 s count as 16.8 s.
     pub max_s: f64,
 }
 
-/// How an agent has fared so far.
+/// Statistics of an agent so far.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AgentStats {
-    /// Which agent.
+    /// The agent.
     pub id: AgentId,
     /// Its name in the scene.
     pub name: Arc<str>,
@@ -43,11 +43,11 @@ pub struct AgentStats {
     pub model: &'static str,
     /// Steps taken.
     pub steps: u64,
-    /// Steps a simulated second over the last half second; zero at rest and when parked.
+    /// Steps per simulated second over the last half second; zero at rest and when parked.
     pub rate_hz: f64,
-    /// Steps a simulated second over its whole waking life.
+    /// Steps per simulated second over all time that it was awake.
     pub mean_hz: f64,
-    /// Steps a simulated second the scene wants.
+    /// Steps per simulated second requested by the scene.
     pub wanted_hz: f64,
     /// The present step length.
     pub dt: SimSpan,
@@ -55,29 +55,29 @@ pub struct AgentStats {
     pub resolution: Option<Resolution>,
     /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
     pub work_s: f64,
-    /// Work of the steps that it made, in its model's unit.
+    /// Work of its steps so far, in its model's unit.
     pub work: f64,
-    /// CPU time of its turns so far, seconds; really measured, in lockstep too.
+    /// CPU time of its turns so far, seconds; measured, in lockstep too.
     pub cpu_s: f64,
-    /// How old its newest state was when a reader used it ([`super::AgentHandle::record_age`]).
+    /// Age of its newest state when a reader used it ([`super::AgentHandle::record_age`]).
     pub age: Spread,
-    /// How late its turns began after their release, wall time.
+    /// Delay between the release of its turns and their start, wall time.
     pub late: Spread,
-    /// Turns that were not published before the end of their step.
+    /// Turns published after the end of their step.
     pub misses: u64,
-    /// Simulated time given up because it could not be made up.
+    /// Simulated time dropped because it could not be made up.
     pub dropped: SimSpan,
     /// Simulated time at rest.
     pub rested: SimSpan,
-    /// What it does now.
+    /// State of its execution.
     pub state: AgentState,
     /// Mechanical energy of the newest state, joules.
     pub energy_j: f64,
     /// Estimated error of the newest state, metres.
     pub residual_m: f64,
-    /// The part of it that its steps made, metres.
+    /// The part of it caused by its time steps, metres.
     pub drift_m: f64,
-    /// Who makes its turns, on his own thread and clock, because the two share a world; `None` where it makes them itself.
+    /// The leader that makes its turns, on the leader's thread and clock, because the two share an island; `None` if it makes them itself.
     pub led_by: Option<AgentId>,
 }
 
@@ -99,7 +99,7 @@ const RUNNING: u8 = 0;
 const RESTING: u8 = 1;
 const PARKED: u8 = 2;
 
-/// The readable side of an agent's account.
+/// The readable side of an agent's metrics.
 #[derive(Debug, Default)]
 pub(super) struct Gauges {
     pub steps: AtomicU64,
@@ -138,7 +138,7 @@ impl Gauges {
         self.state.store(if resting { RESTING } else { RUNNING }, Relaxed);
     }
 
-    /// Parks for good; the first reason stands.
+    /// Parks the agent for good; the first reason is kept.
     pub fn park(&self, reason: String) {
         self.reason.get_or_init(|| reason);
         self.state.store(PARKED, Relaxed);
@@ -156,13 +156,13 @@ impl Gauges {
     }
 }
 
-/// Over how much simulated time the recent rate is counted.
+/// Window of the recent rate, simulated time.
 const RATE_WINDOW: SimSpan = SimSpan::from_nanos(500_000_000);
 
-/// The share of a new value in a smoothed one: about eight values count.
+/// The weight of a new value in a smoothed one: about eight values count.
 pub(super) const SMOOTHING: f64 = 0.125;
 
-/// The writing side of an agent's account, kept by whoever makes its turns.
+/// The writing side of an agent's metrics, owned by the thread that makes its turns.
 #[derive(Debug)]
 pub(super) struct Diary {
     steps: u64,
@@ -173,7 +173,7 @@ pub(super) struct Diary {
     first_window: bool,
 }
 
-/// A turn, as the diary wants it.
+/// A turn, as recorded in the metrics.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Entry {
     /// Simulated time at the turn's end.
@@ -182,7 +182,7 @@ pub(super) struct Entry {
     pub late: Duration,
     /// Whether it was published after the end of its step.
     pub missed: bool,
-    /// What it took, seconds.
+    /// Its duration, seconds.
     pub work_s: f64,
 }
 
@@ -192,17 +192,17 @@ impl Diary {
         Self { steps: 0, misses: 0, late: Times::default(), work_s: None, window, first_window: true }
     }
 
-    /// Steps written down so far.
+    /// Steps recorded so far.
     pub const fn steps(&self) -> u64 {
         self.steps
     }
 
-    /// Reads a word of what a turn will write to ([`super::fetch`]).
+    /// Reads a word of the memory that a turn will write to ([`super::fetch`]).
     pub fn fetch(&self) {
         self.late.fetch();
     }
 
-    /// Writes a turn down.
+    /// Records a turn.
     pub fn write(&mut self, gauges: &Gauges, pace: &Pace, entry: Entry) {
         self.steps += 1;
         self.misses += u64::from(entry.missed);
@@ -219,19 +219,19 @@ impl Diary {
         self.count_rate(gauges, entry.now);
     }
 
-    /// Writes down what is read off the pace.
+    /// Publishes the values of the pace.
     pub fn pace(&self, gauges: &Gauges, pace: &Pace) {
         gauges.dt.store(pace.dt().as_nanos(), Relaxed);
         gauges.dropped.store(pace.dropped().as_nanos(), Relaxed);
         gauges.rested.store(pace.rested().as_nanos(), Relaxed);
     }
 
-    /// Starts to count the rate afresh, after a rest.
+    /// Restarts the measurement of the rate, after a rest.
     pub fn restart(&mut self, now: SimTime) {
         self.window = (now, self.steps);
     }
 
-    /// Brings the percentiles up to date: they are too dear for every turn.
+    /// Updates the percentiles: too expensive for every turn.
     pub fn flush(&self, gauges: &Gauges) {
         gauges.set_late(self.late.spread());
     }

@@ -1,9 +1,9 @@
-//! Calls the workers of a pool: which agents were summoned, and who sleeps that could look after them.
+//! Wake-up of a pool's workers: which agents were summoned, and which sleeping worker can serve them.
 //!
-//! In: summons from any thread. Out: the agents that were summoned, once, to the first worker that looks.
-//! Nobody waits for anybody, and a summons is never lost: who rings marks the agent first and looks for sleepers after; who
-//! goes to sleep says so first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
-//! Never here: what a worker does for those it finds, how long it sleeps.
+//! In: summons from any thread. Out: the summoned agents, once, to the first worker that looks.
+//! No thread blocks another, and no summons is lost: the caller marks the agent first and looks for sleepers after; a worker declares
+//! itself asleep first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
+//! Never here: what a worker does with the summoned agents, how long it sleeps.
 
 use super::sync::Mutex;
 use super::sync::atomic::{
@@ -16,16 +16,16 @@ use metachron_core::AgentId;
 use std::sync::PoisonError;
 use std::time::Duration;
 
-/// The marks of all agents and the beds of all workers.
+/// The marks of all agents and the sleep states of all workers.
 #[derive(Debug)]
 pub(super) struct Bell {
-    /// A bit an agent.
+    /// One bit per agent.
     marks: Vec<AtomicU64>,
     rung: AtomicBool,
     beds: Vec<Bed>,
 }
 
-/// Where one worker sleeps.
+/// Sleep state of one worker.
 #[derive(Debug, Default)]
 struct Bed {
     asleep: AtomicBool,
@@ -59,24 +59,24 @@ impl Bell {
         self.rouse();
     }
 
-    /// Wakes one worker that sleeps, if any does.
+    /// Wakes one sleeping worker, if there is one.
     pub fn rouse(&self) {
         if let Some(bed) = self.beds.iter().find(|bed| bed.asleep.load(Relaxed) && bed.asleep.swap(false, AcqRel)) {
             bed.wake();
         }
     }
 
-    /// Makes every worker look around, whether it sleeps or is about to.
+    /// Makes every worker check for work, whether it sleeps or is about to.
     pub fn rouse_all(&self) {
         self.beds.iter().for_each(Bed::wake);
     }
 
-    /// Whether somebody was summoned since the last [`Self::answer`].
+    /// Whether any agent was summoned since the last [`Self::answer`].
     pub fn has_rung(&self) -> bool {
         self.rung.load(Acquire)
     }
 
-    /// Visits those who were summoned since the last call, by rising numbers; says how many they were.
+    /// Visits the agents summoned since the last call, by rising numbers; returns their count.
     pub fn answer(&self, mut visit: impl FnMut(AgentId)) -> usize {
         if !self.rung.swap(false, AcqRel) {
             return 0;
@@ -93,7 +93,7 @@ impl Bell {
         count
     }
 
-    /// Sleeps as worker `at` for `span` (`None`: without end), but not if somebody was summoned. It may wake early.
+    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was summoned. It may wake early.
     pub fn sleep(&self, at: usize, span: Option<Duration>) {
         let Some(bed) = self.beds.get(at) else { return };
         bed.asleep.store(true, Relaxed);

@@ -1,17 +1,17 @@
-//! Wall time: how long the run has lasted.
+//! Wall time since the start of the run.
 //!
-//! Out: a [`Duration`] since the run's start that never falls. Never here: simulated time, dates.
+//! Out: a [`Duration`] since the run's start that never decreases. Never here: simulated time, dates.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// Tells how long a run has lasted.
+/// Measures how long a run has lasted.
 pub trait Clock: Send + Sync {
-    /// Wall time since the run's start; never less than it was.
+    /// Wall time since the run's start; never decreases.
     fn now(&self) -> Duration;
 }
 
-/// The machine's monotonic clock, zero when it was made.
+/// The machine's monotonic clock, zero at its creation.
 #[derive(Debug, Clone, Copy)]
 pub struct SystemClock {
     start: Instant,
@@ -37,7 +37,7 @@ impl Clock for SystemClock {
     }
 }
 
-/// A clock that stands still until it is told to go on: for tests and replay.
+/// A clock that moves only by [`Self::advance`]: for tests and replay.
 #[derive(Debug, Default)]
 pub struct ManualClock {
     nanos: AtomicU64,
@@ -50,7 +50,7 @@ impl ManualClock {
         Self::default()
     }
 
-    /// Lets `span` pass; spans add up to 584 years.
+    /// Advances by `span`; spans add up to 584 years.
     pub fn advance(&self, span: Duration) {
         self.nanos.fetch_add(u64::try_from(span.as_nanos()).unwrap_or(u64::MAX), Ordering::SeqCst);
     }
@@ -62,7 +62,7 @@ impl Clock for ManualClock {
     }
 }
 
-/// Sleeps until it is `until` by `clock`.
+/// Sleeps until `clock` reads `until`.
 pub(super) fn wait_until(clock: &dyn Clock, until: Duration) {
     loop {
         let left = until.saturating_sub(clock.now());

@@ -1,7 +1,7 @@
-//! CPU time of turns, read from the thread's clock once a batch: the clock costs as much as a small step.
+//! CPU time of turns, read from the thread's clock once per batch: reading the clock costs as much as a small step.
 //!
-//! In: the wall time of each turn of a batch. Out: which share of it the thread really computed. A turn that was interrupted
-//! took long on the wall and little of the CPU: the batch's share corrects for it. Never here: who made the turns.
+//! In: the wall time of each turn of a batch. Out: the share of it that was CPU time. A turn that was interrupted took long wall time and
+//! little CPU time: the batch's share corrects for it. Never here: which agents made the turns.
 
 use cpu_time::ThreadTime;
 use std::time::{Duration, Instant};
@@ -17,18 +17,18 @@ pub(super) struct CpuBatch {
 /// When a batch was opened.
 #[derive(Debug, Clone, Copy)]
 struct Opened {
-    /// On the thread's clock; `None` where the system does not tell, and wall time must do.
+    /// On the thread's clock; `None` if the system does not provide it, and wall time is used instead.
     cpu: Option<Duration>,
     wall: Instant,
 }
 
-/// A batch of so many turns is closed.
+/// A batch is closed after this many turns.
 const TURNS_MAX: u32 = 256;
 
-/// A batch of so much work is closed.
+/// A batch is closed after this much work.
 const WORK_MAX: Duration = Duration::from_millis(20);
 
-/// A batch so old is closed, so that the account of a slow agent is no older.
+/// A batch is closed at this age, so that the metrics of a slow agent are no older.
 const AGE_MAX: Duration = Duration::from_millis(500);
 
 impl CpuBatch {
@@ -37,7 +37,7 @@ impl CpuBatch {
         self.opened.get_or_insert_with(|| Opened { cpu: thread_time(), wall: Instant::now() });
     }
 
-    /// Counts a turn that took `wall`; whether the batch should be closed.
+    /// Counts a turn that took `wall`; returns whether the batch should be closed.
     pub fn add(&mut self, wall: Duration) -> bool {
         self.count(wall);
         self.is_full() || self.opened.is_some_and(|o| o.wall.elapsed() >= AGE_MAX)
@@ -52,7 +52,7 @@ impl CpuBatch {
         self.turns >= TURNS_MAX || self.wall >= WORK_MAX
     }
 
-    /// Whether no turn has been counted since the last was closed.
+    /// Whether no turn has been counted since the last batch was closed.
     pub const fn is_empty(&self) -> bool {
         self.turns == 0
     }
@@ -67,12 +67,12 @@ impl CpuBatch {
     }
 }
 
-/// The share of wall time that is CPU time, for turns that must be accounted for at once, because others make the next ones.
+/// The share of wall time that is CPU time, for turns that must be accounted for immediately, because other agents make the next ones.
 #[derive(Debug)]
 pub(super) struct CpuShare {
     batch: CpuBatch,
     share: f64,
-    /// CPU time that was used and not accounted for, seconds; negative where too much was.
+    /// CPU time used and not accounted for, seconds; negative if too much was accounted for.
     owed_s: f64,
 }
 
@@ -81,8 +81,8 @@ impl CpuShare {
         Self { batch: CpuBatch::default(), share: 1.0, owed_s: 0.0 }
     }
 
-    /// Counts a turn that took `wall` and begins after [`Self::open`]: the share of it to be accounted for. What the newest
-    /// batch had too little or too much, the next one makes up.
+    /// Counts a turn that took `wall` and began after [`Self::open`]; returns the share of it to be accounted for. The error of the newest
+    /// batch is corrected in the next one.
     pub fn count(&mut self, wall: Duration) -> f64 {
         let share = self.share;
         self.batch.count(wall);
@@ -95,7 +95,7 @@ impl CpuShare {
         share
     }
 
-    /// The worker's thread begins to make turns.
+    /// The worker's thread starts making turns.
     pub fn open(&mut self) {
         self.batch.open();
     }

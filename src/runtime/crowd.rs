@@ -1,9 +1,9 @@
-//! Who may touch whom: the broad phase between agents.
+//! Broad phase between agents: which agents may touch each other.
 //!
-//! In: the box each agent publishes, and how fast it may leave it. Out: for every agent a list of those near enough to touch
-//! within its next turns, and of those that have booked impulses for it ([`Sight`]). Agents meet here in atomic words alone:
-//! nobody waits for anybody. Who is far is not looked at before the moment at which he could be near (an appointment);
-//! who turns out faster than he had said says so in a common log, and is looked at again.
+//! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near enough to touch within
+//! its next turns, and of those that have given impulses to it ([`Sight`]). Agents exchange atomic words only: no agent waits for another.
+//! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
+//! published speed enters itself in a common log, and is checked again.
 //! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no crowd.
 
 mod berth;
@@ -16,19 +16,19 @@ use metachron_core::{AgentId, Bounds, SimTime};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
 
-/// What the agents of a run share to find each other.
+/// Shared data by which the agents of a run find each other.
 #[derive(Debug)]
 pub(super) struct Crowd {
     berths: Vec<Berth>,
-    /// Who has become faster than he had said, newest last; a word is the note's place and the agent's number.
+    /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
     log: Vec<AtomicU64>,
-    /// How many notes there ever were.
+    /// Number of entries ever written.
     noted: AtomicU64,
     calls: Vec<Calls>,
 }
 
-/// Who has booked something for one agent since it last asked: a bit each, on pages that are made when first needed, since most
-/// agents never hear of most others.
+/// Agents that have given impulses to one agent since its last query: a bit each, on pages allocated on first use, since most agents never
+/// interact with most others.
 #[derive(Debug, Default)]
 struct Calls {
     any: AtomicBool,
@@ -38,20 +38,20 @@ struct Calls {
 /// The bits of some callers.
 type Page = Box<[AtomicU64; PAGE_WORDS]>;
 
-/// Words of a page: it tells of 1024 agents.
+/// Words of a page: it covers 1024 agents.
 const PAGE_WORDS: usize = 16;
 
-/// Notes that are kept: who is further behind looks at everybody again.
+/// Stored log entries: a reader that is further behind checks all agents again.
 const LOG_LENGTH: u64 = 1024;
 
-/// No agent's speed is said to be less, m/s: what trembles need not tell everybody.
+/// Least published speed, m/s: small vibrations need not be logged.
 const SPEED_LEAST_M_S: f64 = 0.0625;
 
-/// What is said is this much above what is measured, so that speed may grow a little before all must know.
+/// The published speed is this factor above the measured one, so that speed may grow a little before a log entry is needed.
 const SPEED_ROOM: f64 = 1.25;
 
 impl Crowd {
-    /// A crowd of that many agents, none of which is anywhere yet.
+    /// A crowd of that many agents, none of which has published a box.
     pub fn new(agents: usize) -> Self {
         Self {
             berths: std::iter::repeat_with(Berth::default).take(agents).collect(),
@@ -61,7 +61,7 @@ impl Crowd {
         }
     }
 
-    /// `id` is inside `bounds` at its time `time`; said by whoever makes its turns. Gives the speed that is said of it.
+    /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
     pub fn stand(&self, id: AgentId, bounds: &Bounds, time: SimTime) -> f64 {
         let Some(berth) = self.berths.get(id.0 as usize) else { return 0.0 };
         let before = berth.mine();
@@ -74,12 +74,12 @@ impl Crowd {
         speed_m_s
     }
 
-    /// Where `id` was said to be last.
+    /// The last published box of `id`.
     fn seen(&self, id: AgentId) -> Seen {
         self.berths.get(id.0 as usize).map_or(Seen::Nowhere, Berth::read)
     }
 
-    /// `id` stays where it is until it stands somewhere again.
+    /// Publishes speed zero for `id`: it stays in place until it publishes a box again.
     pub fn stay(&self, id: AgentId) {
         let Some(berth) = self.berths.get(id.0 as usize) else { return };
         if let Some(reach) = berth.mine() {
@@ -87,7 +87,7 @@ impl Crowd {
         }
     }
 
-    /// Tells `to` that `from` has booked something for it: it lists it at its next turn.
+    /// Notifies `to` that `from` has given an impulse to it: `to` lists `from` at its next turn.
     pub fn call(&self, to: AgentId, from: AgentId) {
         let Some(calls) = self.calls.get(to.0 as usize) else { return };
         let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
@@ -99,7 +99,7 @@ impl Crowd {
         }
     }
 
-    /// Visits those who have called `id` since the last time, by rising numbers.
+    /// Visits the agents that have called `id` since the last query, by rising numbers.
     pub fn answer(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
         let Some(calls) = self.calls.get(id.0 as usize) else { return };
         if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
@@ -122,8 +122,8 @@ impl Crowd {
         self.log[(at % LOG_LENGTH) as usize].store(word(at, id), SeqCst);
     }
 
-    /// Visits the notes from number `from` on and gives the number of the next; `None` where some are gone or not yet written:
-    /// anybody may have been meant.
+    /// Visits the log entries from number `from` on and returns the number of the next one; `None` if some are overwritten or not yet
+    /// written: any agent may be affected.
     fn notes(&self, from: u64, mut visit: impl FnMut(AgentId)) -> (u64, Option<()>) {
         let end = self.noted.load(SeqCst);
         if end - from > LOG_LENGTH / 2 {
@@ -141,7 +141,7 @@ impl Crowd {
     }
 }
 
-/// A note: its place, so that an older one in the same place is told apart, and whom it means.
+/// A log entry: its index, so that an older entry in the same place is recognised, and the agent.
 const fn word(at: u64, id: AgentId) -> u64 {
     ((at + 1) << 32) | id.0 as u64
 }
@@ -150,8 +150,8 @@ fn zeros(count: usize) -> Vec<AtomicU64> {
     std::iter::repeat_with(AtomicU64::default).take(count).collect()
 }
 
-/// The speed that is said of one who has `speed_m_s`, where `said` was before: a power of two above it, so that it seldom
-/// changes, and only lowered when it is far too high.
+/// The speed to publish for an agent of `speed_m_s` that published `said` before: a power of two above it, so that it seldom changes,
+/// lowered only if it is far too high.
 fn promise(speed_m_s: f64, said: f64) -> f64 {
     let wanted = (speed_m_s * SPEED_ROOM).max(SPEED_LEAST_M_S);
     let told = libm::exp2(libm::ceil(libm::log2(wanted)));

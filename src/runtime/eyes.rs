@@ -1,8 +1,8 @@
-//! What an agent sees of the others: whom, and by which law they act on each other.
+//! An agent's view of its peers: which it sees, and by which law each pair interacts.
 //!
-//! In: the links and laws of the scene, the crowd. Out: [`Neighbour`]s with their newest states: first those it is linked to,
-//! always and in their order; then those near enough to touch, and those with which an account is not settled, by rising
-//! numbers. Nothing is allocated once the sizes settle. Never here: when an agent looks.
+//! In: the links and laws of the scene, the crowd. Out: [`Neighbour`]s with their newest states: first the linked peers, always and in
+//! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
+//! settle. Never here: when an agent looks.
 
 use super::crowd::{Crowd, Sight};
 use super::fellows::Fellows;
@@ -14,43 +14,43 @@ use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
 use metachron_geometry::{Form, FormKind};
 use std::sync::Arc;
 
-/// What is known of all agents of a run from the start.
+/// Data of all agents of a run, fixed at the start.
 #[derive(Debug)]
 pub(super) struct Peers {
     pub all: Vec<Peer>,
-    /// `None` where no two agents could touch: then nobody looks for anybody.
+    /// `None` if no two agents could touch: then no agent searches for peers.
     pub crowd: Option<Crowd>,
-    /// Whom links by the ledger join, each pair both ways round, sorted.
+    /// Pairs joined by links with the ledger law, each in both orders, sorted.
     pub linked: Vec<[AgentId; 2]>,
 }
 
-/// One agent, as the others know it.
+/// Data of one agent for its peers.
 pub(super) struct Peer {
     pub shared: Arc<Shared>,
     pub form: Option<Arc<Form>>,
-    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the others.
+    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the peers.
     pub laws: Vec<(AgentId, Law)>,
 }
 
-/// What an agent looks with.
+/// The list of peers that an agent sees.
 #[derive(Debug, Default)]
 pub(super) struct Eyes {
     neighbours: Vec<Neighbour>,
     /// One for each neighbour, in their order.
     looks: Vec<Look>,
-    /// The first so many neighbours are links.
+    /// The first `links` neighbours are the linked ones.
     links: usize,
     /// Only in a crowd.
     sight: Option<Box<Sight>>,
-    /// Whom it wants to see besides its links.
+    /// Agents to be seen in addition to the linked ones.
     wanted: Vec<AgentId>,
 }
 
-/// How one neighbour is looked at.
+/// Source of one neighbour's states.
 #[derive(Debug)]
 struct Look {
     slot: Arc<LatestSlot<Snapshot>>,
-    /// It steps in the same world: that world, and no law, says what the two do to each other.
+    /// It steps in the same island: the island's solve, and no law, determines their interaction.
     fellow: bool,
 }
 
@@ -75,9 +75,9 @@ impl Peer {
         !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
     }
 
-    /// `other`, to whom a link may have it `linked`, as this agent sees it.
+    /// The neighbour `other` as seen by this agent; `linked`: a link by the ledger joins the two.
     fn meets(&self, other: &Self, linked: bool) -> Neighbour {
-        // jaws take hold of a form, also where the tool passes through it
+        // a tool needs the form to grasp it, even if it passes through it
         let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
         let snapshot = other.shared.slot.latest();
         let (mine, its) = (self.standing(), other.standing());
@@ -98,13 +98,13 @@ impl Peers {
         self.all.get(id.0 as usize)
     }
 
-    /// `other` as `me` sees it.
+    /// The neighbour `other` as seen by `me`.
     fn meet(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
         let linked = self.linked.binary_search(&[me, other]).is_ok();
         Some(self.get(me)?.meets(self.get(other)?, linked))
     }
 
-    /// The eyes of `me`, who is linked to `links`.
+    /// The view of `me`, which is linked to `links`.
     pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Eyes {
         let sight = self.crowd.is_some().then(|| Box::new(Sight::new(me)));
         let mut eyes = Eyes { sight, ..Eyes::default() };
@@ -115,32 +115,32 @@ impl Peers {
 }
 
 impl Eyes {
-    /// Those it sees, as they were when it last looked.
+    /// Its neighbours, as they were at the last look.
     pub fn neighbours(&self) -> &[Neighbour] {
         &self.neighbours
     }
 
-    /// The state this agent has written last: it tells the crowd where that is.
+    /// Publishes the bounds of the state that this agent has just written to the crowd.
     pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
         if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
             sight.stand(crowd, state.bounds.as_ref(), state.moment());
         }
     }
 
-    /// Whether all that `me`, whose states `writer` writes, and those of whom it sees that they `live` have booked for each other has been
+    /// Whether all impulses exchanged between `me`, whose states `writer` writes, and its neighbours for which `live` is true have been
     /// taken.
     pub fn is_settled(&self, me: AgentId, writer: &SlotWriter<Snapshot>, live: impl Fn(AgentId) -> bool) -> bool {
         newest(writer, |mine| self.neighbours.iter().filter(|n| live(n.id)).all(|n| is_settled(me, mine, n)))
     }
 
-    /// Looks at those it saw last, and at nobody else.
+    /// Reads the newest states of the present neighbours, without searching for others.
     pub fn look_again(&mut self) {
         for (neighbour, look) in self.neighbours.iter_mut().zip(&self.looks) {
             neighbour.snapshot = look.slot.latest();
         }
     }
 
-    /// Looks around before the step of `dt` from `now` of `me`, whose states `writer` writes and who shares a world with
+    /// Updates the neighbours before the step of `dt` from `now` of `me`, whose states `writer` writes and which shares an island with
     /// `fellows`.
     pub fn look(
         &mut self,
@@ -166,8 +166,8 @@ impl Eyes {
         }
     }
 
-    /// Gathers whom it must see: who is near, who has called, who is neither but has an account to settle, and who gives to
-    /// somebody that it gives to.
+    /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
+    /// body to which this agent also gives.
     fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
         let Self { neighbours, links, sight, wanted, looks } = self;
         let (linked, near_once) = neighbours.split_at_mut(*links);
@@ -218,12 +218,12 @@ impl Eyes {
     }
 }
 
-/// Whether it is a tool's.
+/// Whether the form is a tool's.
 const fn is_led(form: &Form) -> bool {
     matches!(form.kind, FormKind::Tool(_))
 }
 
-/// Sees `neighbour` as a fellow of the same world, or again as a stranger.
+/// Treats `neighbour` as a member of the same island, or again as a peer outside it.
 fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
     if fellow {
         (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
@@ -232,7 +232,7 @@ fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
     }
 }
 
-/// Whether all that the two have booked for each other has been taken.
+/// Whether all impulses that the two have given each other have been taken.
 fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
     let given = mine.given.iter().find(|ledger| ledger.with == other.id);
     let received = other.snapshot.given.iter().find(|ledger| ledger.with == me);
@@ -241,7 +241,7 @@ fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
         && received.is_none_or(|ledger| ledger.is_settled(taken))
 }
 
-/// Who else gives to one that `me` gives to: what they give it has to be expected of it.
+/// The other agents that give impulses to an agent to which `me` also gives: their impulses must be anticipated.
 fn others_who_give(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentId> + '_ {
     let mine = other.taken.iter().any(|ledger| ledger.with == me);
     other.taken.iter().map(|ledger| ledger.with).filter(move |with| mine && *with != me)

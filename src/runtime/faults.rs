@@ -1,26 +1,25 @@
-//! Faults on purpose: steps that are longer or shorter than asked, states that nobody sees.
+//! Fault injection: steps that are longer or shorter than requested, states that are never published.
 //!
-//! In: what to spoil and a seed. Out: the length of a step, whether a state is withheld; both the same on every run, whoever
-//! makes the turns. They stand for what networks and loaded machines do, so that couplings can be held against it.
+//! In: rates of faults and a seed. Out: the length of a step, whether a state is withheld; both the same on every run with every executor.
+//! The faults imitate networks and loaded machines, so that couplings can be tested against them.
 //! Never here: a model of physics, time passing.
 
 use super::machine::{GOLDEN, mix};
 use metachron_core::{AgentId, DT_MAX_S, SimSpan};
 
-/// How an agent's life is disturbed.
+/// Faults injected into one agent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Faults {
-    /// Each step's length is dt · (1 + jitter · u), u even in −1 … 1; `0 <= jitter < 1`. The agent still advances by exactly
-    /// the step it makes, and a step stays at most [`DT_MAX_S`] long.
+    /// Each step's length is dt · (1 + jitter · u), u uniform in −1 … 1; `0 <= jitter < 1`. The agent still advances by exactly the step it
+    /// makes, and a step stays at most [`DT_MAX_S`] long.
     pub jitter: f64,
-    /// The share of states that are withheld, so that nobody ever sees them; `0 <= loss < 1`.
-    /// The last state of a life is always shown.
+    /// The share of states that are never published; `0 <= loss < 1`. The last state of an agent is always published.
     pub loss: f64,
-    /// Which disturbances: equal seeds disturb equally.
+    /// Seed: equal seeds give equal faults.
     pub seed: u64,
 }
 
-/// What a draw is for: one stream of numbers each.
+/// Purpose of a random number: one stream each.
 #[derive(Debug, Clone, Copy)]
 enum Draw {
     Jitter = 1,
@@ -28,13 +27,13 @@ enum Draw {
 }
 
 impl Faults {
-    /// Whether both shares are shares.
+    /// Whether both rates are valid fractions.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         [self.jitter, self.loss].iter().all(|share| (0.0..1.0).contains(share))
     }
 
-    /// The length of step number `step` of `id`, where `dt` was asked for.
+    /// The length of step number `step` of `id`, where `dt` was requested.
     pub(super) fn span(&self, dt: SimSpan, id: AgentId, step: u64) -> SimSpan {
         if self.jitter == 0.0 {
             return dt;
@@ -50,7 +49,7 @@ impl Faults {
         self.loss > 0.0 && self.even(Draw::Loss, id, step) < self.loss
     }
 
-    /// A number even in 0 … 1 that depends on nothing but its arguments.
+    /// A number uniform in 0 … 1 that depends only on its arguments.
     fn even(&self, draw: Draw, id: AgentId, step: u64) -> f64 {
         const TWO_POW_53: f64 = 9_007_199_254_740_992.0;
         let stream = mix((draw as u64).wrapping_mul(GOLDEN) ^ mix(u64::from(id.0).wrapping_add(1)));
@@ -76,9 +75,9 @@ mod tests {
         let count = STEPS as f64;
         let mean = factors.iter().sum::<f64>() / count;
         let variance = factors.iter().map(|f| (f - mean) * (f - mean)).sum::<f64>() / count;
-        // an even spread of half width 0.2: deviation 0.2/√3; standard error of the mean 8e-4, five of them
+        // a uniform spread of half width 0.2: deviation 0.2/√3; standard error of the mean 8e-4, five of them
         assert!((mean - 1.0).abs() < 4e-3, "{mean}");
-        // the variance's own deviation is σ² √(0.8/n) for an even spread: 0.6 %, five of them
+        // the variance's own deviation is σ² √(0.8/n) for a uniform spread: 0.6 %, five of them
         assert!((variance / (0.04 / 3.0) - 1.0).abs() < 0.032, "{variance}");
     }
 

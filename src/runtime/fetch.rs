@@ -1,8 +1,8 @@
-//! What a turn will need, on its way to the cache before it is needed.
+//! Prefetch of the memory that a turn will use.
 //!
-//! In: an agent whose turn begins after thousands of others have had theirs, so that of the forty lines of the cache that it needs
-//! none is left. Out: nothing: a word of each was read. Fetched one after the other, where the turn comes to them, they take
-//! longer than a cheap step; all at once they arrive while the step computes. Never here: anything that depends on what is read.
+//! In: an agent whose turn begins after thousands of others, so that none of the forty cache lines that it needs is cached. Out: nothing:
+//! one word of each line was read. Loaded one after the other during the turn, the lines take longer than a cheap step; loaded together,
+//! they arrive while the step computes. Never here: anything that depends on the values read.
 
 use super::handle::Shared;
 use super::turn::Actor;
@@ -11,7 +11,7 @@ use std::hint::black_box;
 use std::sync::atomic::Ordering::Relaxed;
 
 impl Actor {
-    /// Reads a word of what lies together, for all that a turn of its own reads or writes.
+    /// Reads one word of each block of memory that a turn of this agent reads or writes.
     pub fn fetch(&self) {
         black_box(self.agent.resolution());
         black_box([

@@ -1,21 +1,21 @@
-//! The seam to whoever steers an agent's rate: measured times out, demands in.
+//! Interface to the controller of an agent's rate: measured times out, demands in.
 //!
 //! Never here: a control law. The runtime measures and obeys; it decides no ε.
 
 use metachron_core::{Resolution, SimSpan};
 
-/// Steers one agent by what its turns take.
+/// Controls one agent by the times of its turns.
 pub trait Governor: Send {
-    /// Told after every turn; what it demands holds from the next turn on.
+    /// Called after every turn; its demand holds from the next turn on.
     fn after_step(&mut self, measure: &TurnMeasure) -> Demand;
 }
 
-/// What a turn took.
+/// Measurements of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnMeasure {
     /// Wall time the turn took, seconds, waiting for a core included; virtual in lockstep.
     pub work_s: f64,
-    /// Wall time between turns at the rate that is wanted, seconds, at the timeline's present speed.
+    /// Wall time between turns at the requested rate, seconds, at the timeline's present speed.
     pub wanted_period_s: f64,
     /// Wall time between the starts of the last turns, seconds, smoothed over about eight of them; equal to `wanted_period_s`
     /// as long as there is nothing to measure (first turn, after a rest, a pause or a change of speed).
@@ -26,19 +26,19 @@ pub struct TurnMeasure {
     pub dropped: SimSpan,
     /// The step's length.
     pub dt: SimSpan,
-    /// The resolution the step was made at; `None` for a model that has none.
+    /// The resolution of the step; `None` for a model that has none.
     pub resolution: Option<Resolution>,
-    /// What the agent says of its own error, metres.
+    /// The agent's estimate of its own error, metres.
     pub residual_m: f64,
-    /// The part of it that its steps made, metres.
+    /// The part of it caused by its time steps, metres.
     pub drift_m: f64,
 }
 
-/// What a governor wants of its agent; `None` leaves things as they are.
+/// A governor's demand on its agent; `None` leaves the present value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Demand {
-    /// Step by this span; clamped to the agent's range.
+    /// The step length; clamped to the agent's range.
     pub dt: Option<SimSpan>,
-    /// Simulate at this resolution; clamped to the agent's range.
+    /// The resolution of the simulation; clamped to the agent's range.
     pub resolution: Option<Resolution>,
 }

@@ -1,4 +1,4 @@
-//! What the rest of the program holds of an agent that runs: its newest state, its account, its ear.
+//! Handle of a running agent: its newest state, its metrics, its commands.
 //!
 //! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
 
@@ -14,7 +14,7 @@ use std::sync::atomic::Ordering::Relaxed;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// What an agent and those who watch it share.
+/// Data shared by an agent and its observers.
 #[derive(Debug)]
 pub(super) struct Shared {
     pub id: AgentId,
@@ -25,22 +25,22 @@ pub(super) struct Shared {
     pub mail: Mailbox,
     pub slot: Arc<LatestSlot<Snapshot>>,
     pub board: Arc<Switchboard>,
-    /// Where agents come in that it shall lead, and where it comes back to itself; `None` where nobody leads anybody.
+    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
     pub seating: Option<Seating>,
-    /// Only readers touch it: the agent never waits for this lock.
+    /// Used by readers only: the agent never waits for this lock.
     pub ages: Mutex<Times>,
-    /// None for most agents. The agent alone writes, so that it never waits while it runs; readers look at the end.
+    /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
     pub traces: Vec<Mutex<Trace>>,
 }
 
-/// A running agent, seen from outside. Copies show the same agent; they outlive the run and then show its end.
+/// A running agent, seen from outside. Copies refer to the same agent; they outlive the run and then show its final state.
 #[derive(Debug, Clone)]
 pub struct AgentHandle {
     pub(super) shared: Arc<Shared>,
 }
 
 impl AgentHandle {
-    /// Its number: the place it was given at the start.
+    /// Its number: its place in the list at the start.
     #[must_use]
     pub fn id(&self) -> AgentId {
         self.shared.id
@@ -64,15 +64,15 @@ impl AgentHandle {
         self.shared.slot.latest()
     }
 
-    /// How far `snapshot` lies behind the simulated time `now`, seconds, ≥ 0.
+    /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
     ///
-    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it still holds.
+    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.
     #[must_use]
     pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
         if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.moment()).as_secs_f64() }
     }
 
-    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); what is no age is not counted.
+    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
     pub fn record_age(&self, age_s: f64) {
         if let Ok(age) = Duration::try_from_secs_f64(age_s) {
             self.ages().record(age);
@@ -94,19 +94,19 @@ impl AgentHandle {
         self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// In whose world it steps now; `None` where it keeps its own.
+    /// The leader of the island in which it steps; `None` if it makes its own turns.
     #[must_use]
     pub fn led_by(&self) -> Option<AgentId> {
         Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
     }
 
-    /// What it does now.
+    /// State of its execution.
     #[must_use]
     pub fn state(&self) -> AgentState {
         self.shared.gauges.state()
     }
 
-    /// Tells the agent something; it obeys at its next turn, and wakes for it.
+    /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
     ///
     /// # Errors
     /// [`SendError::BadNumber`]: nothing was delivered.
@@ -116,27 +116,27 @@ impl AgentHandle {
         Ok(())
     }
 
-    /// CPU time of its turns so far, seconds; counted about twice a second on threads.
+    /// CPU time of its turns so far, seconds; updated about twice a second on threads.
     #[must_use]
     pub fn cpu_s(&self) -> f64 {
         self.shared.gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9
     }
 
-    /// What was written down of the point watched as number `watch`; empty where there is none. To be read when the run has
-    /// ended: until then it may hold up the agent.
+    /// Samples of the point watched as number `watch`; empty if there is none. To be read when the run has ended: until then reading may
+    /// block the agent.
     #[must_use]
     pub fn samples(&self, watch: usize) -> Vec<Sample> {
         let trace = self.shared.traces.get(watch).map(|trace| trace.lock().unwrap_or_else(PoisonError::into_inner));
         trace.map_or_else(Vec::new, |trace| trace.samples().to_vec())
     }
 
-    /// Steps it has taken.
+    /// Steps taken.
     #[must_use]
     pub fn steps(&self) -> u64 {
         self.shared.gauges.steps.load(Relaxed)
     }
 
-    /// How it has fared so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
+    /// Its statistics so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
     #[must_use]
     pub fn stats(&self) -> AgentStats {
         let Shared { gauges, .. } = &*self.shared;
@@ -169,7 +169,7 @@ impl AgentHandle {
     }
 }
 
-/// One number for the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
+/// Hash of the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
 #[must_use]
 pub fn state_hash(agents: &[AgentHandle]) -> u64 {
     agents.iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))

@@ -1,8 +1,8 @@
 //! One thread, virtual time, declared costs: the executor for tests, tuning, charts and replay.
 //!
-//! In: agents and a [`Machine`]. Out: the same run to the bit, every time. Events happen in the order (time, ends before
-//! starts, number): a turn sees what is published when it starts, and what it publishes is seen when its declared cost has
-//! passed, on cores that all turns and the frame loop share. Never here: a wall clock, but for the CPU time that is reported.
+//! In: agents and a [`Machine`]. Out: a run that is bit-identical every time. Events happen in the order (time, ends before starts,
+//! number): a turn sees the states published when it starts, and its own state is seen when its declared cost has passed, on cores that all
+//! turns and the frame loop share. Never here: a wall clock, except for the CPU time that is reported.
 
 mod cores;
 
@@ -29,19 +29,19 @@ pub struct Lockstep {
     timeline: Timeline,
     now: Duration,
     lives: Vec<Life>,
-    /// When the turns of waiting agents are due. Those the timeline never reaches are left out.
+    /// Due times of the turns of waiting agents, without those that the timeline never reaches.
     due: BinaryHeap<Reverse<(Duration, u32)>>,
     cores: Cores,
     handles: Vec<AgentHandle>,
     board: Arc<Switchboard>,
     batch: CpuBatch,
-    /// Who has made turns in the batch that is open.
+    /// Agents that have made turns in the open batch.
     unsettled: Vec<u32>,
 }
 
-/// An agent and where it is in its turns.
+/// An agent and the phase of its turns.
 struct Life {
-    /// `None` while another leads it.
+    /// `None` while another agent leads it.
     actor: Option<Box<Actor>>,
     phase: Phase,
     turns: u64,
@@ -57,7 +57,7 @@ enum Phase {
     Parked,
 }
 
-/// The number of the frame loop's own job: above every agent's, so that of equal ends the agents' come first.
+/// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
 const FRAME: u32 = u32::MAX;
 
 impl Lockstep {
@@ -81,7 +81,7 @@ impl Lockstep {
         Ok(run)
     }
 
-    /// The machine that is declared.
+    /// The declared machine.
     #[must_use]
     pub const fn machine(&self) -> &Machine {
         &self.machine
@@ -94,7 +94,7 @@ impl Lockstep {
         }
     }
 
-    /// Notes when the next turn is due, if the agent waits for one.
+    /// Schedules the next turn, if the agent waits for one.
     fn schedule(&mut self, whose: usize) {
         let life = &self.lives[whose];
         if life.phase == Phase::Waiting
@@ -104,7 +104,7 @@ impl Lockstep {
         }
     }
 
-    /// Looks after those who were summoned: sleepers that are woken, and agents that have come home.
+    /// Serves the summoned agents: sleepers that are woken, and agents that return from a leader.
     fn wake_sleepers(&mut self) {
         if !self.board.take_rung() {
             return;
@@ -130,7 +130,7 @@ impl Lockstep {
         }
     }
 
-    /// Goes on to what happens next; `None` if nothing does up to `limit`.
+    /// Advances to the next event; `None` if there is none up to `limit`.
     fn next_event(&mut self, limit: Duration) -> Option<Event> {
         self.wake_sleepers();
         let end = self.cores.until_end().map(|span| self.now.saturating_add(span));
@@ -141,14 +141,14 @@ impl Lockstep {
         }
         self.cores.pass(at - self.now);
         self.now = at;
-        // time went on to the end of a job or to a due turn, whichever was first
+        // time advanced to the end of a job or to a due turn, whichever was first
         match self.cores.take_ended() {
             Some(whose) => Some(Event::End(whose)),
             None => self.due.pop().map(|Reverse((_, whose))| Event::Start(whose)),
         }
     }
 
-    /// Happens until `limit`, or until the frame's own job has ended.
+    /// Processes events until `limit`, or until the frame's own job has ended.
     fn run(&mut self, limit: Duration) {
         while let Some(event) = self.next_event(limit) {
             match event {
@@ -198,7 +198,7 @@ impl Lockstep {
         self.schedule(whose);
     }
 
-    /// Hands an agent over to `leader`, if that takes it in now.
+    /// Hands an agent over to `leader`, if the leader accepts it now.
     fn hand_over(&mut self, whose: usize, leader: AgentId) {
         self.settle();
         let life = &mut self.lives[whose];
@@ -220,7 +220,7 @@ impl Lockstep {
         }
     }
 
-    /// Ends all lives, wherever they are.
+    /// Ends all agents, whatever their phase.
     fn end(&mut self) {
         let actors = self.lives.drain(..).filter_map(|life| life.actor);
         actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
@@ -246,11 +246,11 @@ impl Drop for Lockstep {
     }
 }
 
-/// What happens at a moment of virtual time.
+/// An event in virtual time.
 enum Event {
     /// An agent's turn begins.
     Start(u32),
-    /// The job of an agent, or of the frame, has passed.
+    /// The job of an agent, or of the frame, ends.
     End(u32),
 }
 

@@ -1,4 +1,4 @@
-//! The declared machine: what work costs where nothing is measured.
+//! The declared machine: prices of work where nothing is measured.
 //!
 //! In: work in each model's unit, what a frame draws. Out: seconds, with noise that is the same on every run.
 //! Never here: a clock. Lockstep charges these prices instead of measuring, so that a run is the same on every computer.
@@ -6,70 +6,71 @@
 use std::borrow::Cow;
 use std::time::Duration;
 
-/// A machine as lockstep believes it to be.
+/// The machine assumed by lockstep.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
-    /// Cores that agents and the frame loop share; at least 1 is taken.
+    /// Cores shared by agents and the frame loop; at least 1 is assumed.
     pub cores: u32,
-    /// What a step of each model costs. A model that is not listed costs [`OTHER_STEP_US`] a step.
+    /// Price of a step of each model. A model that is not listed costs [`OTHER_STEP_US`] per step.
     pub steps: Vec<StepPrice>,
-    /// What a frame costs.
+    /// Price of a frame.
     pub draw: DrawPrice,
-    /// Nanoseconds that finding out whether an object is seen takes, and choosing the level of one in view, ≥ 0.
+    /// Nanoseconds per object for the visibility test, and per visible object for choosing its level, ≥ 0.
     pub choice_ns: (f64, f64),
     /// Relative standard deviation of every cost, `0..=1`.
     pub noise_sd: f64,
-    /// Relative standard deviation of a factor on frames that wanders, nine tenths of it kept from one frame to the next, `0..=1`.
+    /// Relative standard deviation of a slowly varying factor on frames, nine tenths of it kept from one frame to the next, `0..=1`.
     pub wander_sd: f64,
-    /// Share of frames that take half as long again, `0..=1`.
+    /// Share of frames that take 1.5 times as long, `0..=1`.
     pub spikes: f64,
-    /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time, before the first once.
+    /// Load on frames: from this wall time on, seconds, a frame takes this multiple of its declared time; by rising time, 1 before the
+    /// first.
     pub load: Vec<(f64, f64)>,
-    /// The same of a step.
+    /// The same for steps.
     pub step_load: Vec<(f64, f64)>,
-    /// Which noise: equal seeds give equal runs.
+    /// Seed of the noise: equal seeds give equal runs.
     pub seed: u64,
 }
 
-/// What a step of one model costs: base + unit · work.
+/// Price of a step of one model: base + unit · work.
 #[derive(Debug, Clone, PartialEq)]
 pub struct StepPrice {
-    /// The model's name, as its agents say it.
+    /// The model's name, as its agents report it.
     pub model: Cow<'static, str>,
-    /// Microseconds a step, ≥ 0.
+    /// Microseconds per step, ≥ 0.
     pub base_us: f64,
-    /// Microseconds a unit of the work its steps report, ≥ 0.
+    /// Microseconds per unit of the work its steps report, ≥ 0.
     pub unit_us: f64,
 }
 
-/// What a frame costs: setup + pixel · pixels of the picture + what its objects cost.
+/// Price of a frame: setup + pixel · pixels of the picture + the price of its objects.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawPrice {
-    /// Milliseconds a frame, ≥ 0.
+    /// Milliseconds per frame, ≥ 0.
     pub setup_ms: f64,
-    /// Nanoseconds a pixel of the picture, whatever covers it, ≥ 0.
+    /// Nanoseconds per pixel of the picture, whatever covers it, ≥ 0.
     pub pixel_ns: f64,
-    /// What objects cost by their shading: flat, Gouraud, light at every pixel, textured.
+    /// Price of objects by their shading: flat, Gouraud, light at every pixel, textured.
     pub objects: [ObjectPrice; 4],
 }
 
-/// What an object costs: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
+/// Price of an object: setup + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ObjectPrice {
-    /// Microseconds an object, ≥ 0.
+    /// Microseconds per object, ≥ 0.
     pub setup_us: f64,
-    /// Microseconds a triangle, ≥ 0.
+    /// Microseconds per triangle, ≥ 0.
     pub triangle_us: f64,
-    /// Microseconds a vertex, ≥ 0.
+    /// Microseconds per vertex, ≥ 0.
     pub vertex_us: f64,
-    /// Nanoseconds a pixel, ≥ 0.
+    /// Nanoseconds per pixel, ≥ 0.
     pub pixel_ns: f64,
 }
 
-/// What a step of an unlisted model costs, microseconds.
+/// Price of a step of an unlisted model, microseconds.
 pub const OTHER_STEP_US: f64 = 10.0;
 
-/// The machines known by name.
+/// The names of the predefined machines.
 pub const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
 
 impl Machine {
@@ -83,7 +84,7 @@ impl Machine {
         }
     }
 
-    /// Two cores that also draw (Mesa): 1.4 ms + 0.22 µs a triangle + 6 ns a pixel.
+    /// Two cores that also draw (Mesa): 1.4 ms + 0.22 µs per triangle + 6 ns per pixel.
     #[must_use]
     pub fn two_cores_software() -> Self {
         Self {
@@ -124,7 +125,7 @@ impl Machine {
         }
     }
 
-    /// Seconds that a step of `model` takes which reported `work`; `stream` and `count` say which step of whom, for the noise.
+    /// Seconds of a step of `model` that reported `work`; `stream` is the agent's and `count` the step's number, for the noise.
     #[must_use]
     pub fn step_s(&self, model: &str, work: f64, stream: u64, count: u64) -> f64 {
         let us =
@@ -132,21 +133,21 @@ impl Machine {
         us * 1e-6 * self.noise(stream, count)
     }
 
-    /// What the frame `count` takes that begins `at` and should take `seconds`: load, white noise, noise that wanders, spikes.
+    /// Time of the frame `count` that begins `at` and nominally takes `seconds`: with load, white noise, slowly varying noise, spikes.
     #[must_use]
     pub fn frame_time(&self, seconds: f64, count: u64, at: Duration) -> Duration {
         let spike = if uniform(self.seed, SPIKE_STREAM, count) < sound(self.spikes) { SPIKE } else { 1.0 };
         duration(seconds * factor(&self.load, at) * self.noise(FRAME_STREAM, count) * self.wander(count) * spike)
     }
 
-    /// How many times its declared time a step takes that begins `at`.
+    /// Load factor of a step that begins `at`.
     #[must_use]
     pub fn slower(&self, at: Duration) -> f64 {
         factor(&self.step_load, at)
     }
 
-    /// A log-normal factor of mean 1 whose logarithm keeps nine tenths of itself from one frame to the next: the sum of what
-    /// is left of the last frames' news, so that it depends on nothing but the seed and the frame.
+    /// A log-normal factor of mean 1 whose logarithm keeps nine tenths of its value from one frame to the next: the decaying sum of the
+    /// last frames' random terms, so that it depends on the seed and the frame only.
     fn wander(&self, count: u64) -> f64 {
         let sd = sound(self.wander_sd).min(1.0);
         if sd == 0.0 {
@@ -182,14 +183,14 @@ impl Default for Machine {
 
 /// The noise stream of the frame loop; agents use their numbers, which are below.
 const FRAME_STREAM: u64 = u64::MAX;
-/// The stream of the noise that wanders, and of spikes.
+/// The stream of the slowly varying noise, and of spikes.
 const WANDER_STREAM: u64 = u64::MAX - 1;
 const SPIKE_STREAM: u64 = u64::MAX - 2;
-/// What a spike multiplies a frame by.
+/// Factor of a spike on a frame.
 const SPIKE: f64 = 1.5;
-/// What is kept of the wandering from one frame to the next.
+/// Share of the slowly varying noise kept from one frame to the next.
 const WANDER_KEPT: f64 = 0.9;
-/// Past so many frames a thousandth of the news is left.
+/// After so many frames a thousandth of a random term is left.
 const WANDER_FRAMES: u64 = 64;
 
 const fn price(model: &'static str, base_us: f64, unit_us: f64) -> StepPrice {
@@ -200,24 +201,24 @@ const fn price_of_objects(setup_us: f64, triangle_us: f64) -> ObjectPrice {
     ObjectPrice { setup_us, triangle_us, vertex_us: 0.0, pixel_ns: 0.0 }
 }
 
-/// The factor that holds at a time.
+/// The factor in force at a time.
 fn factor(load: &[(f64, f64)], at: Duration) -> f64 {
     load.iter().take_while(|(at_s, _)| *at_s <= at.as_secs_f64()).last().map_or(1.0, |(_, factor)| *factor)
 }
 
-/// `x`, or zero where it is negative or no number: a price is never a debt.
+/// `x`, or zero where it is negative or not finite: prices are not negative.
 fn sound(x: f64) -> f64 {
     if x.is_finite() { x.max(0.0) } else { 0.0 }
 }
 
-/// The duration nearest to `seconds`, to the nanosecond; zero for what is no length, an hour at most.
+/// The duration nearest to `seconds`, to the nanosecond; zero for an invalid length, an hour at most.
 pub(super) fn duration(seconds: f64) -> Duration {
     const LONGEST_S: f64 = 3600.0;
     Duration::from_nanos((sound(seconds).min(LONGEST_S) * 1e9).round() as u64)
 }
 
-/// A number of mean 0 and deviation 1 that depends on nothing but its arguments: twelve uniform numbers less six,
-/// close to normal out to three deviations and never beyond six.
+/// A number of mean 0 and deviation 1 that depends only on its arguments: twelve uniform numbers less six, close to normal out to three
+/// deviations and never beyond six.
 fn normal(seed: u64, stream: u64, count: u64) -> f64 {
     let mut state = start(seed, stream, count);
     let mut sum = -6.0;
@@ -228,7 +229,7 @@ fn normal(seed: u64, stream: u64, count: u64) -> f64 {
     sum
 }
 
-/// A number between 0 and 1 that depends on nothing but its arguments.
+/// A number between 0 and 1 that depends only on its arguments.
 fn uniform(seed: u64, stream: u64, count: u64) -> f64 {
     part(start(seed, stream, count).wrapping_add(GOLDEN))
 }

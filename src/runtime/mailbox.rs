@@ -1,7 +1,7 @@
-//! What others tell an agent: the newest demand of each kind, taken at its next turn.
+//! Commands to an agent: the newest of each kind, taken at its next turn.
 //!
-//! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded by construction: a kind has one
-//! place, a newer command takes it. Never here: what an agent does with them ([`super::turn`] does).
+//! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
+//! overwrites. Never here: the execution of commands ([`super::turn`] does).
 
 use metachron_contact::Pull;
 use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
@@ -11,20 +11,20 @@ use std::sync::atomic::{
 };
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// What an agent can be told.
+/// A command to an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Command {
     /// Simulate at this resolution; clamped to the agent's range.
     Retune(Resolution),
     /// Step by this span; clamped to the agent's range.
     SetDt(SimSpan),
-    /// The user's hand pulls at the agent until told otherwise; `None` lets go.
+    /// The user spring pulls at the agent until the next such command; `None` releases it.
     Hand(Option<Pull>),
-    /// Stop resting.
+    /// Wake up from rest.
     Wake,
 }
 
-/// Why a command was not delivered.
+/// Reason why a command was not delivered.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum SendError {
@@ -39,25 +39,25 @@ pub enum SendError {
 /// The newest command of each kind, waiting for one agent.
 #[derive(Debug, Default)]
 pub(super) struct Mailbox {
-    /// Whether there is anything: an agent to whom nobody writes looks at this alone.
+    /// Whether there is any command: an agent without commands reads only this.
     full: AtomicBool,
-    /// There from the first letter on: most agents never get one.
+    /// Allocated by the first command: most agents never get one.
     letters: OnceLock<Box<Mutex<Letters>>>,
 }
 
-/// What lies in a mailbox.
+/// Contents of a mailbox.
 #[derive(Debug, Default)]
 pub(super) struct Letters {
-    /// The newest resolution asked for.
+    /// The newest requested resolution.
     pub retune: Option<Resolution>,
-    /// The newest step length asked for.
+    /// The newest requested step length.
     pub dt: Option<SimSpan>,
-    /// What the hand did last.
+    /// The newest state of the user spring.
     pub hand: Option<Option<Pull>>,
 }
 
 impl Mailbox {
-    /// Puts `command` in the place of its kind.
+    /// Stores `command` in the place of its kind.
     ///
     /// # Errors
     /// [`SendError::BadNumber`]; nothing is delivered then.
@@ -80,12 +80,12 @@ impl Mailbox {
         Ok(())
     }
 
-    /// Whether anything has come.
+    /// Whether any command has arrived.
     pub fn has_letters(&self) -> bool {
         self.full.load(Acquire)
     }
 
-    /// All that has come since the last call. It waits for nobody: where somebody is just writing it finds nothing yet.
+    /// All commands since the last call. Never blocks: while another thread is writing it returns nothing yet.
     pub fn take(&self) -> Letters {
         if !self.has_letters() {
             return Letters::default();

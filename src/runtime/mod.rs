@@ -1,10 +1,10 @@
-//! Threads, clocks, slots and pacing: everything that makes agents run.
+//! Execution of agents: threads, clocks, slots and pacing.
 //!
-//! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and how they fare.
-//! Every executor makes the same turns of an agent and shows the same surface, [`Run`], so that there is one frame loop:
-//! [`Threads`] gives each agent a thread of its own and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time on a declared
-//! [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
-//! those that hang together share the turns of one of them (`island`). Never here: a model of physics, a picture, a law of control, a file.
+//! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and statistics.
+//! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`] gives
+//! each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time on a
+//! declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
+//! agents in lasting contact share the turns of one of them (`island`). Never here: a model of physics, a picture, a control law, a file.
 
 mod abreast;
 mod account;
@@ -62,16 +62,16 @@ pub use watch::{SAMPLES_MAX, Sample, Watch};
 use metachron_core::{AgentId, SimTime};
 use std::time::Duration;
 
-/// Agents that run, whoever keeps the time.
+/// A run of agents, on any executor.
 pub trait Run: Send {
     /// Wall time since the run began; virtual in lockstep.
     fn now(&self) -> Duration;
 
-    /// Waits until the wall time `until`, the agents going on meanwhile; returns at once if that has passed.
+    /// Waits until the wall time `until`, while the agents run; returns immediately if that has passed.
     fn wait_until(&mut self, until: Duration);
 
-    /// Lets the frame's own work of `work` pass: nothing on threads, where it really passed; in lockstep it occupies a core
-    /// of the declared machine, and takes longer where agents want the cores too.
+    /// Lets the frame's own work of `work` pass: nothing on threads, where it really passed; in lockstep it occupies a core of the declared
+    /// machine, and takes longer if agents compete for the cores.
     fn spend(&mut self, work: Duration);
 
     /// The timeline in force.
@@ -83,8 +83,8 @@ pub trait Run: Send {
     /// All agents, in the order of their numbers.
     fn agents(&self) -> &[AgentHandle];
 
-    /// Ends the run: waits for the turns under way (boundedly) and says how every agent fared.
-    /// Handles kept show the last states.
+    /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
+    /// the last states.
     fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
 
     /// Simulated time now.
@@ -92,7 +92,7 @@ pub trait Run: Send {
         self.timeline().sim_at(self.now())
     }
 
-    /// Tells an agent something ([`AgentHandle::send`]).
+    /// Sends a command to an agent ([`AgentHandle::send`]).
     ///
     /// # Errors
     /// [`SendError`]: nothing was delivered.

@@ -1,13 +1,13 @@
-//! Whose state has changed since the one reader of a run looked last.
+//! Set of agents whose state has changed since the run's single reader last looked.
 //!
-//! In: numbers of agents, from whoever makes their turns. Out: each of them once. A reader finds a hundred thousand agents of
-//! which none has news in as little time as one that has. Never here: the states themselves.
+//! In: numbers of agents, from the threads that make their turns. Out: each of them once. Scanning a hundred thousand agents without news
+//! takes as little time as reading one agent with news. Never here: the states themselves.
 
 use super::sync::atomic::{AtomicU64, Ordering};
 use crossbeam::utils::CachePadded;
 use metachron_core::AgentId;
 
-/// A bit an agent. Words lie far apart: agents of one word mostly share a worker, and workers must not disturb each other.
+/// One bit per agent. Words are padded: agents of one word mostly share a worker, and workers must not disturb each other.
 #[derive(Debug)]
 pub(super) struct News(Vec<CachePadded<AtomicU64>>);
 
@@ -16,18 +16,18 @@ impl News {
         Self(std::iter::repeat_with(CachePadded::default).take(agents.div_ceil(64)).collect())
     }
 
-    /// There is something new of `id`; to be said after it can be seen.
+    /// Reports a new state of `id`; to be called after the state is visible.
     pub fn tell(&self, id: AgentId) {
         if let Some(word) = self.0.get(id.0 as usize / 64) {
-            // always written, even where the bit is set: else the reader might take the bit and miss what this one has published
+            // written even if the bit is set: else the reader could clear the bit and miss the state that this caller has published
             word.fetch_or(1 << (id.0 % 64), Ordering::AcqRel);
         }
     }
 
-    /// Visits those of whom there is something new, by rising numbers.
+    /// Visits the agents with new states, by rising numbers.
     pub fn take(&self, mut visit: impl FnMut(AgentId)) {
         for (at, word) in self.0.iter().enumerate() {
-            // an idle word is only read; a bit that comes now is found the next time
+            // an idle word is only read; a bit that is set now is found the next time
             if word.load(Ordering::Relaxed) == 0 {
                 continue;
             }
@@ -70,7 +70,7 @@ mod tests {
                     news.tell(AgentId(0));
                 }
             });
-            // a reader that looks only when told comes to the last value
+            // a reader that looks only at reported agents reaches the last value
             let mut seen = 0;
             while seen < last {
                 news.take(|_| seen = value.load(Ordering::Acquire));

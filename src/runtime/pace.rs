@@ -1,10 +1,10 @@
-//! An agent's own time against the scene's: the one place where wall time and simulated time meet.
+//! An agent's own time relative to the scene's: the only place where wall time and simulated time are related.
 //!
-//! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state
-//! that is on time covers the present and pictures need no delay. An agent that is late steps again at once until it has
-//! caught up; one that others touch makes longer steps while it is behind, for its contact to keep its time. Past the lag cap its time leaps to the present without a step: the gap is dropped and counted,
-//! so that an agent that cannot keep up runs at the rate it can reach, and never falls further behind.
-//! Beside others no time leaps: it is put off, and what the agents do to each other goes on as it would, slower.
+//! A step from t to t + dt is *released* when the timeline reaches t and has until t + dt to be published, so that a state that is on time
+//! covers the present and pictures need no delay. A late agent steps again immediately until it has caught up; an agent that may touch
+//! peers makes longer steps while it is behind, so that its contact keeps its time. Past the lag cap its time jumps to the present without
+//! a step: the gap is dropped and counted, so that an overloaded agent runs at the rate it can reach, and never falls further behind.
+//! Near peers time never jumps: it is postponed ("put off"), and the interaction continues unchanged, but slower.
 //! Never here: sleeping, the step itself. Theory: the periodic task of real-time scheduling, release and deadline.
 
 mod timeline;
@@ -14,40 +14,40 @@ pub use timeline::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
 use metachron_core::{SimSpan, SimTime};
 use std::time::Duration;
 
-/// How far an agent may lag before it gives up the gap, wall time.
+/// Lag past which an agent drops the gap, wall time.
 /// Shorter, a hiccup of the machine costs simulated time; longer, an overload shows as old states (MuJoCo resyncs at the same lag).
 pub const LAG_CAP: Duration = Duration::from_millis(100);
 
-/// The same of an agent that is near others: it makes up what holds it up for less than this, and is put off by what it cannot.
+/// The same for an agent near peers: it makes up shorter delays, and its time is postponed by the rest.
 pub const LAG_CAP_NEAR: Duration = Duration::from_millis(500);
 
-/// So often an agent waits for others of whom nothing is heard, two milliseconds of wall time at once: for a second. Who is heard of is
-/// waited for as long as it is behind.
+/// Number of waits of two milliseconds of wall time, a second in all, for peers without news. An agent waits for peers with news as long as
+/// they are behind.
 const PATIENCE: u16 = 500;
 
-/// A lag of so many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
+/// A lag of this many steps is still made up, however long a step is: an agent of 5 Hz is not late after 100 ms.
 const LAG_CAP_STEPS: u64 = 2;
 
 /// Longer than any step.
 const ANY: u32 = u32::MAX;
 
-/// The longest step that an agent makes of a shorter one that it wants, because it is behind.
+/// Longest stretched step of an agent that is behind.
 const STRETCHED_MAX: SimSpan = SimSpan::from_nanos(50_000_000);
 
-/// Beside others they are so many times as long as what is wanted at most, two numbers' quotient: a sheet of 240 Hz that makes three of its steps
-/// in one throws off what lies on it.
+/// Near peers a stretched step is at most this multiple of the requested one, as a quotient: a sheet of 240 Hz that merges three of its
+/// steps into one throws off what rests on it.
 const STRETCHED_NEAR: (u64, u64) = (5, 2);
 
-/// And no longer than this (docs/theory/coupling.md, eq. 7g).
+/// And at most this long (docs/theory/coupling.md, eq. 7g).
 const STRETCHED_NEAR_MAX: SimSpan = SimSpan::from_nanos(16_666_667);
 
-/// Who waits for others for more than such a part of its time is behind for their sake.
+/// An agent that waits for peers for more than 1/`WAITER` of its time is behind because of them.
 const WAITER: u16 = 4;
 
-/// In what waiting is counted, wall time.
+/// Unit of waiting times, wall time.
 const TICK: Duration = Duration::from_micros(125);
 
-/// How long it waits at once, milliseconds of wall time.
+/// Duration of one wait, milliseconds of wall time.
 const WAIT_MS: u32 = 2;
 
 /// An agent's own time and the length of its next step.
@@ -55,32 +55,32 @@ const WAIT_MS: u32 = 2;
 pub struct Pace {
     time: SimTime,
     dt: SimSpan,
-    /// What the agent makes of it, where that is less, nanoseconds; else longer than any step.
+    /// The step it makes instead of `dt` if that is shorter, nanoseconds; else longer than any step.
     shorter: u32,
-    /// What it makes of it while it is behind, nanoseconds.
+    /// The stretched step while it is behind, nanoseconds.
     stretched: u32,
     dropped: SimSpan,
-    /// How far it has been put off: it is on time at the timeline's present less this.
+    /// Total postponement: it is on time at the timeline's present less this.
     put_off: SimSpan,
     rested: SimSpan,
-    /// No step before this wall time, milliseconds: it waits for others.
+    /// No step before this wall time, milliseconds: it waits for peers.
     held_until_ms: u32,
-    /// When the step before began, wall time in [`TICK`]s.
+    /// Start of the previous step, wall time in [`TICK`]s.
     begun: u32,
-    /// How long it has waited for others since and in the steps before, and of how long, in ticks: the longer ago the less it counts.
+    /// Ticks spent waiting for peers, and ticks in all, since the previous step and before, with decaying weight.
     waits: [u16; 2],
-    /// How much of its patience is spent.
+    /// Waits used up of [`PATIENCE`].
     waited: u16,
-    /// What it heard last of those it waits for.
+    /// Hash of the last news of the awaited peers.
     heard: u16,
 }
 
-/// How a turn begins.
+/// Start of a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Start {
-    /// How long after its release the turn begins, wall time; measured before time was dropped.
+    /// Delay between the release and the start of the turn, wall time; measured before time is dropped.
     pub late: Duration,
-    /// The simulated time that was given up to come here; zero for a turn within the lag cap.
+    /// The simulated time dropped at this start; zero for a turn within the lag cap.
     pub dropped: SimSpan,
 }
 
@@ -110,68 +110,68 @@ impl Pace {
         self.time
     }
 
-    /// The moment of the timeline at which it is on time: its own, and how far it has been put off.
+    /// The scene time at which it is on time: its own time plus its postponement.
     #[must_use]
     pub fn scene_time(&self) -> SimTime {
         self.time + self.put_off
     }
 
-    /// How far it has been put off.
+    /// Its total postponement.
     #[must_use]
     pub const fn put_off(&self) -> SimSpan {
         self.put_off
     }
 
-    /// The length of its steps: what is wanted, or the shorter one that it made last.
+    /// The length of its steps: the requested one, or the shorter one that it made last.
     #[must_use]
     pub fn dt(&self) -> SimSpan {
         self.shorter().map_or(self.dt, |shorter| self.dt.min(shorter))
     }
 
-    /// The length of step that is wanted.
+    /// The requested length of step.
     #[must_use]
     pub const fn wanted(&self) -> SimSpan {
         self.dt
     }
 
-    /// Wants steps of `dt` (above zero) from now on.
+    /// Requests steps of `dt` (above zero) from now on.
     pub const fn set_dt(&mut self, dt: SimSpan) {
         self.dt = dt;
     }
 
-    /// The step that it made last where that was shorter than wanted.
+    /// The last step, if it was shorter than requested.
     #[must_use]
     pub fn shorter(&self) -> Option<SimSpan> {
         (self.shorter != ANY).then(|| SimSpan::from_nanos(self.shorter.into()))
     }
 
-    /// Where `wanted` was to be stepped by, the agent steps by `made` (above zero), which is not longer.
+    /// Stores that the agent steps by `made` (above zero, not longer than `wanted`) instead of `wanted`.
     pub fn shorten(&mut self, wanted: SimSpan, made: SimSpan) {
         self.shorter = if made < wanted { u32::try_from(made.as_nanos()).unwrap_or(ANY) } else { ANY };
     }
 
-    /// Simulated time given up so far because it could not be made up.
+    /// Simulated time dropped so far because it could not be made up.
     #[must_use]
     pub const fn dropped(&self) -> SimSpan {
         self.dropped
     }
 
-    /// Simulated time spent at rest so far: it took no steps and none are missing.
+    /// Simulated time spent at rest so far: no steps were made and none are missing.
     #[must_use]
     pub const fn rested(&self) -> SimSpan {
         self.rested
     }
 
-    /// The wall time at which the next step is released; `None` while the timeline stands still before it.
+    /// The wall time at which the next step is released; `None` if the timeline stops before it.
     #[must_use]
     pub fn due(&self, timeline: &Timeline) -> Option<Duration> {
         timeline.wall_of(self.scene_time()).map(|due| due.max(Duration::from_millis(self.held_until_ms.into())))
     }
 
-    /// Waits a moment from wall time `wall` for others that are behind; whether it has the patience. `heard` is another number as soon as
-    /// there is news of them.
+    /// Waits briefly from wall time `wall` for peers that are behind; returns `false` once its patience is used up. `heard` changes with
+    /// every news of them.
     pub fn wait(&mut self, wall: Duration, heard: u64) -> bool {
-        // another number in nearly all cases
+        // a different number in nearly all cases
         let heard = (heard ^ (heard >> 16) ^ (heard >> 32)) as u16;
         if heard != self.heard {
             (self.heard, self.waited) = (heard, 0);
@@ -191,8 +191,8 @@ impl Pace {
         timeline.sim_at(wall).since(self.scene_time()).as_nanos() > steps
     }
 
-    /// Begins a turn at wall time `wall`: measures how late it is and gives up what is past the lag cap. Its time leaps to the present
-    /// then; that of one that is `near` others is put off instead, and goes on from where it is.
+    /// Begins a turn at wall time `wall`: measures how late it is. Past the lag cap its time jumps to the present and the lag is dropped;
+    /// if it is `near` peers its time is postponed by the excess instead, and continues from where it is.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration, near: bool) -> Start {
         let cap = if near { LAG_CAP_NEAR } else { LAG_CAP };
         let now = timeline.sim_at(wall);
@@ -214,11 +214,11 @@ impl Pace {
         Start { late, dropped }
     }
 
-    /// The step in place of a `wanted` one of an agent that others touch, at wall time `wall`: a quarter longer with each turn that
+    /// The step to make instead of `wanted` by an agent that may touch peers, at wall time `wall`: a quarter longer with each turn that
     /// finds it more than two steps behind, slowly shorter again when it has caught up.
     ///
-    /// What it would give up later, others would have gone through without it; and steps of one length change what it does less
-    /// than single long ones.
+    /// Time that it dropped later would be time that its peers simulate without it; and steps of one length disturb its motion less than
+    /// single long ones.
     pub fn stretch(&mut self, wanted: SimSpan, timeline: &Timeline, wall: Duration, near: bool) -> SimSpan {
         let lag = timeline.sim_at(wall).since(self.scene_time());
         let now = SimSpan::from_nanos(self.stretched.into()).max(wanted);
@@ -228,7 +228,7 @@ impl Pace {
         } else {
             STRETCHED_MAX
         };
-        // who waits for others is behind for their sake: longer steps would not help
+        // an agent that waits for peers is behind because of them: longer steps would not help
         let waits = self.is_waiter(wall);
         let next = if lag > times(now, LAG_CAP_STEPS, 1) && !waits {
             times(now, 5, 4).min(most).max(wanted)
@@ -241,7 +241,7 @@ impl Pace {
         next.max(wanted)
     }
 
-    /// Counts the wait that ends at wall time `wall`.
+    /// Accounts for the wait that ends at wall time `wall`.
     fn count_wait(&mut self, wall: Duration) {
         let until_ms = std::mem::take(&mut self.held_until_ms);
         if until_ms > 0 {
@@ -251,7 +251,7 @@ impl Pace {
         }
     }
 
-    /// Whether it has lately spent much of its time waiting; asked once a step.
+    /// Whether it has lately spent much of its time waiting; called once per step.
     fn is_waiter(&mut self, wall: Duration) -> bool {
         let (now, [waited, of]) = (ticks(wall), self.waits);
         let of = of.saturating_add(u16::try_from(now.wrapping_sub(self.begun)).unwrap_or(u16::MAX));
@@ -259,37 +259,37 @@ impl Pace {
         waited > of / WAITER
     }
 
-    /// The step is done: the agent's time is a step further.
+    /// The step is done: advances the agent's time by it.
     pub fn advance(&mut self) {
         self.advance_by(self.dt());
     }
 
-    /// A step of `span` is done, whatever was wanted.
+    /// A step of `span` is done, whatever was requested.
     pub fn advance_by(&mut self, span: SimSpan) {
         self.time += span;
     }
 
-    /// Gives up what the one who makes this agent's turns gave up, of which its time leapt by `leapt`.
+    /// Drops the time that this agent's leader has dropped, of which its time jumped by `leapt`.
     pub fn give_up(&mut self, dropped: SimSpan, leapt: SimSpan) {
         self.dropped += dropped;
         self.time += leapt;
         self.put_off += dropped - leapt;
     }
 
-    /// Is put off by `put_off` in all, as the one who makes this agent's turns is: what that is more it has given up.
+    /// Takes the leader's total postponement `put_off`: the increase counts as dropped.
     pub fn keep_up(&mut self, put_off: SimSpan) {
         self.dropped = self.dropped + put_off - self.put_off;
         self.put_off = put_off;
     }
 
-    /// Calls its own time another from now on, so that it has been put off by `put_off`; by how many seconds it is later for that.
+    /// Redefines its own time so that its total postponement is `put_off`; returns by how many seconds its own time is later.
     pub fn rename(&mut self, put_off: SimSpan) -> f64 {
         let (moment, before) = (self.scene_time(), self.time);
         (self.time, self.put_off) = (moment - put_off, put_off);
         self.time.secs_after(before)
     }
 
-    /// The agent wakes at wall time `wall`: the time it slept is behind it.
+    /// The agent wakes at wall time `wall`: its time skips the sleep.
     pub fn wake(&mut self, timeline: &Timeline, wall: Duration) {
         let slept = timeline.sim_at(wall).since(self.scene_time());
         self.rested += slept;
@@ -297,7 +297,7 @@ impl Pace {
     }
 }
 
-/// Wall time in ticks, from the beginning again after some days.
+/// Wall time in ticks, which wraps around after some days.
 const fn ticks(wall: Duration) -> u32 {
     (wall.as_nanos() / TICK.as_nanos()) as u32
 }
@@ -336,7 +336,7 @@ mod tests {
 
     #[test]
     fn who_is_near_others_is_put_off_and_lives_through_all_of_its_time() {
-        // a step of 4 ms that takes 10 ms: what others see of it is never missing any time, and it is never late by more than the cap
+        // a step of 4 ms that takes 10 ms: peers never see time missing, and it is never late by more than the cap
         let (line, mut pace, mut wall) = (Timeline::new(), pace(4), ms(0));
         for step in 0..1000 {
             assert_eq!(pace.time(), SimTime::ZERO + span_ms(4 * step));
@@ -415,7 +415,7 @@ mod tests {
 
     #[test]
     fn overload_is_no_death_spiral() {
-        // a step of 4 ms that takes 40 ms: whatever happens, own time + dropped time is the wall's, and the lag stays capped
+        // a step of 4 ms that takes 40 ms: own time + dropped time is always the wall's, and the lag stays capped
         let line = Timeline::new();
         let mut pace = pace(4);
         let mut wall = Duration::ZERO;

@@ -1,8 +1,8 @@
-//! A few workers for thousands of agents, real time.
+//! Executor in real time with a few workers for thousands of agents.
 //!
-//! In: agents and a [`Clock`]. Out: [`Run`]. Each worker makes the turns that are due, earliest deadline first, and sleeps when
-//! none is; agents keep their own clocks as they do on threads, and none knows who makes its turns.
-//! A thread for each agent costs a switch of threads for each turn; here a worker goes from one agent to the next.
+//! In: agents and a [`Clock`]. Out: [`Run`]. Each worker makes the turns that are due, earliest deadline first, and sleeps when none is;
+//! agents have their own clocks as on threads, and do not depend on the worker that makes their turns.
+//! A thread per agent costs a context switch per turn; a worker just goes from one agent to the next.
 //! Under overload every agent falls to the same share of its rate (`pool/queue.rs`). Never here: virtual time, declared costs.
 
 mod desk;
@@ -37,17 +37,17 @@ pub struct Pool {
 }
 
 impl Pool {
-    /// Starts a worker for each core the system gives; simulated time stands still until somebody lets it run ([`Drive::Run`]).
-    /// Where the system refuses `priority` ([`Priority::ask`]) workers have the ordinary one.
+    /// Starts a worker per core that the system gives; simulated time is paused until [`Drive::Run`]. If the system refuses `priority`
+    /// ([`Priority::ask`]) workers have the ordinary one.
     ///
     /// # Errors
-    /// [`RunError`] for agents that cannot run as asked, and where the system gives no thread.
+    /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.
     pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         let workers = thread::available_parallelism().map_or(1, NonZero::get);
         Self::with_workers(spawns, clock, workers, (PATIENCE, priority))
     }
 
-    /// Starts `workers` workers, at least one, who are given up after `patience` in one step.
+    /// Starts `workers` workers, at least one, each given up after `patience` in one step.
     pub(super) fn with_workers(
         spawns: Vec<AgentSpawn>,
         clock: Arc<dyn Clock>,
@@ -71,7 +71,7 @@ impl Pool {
 
     fn end(&mut self) {
         self.hall.board.stop();
-        // where the watch has ended there is nobody left to be told
+        // the send fails only if the watchdog has already ended
         let _ = self.notes.send(Note::Stop);
         drop(self.watch.take().map(JoinHandle::join));
     }

@@ -1,6 +1,6 @@
-//! With which priority the system runs the threads that make turns.
+//! Scheduling priority of the threads that make turns.
 //!
-//! In: what a scene asks for. Out: threads that have it, or the reason why they do not. Never here: which agent is next.
+//! In: the scene's request. Out: threads with this priority, or the reason for a refusal. Never here: which agent is next.
 
 use thread_priority::{
     RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
@@ -10,11 +10,11 @@ use thread_priority::{
 /// How the system's scheduler ranks the threads of agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Priority {
-    /// As it ranks everybody.
+    /// The default of the system.
     #[default]
     Normal,
-    /// Before everything of ordinary priority, the frame loop included: first in, first out (POSIX `SCHED_FIFO`), at the
-    /// lowest of those ranks. Agents that want all cores leave nothing for pictures then.
+    /// Before all threads of ordinary priority, the frame loop included: first in, first out (POSIX `SCHED_FIFO`), at the lowest real-time
+    /// priority. If agents use all cores, nothing is left for pictures.
     Realtime,
 }
 
@@ -29,7 +29,7 @@ pub struct PriorityRefused {
 }
 
 impl Priority {
-    /// Gives this thread the priority. After a refusal it keeps what it had.
+    /// Sets the priority of this thread. After a refusal it has its previous one.
     ///
     /// # Errors
     /// [`PriorityRefused`].
@@ -42,7 +42,7 @@ impl Priority {
             .map_err(|error| PriorityRefused { why: error.to_string() })
     }
 
-    /// Whether the system grants it; asked on a thread of its own, which changes nothing for the others.
+    /// Whether the system grants it; tested on a separate thread, without effect on others.
     ///
     /// # Errors
     /// [`PriorityRefused`].
@@ -89,7 +89,7 @@ mod tests {
                 running(Threads::start(vec![spawn()], system(), Priority::Realtime).unwrap())
             };
             eventually("it steps", || run.agents()[0].steps() >= 3);
-            // other tests have pools of ordinary priority meanwhile
+            // other tests run pools of ordinary priority meanwhile
             let found = classes(prefix);
             assert!(found.contains(&class), "{prefix} {found:?}");
             run.shutdown();

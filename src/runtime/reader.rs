@@ -1,8 +1,8 @@
-//! The newest states of all agents, frame by frame, for the one who shows them.
+//! Reads the newest states of all agents, frame by frame, for display.
 //!
-//! In: a run's agents and the time of each frame. Out: the states, and which of them are new. Only what has changed is looked at.
-//! Ages are counted for every agent in every frame nevertheless: of one that has not changed they follow from the times of the
-//! frames, and are counted when it changes. Never here: what is done with the states.
+//! In: a run's agents and the time of each frame. Out: the states, and which of them are new. Only changed agents are read.
+//! Ages are nevertheless counted for every agent in every frame: for an unchanged agent they follow from the times of the frames, and are
+//! counted when it changes. Never here: the use of the states.
 
 use super::account::AgentState;
 use super::handle::AgentHandle;
@@ -10,7 +10,7 @@ use metachron_core::{SimTime, Snapshot};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
-/// The ages of an agent that does not change are counted at least every so many frames.
+/// The ages of an unchanged agent are counted at least once in this many frames.
 const FRAMES_KEPT: usize = 256;
 
 /// Reads the agents of one run; a run has one reader.
@@ -24,10 +24,10 @@ pub struct Reader {
     read: u64,
 }
 
-/// How an agent was when it was last looked at.
+/// An agent at its last reading.
 #[derive(Debug, Clone, Copy)]
 struct Look {
-    /// Up to which frame its ages are counted.
+    /// Number of frames up to which its ages are counted.
     counted: u64,
     time: SimTime,
     rests: bool,
@@ -42,14 +42,14 @@ impl Reader {
         Self { newest, looks, frames: VecDeque::with_capacity(2 * FRAMES_KEPT), read: 0 }
     }
 
-    /// The states as they were read last, in the order of the agents.
+    /// The states of the last reading, in the order of the agents.
     #[must_use]
     pub fn newest(&self) -> &[Arc<Snapshot>] {
         &self.newest
     }
 
-    /// Reads the states for a frame at `now`; visits those agents whose state or condition has changed since the last frame, in
-    /// their order, with the newest state and whether they step on.
+    /// Reads the states for a frame at `now`; visits the agents whose state or condition has changed since the last frame, in their order,
+    /// with the newest state and whether they are running.
     pub fn read(
         &mut self,
         agents: &[AgentHandle],
@@ -80,7 +80,7 @@ impl Reader {
         }
     }
 
-    /// Counts the ages of agent `at` in the frames that have passed since they were counted.
+    /// Counts the ages of agent `at` in the frames since its last count.
     fn count(&mut self, at: usize, agent: &AgentHandle) {
         let look = &mut self.looks[at];
         let frames = (self.read - look.counted) as usize;
@@ -93,7 +93,7 @@ impl Reader {
         look.counted = self.read;
     }
 
-    /// Counts some of those that do not change, so that nobody is behind by more frames than are kept.
+    /// Counts some of the unchanged agents, so that no agent is behind by more frames than are stored.
     fn catch_up(&mut self, agents: &[AgentHandle]) {
         let share = agents.len().div_ceil(FRAMES_KEPT);
         let from = (self.read as usize % FRAMES_KEPT) * share;
@@ -114,7 +114,7 @@ mod tests {
     use metachron_core::AgentId;
     use std::time::Duration;
 
-    /// Rates of 1 to 30 Hz, one that sleeps and one that breaks.
+    /// Rates of 1 to 30 Hz, one agent that goes to rest and one that fails.
     fn run() -> Box<Lockstep> {
         let mut spawns: Vec<_> = [30.0, 7.0, 2.0, 1.0].map(|hz| Dummy::new(1.0).at(hz)).into();
         spawns.push(Dummy { rest_from: Some(5), ..Dummy::new(1.0) }.at(10.0));

@@ -1,30 +1,30 @@
-//! Words that one thread writes and any thread reads whole, without waiting: a version before and after them tells (a seqlock).
+//! Seqlock: words that one thread writes and any thread reads consistently, without waiting, checked by a version before and after.
 //!
-//! In: all words at once. Out: all words of one writing, or word that they are just being written. The words are atomic, so that
-//! a reader in the middle of a writing reads old and new ones, which it throws away, and nothing undefined.
-//! Never here: what the words mean, how often a reader tries again.
+//! In: all words together. Out: all words of one write, or the report that a write is in progress. The words are atomic, so that a reader
+//! in the middle of a write reads a mix of old and new ones, which it discards, without undefined behaviour.
+//! Never here: the meaning of the words, how often a reader retries.
 
 use super::sync::atomic::{AtomicU64, Ordering, fence};
 
 /// `N` words and their version.
 #[derive(Debug)]
 pub(super) struct Seqlock<const N: usize> {
-    /// The version that the writer has come to, for it alone: so it never loads what it stores, and loom sees every order (it
-    /// overlooks those in which a store comes right after its own thread's load).
+    /// The writer's copy of its version: so it never loads what it stores, and loom explores every order (it misses those in which a store
+    /// comes right after a load by the same thread).
     reached: AtomicU64,
-    /// Odd while the words are being written; zero before the first writing.
+    /// Odd while the words are being written; zero before the first write.
     version: AtomicU64,
     words: [AtomicU64; N],
 }
 
-/// What a reader finds.
+/// Result of a read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Glance<const N: usize> {
     /// Nothing was ever written.
     Nothing,
-    /// The newest whole writing.
+    /// The newest complete write.
     Whole([u64; N]),
-    /// A writer stands in the middle of a writing, or came to one meanwhile.
+    /// A write was in progress, or began meanwhile.
     Torn,
 }
 
@@ -50,7 +50,7 @@ impl<const N: usize> Seqlock<N> {
         self.version.store(version.wrapping_add(2), Ordering::Release);
     }
 
-    /// Looks once.
+    /// Tries to read once.
     pub fn read(&self) -> Glance<N> {
         let version = self.version.load(Ordering::Acquire);
         if version == 0 {

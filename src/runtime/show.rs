@@ -1,7 +1,7 @@
-//! What others come to see of an agent: its states, and whom they concern.
+//! Publication of an agent: its states, and the notification of the agents that it acts on.
 //!
-//! In: a step that has been made. Out: a state written, later published or kept from being seen ([`super::faults`]); those it
-//! acts on are told once they can see how. Never here: the step, what the agent sees itself.
+//! In: a step that has been made. Out: a state, written and later published or withheld ([`super::faults`]); the agents it acts on are
+//! notified once the state is visible. Never here: the step, the agent's own view.
 
 use super::account::Entry;
 use super::turn::{Actor, Open};
@@ -10,17 +10,17 @@ use metachron_core::SimTime;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
 impl Actor {
-    /// Accounts for a step that has been made and shows it; whether its state can be seen.
+    /// Records a step in the metrics and publishes its state; whether the state is visible.
     pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
         let missed = now > self.pace.scene_time();
         let entry = Entry { now, late: open.start.late, missed, work_s };
-        // first the account: who sees a state finds it accounted for
+        // metrics first: a state that is visible is accounted for
         self.diary.write(&self.shared.gauges, &self.pace, entry);
         self.withheld = self.faults.loses(self.id(), self.diary.steps());
         !self.withheld && self.show(now)
     }
 
-    /// Publishes the state that was written last; whether it can be seen.
+    /// Publishes the state that was written last; whether it is visible.
     pub fn show(&mut self, now: SimTime) -> bool {
         let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
         let published = self.writer.publish();
@@ -33,7 +33,7 @@ impl Actor {
         published
     }
 
-    /// Writes the state at `time`, to be published later; `at_rest` where the agent means to rest in it.
+    /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
     pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
         let (agent, put_off, shorter) = (&self.agent, self.pace.put_off(), self.pace.shorter());
         self.withheld = false;
@@ -53,19 +53,19 @@ impl Actor {
         }
     }
 
-    /// Shows a state that was kept from being seen: the last of a life never is.
+    /// Publishes a withheld state: the last state of an agent is never withheld.
     pub fn show_withheld(&mut self) {
         if std::mem::take(&mut self.withheld) && self.writer.publish() {
             self.tell();
         }
     }
 
-    /// Lets the reader of the run know that there is something new of this agent.
+    /// Reports a new state of this agent to the run's reader.
     pub fn tell(&self) {
         self.shared.board.news.tell(self.shared.id);
     }
 
-    /// Writes down that the points watched stay where they are until `now`: a state at rest still holds.
+    /// Records that the watched points stay in place until `now`: a state at rest is still valid.
     pub fn hold_watched(&self, now: SimTime) {
         if self.shared.traces.is_empty() {
             return;
@@ -74,7 +74,7 @@ impl Actor {
         self.shared.traces.iter().for_each(|trace| locked(trace).hold(&state, now));
     }
 
-    /// Tells those this agent acts on, once they can see how.
+    /// Notifies the agents that this agent acts on, once its state is visible.
     fn announce(&mut self, now: SimTime) {
         let newest = self.shared.slot.latest();
         let board = &self.shared.board;
@@ -99,7 +99,7 @@ impl Actor {
     }
 }
 
-/// Nobody waits here while the agent runs: others read at the end.
+/// Uncontended while the agent runs: other threads read at the end.
 fn locked(trace: &Mutex<Trace>) -> MutexGuard<'_, Trace> {
     trace.lock().unwrap_or_else(PoisonError::into_inner)
 }

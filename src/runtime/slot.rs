@@ -1,22 +1,22 @@
-//! The newest value only: one writer, any number of readers, nobody waits.
+//! Slot for the newest value only: one writer, any number of readers, non-blocking.
 //!
-//! In: whole values. Out: the newest of them, shared. A value that nobody read is lost, and that is meant.
-//! The writer fills values that the readers have let go of, so that nothing is allocated once there are enough of them:
-//! one published, one being filled, and one for each that a reader keeps. Never here: queues, locks that are waited for.
+//! In: complete values. Out: the newest of them, shared. A value that was not read before the next one is lost, by design.
+//! The writer reuses values that the readers have released, so that nothing is allocated once there are enough of them: one published, one
+//! being filled, and one for each held by a reader. Never here: queues, blocking locks.
 //!
-//! The newest value lies in one of a few cells; an index says which. The writer only ever takes a cell that is not the newest,
-//! and only if no reader is in it; a reader takes the newest and looks again if the index has moved meanwhile. Both only try
-//! the cells' locks, so that a thread that is stopped in the middle stops nobody.
-//! (arc-swap does this for readers, but its writer visits every thread that ever read: 60 µs a publication with 1000 agents.)
+//! The newest value is in one of a few cells; an index says which. The writer only ever takes a cell that is not the newest, and only if no
+//! reader is in it; a reader takes the newest and retries if the index has moved meanwhile. Both only try the cells' locks, so that a
+//! thread that is suspended in the middle blocks no other.
+//! (arc-swap does this for readers, but its writer visits every thread that ever read: 60 µs per publication with 1000 agents.)
 
 use super::sync::atomic::{AtomicUsize, Ordering};
 use super::sync::{Arc, RwLock};
 
-/// How many cells. The writer needs one that is not the newest and not just being read;
-/// three readers of one slot must be stopped inside a read (20 ns) of old values before it finds none.
+/// Number of cells. The writer needs one that is not the newest and not just being read; only three readers of one slot that are suspended
+/// inside a read (20 ns) of old values leave it none.
 const CELLS: usize = 4;
 
-/// Where the newest value lies.
+/// The cells and the index of the newest value.
 #[derive(Debug)]
 pub struct LatestSlot<T> {
     newest: AtomicUsize,
@@ -29,13 +29,13 @@ impl<T> LatestSlot<T> {
         Self { newest: AtomicUsize::new(0), cells: std::array::from_fn(|_| RwLock::new(first.take())) }
     }
 
-    /// The newest value. It stays as it is for as long as it is kept; keep few of them, each is storage the writer must replace.
+    /// The newest value. It does not change while it is held; hold few of them, since the writer must replace the storage of each.
     #[must_use]
     pub fn latest(&self) -> Arc<T> {
         loop {
             let at = self.newest.load(Ordering::Acquire);
             let seen = self.cells[at].try_read().ok().and_then(|cell| cell.clone());
-            // a cell that is written again before it is the newest again holds what is not published yet
+            // a cell that is rewritten before it is the newest again holds a value that is not published yet
             if self.newest.load(Ordering::Acquire) == at
                 && let Some(value) = seen
             {
@@ -49,7 +49,7 @@ impl<T> LatestSlot<T> {
         std::hint::black_box(self.newest.load(Ordering::Relaxed));
     }
 
-    /// Makes `value` the newest and takes back what is not read any more; gives `value` back if no cell is free.
+    /// Makes `value` the newest and collects values that are no longer read; returns `value` if no cell is free.
     fn put(&self, value: Arc<T>, spare: &mut Vec<Arc<T>>) -> Result<(), Arc<T>> {
         let newest = self.newest.load(Ordering::Relaxed);
         let others = (1..CELLS).map(|k| (newest + k) % CELLS);
@@ -59,12 +59,12 @@ impl<T> LatestSlot<T> {
         spare.extend(cell.replace(value));
         drop(cell);
         self.newest.store(at, Ordering::Release);
-        // a reader may be in the cell that was the newest: then it is emptied when storage is short
+        // a reader may be in the previous newest cell: then it is emptied when storage is short
         spare.extend(self.take(newest));
         Ok(())
     }
 
-    /// Takes back what lies in cells that are not the newest and that no reader is in.
+    /// Collects values from cells that are not the newest and that no reader is in.
     fn sweep(&self, spare: &mut Vec<Arc<T>>) {
         let newest = self.newest.load(Ordering::Relaxed);
         spare.extend((1..CELLS).filter_map(|k| self.take((newest + k) % CELLS)));
@@ -75,7 +75,7 @@ impl<T> LatestSlot<T> {
     }
 }
 
-/// The one who publishes into a [`LatestSlot`].
+/// The writer of a [`LatestSlot`].
 #[derive(Debug)]
 pub struct SlotWriter<T> {
     slot: Arc<LatestSlot<T>>,
@@ -88,7 +88,7 @@ impl<T: Default> SlotWriter<T> {
     /// A slot whose first value is `first`, and its writer.
     #[must_use]
     pub fn new(first: T) -> Self {
-        // one published, one filled: made one after the other they lie on neighbouring pages
+        // one published, one to be filled: allocated one after the other they are on neighbouring pages
         Self { slot: Arc::new(LatestSlot::new(first)), spare: vec![Arc::new(T::default())], filled: None, made: 2 }
     }
 
@@ -98,8 +98,8 @@ impl<T: Default> SlotWriter<T> {
         Arc::clone(&self.slot)
     }
 
-    /// Fills a value that no reader holds, to be published later. `fill` gets an old value and must overwrite all of it.
-    /// A value filled before and not yet published is filled again.
+    /// Fills a value that no reader holds, to be published later. `fill` gets an old value and must overwrite all of it. A filled value
+    /// that is not yet published is filled again.
     pub fn fill<R>(&mut self, fill: impl FnOnce(&mut T) -> R) -> R {
         let mut free = self.filled.take().unwrap_or_else(|| self.take_spare());
         let result = fill(Arc::get_mut(&mut free).expect("nobody else holds a spare value"));
@@ -107,8 +107,8 @@ impl<T: Default> SlotWriter<T> {
         result
     }
 
-    /// Publishes the value that was filled last; whether it did. It does not if there is none, or if readers that were stopped
-    /// in the middle of a read keep every cell: the value stays filled then, for the next time.
+    /// Publishes the value that was filled last; whether it did. It does not if there is none, or if readers suspended in the middle of a
+    /// read occupy every cell: then the value stays filled for the next time.
     pub fn publish(&mut self) -> bool {
         let Some(value) = self.filled.take() else { return false };
         self.filled = self.slot.put(value, &mut self.spare).err();
@@ -121,13 +121,13 @@ impl<T: Default> SlotWriter<T> {
         self.filled.as_deref()
     }
 
-    /// The value that will be filled next, where one is at hand.
+    /// The value that will be filled next, if one is available.
     #[must_use]
     pub fn spare(&self) -> Option<&T> {
         self.spare.iter().find(|value| Arc::strong_count(value) == 1).map(|value| &**value)
     }
 
-    /// How many values were ever allocated.
+    /// Number of values ever allocated.
     #[must_use]
     pub const fn made(&self) -> usize {
         self.made
@@ -145,7 +145,7 @@ impl<T: Default> SlotWriter<T> {
 
     /// A spare value that no reader holds.
     fn unread(&mut self) -> Option<Arc<T>> {
-        // what lies in no cell any more nobody comes to hold again
+        // no reader can acquire a value that is in no cell any more
         let at = self.spare.iter().position(|value| Arc::strong_count(value) == 1)?;
         Some(self.spare.swap_remove(at))
     }
@@ -216,7 +216,7 @@ mod tests {
         let after = allocation_counter::measure(|| rounds(10..10_000));
         assert!(warm_up.count_total > 0, "the counter counts");
         assert_eq!(after.count_total, 0, "{after:?}");
-        // one published, one being filled, three kept
+        // one published, one being filled, three held
         assert!(writer.made() <= 5, "made {}", writer.made());
     }
 

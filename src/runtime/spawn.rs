@@ -1,4 +1,4 @@
-//! Bringing agents into a run: what is asked is checked, and everybody is told of the others.
+//! Assembly of a run: checks the requested agents, and introduces them to each other.
 //!
 //! In: [`AgentSpawn`]s; an agent's number is its place in their list. Out: actors and handles, or a [`RunError`].
 //! Never here: threads, time passing.
@@ -23,42 +23,41 @@ use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snaps
 use metachron_geometry::{Form, FormKind};
 use std::sync::{Arc, Mutex};
 
-/// An agent on its way into a run.
+/// Description of an agent to be started.
 pub struct AgentSpawn {
     /// Its name in the scene.
     pub name: String,
     /// The agent.
     pub agent: Box<dyn Agent>,
-    /// Steps a simulated second that are wanted, `0 < rate <=` [`RATE_MAX_HZ`].
+    /// Requested steps per simulated second, `0 < rate <=` [`RATE_MAX_HZ`].
     pub rate_hz: f64,
     /// The length of its first step; clamped to `dt_range`.
     pub dt: SimSpan,
-    /// The shortest and the longest step it may be given; `0 < shortest <= longest <=` [`DT_MAX_S`].
+    /// The shortest and the longest allowed step; `0 < shortest <= longest <=` [`DT_MAX_S`].
     pub dt_range: (SimSpan, SimSpan),
-    /// The resolutions it may be given; `None` for an agent that is never retuned.
+    /// The allowed resolutions; `None` for an agent that is never retuned.
     pub range: Option<ResolutionRange>,
-    /// Whose newest states it sees. Its own number and repeats are left out.
+    /// Agents whose newest states it always sees. Its own number and repeats are ignored.
     pub links: Vec<AgentId>,
-    /// How it and others act on each other where that is not [`Law::Ledger`]. One side says it; where both do, the one with
-    /// the lower number counts.
+    /// Laws between it and its peers, where not [`Law::Ledger`]. Given by one side; if both give one, that of the lower number counts.
     pub laws: Vec<(AgentId, Law)>,
-    /// Lasting couplings with others. One side says it; the other is told, and both see each other always.
+    /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
     pub attached: Vec<Link>,
-    /// An agent in whose world it steps from the first step on, or that steps in its world: the lower number leads.
+    /// An agent with which it shares an island from the first step on: the lower number leads.
     pub together: Option<AgentId>,
-    /// How its life is disturbed on purpose.
+    /// Faults injected on purpose.
     pub faults: Faults,
-    /// Points of it that are written down ([`AgentHandle::samples`]).
+    /// Points of it that are recorded ([`AgentHandle::samples`]).
     pub watches: Vec<Watch>,
-    /// Who steers its rate; `None` for an agent that keeps what it has.
+    /// Governor of its rate; `None` for an agent with fixed settings.
     pub governor: Option<Box<dyn Governor>>,
 }
 
 impl AgentSpawn {
-    /// An agent that steps `rate_hz` times a second with a step that is fixed, knows nobody and is steered by nobody.
+    /// An agent that steps `rate_hz` times a second with a fixed step, without links and without a governor.
     #[must_use]
     pub fn alone(name: impl Into<String>, agent: Box<dyn Agent>, rate_hz: f64) -> Self {
-        // a rate that is none is told of when the run begins
+        // an invalid rate is reported when the run begins
         let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
         Self {
             name: name.into(),
@@ -78,10 +77,10 @@ impl AgentSpawn {
     }
 }
 
-/// The highest rate that may be wanted: a step of a microsecond is less than a thread needs to wake.
+/// The highest allowed rate: a step of a microsecond is less than a thread needs to wake.
 pub const RATE_MAX_HZ: f64 = 1e6;
 
-/// Why a run did not begin. No agent has made a step.
+/// Reason why a run did not start. No agent has made a step.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum RunError {
@@ -90,68 +89,68 @@ pub enum RunError {
         "{agents} agents are too many for a thread each, at most {most}: run them with executor = \"pool\" or \"auto\""
     )]
     TooMany {
-        /// How many agents were asked for.
+        /// Number of requested agents.
         agents: usize,
-        /// How many it takes.
+        /// The limit.
         most: usize,
     },
-    /// A rate that is none.
+    /// An invalid rate.
     #[error("agent \"{name}\": the rate of {rate_hz} Hz must be above zero and at most 1e6")]
     BadRate {
         /// The agent's name.
         name: String,
-        /// The rate asked for, Hz.
+        /// The requested rate, Hz.
         rate_hz: f64,
     },
-    /// A range of step lengths that is none.
+    /// An invalid range of step lengths.
     #[error(
         "agent \"{name}\": the step range {shortest_s} s to {longest_s} s must rise, lie above zero and end at 1 s at most"
     )]
     BadStep {
         /// The agent's name.
         name: String,
-        /// The shortest step asked for, seconds.
+        /// The shortest requested step, seconds.
         shortest_s: f64,
-        /// The longest step asked for, seconds.
+        /// The longest requested step, seconds.
         longest_s: f64,
     },
-    /// A link to nobody.
+    /// A link to an agent that does not exist.
     #[error("agent \"{name}\" is linked to agent {link}, which does not exist")]
     BadLink {
         /// The agent's name.
         name: String,
-        /// The number it is linked to.
+        /// The number of the missing agent.
         link: u32,
     },
-    /// Faults that are none.
+    /// Invalid fault rates.
     #[error("agent \"{name}\": jitter {jitter} and loss {loss} must lie from 0 to below 1")]
     BadFaults {
         /// The agent's name.
         name: String,
-        /// The jitter asked for.
+        /// The requested jitter.
         jitter: f64,
-        /// The loss asked for.
+        /// The requested loss.
         loss: f64,
     },
     /// The system gave no thread.
     #[error("the system gives no thread for {name}: {source}")]
     NoThread {
-        /// What it was for.
+        /// The purpose of the thread.
         name: String,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
 }
 
-/// The agents of a run, before anybody makes them step.
+/// The agents of a run, before their first turn.
 pub(super) struct Company {
-    /// Who makes turns of its own; an agent that is led from the start is in the company of its leader.
+    /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
     pub actors: Vec<Option<Box<Actor>>>,
     pub handles: Vec<AgentHandle>,
     pub board: Arc<Switchboard>,
 }
 
-/// Brings all agents into a run; each has published the state it starts from, at simulated time zero.
+/// Assembles all agents; each has published its initial state, at simulated time zero.
 pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<Company, RunError> {
     let count = spawns.len();
     spawns.iter().try_for_each(|spawn| check(spawn, count))?;
@@ -192,7 +191,7 @@ fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
     }
 }
 
-/// Tells both sides of every lasting coupling, and lets them see each other.
+/// Gives every permanent link to both sides, and lets them see each other.
 fn attach_both_sides(spawns: &mut [AgentSpawn]) {
     for at in 0..spawns.len() {
         let me = AgentId(at as u32);
@@ -208,10 +207,10 @@ fn attach_both_sides(spawns: &mut [AgentSpawn]) {
     }
 }
 
-/// What is known of all from the start, and everybody's writer.
+/// The data fixed at the start, and the writer of each agent.
 fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
     let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
-    // only rigid bodies can lead, and be led
+    // only rigid bodies can lead and be led
     let rigid = |form: &Option<Arc<Form>>| form.as_ref().is_some_and(|form| matches!(form.kind, FormKind::Solid(_)));
     let led = forms.iter().filter(|form| rigid(form)).count() > 1;
     let mut writers = Vec::with_capacity(spawns.len());
@@ -229,7 +228,7 @@ fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<Slo
     (Peers { all, crowd, linked }, writers)
 }
 
-/// Whom links by the ledger join, each pair both ways round, sorted.
+/// Pairs joined by links with the ledger law, each in both orders, sorted.
 fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
     let mut linked = Vec::new();
     for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
@@ -240,13 +239,13 @@ fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
     linked
 }
 
-/// Whether any two of them could touch.
+/// Whether any two agents could touch.
 fn meet_at_all(all: &[Peer]) -> bool {
     let formed: Vec<&Peer> = all.iter().filter(|peer| peer.form.is_some()).collect();
     formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
 }
 
-/// Writes the law of every pair down on both sides.
+/// Stores the law of every pair on both sides.
 fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
     for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
         for &(other, law) in spawn.laws.iter().filter(|(other, _)| *other != me) {
@@ -336,7 +335,7 @@ mod tests {
         AgentSpawn::alone("tube", Box::new(Tube::new(spec).unwrap()), 100.0)
     }
 
-    /// Whether there is a crowd to look around in, and how many agents have seats for others.
+    /// Whether a crowd is set up, and how many agents can lead or be led.
     fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
         let board = Arc::new(Switchboard::new(spawns.len()));
         let (peers, _) = peers(&mut spawns, &board);

@@ -1,12 +1,12 @@
-//! Who sleeps and who wakes whom.
+//! Sleep registry: which agents are at rest, and how they are woken.
 //!
-//! In: wakes and touches from any thread. Out: a flag each agent looks at, and its thread unparked, or the bell of its pool rung.
-//! An agent that another leads has no turns of its own: who wakes it wakes its leader, and the leader rests for all it leads.
-//! Never here: when an agent is due ([`super::pace`]), what it is told ([`super::mailbox`]).
+//! In: wakes and touches from any thread. Out: a flag per agent, and its thread unparked, or a wake-up of its pool.
+//! An agent that is led has no turns of its own: waking it wakes its leader, and the leader rests for all agents it leads.
+//! Never here: when an agent is due ([`super::pace`]), its commands ([`super::mailbox`]).
 //!
-//! Leaders have lower numbers than those they lead, so that the way up always ends.
-//! No wake is lost: who goes to rest raises `resting` first and looks at `woken` and `touched` after; who wakes writes these
-//! first and looks at `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
+//! Leaders have lower numbers than those they lead, so that the chain of leaders always ends.
+//! No wake is lost: an agent that goes to rest raises `resting` first and reads `woken` and `touched` after; a caller that wakes it writes
+//! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
 
 use super::bell::Bell;
 use super::news::News;
@@ -19,11 +19,11 @@ use super::sync::thread::Thread;
 use metachron_core::{AgentId, SimSpan, SimTime};
 use std::sync::OnceLock;
 
-/// How long after the last touch an agent may not rest, simulated time: longer than the period of any toucher above 10 Hz,
-/// so that a touched agent does not doze off between two touches.
+/// How long after the last touch an agent may not rest, simulated time: longer than the period of any touching agent above 10 Hz, so that
+/// an agent does not go to rest between two touches.
 const TOUCH_HOLD: SimSpan = SimSpan::from_nanos(100_000_000);
 
-/// How long after somebody was far behind everybody asks for it, simulated time; and how often that is noted.
+/// How long after an agent was far behind the others check for it, simulated time; and the least interval between two records of it.
 const FAR_BEHIND_HOLD: SimSpan = SimSpan::from_nanos(2_000_000_000);
 const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
 
@@ -32,16 +32,16 @@ const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
 struct Signal {
     resting: AtomicBool,
     woken: AtomicBool,
-    /// Who makes its turns, by number; [`NOBODY`] where it makes them itself.
+    /// Number of the agent that makes its turns; [`NOBODY`] if it makes them itself.
     leader: AtomicU32,
-    /// It makes no turns any more and takes nobody in.
+    /// It makes no more turns and accepts no agents to lead.
     closed: AtomicBool,
     /// Simulated nanoseconds of the last touch, plus one; zero for never.
     touched: AtomicU64,
     thread: OnceLock<Thread>,
 }
 
-/// No agent has this number.
+/// Not the number of any agent.
 const NOBODY: u32 = u32::MAX;
 
 impl Default for Signal {
@@ -61,14 +61,14 @@ impl Default for Signal {
 #[derive(Debug)]
 pub(super) struct Switchboard {
     signals: Vec<Signal>,
-    /// Somebody was summoned: the lockstep loop looks for them.
+    /// An agent was summoned: the lockstep loop serves it.
     rung: AtomicBool,
     stop: AtomicBool,
-    /// Simulated nanoseconds when somebody who is near others was far behind last, plus one; zero for never.
+    /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
     far_behind: AtomicU64,
-    /// Calls the workers, where agents have no threads of their own.
+    /// Wake-up of the workers, where agents have no threads of their own.
     bell: OnceLock<Bell>,
-    /// Whose state has changed, for the reader of the run.
+    /// Agents with new states, for the reader of the run.
     pub news: News,
 }
 
@@ -85,12 +85,12 @@ impl Switchboard {
         }
     }
 
-    /// That many workers look after those that are summoned from now on.
+    /// From now on summons go to this many workers of a pool.
     pub fn hire(&self, workers: usize) {
         self.bell.get_or_init(|| Bell::new(self.signals.len(), workers));
     }
 
-    /// What calls the workers; `None` where every agent has a thread of its own.
+    /// Wake-up of the workers; `None` where every agent has its own thread.
     pub fn bell(&self) -> Option<&Bell> {
         self.bell.get()
     }
@@ -99,21 +99,21 @@ impl Switchboard {
         self.signals.get(id.0 as usize)
     }
 
-    /// Tells which thread to unpark for `id`.
+    /// Registers the thread to unpark for `id`.
     pub fn lives_on(&self, id: AgentId, thread: Thread) {
         if let Some(signal) = self.signal(id) {
             signal.thread.get_or_init(|| thread);
         }
     }
 
-    /// Hands the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
+    /// Assigns the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
     pub fn follow(&self, id: AgentId, leader: Option<AgentId>) {
         if let Some(signal) = self.signal(id) {
             signal.leader.store(leader.map_or(NOBODY, |l| l.0), Release);
         }
     }
 
-    /// Who makes the turns of `id` in the end; itself where nobody leads it.
+    /// The agent that makes the turns of `id`, at the end of the chain of leaders; `id` itself if it is not led.
     pub fn leader(&self, id: AgentId) -> AgentId {
         let mut at = id;
         while let Some(next) = self.next_up(at) {
@@ -127,19 +127,19 @@ impl Switchboard {
         (leader < id.0).then_some(AgentId(leader))
     }
 
-    /// `id` makes no turns any more.
+    /// Declares that `id` makes no more turns.
     pub fn close(&self, id: AgentId) {
         if let Some(signal) = self.signal(id) {
             signal.closed.store(true, Release);
         }
     }
 
-    /// Whether `id` makes no turns any more.
+    /// Whether `id` makes no more turns.
     pub fn is_closed(&self, id: AgentId) -> bool {
         self.signal(id).is_some_and(|signal| signal.closed.load(Acquire))
     }
 
-    /// `id` must not rest before its next turn; if it rests now, it wakes.
+    /// `id` must not rest before its next turn; if it is at rest, it wakes.
     pub fn wake(&self, id: AgentId) {
         let mut at = Some(id);
         while let Some(who) = at {
@@ -153,7 +153,7 @@ impl Switchboard {
         }
     }
 
-    /// Makes the one who waits for `id` look at what has come for it.
+    /// Makes the thread that serves `id` check its flags.
     pub fn summon(&self, id: AgentId) {
         let Some(signal) = self.signal(id) else { return };
         if let Some(bell) = self.bell.get() {
@@ -164,7 +164,7 @@ impl Switchboard {
         signal.thread.get().inspect(|t| t.unpark());
     }
 
-    /// Another agent acts on `id` at simulated time `now`.
+    /// Reports that another agent acts on `id` at simulated time `now`.
     pub fn touch(&self, id: AgentId, now: SimTime) {
         let Some(signal) = self.signal(id) else { return };
         signal.touched.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
@@ -174,17 +174,17 @@ impl Switchboard {
         }
     }
 
-    /// Whether whoever makes the turns of `id` rests.
+    /// Whether the agent that makes the turns of `id` is at rest.
     pub fn rests(&self, id: AgentId) -> bool {
         self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(Acquire))
     }
 
-    /// Whether `id` was touched so lately, or woken, that it may not rest at `now`.
+    /// Whether `id` was woken, or touched so recently that it may not rest at `now`.
     pub fn is_stirred(&self, id: AgentId, now: SimTime) -> bool {
         self.signal(id).is_some_and(|signal| signal.woken.load(Acquire) || signal.is_held(now))
     }
 
-    /// Goes to rest, with all whose turns it makes, unless somebody woke or touched one of them lately; whether it did.
+    /// Puts the agent to rest, with all agents it leads, unless one of them was woken or recently touched; whether it did.
     pub fn try_rest(&self, id: AgentId, led: impl Iterator<Item = AgentId>, now: SimTime) -> bool {
         let Some(signal) = self.signal(id) else { return false };
         signal.resting.store(true, Release);
@@ -199,19 +199,19 @@ impl Switchboard {
         !disturbed
     }
 
-    /// A turn of `id` begins: what it was woken for is looked after in this turn. To be said before looking.
+    /// A turn of `id` begins: clears its wake-up, which this turn handles. To be called before the turn reads its inputs.
     pub fn heed(&self, id: AgentId) {
         if let Some(signal) = self.signal(id) {
             signal.take_wake();
         }
     }
 
-    /// Whether somebody woke `id` and it has not looked yet.
+    /// Whether `id` was woken and has not handled it yet.
     pub fn is_woken(&self, id: AgentId) -> bool {
         self.signal(id).is_some_and(|signal| signal.woken.load(Acquire))
     }
 
-    /// Ends the rest of `id` if somebody woke it; whether somebody did.
+    /// Ends the rest of `id` if it was woken; whether it was.
     pub fn take_wake(&self, id: AgentId) -> bool {
         let Some(signal) = self.signal(id) else { return false };
         let woken = signal.take_wake();
@@ -221,12 +221,12 @@ impl Switchboard {
         woken
     }
 
-    /// Whether anybody was summoned since the last call.
+    /// Whether any agent was summoned since the last call.
     pub fn take_rung(&self) -> bool {
         self.rung.load(Relaxed) && self.rung.swap(false, AcqRel)
     }
 
-    /// Unparks every thread, so that it looks at the timeline again.
+    /// Unparks every thread, so that it reads the timeline again.
     pub fn unpark_all(&self) {
         if let Some(bell) = self.bell.get() {
             bell.rouse_all();
@@ -234,16 +234,16 @@ impl Switchboard {
         self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
     }
 
-    /// Somebody who is near others is far behind, or was and is not at the scene's time yet, at `now`.
+    /// Records at `now` that an agent near peers is far behind, or is still postponed relative to the scene's time.
     pub fn note_far_behind(&self, now: SimTime) {
         let noted = self.far_behind.load(Relaxed);
-        // everybody reads it: it is written now and then
+        // all agents read this word: it is written seldom
         if noted == 0 || now > SimTime::from_nanos(noted - 1) + FAR_BEHIND_NOTED {
             self.far_behind.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
         }
     }
 
-    /// Whether anybody has been so lately.
+    /// Whether any agent was far behind recently.
     pub fn is_anybody_far_behind(&self, now: SimTime) -> bool {
         let noted = self.far_behind.load(Acquire);
         noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
@@ -262,10 +262,10 @@ impl Switchboard {
 }
 
 impl Signal {
-    /// Whether somebody woke it since this was asked last; what was said before the wake can be seen then.
+    /// Whether it was woken since the last call; writes before the wake are then visible.
     fn take_wake(&self) -> bool {
-        // a flag that is down is not written: its line of the cache stays with all who read there;
-        // one that is up is exchanged, not only lowered: a wake that came just before would be overwritten unseen
+        // a flag that is down is not written: its cache line stays shared by all readers;
+        // a flag that is up is exchanged, not just cleared: else a wake right before would be overwritten unseen
         self.woken.load(Relaxed) && self.woken.swap(false, AcqRel)
     }
 

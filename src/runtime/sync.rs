@@ -1,4 +1,4 @@
-//! What threads meet at, under one name, so that a model checker's can take its place (`models/`).
+//! Synchronisation primitives under one name, so that those of a model checker can replace them (`models/`).
 //!
 //! Out: the standard library's. Never here: what is built of them.
 

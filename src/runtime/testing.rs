@@ -1,4 +1,4 @@
-//! An agent without physics for the tests of this room: it counts, drifts towards its neighbours and fails on demand.
+//! An agent without physics for the runtime's tests: it counts, drifts towards its neighbours and fails on demand.
 
 use super::pool::Pool;
 use super::spawn::AgentSpawn;
@@ -18,10 +18,10 @@ use std::sync::{Arc, Mutex};
 use std::thread;
 use std::time::{Duration, Instant};
 
-/// A way to start a run in real time.
+/// Starts a run in real time.
 pub(super) type Start = fn(Vec<AgentSpawn>, Arc<dyn Clock>) -> Box<dyn Run>;
 
-/// Every executor that keeps real time; pools with fewer and with more workers than a small machine has cores.
+/// Every executor in real time; pools with fewer and with more workers than a small machine has cores.
 const LIVE: [(&str, Start); 4] = [
     ("threads", |spawns, clock| running(Threads::start(spawns, clock, Priority::Normal).unwrap())),
     ("pool of one", |spawns, clock| pool(spawns, clock, 1)),
@@ -33,16 +33,16 @@ fn pool(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, workers: usize) -> Box<d
     running(Pool::with_workers(spawns, clock, workers, (Duration::from_secs(60), Priority::Normal)).unwrap())
 }
 
-/// Lets the time of a run begin.
+/// Starts the time of a run.
 pub(super) fn running<R: Run + 'static>(mut run: R) -> Box<R> {
     run.drive(Drive::Run);
     Box::new(run)
 }
 
-/// Holds a claim against every executor that keeps real time.
+/// Tests a claim on every executor in real time.
 pub(super) fn on_every_executor(claim: impl Fn(Start)) {
     for (name, start) in LIVE {
-        // shown where the claim fails
+        // shown if the claim fails
         println!("{name}");
         claim(start);
     }
@@ -62,72 +62,72 @@ pub(super) fn eventually(what: &str, done: impl Fn() -> bool) {
     }
 }
 
-/// What goes wrong at a step.
+/// A failure of a step.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Fault {
-    /// The state is no number.
+    /// The state is not finite.
     NotFinite,
-    /// The model gives up.
+    /// The model returns an error.
     Diverged,
-    /// The model has a bug.
+    /// The model panics.
     Panic,
     /// The step does not return.
     Hang,
 }
 
-/// Whether two agents, by rising numbers, hang together at a time.
+/// Whether two agents, by rising numbers, are bonded at a time.
 pub(super) type Bond = fn(u32, u32, SimTime) -> bool;
 
-/// One step as it was made.
+/// One step that was made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Made {
     pub id: AgentId,
     pub from: SimTime,
     pub to: SimTime,
     pub thread: String,
-    /// Whom it saw: those that could touch it, and those that it was to act on.
+    /// The neighbours it saw, and whether it was to act on them.
     pub saw: Vec<(AgentId, bool)>,
 }
 
-/// All steps that were made, by anybody.
+/// All steps made by any agent.
 pub(super) type Log = Arc<Mutex<Vec<Made>>>;
 
-/// The test agent. Its snapshot says as energy what it has taken, and as residual what it has given.
+/// The test agent. Its snapshot reports the impulse taken as energy and the impulse given as residual.
 #[derive(Debug, Clone)]
 pub(super) struct Dummy {
     /// The work each step reports; with the model "synthetic", microseconds.
     pub work: f64,
-    /// At rest from this step on, while no hand pulls.
+    /// At rest from this step on, unless the user spring pulls.
     pub rest_from: Option<u64>,
     /// Fails at this step.
     pub fault: Option<(u64, Fault)>,
-    /// Up to this step it makes none longer than this.
+    /// Up to this step none is longer than this.
     pub short: Option<(u64, SimSpan)>,
-    /// Whom it acts on, from which step on.
+    /// The agent it acts on, and from which step on.
     pub touches: Option<(u64, AgentId)>,
     pub resolution: Resolution,
     pub steps: u64,
     pub x: f64,
-    /// It has a form: a ball of this radius that flies along z with this speed.
+    /// It has a form: a ball of this radius that moves along z with this speed.
     pub ball: Option<(f64, f64)>,
-    /// With whom it hangs together.
+    /// The agents to which it is bonded.
     pub bond: Option<Bond>,
-    /// It gives one newton second to everybody it owns a pair with, at each of its first so many steps.
+    /// It gives one newton second to every peer whose pair it owns, at each of its first so many steps.
     pub gifts: u64,
-    /// Impulses along x it has taken, newton seconds.
+    /// Impulses along x taken, newton seconds.
     pub taken: f64,
-    /// Impulses along x it has given.
+    /// Impulses along x given.
     pub given: f64,
     pub exchange: Exchange,
     pub log: Option<Log>,
     pub me: AgentId,
     pub time: SimTime,
-    /// Where its matter is.
+    /// Position of its matter along z.
     pub z: f64,
 }
 
 impl Dummy {
-    /// One that takes `work` microseconds a step.
+    /// An agent that reports work of `work` microseconds per step.
     pub fn new(work: f64) -> Self {
         Self {
             work,
@@ -151,12 +151,12 @@ impl Dummy {
         }
     }
 
-    /// One that hangs together with others as `bond` says, and whose steps are written down in `log`.
+    /// An agent that is bonded to others as `bond` says, and whose steps are recorded in `log`.
     pub fn mate(work: f64, bond: Bond, log: &Log) -> Self {
         Self { ball: Some((0.1, 0.0)), bond: Some(bond), log: Some(Arc::clone(log)), ..Self::new(work) }
     }
 
-    /// On its way into a run at this rate, its step fixed.
+    /// A spawn at this rate with a fixed step.
     pub fn at(self, rate_hz: f64) -> AgentSpawn {
         let range = Some(ResolutionRange { eps_m: (0.001, 0.1), n: (0, N_MAX) });
         AgentSpawn { range, ..AgentSpawn::alone(format!("dummy at {rate_hz}"), Box::new(self), rate_hz) }
@@ -184,7 +184,7 @@ impl Dummy {
     }
 }
 
-/// Writes the group of every agent but the first of `ids` into `apart`: zero hangs together with the first.
+/// Writes the group of every agent but the first of `ids` into `apart`: zero is bonded to the first.
 fn groups(bond: Bond, ids: impl Fn(usize) -> AgentId, count: usize, time: SimTime, apart: &mut Vec<u32>) {
     apart.extend(0..count as u32);
     for _ in 0..count {
@@ -252,7 +252,7 @@ impl Agent for Dummy {
         into.resolution = Some(self.resolution);
         (into.energy_j, into.residual_m) = (self.taken, self.given);
         into.touches.extend(self.touches.filter(|(from, _)| self.steps >= *from).map(|(_, id)| id));
-        // where its matter is does not follow x, so that these tests place it
+        // the published bounds do not follow x, so that tests can place them
         into.bounds = self.ball.map(|(radius_m, speed_m_s)| {
             let (centre, half) = (DVec3::Z * self.z, DVec3::splat(radius_m));
             Bounds { low: centre - half, high: centre + half, speed_m_s: speed_m_s.abs() }

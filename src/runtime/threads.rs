@@ -1,8 +1,7 @@
-//! A thread for each agent, real time: the default executor.
+//! Default executor in real time: a thread per agent.
 //!
-//! In: agents and a [`Clock`]. Out: [`Run`]. A thread sleeps until its agent is due and is woken for a command, a touch, a
-//! changed timeline and the end; one whose agent rests or is led by another sleeps without a timer, one whose agent has given
-//! up ends.
+//! In: agents and a [`Clock`]. Out: [`Run`]. A thread sleeps until its agent is due and is woken by a command, a touch, a changed timeline
+//! and the end; a thread whose agent rests or is led by another sleeps without a timer, a thread whose agent is parked ends.
 //! Never here: virtual time, declared costs.
 
 use super::Run;
@@ -22,14 +21,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::{Duration, Instant};
 
-/// The most agents that get a thread each; beyond, waking them costs more than they do.
+/// The most agents with a thread each; beyond, waking them costs more than their steps.
 pub const THREADS_MAX: usize = 1000;
 
-/// Up to so many agents have a thread each where nobody says otherwise: 10 agents of 200 Hz cost 15 µs a turn on threads and 20 in
-/// a pool, 100 cost 10 and 6 (`docs/throughput.md`).
+/// Up to this many agents have a thread each if the scene names no executor: 10 agents of 200 Hz cost 15 µs a turn on threads and 20 in a
+/// pool, 100 cost 10 and 6 (`docs/throughput.md`).
 pub const AUTO_THREADS_MAX: usize = 64;
 
-/// How long the end of a run waits after the last agent that ended. A step that takes longer hangs; its thread is left behind.
+/// How long the end of a run waits after the last agent that ended. A step that takes longer counts as hung; its thread is left behind.
 const PATIENCE: Duration = Duration::from_millis(400);
 
 /// Agents on threads of their own.
@@ -44,11 +43,11 @@ pub struct Threads {
 }
 
 impl Threads {
-    /// Gives every agent its thread; simulated time stands still until somebody lets it run ([`Drive::Run`]). Where the system
-    /// refuses `priority` ([`Priority::ask`]) they have the ordinary one.
+    /// Gives every agent its thread; simulated time is paused until [`Drive::Run`]. If the system refuses `priority` ([`Priority::ask`])
+    /// the threads have the ordinary one.
     ///
     /// # Errors
-    /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as asked, and where the system gives no thread.
+    /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as requested, and if the system gives no thread.
     pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
         if spawns.len() > THREADS_MAX {
             return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
@@ -82,14 +81,14 @@ impl Threads {
         let priority = self.priority;
         let body = move || {
             let _farewell = farewell;
-            // who asked for it has been told whether it is granted
+            // a refusal was already reported to the caller of `Priority::ask`
             drop(priority.take());
             stage.live(actor, &shared);
         };
         builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
     }
 
-    /// Ends all threads and waits for them, as long as it has patience.
+    /// Ends all threads and waits for them until a timeout.
     fn end(&mut self) {
         self.board.stop();
         let mut missing = self.threads.iter().flatten().count();
@@ -97,7 +96,7 @@ impl Threads {
             let Ok(id) = self.ended.recv_timeout(PATIENCE) else { break };
             missing -= 1;
             if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
-                // a panic outside a turn is a bug of ours: it has been printed, and the others must still be joined
+                // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
                 drop(thread.join());
             }
         }
@@ -145,7 +144,7 @@ impl Run for Threads {
     }
 }
 
-/// Says that a thread has ended, however it did.
+/// Reports that a thread has ended, for whatever reason.
 struct Farewell {
     id: AgentId,
     ended: Sender<AgentId>,
@@ -153,12 +152,12 @@ struct Farewell {
 
 impl Drop for Farewell {
     fn drop(&mut self) {
-        // nobody listens any more after the patience of the end: then nobody needs to know
+        // the send fails only after the final timeout, when the report is no longer needed
         let _ = self.ended.send(self.id);
     }
 }
 
-/// What an agent's thread works with.
+/// Working state of an agent's thread.
 struct Stage {
     clock: Arc<dyn Clock>,
     timeline: Arc<SharedTimeline>,
@@ -166,7 +165,7 @@ struct Stage {
 }
 
 impl Stage {
-    /// The life of an agent: turn after turn until it is asked to end, or gives up. While another leads it, it is elsewhere.
+    /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
     fn live(mut self, mut here: Option<Box<Actor>>, shared: &Shared) {
         while !shared.board.stopping() {
             here = match here {
@@ -183,7 +182,7 @@ impl Stage {
         }
     }
 
-    /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or gives up.
+    /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
     fn live_alone(&mut self, mut actor: Box<Actor>) -> Option<Box<Actor>> {
         let board = Arc::clone(&actor.shared.board);
         let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
@@ -205,7 +204,7 @@ impl Stage {
         Some(actor)
     }
 
-    /// Waits until the agent comes home.
+    /// Waits until the agent returns from its leader.
     fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<Actor>> {
         let home = seating.and_then(Seating::come_home);
         if home.is_none() {
@@ -214,7 +213,7 @@ impl Stage {
         home
     }
 
-    /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which does no harm.
+    /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which is harmless.
     fn wait_or_turn(&mut self, actor: &mut Actor) -> Next {
         let timeline = self.timeline.read();
         let now = self.clock.now();

@@ -1,29 +1,29 @@
-//! How long things took, counted: percentiles of any number of times in little memory.
+//! Histogram of durations: percentiles of any number of times in little memory.
 //!
-//! In: times. Out: percentiles to 2 %, as [`Spread`]. An agent has two such accounts, and there may be a hundred thousand agents:
-//! counters are laid out in pages, one for each doubling of time, and only the pages that are used exist (a log-linear histogram
-//! as in HdrHistogram, whose smallest takes 9 kB); a page is a line of the cache. Where a counter is full, all are halved: what
-//! came before counts for half then. Never here: clocks, locks.
+//! In: times. Out: percentiles to 2 %, as [`Spread`]. An agent has two histograms, and there may be a hundred thousand agents: counters are
+//! laid out in pages, one for each doubling of time, and only the pages that are used exist (a log-linear histogram as in HdrHistogram,
+//! whose smallest takes 9 kB); a page is a cache line. When a counter is full, all are halved: earlier times then count for half. Never
+//! here: clocks, locks.
 
 use super::account::Spread;
 use std::time::Duration;
 
-/// The longest time told apart from longer ones, microseconds: 16.8 seconds.
+/// The longest time distinguished from longer ones, microseconds: 16.8 seconds.
 const LONGEST_US: u64 = (1 << 24) - 1;
 
-/// Counters of a page. From the second page on one is 1/32 … 1/64 of its time wide.
+/// Counters of a page. From the second page on each is 1/32 … 1/64 of its time wide.
 const COUNTERS: usize = 32;
 
 /// One page for times below 32 µs, counted singly, and one for each doubling up to [`LONGEST_US`].
 const PAGES: usize = 20;
 
-/// There is room for so many from the first time on.
+/// Pages allocated with the first time.
 const PAGES_AT_ONCE: usize = 2;
 
 /// Times of up to [`LONGEST_US`], counted to 2 %.
 #[derive(Debug, Default)]
 pub(super) struct Times {
-    /// Where each page is kept, plus one; zero for a page that does not exist.
+    /// Index of each page in `pages`, plus one; zero for a page that does not exist.
     index: [u8; PAGES],
     pages: Vec<[u16; COUNTERS]>,
     count: u64,
@@ -36,7 +36,7 @@ impl Times {
         self.record_often(time, 1);
     }
 
-    /// Counts `time` so often.
+    /// Counts `time` `often` times.
     pub fn record_often(&mut self, time: Duration, often: u16) {
         let us = u64::try_from(time.as_micros()).unwrap_or(u64::MAX).min(LONGEST_US);
         let (page, counter) = place(us);
@@ -66,13 +66,13 @@ impl Times {
         self.count = self.pages.iter().flatten().map(|count| u64::from(*count)).sum();
     }
 
-    /// The percentiles of all that was counted; zeros where nothing was.
+    /// The percentiles of all counted times; zeros if there are none.
     pub fn spread(&self) -> Spread {
         let [p50_s, p99_s] = self.percentiles([0.5, 0.99]).map(|us| us as f64 * 1e-6);
         Spread { p50_s, p99_s, max_s: self.longest_us as f64 * 1e-6 }
     }
 
-    /// For each of the rising `shares` the least time that so many were at most, microseconds.
+    /// For each of the rising `shares` the least time that is not exceeded by this share of times, microseconds.
     fn percentiles<const N: usize>(&self, shares: [f64; N]) -> [u64; N] {
         let wanted = shares.map(|share| ((share * self.count as f64).ceil() as u64).max(1));
         let mut found = [self.longest_us; N];
@@ -99,7 +99,7 @@ fn place(us: u64) -> (usize, usize) {
     ((shift + 1) as usize, (us >> shift) as usize - COUNTERS)
 }
 
-/// The first time that a counter counts, microseconds, and how many it counts.
+/// The first time counted by a counter, microseconds, and how many microseconds it covers.
 const fn range(page: usize, counter: usize) -> (u64, u64) {
     if page == 0 {
         return (counter as u64, 1);
@@ -107,7 +107,7 @@ const fn range(page: usize, counter: usize) -> (u64, u64) {
     (((COUNTERS + counter) as u64) << (page - 1), 1 << (page - 1))
 }
 
-/// What stands for the times of a counter, microseconds: none of them is farther from it than half its width.
+/// Representative time of a counter, microseconds: no time that it counts differs from it by more than half its width.
 const fn middle(page: usize, counter: usize) -> u64 {
     let (first, width) = range(page, counter);
     first + width / 2
@@ -121,7 +121,7 @@ mod tests {
     fn percentiles_are_those_of_the_public_histogram() {
         let mut theirs = hdrhistogram::Histogram::<u32>::new_with_bounds(1, 20_000_000, 3).unwrap();
         let mut times = Times::default();
-        // 0.6 µs … 6 s, even in the logarithm
+        // 0.6 µs … 6 s, uniform in the logarithm
         for k in 0..7000_u32 {
             let us = libm::exp10(f64::from(k) * 1e-3 - 0.2);
             times.record(Duration::from_nanos((us * 1e3) as u64));

@@ -1,12 +1,12 @@
-//! One turn of an agent: what every executor does, whoever keeps the time.
+//! One turn of an agent, the same for every executor.
 //!
-//! begin   take commands, give up lag, look around, step, write the snapshot
-//! finish  account, publish, touch, ask the governor, rest or go on
+//! begin   take commands, drop lag, look around, step, write the snapshot
+//! finish  record, publish, touch, call the governor, rest or go on
 //!
-//! Between the two an executor lets the turn's time pass: it did on a thread, lockstep charges it. A turn that fails, by an
-//! error of the model, a state that is not finite or a panic (a bug of ours), parks the agent with the reason; nothing of it is
-//! published and the others go on. Never here: threads, sleeping, events, any law of control, the turns of those an agent
-//! leads ([`super::island`]).
+//! Between the two an executor lets the turn's time pass: on a thread it has passed, lockstep charges it. A turn that fails, by an error of
+//! the model, a state that is not finite or a panic (a bug of metachron), parks the agent with the reason; nothing of it is published and
+//! the other agents go on. Never here: threads, sleeping, events, any law of control, the turns of the agents that an agent leads
+//! ([`super::island`]).
 
 use super::account::{Diary, SMOOTHING};
 use super::eyes::{Eyes, Peers};
@@ -25,7 +25,7 @@ use std::sync::Arc;
 use std::sync::atomic::Ordering::Relaxed;
 use std::time::Duration;
 
-/// An agent and all it needs to live.
+/// An agent with its runtime state.
 pub(super) struct Actor {
     pub shared: Arc<Shared>,
     pub peers: Arc<Peers>,
@@ -39,22 +39,22 @@ pub(super) struct Actor {
     pub eyes: Eyes,
     pub links: Vec<Link>,
     pub hands: Vec<Pull>,
-    /// Those whose turns it makes.
+    /// The agents it leads.
     pub company: Company,
     pub diary: Diary,
     pub rhythm: Rhythm,
     pub open: Option<Open>,
-    /// Whether somebody who does not step with it was beside it in its turn before, if that was asked.
+    /// Whether an agent that does not step with it was next to it in its previous turn, if that was checked.
     pub beside: Option<bool>,
-    /// The state that was written last is kept from being seen.
+    /// The state that was written last is withheld.
     pub withheld: bool,
-    /// Up to which revision each ledger was announced to the one it is for.
+    /// Up to which revision each ledger was announced to its receiver.
     pub announced: Vec<(AgentId, u64)>,
     /// Wall time of turns whose CPU time is not known yet, nanoseconds.
     pub unsettled_ns: u64,
-    /// Up to which time it has had its share of a pool's workers.
+    /// Simulated time up to which the workers of a pool have served it.
     pub served: SimTime,
-    /// How far it was served worse with the worker it was taken from: it makes that up.
+    /// Service that it lacks relative to its present worker's queue: it makes that up.
     pub owed: SimSpan,
 }
 
@@ -63,11 +63,11 @@ pub(super) struct Actor {
 pub(super) struct Open {
     pub start: Start,
     pub dt: SimSpan,
-    /// Which the step was made at, where a governor wants to know.
+    /// The resolution of the step, if a governor needs it.
     pub resolution: Option<Resolution>,
-    /// What it says of its own error afterwards, metres: in all, and the part that its steps made.
+    /// Its own error estimates afterwards, metres: in all, and the part caused by its time steps.
     pub errors_m: [f64; 2],
-    /// Whether it could rest after this turn.
+    /// Whether it may rest after this turn.
     pub rests: bool,
 }
 
@@ -75,33 +75,33 @@ pub(super) struct Open {
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Made {
     pub report: StepReport,
-    /// How long it was: no longer than was wanted.
+    /// Its length: at most the requested one.
     pub dt: SimSpan,
 }
 
-/// What a turn that has begun takes.
+/// Cost of a turn that has begun.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Effort {
     /// Work of one step, in the model's unit.
     pub work: f64,
-    /// How many such steps: one, and one more for every step of those it leads.
+    /// Number of such steps: one, and one more for every step of the agents it leads.
     pub steps: u32,
 }
 
-/// What comes after a turn.
+/// Continuation after a turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Next {
-    /// The next one, when the pace says.
+    /// The next turn, when the pace says.
     Due,
-    /// Nothing until somebody wakes the agent.
+    /// Rest until the agent is woken.
     Rest,
     /// It hands its turns over to this agent.
     Join(AgentId),
-    /// Nothing any more.
+    /// Parked: no more turns.
     Parked,
 }
 
-/// The distance between the starts of an agent's turns.
+/// Measures the interval between the starts of an agent's turns.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Rhythm {
     last: Option<(Duration, u64)>,
@@ -127,12 +127,12 @@ impl Actor {
         self.shared.id
     }
 
-    /// Whether the agent has given up.
+    /// Whether the agent is parked.
     pub fn is_parked(&self) -> bool {
         !self.shared.gauges.is_running() && !self.shared.gauges.is_resting()
     }
 
-    /// Publishes the state the agent starts from, or parks it.
+    /// Publishes the initial state of the agent, or parks it.
     pub fn introduce(&mut self) {
         let time = self.pace.time();
         let written = contained(|| self.write_snapshot(time, false));
@@ -144,8 +144,8 @@ impl Actor {
         self.diary.pace(&self.shared.gauges, &self.pace);
     }
 
-    /// Looks around before the first step and publishes what that shows, where anybody is linked to it; comes after everybody's
-    /// [`Self::introduce`].
+    /// Looks around before the first step and publishes the result, if the agent has links; to be called after [`Self::introduce`] of all
+    /// agents.
     pub fn look(&mut self) {
         if self.links.is_empty() || self.is_parked() {
             return;
@@ -165,8 +165,8 @@ impl Actor {
         }
     }
 
-    /// Steps at wall time `wall`, with all it leads, or waits for others that are behind: what that took, or `None` if it failed and
-    /// is parked now.
+    /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
+    /// and is parked now.
     pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
         self.shared.board.heed(self.id());
         self.take_in();
@@ -185,7 +185,7 @@ impl Actor {
 
     /// Ends the turn that began: it took `work_s` seconds and it is wall time `wall`.
     pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
-        // it waited, or somebody leads it from now on
+        // it waited, or another agent leads it from now on
         let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
         let now = timeline.sim_at(wall);
         let mut published = self.conclude(&open, now, work_s);
@@ -199,11 +199,11 @@ impl Actor {
         if let Some(leader) = self.seek_leader() {
             return Next::Join(leader);
         }
-        // a state nobody could see is no state to rest in
+        // an agent does not rest in a state that was not published
         if open.rests && published && self.lie_down(now) { Next::Rest } else { Next::Due }
     }
 
-    /// Whether somebody has woken the agent from its rest; it is on its feet then, at the timeline's present, and all it leads.
+    /// Whether the agent was woken from its rest; it then runs again at the timeline's present, with all agents it leads.
     pub fn wakes(&mut self, timeline: &Timeline, wall: Duration) -> bool {
         if !self.shared.board.take_wake(self.id()) {
             return false;
@@ -212,7 +212,7 @@ impl Actor {
         true
     }
 
-    /// Accounts for the time of a turn on the wall: those it leads share it.
+    /// Accounts for the wall time of a turn, shared equally with the agents it leads.
     pub fn count(&mut self, wall: Duration) {
         let share = if self.company.is_empty() { wall } else { wall / (1 + self.company.len() as u32) };
         let share_ns = share.as_nanos() as u64;
@@ -220,16 +220,16 @@ impl Actor {
         self.company.each(|seat| seat.unsettled_ns += share_ns);
     }
 
-    /// Accounts for the CPU time of the turns since the last call: `share` of what they took on the wall.
+    /// Accounts for the CPU time of the turns since the last call: the fraction `share` of their wall time.
     pub fn settle(&mut self, share: f64) {
         let nanos = (std::mem::take(&mut self.unsettled_ns) as f64 * share) as u64;
         let cpu = &self.shared.gauges.cpu_nanos;
-        // nobody else writes: to exchange the word would cost more
+        // no other thread writes: an atomic exchange would cost more
         cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
         self.company.each(|seat| seat.settle(share));
     }
 
-    /// Brings the account up to date, at the end of a run: who rests has rested until now, and the last state is seen.
+    /// Completes the metrics at the end of a run: a resting agent has rested until now, and the last state is published.
     pub fn close_account(&mut self, timeline: &Timeline, wall: Duration) {
         self.show_withheld();
         if self.shared.gauges.is_resting() {
@@ -241,7 +241,7 @@ impl Actor {
         self.company.each(|seat| seat.close_account(timeline, wall));
     }
 
-    /// Gives up for good, for this reason.
+    /// Parks the agent for good, for this reason.
     pub fn park(&mut self, reason: String) {
         self.show_withheld();
         self.diary.flush(&self.shared.gauges);
@@ -253,7 +253,7 @@ impl Actor {
         self.shut_door();
     }
 
-    /// No open turn where it waits instead, or hands its turns over before it steps.
+    /// Returns no open turn if it waits instead, or hands its turns over before it steps.
     fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<Open>, Effort), String> {
         self.take_commands();
         let now = timeline.sim_at(wall);
@@ -264,7 +264,7 @@ impl Actor {
         if near && start.late > LAG_CAP || self.pace.put_off() > SimSpan::ZERO {
             self.shared.board.note_far_behind(now);
         }
-        // even where it waits: those whom it waits for may wait for one that it leads
+        // even if it waits: the awaited agents may wait for one that it leads
         let alone = self.gather(timeline, wall, (&start, leapt));
         if self.waits(wall) || self.is_called() {
             return Ok((None, Effort { work: 0.0, steps: alone }));
@@ -290,8 +290,8 @@ impl Actor {
         Ok((Some(open), Effort { work: report.work, steps: 1 + led + alone }))
     }
 
-    /// Whether somebody has found since its last step that it should lead this agent: a slow one that stepped once more alone would
-    /// be where nobody expects it.
+    /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
+    /// not be where its leader expects it.
     fn is_called(&mut self) -> bool {
         if self.shared.seating.is_none() || self.eyes.neighbours().is_empty() {
             return false;
@@ -300,7 +300,7 @@ impl Actor {
         self.seek_leader().is_some()
     }
 
-    /// Steps by itself, by `wanted` or what the agent makes of that.
+    /// Steps alone, by `wanted` or by the shorter step that the agent chooses.
     pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
         let time = self.pace.time();
         self.eyes.look(
@@ -330,7 +330,7 @@ impl Actor {
         }
     }
 
-    /// Whether nothing from outside keeps the agent from resting at simulated time `now`.
+    /// Whether no outside influence prevents the agent from resting at simulated time `now`.
     pub fn is_let_alone(&self, now: SimTime) -> bool {
         self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
     }
@@ -375,7 +375,7 @@ impl Actor {
         rests
     }
 
-    /// Rests, and all it leads.
+    /// Puts it to rest, with all agents it leads.
     fn rest_now(&mut self) {
         self.diary.flush(&self.shared.gauges);
         self.shared.gauges.set_resting(true);
@@ -386,11 +386,11 @@ impl Actor {
         self.company.each(Actor::rest_now);
     }
 
-    /// Goes on after a rest, at the timeline's present, and all it leads.
+    /// Continues after a rest, at the timeline's present, with all agents it leads.
     fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
         self.hold_watched(timeline.sim_at(wall));
         self.pace.wake(timeline, wall);
-        // as one who comes from elsewhere: while it slept the others' time went on
+        // as an agent that newly comes near its peers: while it slept their time went on
         self.beside = Some(false);
         self.rhythm = Rhythm::default();
         self.diary.restart(timeline.sim_at(wall));
@@ -403,7 +403,7 @@ impl Actor {
 
 /// Runs `part` of a turn; an error or a panic in it is the reason to park.
 pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    // the agent is not used again after a panic, so its broken promises are seen by nobody
+    // the agent is not used again after a panic, so its broken invariants have no effect
     match catch_unwind(AssertUnwindSafe(part)) {
         Ok(result) => result,
         Err(payload) => {

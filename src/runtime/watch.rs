@@ -1,4 +1,4 @@
-//! Material points whose path is written down, state by state.
+//! Recording of the paths of material points, state by state.
 //!
 //! In: an agent's snapshots, as it publishes them. Out: for each [`Watch`] the first state at or after every multiple of its
 //! period, with that state's own time; while the agent rests, its state at every multiple. Never here: files, units of a report.
@@ -6,7 +6,7 @@
 use glam::DVec3;
 use metachron_core::{SimSpan, SimTime, Snapshot};
 
-/// A material point to be written down.
+/// A material point to be recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Watch {
     /// Which point: share of a tube's rest length, 0 … 1; no meaning for other bodies.
@@ -15,13 +15,13 @@ pub struct Watch {
     pub every: SimSpan,
 }
 
-/// Samples that are kept of one point; later ones are dropped. A run of 24 hours at 10 Hz.
+/// Samples stored of one point; later ones are dropped. A run of 24 hours at 10 Hz.
 pub const SAMPLES_MAX: usize = 864_000;
 
-/// The time of a state and where the point was, metres.
+/// The time of a state and the position of the point, metres.
 pub type Sample = (SimTime, DVec3);
 
-/// A point and what was written down of it.
+/// A point and its samples.
 #[derive(Debug)]
 pub(super) struct Trace {
     watch: Watch,
@@ -38,7 +38,7 @@ impl Trace {
         &self.samples
     }
 
-    /// Writes the state down if its time has come.
+    /// Records the state if a sample is due.
     pub fn look(&mut self, state: &Snapshot) {
         if state.moment() < self.next || self.samples.len() >= SAMPLES_MAX || self.watch.every == SimSpan::ZERO {
             return;
@@ -48,7 +48,7 @@ impl Trace {
         self.next = self.multiple_after(state.moment());
     }
 
-    /// Writes the state down at every multiple of the period up to `until`: it holds that long.
+    /// Records the state at every multiple of the period up to `until`, for which it is valid.
     pub fn hold(&mut self, state: &Snapshot, until: SimTime) {
         if self.watch.every == SimSpan::ZERO {
             return;

@@ -1,6 +1,6 @@
-//! A frame's choice: what is seen, a level for each of it, the picture made of these, and what they cost where costs are declared.
+//! Choice of a frame: visible objects, a level for each of them, the picture made of these, and their declared costs.
 //!
-//! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, what a frame took.
+//! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, measuring a frame.
 
 use super::super::cast;
 use super::{Chosen, Session};
@@ -11,7 +11,7 @@ use metachron_budget::adaptive::joint::Drawing;
 use std::time::Duration;
 
 impl Session {
-    /// Takes the newest states, finds what `camera` sees of them, chooses levels and makes the picture.
+    /// Reads the newest states, finds the objects seen by `camera`, chooses levels and makes the picture.
     pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
         let started = self.now();
         self.gather();
@@ -29,7 +29,7 @@ impl Session {
         self.stage.picture()
     }
 
-    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Gives what of it passed from the
+    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Returns the part of it from the
     /// start of the drawing to its end.
     pub fn spend_declared(&mut self, size: Size) -> Duration {
         let Chosen { cull, select, beside, objects_s, other_triangles, .. } = self.chosen;
@@ -41,13 +41,13 @@ impl Session {
         self.now().saturating_sub(started + cull + select)
     }
 
-    /// Finds what `camera` sees.
+    /// Finds the objects seen by `camera`.
     pub(super) fn survey(&mut self, camera: &Camera, size: Size) {
         self.stage.survey(camera, size);
         cast::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
     }
 
-    /// What this frame is drawn with: what was chosen while the frame before was drawn, else what is chosen now.
+    /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.
     fn choose(&mut self, started: Duration, size: Size) {
         self.chosen.select = Duration::ZERO;
         if !self.control.take_up(&self.views) {
@@ -67,27 +67,27 @@ impl Session {
         self.chosen.n = self.mean_level();
     }
 
-    /// Whether most of the time of the frame that began at `started` is gone; while time stands still nothing is late.
+    /// Whether most of the time of the frame that began at `started` is gone; while time is paused no frame is late.
     fn is_late(&self, started: Duration) -> bool {
         let gone = self.now().saturating_sub(started) + self.declared_cull() + self.chosen.select;
         let passes = self.run.timeline().runs_at(self.now());
         passes && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
     }
 
-    /// Tells the controller what the choice that it is to make next has to do with.
+    /// Sets the controller's inputs for the next choice.
     pub(super) fn bid(&mut self, size: Size) {
-        // what is in the picture besides hardly changes from one frame to the next
+        // the triangles outside the choice hardly change from one frame to the next
         self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
         self.buy();
         self.control.set_cull(self.chosen.cull);
     }
 
-    /// What finding out what is seen takes on the declared machine; nothing in real time, where it is measured.
+    /// Declared time of finding visible objects; zero in real time, where it is measured.
     pub(super) fn declared_cull(&self) -> Duration {
         self.declared_work(self.machine.choice_ns.0, self.views.len())
     }
 
-    /// What choosing takes on it.
+    /// Declared time of choosing; zero in real time.
     pub(super) fn declared_choice(&self) -> Duration {
         self.declared_work(self.machine.choice_ns.1, self.views.iter().filter(|view| view.visible).count())
     }
@@ -97,7 +97,7 @@ impl Session {
         Duration::try_from_secs_f64(seconds).unwrap_or_default()
     }
 
-    /// Shares the processor out between agents and the picture, where it draws as well.
+    /// Shares the processor between agents and the picture, if it also draws.
     fn buy(&mut self) {
         let wants = self.control.wants().filter(|_| self.shares_processor);
         let Some((wants, lambda)) = wants else {

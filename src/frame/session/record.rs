@@ -1,6 +1,6 @@
-//! What is written down of a frame, and of the points that a scene watches.
+//! Recording of frames, and of the points that a scene probes.
 //!
-//! In: a session after a frame. Out: a [`FrameRecord`], [`ProbeOutcome`]s. Never here: a choice, what becomes of them.
+//! In: a session after a frame. Out: a [`FrameRecord`], [`ProbeOutcome`]s. Never here: a choice, the use of the records.
 
 use super::super::outcome::{FrameRecord, ProbeOutcome};
 use super::{Chosen, Finished, Session};
@@ -40,7 +40,7 @@ impl Session {
         }
     }
 
-    /// Mean n of the tubes in view, else of everything in view; zero where nothing is.
+    /// Mean n of the tubes in view, else of everything in view; zero if nothing is in view.
     pub(super) fn mean_level(&self) -> f64 {
         let mean = |tubes_only: bool| {
             let all = self.stage.seen().iter().zip(&self.levels);
@@ -53,7 +53,7 @@ impl Session {
     }
 }
 
-/// Where every probe's point is in the final states.
+/// The position of every probe's point in the final states.
 pub(super) fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
     // an agent's watches are its probes with a period, in the scene's order
     let watch = |at: usize| {

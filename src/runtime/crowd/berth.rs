@@ -1,21 +1,21 @@
-//! Where each agent's matter is, for all to read without waiting.
+//! Published bounds of each agent, readable by all without waiting.
 //!
-//! In: one agent's box at a time, from the one who makes its turns. Out: whole boxes, or none where one is just being written:
-//! the reader must think the worst then ([`Seqlock`]).
-//! Never here: who is near whom.
+//! In: one agent's box at a time, from the thread that makes its turns. Out: complete boxes, or none while one is being written: the reader
+//! must then assume the worst case ([`Seqlock`]).
+//! Never here: which agents are near each other.
 
 use super::super::seqlock::{Glance, Seqlock};
 use glam::DVec3;
 use metachron_core::{Bounds, SimTime};
 
-/// A box around an agent's matter at one moment, and how fast it may grow in every direction since and before.
+/// A box around an agent's matter at one moment, and how fast it may grow in every direction after and before it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Reach {
     /// Least coordinates, metres.
     pub low: DVec3,
     /// Greatest coordinates, metres.
     pub high: DVec3,
-    /// A speed that no point of it passes, m/s; zero at rest.
+    /// An upper bound of the speed of all its points, m/s; zero at rest.
     pub speed_m_s: f64,
     /// The moment, in the agent's own time.
     pub time: SimTime,
@@ -31,33 +31,33 @@ impl Reach {
         self.gap_vector(other).length()
     }
 
-    /// From the one box to the other along each axis, without sign, metres; zero where they overlap.
+    /// Distance of the boxes along each axis, unsigned, metres; zero where they overlap.
     pub fn gap_vector(&self, other: &Self) -> DVec3 {
         (other.low - self.high).max(self.low - other.high).max(DVec3::ZERO)
     }
 }
 
-/// What a reader finds.
+/// Result of a read.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Seen {
     /// Nothing was ever written.
     Nowhere,
-    /// The newest whole writing.
+    /// The newest complete box.
     There(Reach),
-    /// A writer stands in the middle of a writing.
+    /// A writer is in the middle of a write.
     Unsure,
 }
 
-/// One agent's reach in shared memory: a line of the cache of its own, so that writers do not disturb each other's readers.
+/// One agent's box in shared memory: a cache line of its own, so that writers do not disturb each other's readers.
 #[derive(Debug, Default)]
 #[repr(align(64))]
 pub(super) struct Berth(Seqlock<5>);
 
-/// How often a reader looks again at a box that is just being written. A writing takes 10 ns.
+/// Read attempts while a box is being written. A write takes 10 ns.
 const TRIES: u32 = 8;
 
 impl Berth {
-    /// What was written last, for the one who writes.
+    /// The last written box, for its writer.
     pub fn mine(&self) -> Option<Reach> {
         if let Seen::There(reach) = self.read() { Some(reach) } else { None }
     }
@@ -67,7 +67,7 @@ impl Berth {
         self.0.write(words(reach));
     }
 
-    /// What was written last.
+    /// The last written box.
     pub fn read(&self) -> Seen {
         for _ in 0..TRIES {
             match self.0.read() {

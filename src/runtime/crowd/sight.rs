@@ -1,39 +1,38 @@
-//! Whom one agent may touch next.
+//! Candidates for contact of one agent.
 //!
-//! In: the agent's own box and time, the crowd. Out: the others near enough, by rising numbers.
-//! Each other has an appointment: the time before which the two cannot be near, from their distance and the speeds that are
-//! said of them (the kinetic form of a Verlet list). Nobody is looked at before. The few whose appointments come first are
-//! remembered one by one; all others share one, the earliest of theirs, at which everybody is looked at: what an agent
-//! remembers does not grow with the crowd. Never here: why they are listed.
+//! In: the agent's own box and time, the crowd. Out: the peers near enough, by rising numbers.
+//! Every peer has an appointment: the time before which the two cannot be near, from their distance and their published speeds (the kinetic
+//! form of a Verlet list). It is not checked earlier. The few earliest appointments are stored one by one; all other peers share one, the
+//! earliest of theirs, at which all agents are checked: memory per agent does not grow with the crowd. Never here: the purpose of the list.
 
 use super::super::fellows::{Fellows, World};
 use super::berth::{Reach, Seen};
 use super::{Crowd, SPEED_LEAST_M_S};
 use metachron_core::{AgentId, Bounds, SimSpan, SimTime};
 
-/// What one agent knows of where the others are.
+/// Knowledge of one agent about the boxes of the others.
 #[derive(Debug)]
 pub(in super::super) struct Sight {
     me: AgentId,
     mine: Option<Reach>,
-    /// The speed at the end of the step before, m/s: the way to the newest state may have begun with it.
+    /// The speed at the end of the previous step, m/s: the motion to the newest state may have started with it.
     speed_before_m_s: f64,
-    /// Those with appointments before the common one, by rising numbers.
+    /// Peers with appointments before the common one, by rising numbers.
     listed: Vec<Other>,
-    /// No appointment in the list is earlier.
+    /// No listed appointment is earlier.
     soonest: SimTime,
-    /// The appointment with all who are not listed.
+    /// The common appointment of all peers that are not listed.
     everybody: SimTime,
-    /// The step that appointments were made for.
+    /// The step length for which appointments were made.
     dt: SimSpan,
-    /// The first note of the log that has not been read.
+    /// The first log entry that has not been read.
     unread: u64,
     near: Vec<AgentId>,
-    /// The world whose members were passed over last.
+    /// The island whose members were skipped last.
     world: World,
 }
 
-/// Another agent, and when it is looked at again.
+/// A peer, and when it is checked again.
 #[derive(Debug, Clone, Copy)]
 struct Other {
     id: AgentId,
@@ -41,29 +40,29 @@ struct Other {
     near: bool,
 }
 
-/// Skins closer than this are near whatever the speeds, metres: contact laws look that far ahead.
+/// Boxes closer than this are near at any speed, metres: contact laws look that far ahead.
 const SKIN_M: f64 = 0.005;
 
-/// Speeds may change by so much a second before anybody says so, m/s²: free fall, and as much again.
+/// Unpublished change of speed that is allowed for, m/s²: free fall, and as much again.
 const ACCELERATION_M_S2: f64 = 20.0;
 
-/// Who could touch within so many of one's steps is near.
+/// A peer that could touch within this many own steps becomes near.
 const NEAR_STEPS: f64 = 2.0;
 
-/// Who is near stays so until he could not touch within so many.
+/// A near peer stays near until it could not touch within this many steps.
 const FAR_STEPS: f64 = 4.0;
 
-/// What is surely far is so with this factor to spare: more than roundings of times and distances.
+/// Safety factor of the test for distant peers: more than the rounding of times and distances.
 const FAR_ROOM: f64 = 1.001;
 
-/// So many are remembered besides those who are near.
+/// Number of peers listed in addition to the near ones.
 const LISTED: usize = 8;
 
-/// An appointment that is never due: both stand still, apart.
+/// An appointment that is never due: both are at rest, apart.
 const NEVER: SimTime = SimTime::from_nanos(u64::MAX);
 
 impl Sight {
-    /// The sight of `me`.
+    /// The candidate list of `me`.
     pub fn new(me: AgentId) -> Self {
         Self {
             me,
@@ -79,12 +78,12 @@ impl Sight {
         }
     }
 
-    /// Those who were near when it last looked, by rising numbers.
+    /// The near peers at the last check, by rising numbers.
     pub fn near(&self) -> &[AgentId] {
         &self.near
     }
 
-    /// This agent is inside `bounds` at its time `time` (`None`: nowhere), and lets the crowd know.
+    /// Publishes to the crowd that this agent is inside `bounds` at its time `time` (`None`: without bounds).
     pub fn stand(&mut self, crowd: &Crowd, bounds: Option<&Bounds>, time: SimTime) {
         let said = self.mine.map_or(0.0, |mine| mine.speed_m_s);
         self.mine = bounds.filter(|b| is_sound(b)).map(|bounds| {
@@ -98,8 +97,8 @@ impl Sight {
         }
     }
 
-    /// Looks at those whose appointment has come, before a step of `dt` from `now`; says how many that were. Only those that
-    /// it `may_touch` are near, and `fellows` are passed over.
+    /// Checks the peers whose appointment is due, before a step of `dt` from `now`; returns how many were checked. Only peers that it
+    /// `may_touch` are near; members of its own island (`fellows`) are skipped.
     pub fn look(
         &mut self,
         crowd: &Crowd,
@@ -132,7 +131,7 @@ impl Sight {
         looks
     }
 
-    /// Looks at those in the list whose time has come; who is out of the way again is left to the common appointment.
+    /// Checks the listed peers whose appointment is due; a peer that is distant again falls back to the common appointment.
     fn keep_appointments(
         &mut self,
         crowd: &Crowd,
@@ -152,7 +151,7 @@ impl Sight {
         looks
     }
 
-    /// Looks at everybody, and lists those whose appointments come first.
+    /// Checks all agents, and lists those with the earliest appointments.
     fn survey(
         &mut self,
         crowd: &Crowd,
@@ -185,7 +184,8 @@ impl Sight {
         looks
     }
 
-    /// Leaves all but the first appointments, and those who are near, to the common one; says at how many to do so again.
+    /// Moves all but the earliest appointments and the near peers to the common one; returns the length of the list at which to do so
+    /// again.
     fn shorten(&mut self) -> usize {
         let kept = LISTED + 2 * self.listed.iter().filter(|other| other.near).count();
         if self.listed.len() > kept {
@@ -197,7 +197,7 @@ impl Sight {
         kept + LISTED
     }
 
-    /// Makes new appointments with those who have become faster than they had said.
+    /// Makes the peers that became faster than their published speed due for a check.
     fn read_notes(&mut self, crowd: &Crowd, fellows: &Fellows) {
         let Self { me, listed, soonest, everybody, near, .. } = self;
         let most = 2 * (LISTED + near.len());
@@ -219,32 +219,32 @@ impl Sight {
     }
 }
 
-/// Whether the appointment with one who is `seen` would not be before `everybody`, nor he near: told without a root or a
-/// quotient, as most of a crowd is far from anyone. What it cannot tell so it denies.
+/// Whether a peer that is `seen` is certainly not near and its appointment not before `everybody`: without a square root or a division, as
+/// most peers in a crowd are distant. If in doubt it returns `false`.
 fn is_far(mine: &Reach, seen: &Seen, everybody: SimTime, (now, dt): (SimTime, SimSpan)) -> bool {
     let Seen::There(theirs) = seen else { return false };
     if everybody == NEVER {
         return false;
     }
     let dt_s = dt.as_secs_f64();
-    // the common appointment, with the steps before it in which one is near already
+    // the common appointment, plus the steps ahead of contact at which a peer already counts as near
     let until_s = (everybody.secs_after(now) + NEAR_STEPS * dt_s).max(FAR_STEPS * dt_s);
     let way_m = until_s * (mine.speed_m_s + theirs.speed_m_s);
     let least_m = FAR_ROOM * (way_m + SKIN_M + drift_m(theirs, now) + 0.5 * ACCELERATION_M_S2 * dt_s * dt_s);
     mine.gap_vector(theirs).length_squared() > least_m * least_m
 }
 
-/// When one who is `seen` is looked at again, and whether he is near now, before a step of `dt` from `now`.
+/// When a peer that is `seen` is checked again, and whether it is near now, before a step of `dt` from `now`.
 fn appointment(mine: &Reach, seen: Seen, was_near: bool, (now, dt): (SimTime, SimSpan)) -> (SimTime, bool) {
     let next_turn = now + SimSpan::from_nanos(1);
     let theirs = match seen {
-        // a note tells when he comes
+        // a log entry announces its first box
         Seen::Nowhere => return (NEVER, false),
         Seen::Unsure => return (next_turn, true),
         Seen::There(reach) => reach,
     };
     let dt_s = dt.as_secs_f64();
-    // one's own matter is where it was last said to be, however long that was ago: time dropped or slept moves nothing
+    // own matter is where its box was last published, however long ago: time dropped or slept moves nothing
     let slack_m = mine.gap_m(&theirs) - SKIN_M - drift_m(&theirs, now) - 0.5 * ACCELERATION_M_S2 * dt_s * dt_s;
     let until_s = slack_m / (mine.speed_m_s + theirs.speed_m_s);
     let near = until_s <= dt_s * if was_near { FAR_STEPS } else { NEAR_STEPS };
@@ -252,7 +252,7 @@ fn appointment(mine: &Reach, seen: Seen, was_near: bool, (now, dt): (SimTime, Si
     (if near { next_turn } else { at.max(next_turn) }, near)
 }
 
-/// How far matter may have come from its box by `now`, metres; what rests stays.
+/// How far matter may have moved out of its box by `now`, metres; zero for a box at rest.
 fn drift_m(reach: &Reach, now: SimTime) -> f64 {
     if reach.speed_m_s == 0.0 {
         return 0.0;

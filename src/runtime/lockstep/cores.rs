@@ -1,9 +1,9 @@
 //! Jobs that share the cores of the declared machine, in virtual time.
 //!
-//! In: jobs with the time each would take alone. Out: when the next one ends. All jobs progress alike: at full speed while
-//! there are cores for all, at cores / jobs of it otherwise. Every job's end is a mark on one common count of service, so
-//! that an event costs O(log n) whatever the number of jobs (the virtual time of generalised processor sharing).
-//! Whole numbers throughout: the same events on every computer. Never here: agents, what a job is.
+//! In: jobs with the time each would take alone. Out: when the next one ends. All jobs progress alike: at full speed while there are cores
+//! for all, else at the fraction cores / jobs of it. Every job's end is a mark on one common count of service, so that an event costs O(log
+//! n) whatever the number of jobs (the virtual time of generalised processor sharing).
+//! Integers throughout: the same events on every computer. Never here: agents, the content of a job.
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
@@ -12,18 +12,18 @@ use std::time::Duration;
 /// Service is counted in picoseconds, so that sharing a core loses less than a nanosecond in a thousand events.
 const PICOS_PER_NANO: u128 = 1000;
 
-/// Jobs under way on shared cores.
+/// Jobs in progress on shared cores.
 #[derive(Debug)]
 pub(super) struct Cores {
     cores: u128,
-    /// What a job has been served that was there from the beginning, picoseconds.
+    /// Service received by a job that was there from the beginning, picoseconds.
     served: u128,
-    /// The service at which each job ends, and whose it is.
+    /// The service at which each job ends, and its owner's number.
     jobs: BinaryHeap<Reverse<(u128, u32)>>,
 }
 
 impl Cores {
-    /// That many cores, one at least.
+    /// That many cores, at least one.
     pub fn new(cores: u32) -> Self {
         Self { cores: u128::from(cores.max(1)), served: 0, jobs: BinaryHeap::new() }
     }
@@ -33,7 +33,7 @@ impl Cores {
         self.jobs.push(Reverse((self.served + work.as_nanos() * PICOS_PER_NANO, whose)));
     }
 
-    /// How long it is until a job ends, if none is added; `None` without jobs.
+    /// Time until a job ends, if none is added; `None` without jobs.
     pub fn until_end(&self) -> Option<Duration> {
         let Reverse((end, _)) = self.jobs.peek()?;
         let (gain, cost) = self.rate();
@@ -47,7 +47,7 @@ impl Cores {
         self.served += span.as_nanos() * PICOS_PER_NANO * gain / cost;
     }
 
-    /// Takes a job that has ended: the one that needed least, of equals the lowest number.
+    /// Takes a job that has ended: the one with the earliest end, at equal ends the lowest number.
     pub fn take_ended(&mut self) -> Option<u32> {
         let &Reverse((end, whose)) = self.jobs.peek()?;
         (end <= self.served).then(|| {
@@ -71,7 +71,7 @@ mod tests {
         Duration::from_micros(n)
     }
 
-    /// Runs all jobs to their ends: whose ended when.
+    /// Runs all jobs to their ends: owner and end time of each.
     fn run(cores: &mut Cores) -> Vec<(u32, Duration)> {
         let (mut now, mut ends) = (Duration::ZERO, Vec::new());
         while let Some(span) = cores.until_end() {
@@ -125,7 +125,7 @@ mod tests {
         }
         now += run(&mut cores).last().unwrap().1;
         let least = total / 2;
-        // an end is rounded up by less than a nanosecond, and alone at the end a job leaves one core idle
+        // an end is rounded up by less than a nanosecond, and the last job alone leaves one core idle
         assert!(now >= least, "{now:?} for {total:?}");
         assert!(now <= least + us(20), "{now:?} for {total:?}");
     }

@@ -1,7 +1,7 @@
-//! The scene's common timeline: which simulated time belongs to a moment of wall time.
+//! The scene's common timeline: maps wall time to simulated time.
 //!
 //! In: pause, run, speed, single step. Out: an immutable [`Timeline`] that every thread reads without waiting.
-//! Never here: an agent's own time ([`super::Pace`] keeps it), sleeping.
+//! Never here: an agent's own time ([`super::Pace`] has it), sleeping.
 
 use arc_swap::ArcSwap;
 use metachron_core::{SimSpan, SimTime};
@@ -12,12 +12,12 @@ use std::sync::atomic::{
 };
 use std::time::Duration;
 
-/// The slowest and the fastest that simulated time may run, simulated seconds a wall second.
+/// The slowest and the fastest simulated time, simulated seconds per wall second.
 /// Slower is a pause; faster, no agent keeps up and every step would be late.
 pub const SPEED_RANGE: (f64, f64) = (0.001, 100.0);
 
-/// A straight piece of the timeline: from wall time `wall` on, simulated time runs from `sim` with `speed`,
-/// and stands still once it reaches `until`.
+/// A linear piece of the timeline: from wall time `wall` on, simulated time runs from `sim` with `speed`, and stops when it reaches
+/// `until`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Timeline {
     wall: Duration,
@@ -27,22 +27,22 @@ pub struct Timeline {
     piece: u64,
 }
 
-/// What a user can do to the timeline.
+/// A user's command to the timeline.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Drive {
-    /// Simulated time stands still.
+    /// Simulated time stops.
     Pause,
     /// Simulated time runs on.
     Run,
-    /// Simulated seconds a wall second; clamped to [`SPEED_RANGE`], no number changes nothing.
+    /// Simulated seconds per wall second; clamped to [`SPEED_RANGE`], NaN changes nothing.
     Speed(f64),
-    /// Simulated time runs on for exactly this span, then stands: a frame span for a single step.
-    /// Steps asked for while one is under way add up.
+    /// Simulated time runs on for exactly this span, then stops: a frame span for a single step. Steps requested while one is in progress
+    /// add up.
     Step(SimSpan),
 }
 
 impl Timeline {
-    /// A timeline that runs as wall time does, both from zero.
+    /// A timeline at wall speed, both times from zero.
     #[must_use]
     pub const fn new() -> Self {
         Self { wall: Duration::ZERO, sim: SimTime::ZERO, speed: 1.0, until: None, piece: 0 }
@@ -59,22 +59,22 @@ impl Timeline {
         self.until.map_or(free, |end| free.min(end))
     }
 
-    /// The wall time at which simulated time reaches `sim`; `None` where it stands still before.
+    /// The wall time at which simulated time reaches `sim`; `None` if it stops before.
     ///
-    /// A time passed before this piece began lies as far back as if this piece had always run.
+    /// A time before this piece is mapped as if this piece had always run.
     #[must_use]
     pub fn wall_of(&self, sim: SimTime) -> Option<Duration> {
         if sim < self.sim {
             return Some(self.wall.saturating_sub(self.wall_span(self.sim.since(sim))));
         }
-        // a span that ends where time stops never begins: `until` itself is not passed
+        // a span that begins where time stops never begins: `until` itself is not passed
         if self.until.is_some_and(|end| sim >= end) {
             return None;
         }
         Some(self.wall.saturating_add(self.wall_span(sim.since(self.sim))))
     }
 
-    /// How long `span` lasts on the wall at this speed.
+    /// Wall duration of `span` at this speed.
     #[must_use]
     pub fn wall_span(&self, span: SimSpan) -> Duration {
         if self.speed == 1.0 {
@@ -83,13 +83,13 @@ impl Timeline {
         Duration::from_nanos((span.as_nanos() as f64 / self.speed).ceil() as u64)
     }
 
-    /// How much simulated time passes in `span` of the wall at this speed.
+    /// Simulated time that passes in the wall duration `span` at this speed.
     #[must_use]
     pub fn sim_span(&self, span: Duration) -> SimSpan {
         scaled(span, self.speed)
     }
 
-    /// Simulated seconds a wall second while it runs.
+    /// Simulated seconds per wall second while it runs.
     #[must_use]
     pub const fn speed(&self) -> f64 {
         self.speed
@@ -107,7 +107,7 @@ impl Timeline {
         self.piece
     }
 
-    /// The piece that follows when `drive` is asked for at wall time `wall`.
+    /// The piece that follows when `drive` is requested at wall time `wall`.
     #[must_use]
     pub fn after(&self, wall: Duration, drive: Drive) -> Self {
         let sim = self.sim_at(wall);
@@ -134,7 +134,7 @@ fn scaled(span: Duration, speed: f64) -> SimSpan {
     if speed == 1.0 { SimSpan::from_nanos(nanos) } else { SimSpan::from_nanos((nanos as f64 * speed) as u64) }
 }
 
-/// The timeline all agents of a run share: one writer, readers that never wait.
+/// The timeline shared by all agents of a run: one writer, readers that never wait.
 #[derive(Debug)]
 pub struct SharedTimeline {
     piece: ArcSwap<Timeline>,
@@ -155,14 +155,14 @@ impl SharedTimeline {
         **self.piece.load()
     }
 
-    /// Brings `known`, a piece that was read before, up to date: that costs a glance while it is in force.
+    /// Updates `known`, a piece that was read before: costs one load while it is in force.
     pub fn renew(&self, known: &mut Timeline) {
         if self.number.load(Acquire) != known.piece {
             *known = self.read();
         }
     }
 
-    /// Changes the timeline at wall time `wall`. Whoever sleeps until a due time must be woken after it.
+    /// Changes the timeline at wall time `wall`. Threads that sleep until a due time must be woken after it.
     pub fn drive(&self, wall: Duration, drive: Drive) {
         let next = self.read().after(wall, drive);
         self.piece.store(Arc::new(next));

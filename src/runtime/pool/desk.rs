@@ -1,20 +1,20 @@
-//! Whose turn a worker makes, for those who watch over it.
+//! The turn in progress of a worker, as seen by the watchdog.
 //!
-//! In: turns, from the worker. Out: how long the same one lasts. A worker whose step does not return is given up: whoever comes
-//! first, the worker with its step or the watch with its patience, decides, and the other one finds it decided.
-//! Never here: threads, what becomes of the agent.
+//! In: turns, from the worker. Out: the turn in progress. A worker whose step does not return is given up: the worker when its step returns
+//! and the watchdog at its timeout compete for one atomic word, and the later one finds it decided.
+//! Never here: threads, the treatment of the agent.
 
 use metachron_core::AgentId;
 use std::sync::atomic::{AtomicU64, Ordering::SeqCst};
 
-/// One worker's place; a worker that is replaced leaves its desk behind.
+/// State of one worker; a worker that is replaced leaves its state behind.
 #[derive(Debug, Default)]
 pub(super) struct Desk {
-    /// The turn under way: its number and, below, the agent's number plus one. [`IDLE`] between turns.
+    /// The turn in progress: its number and, in the low half, the agent's number plus one. [`IDLE`] between turns.
     word: AtomicU64,
 }
 
-/// A turn under way, as the watch sees it; equal ones are the same turn.
+/// A turn in progress, as read by the watchdog; equal values are the same turn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sitting(u64);
 
@@ -22,7 +22,7 @@ const IDLE: u64 = 0;
 const GIVEN_UP: u64 = u64::MAX;
 
 impl Sitting {
-    /// Whose turn it is.
+    /// The agent of the turn.
     pub const fn whose(self) -> AgentId {
         AgentId((self.0 as u32).wrapping_sub(1))
     }
@@ -32,22 +32,22 @@ impl Desk {
     /// Turn number `turn` begins, of `id`.
     pub fn sit(&self, turn: u32, id: AgentId) -> Sitting {
         let word = (u64::from(turn & 0x7fff_ffff) << 32) | u64::from(id.0.wrapping_add(1));
-        // read by the watch alone, and its patience is long
+        // read by the watchdog only, and its timeout is long
         self.word.store(word, std::sync::atomic::Ordering::Relaxed);
         Sitting(word)
     }
 
-    /// The step of `sitting` has returned; whether the worker is still wanted.
+    /// The step of `sitting` has returned; whether the worker has not been given up.
     pub fn rise(&self, sitting: Sitting) -> bool {
         self.word.compare_exchange(sitting.0, IDLE, SeqCst, SeqCst).is_ok()
     }
 
-    /// The turn under way, if there is one.
+    /// The turn in progress, if there is one.
     pub fn sitting(&self) -> Option<Sitting> {
         Some(self.word.load(SeqCst)).filter(|word| *word != IDLE && *word != GIVEN_UP).map(Sitting)
     }
 
-    /// Gives the worker up, if `sitting` still lasts; whether it does.
+    /// Gives the worker up, if `sitting` is still in progress; whether it was.
     pub fn give_up(&self, sitting: Sitting) -> bool {
         self.word.compare_exchange(sitting.0, GIVEN_UP, SeqCst, SeqCst).is_ok()
     }

@@ -1,9 +1,9 @@
-//! What the workers of a pool share.
+//! Shared state of a pool's workers.
 //!
 //! In: agents between their turns, summons. Out: for each worker its next turn, or how long it may sleep.
-//! Every worker has a queue of its own, whose lock nobody else wants while all is well. A worker without work helps one whose
-//! turn is overdue, and takes the agent over; now and then a worker with work looks whether agents elsewhere are worse served.
-//! Agents at rest lie in beds, a word each, until they are summoned. Never here: threads, turns.
+//! Every worker has its own queue, with a lock that is normally uncontended. A worker without work helps one whose turn is overdue, and
+//! takes the agent over; at intervals a worker with work checks whether agents of other workers are served worse.
+//! Agents at rest are stored in one slot each until they are summoned. Never here: threads, turns.
 
 use super::super::clock::Clock;
 use super::super::handle::AgentHandle;
@@ -19,16 +19,16 @@ use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::Duration;
 
-/// A turn so long overdue is made by whoever has time: less, and workers would take each other's agents for nothing.
+/// A turn overdue by this much is made by any idle worker: with less, workers would take each other's agents for no gain.
 const OVERDUE: Duration = Duration::from_millis(1);
 
-/// An agent elsewhere that is served so much worse is taken over, served nanoseconds.
+/// An agent of another worker is taken over if it has been served this much less, served nanoseconds.
 const UNJUST: u64 = 5_000_000;
 
-/// How many agents are taken over at once.
+/// Agents taken over in one go.
 const HAUL: usize = 8;
 
-/// Everything that workers share.
+/// State shared by all workers.
 pub(super) struct Hall {
     pub clock: Arc<dyn Clock>,
     pub timeline: SharedTimeline,
@@ -38,7 +38,7 @@ pub(super) struct Hall {
     beds: Vec<AtomicCell<Option<Box<Actor>>>>,
 }
 
-/// The queue of one worker, and what others want to know of it without asking for the lock.
+/// The queue of one worker, and its key figures, readable without the lock.
 #[derive(Default)]
 struct Shelf {
     queue: Mutex<Queue>,
@@ -57,7 +57,7 @@ impl Hall {
         let beds = handles.iter().map(|_| AtomicCell::new(None)).collect();
         let shelves = std::iter::repeat_with(CachePadded::default).take(workers).collect();
         let hall = Self { clock, timeline: SharedTimeline::new(), board, handles, shelves, beds };
-        // neighbours in the scene are neighbours here, and still everybody has some of each kind
+        // neighbours in the scene share a worker, and still every worker gets agents of each kind
         let block = (actors.len() / (8 * workers)).clamp(1, 64);
         for (at, actor) in actors.into_iter().enumerate() {
             if let Some(actor) = actor.filter(|actor| !actor.is_parked()) {
@@ -67,7 +67,7 @@ impl Hall {
         hall
     }
 
-    /// The next turn of worker `at`, who gives `back` the agent of the last one; `None` where none is due.
+    /// The next turn of worker `at`, which returns the agent of the last one as `back`; `None` if none is due.
     pub fn exchange(
         &self,
         at: usize,
@@ -83,26 +83,26 @@ impl Hall {
         taken.or_else(|| self.help(at, timeline, now))
     }
 
-    /// Lets `actor` wait in the queue of worker `at`.
+    /// Adds `actor` to the queue of worker `at`.
     pub fn put(&self, at: usize, actor: Box<Actor>, now: Duration) {
         self.shelves[at].with(|queue| queue.put(actor, now));
     }
 
-    /// Lays `actor` to rest; gives it back if somebody has woken it meanwhile.
+    /// Stores `actor` at rest; returns it if it has been woken meanwhile.
     pub fn lay(&self, actor: Box<Actor>) -> Option<Box<Actor>> {
         let id = actor.id();
         let bed = self.beds.get(id.0 as usize)?;
-        // a summons came before this, and found the bed empty: then its mark is seen here; or it will find the agent
+        // a summons before this found the slot empty: then its mark is seen here; a later one finds the agent
         drop(bed.swap(Some(actor)));
         if self.board.is_woken(id) { bed.take() } else { None }
     }
 
-    /// The agent that lies in its bed.
+    /// Takes the agent out of its resting slot.
     pub fn lift(&self, id: AgentId) -> Option<Box<Actor>> {
         self.beds.get(id.0 as usize)?.take()
     }
 
-    /// The agent that has come home.
+    /// The agent that has returned from a leader.
     pub fn come_home(&self, id: AgentId) -> Option<Box<Actor>> {
         self.handles.get(id.0 as usize)?.shared.seating.as_ref().and_then(Seating::come_home)
     }
@@ -111,14 +111,14 @@ impl Hall {
     pub fn pause(&self, at: usize, now: Duration) -> Option<Duration> {
         let mine = moment(self.shelves[at].due.load(Relaxed));
         let next = (at + 1) % self.shelves.len();
-        // each watches the next one; who finds that one late looks further
+        // each worker watches the next one; a worker that finds it late searches further
         let theirs = moment(self.shelves[next].due.load(Relaxed)).filter(|_| next != at);
         let watch = theirs.map(|due| due.saturating_add(OVERDUE).max(now + OVERDUE / 4));
         let until = mine.into_iter().chain(watch).min()?;
         Some(until.saturating_sub(now))
     }
 
-    /// Takes over agents that are served worse by another worker than worker `at` serves its own.
+    /// Takes over agents that another worker serves worse than worker `at` serves its own.
     pub fn balance(&self, at: usize, timeline: &Timeline, now: Duration) {
         let mine = self.shelves[at].frontier.load(Relaxed);
         let unjust = |shelf: &Shelf| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
@@ -134,13 +134,13 @@ impl Hall {
         self.shelves[at].with(|queue| while haul.give(queue, now) {});
     }
 
-    /// Visits all agents that are nobody's at the end of a run; they are gone after it.
+    /// Visits and removes all resting and queued agents, at the end of a run.
     pub fn clear(&self, mut visit: impl FnMut(Box<Actor>)) {
         self.beds.iter().filter_map(AtomicCell::take).for_each(&mut visit);
         self.shelves.iter().for_each(|shelf| shelf.with(|queue| queue.drain().for_each(&mut visit)));
     }
 
-    /// A turn that is overdue with another worker.
+    /// An overdue turn of another worker.
     fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<Actor>> {
         let count = self.shelves.len();
         let others = (1..count).map(|k| &self.shelves[(at + k) % count]);
@@ -159,7 +159,7 @@ impl Shelf {
         self.show(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
     }
 
-    /// As [`Self::with`], if nobody is at the queue.
+    /// As [`Self::with`], if the queue's lock is free.
     fn try_with<R: Default>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
         self.queue.try_lock().map_or_else(|_| R::default(), |queue| self.show(queue, act))
     }

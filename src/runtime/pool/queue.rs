@@ -1,12 +1,12 @@
-//! The agents of one worker between their turns, in the order of those.
+//! Queue of one worker: its agents between their turns, ordered by urgency.
 //!
 //! In: agents. Out: the most urgent one whose step has been released ([`super::super::pace`]), earliest deadline first.
-//! Under overload deadlines alone would be unjust: an agent past its lag cap gives up time, and with it its place. So deadlines
-//! are counted in *served* time: how much simulated time the workers have given the agent, whatever it dropped. While all keep
-//! up, that is the agent's own time; when they cannot, all fall behind alike, each at the same share of its rate, and none
-//! starves. Who comes back from a rest, or falls behind by its own fault, goes on from what is served now: it saves nothing up
-//! (start-time fair queueing, (GVC97)). A worker that sleeps may sleep on a little past a release, an eighth of the agent's step:
-//! then several turns are made on one awakening, which costs more than ten cheap turns. Never here: threads, sleeping, turns.
+//! Under overload deadlines alone would be unfair: an agent past its lag cap drops time, and with it its rank. So deadlines are counted in
+//! *served* time: how much simulated time the workers have given the agent, whatever it dropped. While all agents keep up, that is the
+//! agent's own time; when they cannot, all fall behind alike, each at the same share of its rate, and none starves. An agent that returns
+//! from a rest, or falls behind for reasons of its own, continues from the present served time: it accumulates no credit (start-time fair
+//! queueing, (GVC97)). A sleeping worker may sleep a little past a release, by an eighth of the agent's step: then several turns share one
+//! wake-up, which costs more than ten cheap turns. Never here: threads, sleeping, turns.
 
 use super::super::pace::Timeline;
 use super::super::turn::Actor;
@@ -15,37 +15,36 @@ use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 use std::time::Duration;
 
-/// A moment that never comes, in nanoseconds.
+/// A time that is never reached, in nanoseconds.
 pub(super) const NEVER: u64 = u64::MAX;
 
-/// A turn may begin so much of its step after its release, if its worker sleeps until then.
+/// A turn may begin 1/`SLACK` of its step after its release, if its worker sleeps until then.
 const SLACK: u64 = 8;
 
-/// But no later than so many nanoseconds: half of a batch of turns that are spread evenly is late by less than half of it.
+/// But at most this many nanoseconds after it: of evenly spread turns in a batch, half are late by less than half of it.
 const SLACK_MOST: u64 = 1_000_000;
 
-/// Agents that wait for their turns.
+/// Agents waiting for their turns.
 #[derive(Default)]
 pub(super) struct Queue {
     timeline: Timeline,
-    /// By the wall time at which their turns are to begin at the latest.
+    /// By the latest wall time at which their turns are to begin.
     waiting: BinaryHeap<Place<Waiter>>,
     /// By deadline.
     ready: BinaryHeap<Place<Released>>,
-    /// The latest served time of those taken so far.
+    /// The latest served time of the agents taken so far.
     served: SimTime,
-    /// Since when somebody has been ready, wall nanoseconds.
+    /// Wall time since which an agent has been ready, nanoseconds.
     ready_since: u64,
 }
 
-/// Someone's rank: the least comes first. All that is asked of an agent that waits lies beside it, for the agent itself is in no
-/// cache any more.
+/// Heap entry with its rank: the least comes first. All keys are stored next to the rank, since a waiting agent itself is not in any cache.
 struct Place<T> {
     rank: u64,
     of: T,
 }
 
-/// An agent whose step is released, and up to which time it had been served when it came.
+/// An agent whose step is released, and its served time at its arrival.
 struct Released {
     served: SimTime,
     actor: Box<Actor>,
@@ -53,15 +52,15 @@ struct Released {
 
 /// An agent whose step will be released.
 struct Waiter {
-    /// The wall time of that, nanoseconds.
+    /// Wall time of the release, nanoseconds.
     release: u64,
-    /// Its rank then.
+    /// Its rank from then on.
     deadline: u64,
     then: Released,
 }
 
 impl Queue {
-    /// Works by `timeline` from now on, if that is newer than the one known.
+    /// Switches to `timeline`, if it is newer than the present one.
     pub fn keep_time(&mut self, timeline: &Timeline, now: Duration) {
         if timeline.piece() <= self.timeline.piece() {
             return;
@@ -71,13 +70,13 @@ impl Queue {
         all.into_iter().for_each(|actor| self.put_back(actor, now));
     }
 
-    /// Lets `actor`, who comes from elsewhere, wait for its next turn.
+    /// Adds `actor`, which comes from outside the queue, to wait for its next turn.
     pub fn put(&mut self, mut actor: Box<Actor>, now: Duration) {
         actor.owed = SimSpan::ZERO;
         self.put_back(actor, now);
     }
 
-    /// Lets `actor`, whose turn was just made, wait for its next one.
+    /// Adds `actor`, whose turn was just made, to wait for its next one.
     pub fn put_back(&mut self, mut actor: Box<Actor>, now: Duration) {
         actor.served = actor.served.max(self.served - actor.owed);
         actor.owed = actor.owed.min(self.served.since(actor.served));
@@ -95,7 +94,7 @@ impl Queue {
         }
     }
 
-    /// The most urgent of those whose steps are released at `now`: who makes its turn writes down that it is served by a step.
+    /// The most urgent agent whose step is released at `now`; the caller adds the step to its served time.
     pub fn take(&mut self, now: Duration) -> Option<Box<Actor>> {
         self.release(now);
         let Released { served, actor } = self.ready.pop()?.of;
@@ -103,27 +102,26 @@ impl Queue {
         Some(actor)
     }
 
-    /// Hands over an agent that is ready to another worker's queue, `thief`, where its rights stay what they are.
+    /// Moves a ready agent to another worker's queue, `thief`, with its claim to service unchanged.
     pub fn give(&mut self, thief: &mut Self, now: Duration) -> bool {
         let Some(Place { rank, of: mut given }) = self.ready.pop() else { return false };
-        // what it was given too little here it is owed there
+        // service that it lacks relative to the new queue is owed to it there
         given.actor.owed = thief.served.since(given.served);
         thief.make_ready(rank, given, now);
         true
     }
 
-    /// The wall time, in nanoseconds, at which a turn is to begin at the latest, or since when one has been ready; [`NEVER`] where
-    /// there is none.
+    /// The latest wall time, in nanoseconds, at which a turn is to begin, or since which one has been ready; [`NEVER`] if there is none.
     pub fn due(&self) -> u64 {
         if self.ready.is_empty() { self.waiting.peek().map_or(NEVER, |place| place.rank) } else { self.ready_since }
     }
 
-    /// How far the most urgent of those that are ready has been served, nanoseconds; [`NEVER`] where none is ready.
+    /// Served time of the most urgent ready agent, nanoseconds; [`NEVER`] if none is ready.
     pub fn frontier(&self) -> u64 {
         self.ready.peek().map_or(NEVER, |place| place.of.served.as_nanos())
     }
 
-    /// All that are left, at the end of a run.
+    /// All remaining agents, at the end of a run.
     pub fn drain(&mut self) -> impl Iterator<Item = Box<Actor>> {
         let waiting = self.waiting.drain().map(|place| place.of.then);
         waiting.chain(self.ready.drain().map(|place| place.of)).map(|released| released.actor)
@@ -166,7 +164,7 @@ impl<T> PartialOrd for Place<T> {
 }
 
 impl<T> Ord for Place<T> {
-    /// The standard library's heap gives the greatest first.
+    /// Reversed, since the standard library's heap returns the greatest first.
     fn cmp(&self, other: &Self) -> Ordering {
         other.rank.cmp(&self.rank)
     }
@@ -188,14 +186,14 @@ mod tests {
         queue
     }
 
-    /// The most urgent agent, served by the step that it is taken for.
+    /// The most urgent agent, with the step for which it is taken added to its served time.
     fn take(queue: &mut Queue, now: Duration) -> Option<Box<Actor>> {
         let mut actor = queue.take(now)?;
         actor.served += actor.pace.dt();
         Some(actor)
     }
 
-    /// Makes turns of [`COST`] each on one worker until `end`, as often as `made` is told of one.
+    /// Makes turns of [`COST`] each on one worker until `end`, and calls `made` for each.
     fn work(queue: &mut Queue, mut now: Duration, end: Duration, mut made: impl FnMut(usize)) {
         let line = Timeline::new();
         while now < end {
@@ -247,7 +245,7 @@ mod tests {
         for ms in 1..10 {
             assert_eq!(turns(&mut queue, Duration::from_millis(ms)), [1]);
         }
-        // the slow ones could wait for another millisecond
+        // the slow agents could wait for another millisecond
         assert_eq!(queue.due(), 10_125_000);
         assert_eq!(turns(&mut queue, Duration::from_millis(10)).len(), 3);
     }
@@ -259,7 +257,7 @@ mod tests {
             let counts: [u32; 4] = turns(&mut queue, 20);
             for (count, hz) in counts.iter().zip(rates) {
                 let wanted = 20.0 * hz * share;
-                // one turn at either end, and what is lost between whole turns
+                // one turn at either end, and the rounding to whole turns
                 assert!((f64::from(*count) - wanted).abs() <= 2.0 + 0.01 * wanted, "{count} of {wanted} at {hz} Hz");
             }
         }
@@ -274,7 +272,7 @@ mod tests {
         queue.put(away, came_back);
         let mut counts = [0; 3];
         work(&mut queue, came_back, end, |id| counts[id] += 1);
-        // 2000 turns for three
+        // 2000 turns for three agents
         assert!(counts.iter().all(|count| (660..=673).contains(count)), "{counts:?}");
     }
 
@@ -305,7 +303,7 @@ mod tests {
 
     #[test]
     fn who_was_served_worse_makes_it_up_where_it_is_taken_to() {
-        // two of 1 ms in a queue that has come to 100 ms, and one more from a queue that has come to 70
+        // two agents with steps of 1 ms in a queue served up to 100 ms, and one from a queue served up to 70 ms
         let mut theirs = queue([1000.0; 2].map(|hz| Dummy::new(1.0).at(hz)).into());
         let mut mine = queue([1000.0; 3].map(|hz| Dummy::new(1.0).at(hz)).into());
         let late = Duration::from_secs(1);

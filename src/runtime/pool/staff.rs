@@ -1,7 +1,7 @@
-//! The workers of a pool as those who must be there: hired, watched, replaced, dismissed.
+//! Supervisor of a pool's workers: starts, watches, replaces and joins them.
 //!
-//! In: a hall. Out: a thread for each place in it, until the end. A step that does not return costs one agent and one thread:
-//! the agent is parked with the reason, and another worker takes the place. Never here: turns.
+//! In: the pool's shared state. Out: a thread for each worker's place, until the end. A step that does not return costs one agent and one
+//! thread: the agent is parked with the reason, and another worker takes the place. Never here: turns.
 
 use super::super::island::{empty_door, empty_rooms};
 use super::super::priority::Priority;
@@ -15,13 +15,14 @@ use std::sync::mpsc::{Receiver, Sender, channel};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-/// How long the end of a run waits after the last worker that ended. A step that takes longer hangs; its thread is left behind.
+/// How long the end of a run waits after the last worker that ended. A step that takes longer counts as hung; its thread is left behind.
 const PARTING: Duration = Duration::from_millis(400);
 
-/// A worker is given up when this often in a row it was found in the same turn: a machine that stood still is found so once.
+/// A worker is given up when it is found in the same turn this many times in a row: after a suspension of the whole machine it is found so
+/// only once.
 const LOOKS: u32 = 4;
 
-/// All workers and what is known of them.
+/// All workers and their state.
 pub(super) struct Staff {
     hall: Arc<Hall>,
     posts: Vec<Post>,
@@ -32,11 +33,11 @@ pub(super) struct Staff {
     notes: Receiver<Note>,
 }
 
-/// What the staff is told.
+/// A message to the supervisor.
 pub(super) enum Note {
     /// The run is to end.
     Stop,
-    /// The worker hired under this number has ended.
+    /// The worker started under this number has ended.
     Ended(u32),
 }
 
@@ -49,7 +50,7 @@ struct Post {
     looks: u32,
 }
 
-/// Says that a worker has ended, however it did.
+/// Reports that a worker has ended, for whatever reason.
 struct Farewell {
     number: u32,
     sender: Sender<Note>,
@@ -57,13 +58,13 @@ struct Farewell {
 
 impl Drop for Farewell {
     fn drop(&mut self) {
-        // nobody listens any more after the end: then nobody needs to know
+        // the send fails only after the end, when the report is no longer needed
         let _ = self.sender.send(Note::Ended(self.number));
     }
 }
 
 impl Staff {
-    /// Hires a worker for each of `places`; a step that takes longer than `patience` is given up.
+    /// Starts a worker for each of `places`; a step that takes longer than `patience` is given up.
     pub fn hire(hall: Arc<Hall>, places: usize, patience: Duration, priority: Priority) -> io::Result<Self> {
         let (sender, notes) = channel();
         let mut staff = Self { hall, posts: Vec::new(), hired: 0, patience, priority, sender, notes };
@@ -80,12 +81,12 @@ impl Staff {
         Ok(staff)
     }
 
-    /// Where notes are sent to.
+    /// The sender for messages to the supervisor.
     pub fn notes(&self) -> Sender<Note> {
         self.sender.clone()
     }
 
-    /// Watches until the run is to end, and ends it.
+    /// Watches the workers until the run is to end, and ends it.
     pub fn watch(mut self) {
         loop {
             match self.notes.recv_timeout(self.patience / LOOKS) {
@@ -105,7 +106,7 @@ impl Staff {
             let (desk, priority) = (Arc::clone(&desk), self.priority);
             move || {
                 let _farewell = farewell;
-                // who asked for it has been told whether it is granted
+                // a refusal was already reported to the caller of `Priority::ask`
                 drop(priority.take());
                 Worker::new(hall, at, desk).work();
             }
@@ -127,7 +128,7 @@ impl Staff {
         }
     }
 
-    /// A worker has ended. Before the end of the run that is a bug of ours, and the others must not suffer from it.
+    /// A worker has ended. Before the end of the run that is a bug of metachron, and the other workers must continue.
     fn bury(&mut self, number: u32) {
         let Some(at) = self.posts.iter().position(|post| post.number == number) else { return };
         if let Some(sitting) = self.posts[at].desk.sitting() {
@@ -136,7 +137,7 @@ impl Staff {
         if self.hall.board.stopping() { self.join(number) } else { self.replace(at) }
     }
 
-    /// Where the system gives no thread any more, the other workers do without.
+    /// If the system gives no more threads, the other workers continue without this one.
     fn replace(&mut self, at: usize) {
         if let Ok(post) = self.post(at) {
             self.posts[at] = post;
@@ -147,7 +148,7 @@ impl Staff {
         self.park(id, &format!("a step has not ended within {} s", patience.as_secs_f64()));
     }
 
-    /// Parks an agent that is stuck in a turn, and all it leads, from outside.
+    /// Parks an agent that is stuck in a turn, and all agents it leads, from outside.
     fn park(&self, id: AgentId, reason: &str) {
         let Hall { board, handles, .. } = &*self.hall;
         board.close(id);
@@ -162,11 +163,11 @@ impl Staff {
 
     fn join(&mut self, number: u32) {
         let post = self.posts.iter_mut().find(|post| post.number == number);
-        // a panic outside a turn has been printed, and the others must still be joined
+        // a panic outside a turn has been printed, and the other workers must still be joined
         drop(post.and_then(|post| post.thread.take()).map(JoinHandle::join));
     }
 
-    /// Waits for the workers, as long as it has patience, and ends the lives of all agents.
+    /// Waits for the workers until a timeout, and ends all agents.
     fn dismiss(&mut self) {
         while self.posts.iter().any(|post| post.thread.is_some()) {
             match self.notes.recv_timeout(PARTING) {

@@ -1,7 +1,7 @@
-//! One worker of a pool: turn after turn of whoever is due.
+//! One worker of a pool: makes one due turn after the other.
 //!
-//! In: the hall, a place in it. Out: turns. Between two turns it answers the bell, and sleeps where nothing is due: it waits for
-//! no lock but its own queue's, and asks the system for nothing but sleep. Never here: which turn is next.
+//! In: the pool's shared state, a place in it. Out: turns. Between two turns it serves summons, and sleeps if no turn is due: it waits for
+//! no lock except its own queue's, and its only system call is to sleep. Never here: the choice of the next turn.
 
 use super::super::cpu::CpuShare;
 use super::super::island::move_in;
@@ -14,17 +14,17 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
-/// After so long without sleep a worker lets others have its core for a moment: the frame loop above all.
+/// After this long without sleep a worker yields its core for a moment, above all to the frame loop.
 const SHIFT: Duration = Duration::from_millis(1);
 
-/// An agent that is behind keeps its worker for so long: twenty cheap turns. Ten thousand such spells on two cores last as long as
-/// the lag cap: longer ones would make states old.
+/// An agent that is behind keeps its worker for this long: twenty cheap turns. Ten thousand such periods on two cores last as long as the
+/// lag cap: longer ones would make states old.
 const SPELL: Duration = Duration::from_micros(20);
 
-/// Every so many turns a worker looks whether agents elsewhere are served worse than its own.
+/// Turns between two checks whether agents of other workers are served worse than its own.
 const BALANCE_TURNS: u32 = 64;
 
-/// A worker and where it stands.
+/// A worker and its state.
 pub(super) struct Worker {
     hall: Arc<Hall>,
     at: usize,
@@ -32,7 +32,7 @@ pub(super) struct Worker {
     cpu: CpuShare,
     turns: u32,
     timeline: Timeline,
-    /// The clock as it was read last.
+    /// The last reading of the clock.
     now: Duration,
     awake_since: Duration,
     given_up: bool,
@@ -47,7 +47,7 @@ impl Worker {
         Self { hall, at, desk, cpu, turns: 0, timeline, now, awake_since: now, given_up: false, last: None }
     }
 
-    /// Works until the run is to end, or until the worker has been given up.
+    /// Works until the run is to end, or until the worker is given up.
     pub fn work(mut self) {
         self.hall.board.bell().inspect(|bell| bell.enter(self.at));
         while !self.hall.board.stopping() && !self.given_up {
@@ -68,9 +68,9 @@ impl Worker {
         self.pause(&timeline);
     }
 
-    /// Makes turns of `actor` for as long as it is behind, but for [`SPELL`] at most; gives it back if it waits for another one.
+    /// Makes turns of `actor` for as long as it is behind, but for [`SPELL`] at most; returns it if it waits for another one.
     ///
-    /// Where all are behind, what one needs is still in the cache for its second turn, and gone when all others have had theirs.
+    /// If all agents are behind, the data of one are still in the cache for its second turn, but no longer after the turns of all others.
     fn spell(&mut self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
         let until = self.now + SPELL;
         actor.fetch();
@@ -84,7 +84,7 @@ impl Worker {
         waiting
     }
 
-    /// Makes a turn of `actor`; gives it back if it waits for another one.
+    /// Makes a turn of `actor`; returns it if it waits for another one.
     fn turn(&mut self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
         self.cpu.open();
         self.turns = self.turns.wrapping_add(1);
@@ -98,7 +98,7 @@ impl Worker {
         if actor.open.is_some() {
             actor.served += actor.pace.dt();
         }
-        // the clock is read once a turn: what follows the step counts for the next one
+        // the clock is read once per turn: the time after the step counts for the next one
         self.now = self.hall.clock.now();
         let wall = self.now.saturating_sub(began);
         let next = match begun {
@@ -115,12 +115,12 @@ impl Worker {
         }
     }
 
-    /// Looks after those who were summoned.
+    /// Serves the summoned agents.
     fn answer(&mut self, timeline: &Timeline) {
         let Some(bell) = self.hall.board.bell().filter(|bell| bell.has_rung()) else { return };
         self.now = self.hall.clock.now();
         if bell.answer(|id| self.attend(id, timeline)) > 1 {
-            // that may be too much for one: another looks how this one gets on
+            // several agents may be too much for one worker: wake another
             bell.rouse();
         }
     }
@@ -131,12 +131,12 @@ impl Worker {
         woken.into_iter().chain(home).for_each(|actor| self.hall.put(self.at, actor, self.now));
     }
 
-    /// Lays `actor` to rest, unless it was woken: then it waits for a turn.
+    /// Stores `actor` at rest, unless it was woken: then returns it to wait for a turn.
     fn lay(&self, actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
         self.hall.lay(actor).and_then(|actor| self.wake(actor, timeline))
     }
 
-    /// Wakes `actor`, if somebody said so; else it lies down again.
+    /// Wakes `actor` if it was woken by a caller; else stores it at rest again.
     fn wake(&self, mut actor: Box<Actor>, timeline: &Timeline) -> Option<Box<Actor>> {
         loop {
             if actor.wakes(timeline, self.now) {
@@ -153,7 +153,7 @@ impl Worker {
         self.awake_since = self.now;
     }
 
-    /// What a worker does now and then while it has work.
+    /// Periodic work of a worker while it has turns to make.
     fn pause(&mut self, timeline: &Timeline) {
         if self.turns.is_multiple_of(BALANCE_TURNS) {
             self.hall.balance(self.at, timeline, self.now);
@@ -183,7 +183,7 @@ mod tests {
         Worker::new(hall, 0, Arc::default())
     }
 
-    /// How much of the heap is taken that was free before.
+    /// Increase of the allocated heap, in bytes.
     fn held<T>(make: impl FnOnce() -> T) -> (T, i64) {
         let mut made = None;
         let measured = allocation_counter::measure(|| made = Some(make()));
@@ -194,7 +194,7 @@ mod tests {
     fn an_agent_takes_two_kilobytes_beyond_its_physics_and_its_states() {
         const COUNT: u32 = 2000;
         let clock = Arc::new(ManualClock::new());
-        // one that can be touched also remembers who comes near
+        // an agent that can be touched also stores the agents near it
         for (radius_m, most) in [(None, 2048), (Some(0.1), 2560)] {
             let dummy = |k: u32| Dummy { ball: radius_m.map(|r| (r, 0.0)), z: f64::from(k), ..Dummy::new(1.0) };
             let (_physics, own) = held(|| (0..COUNT).map(|k| Box::new(dummy(k))).collect::<Vec<_>>());
@@ -209,7 +209,7 @@ mod tests {
                 }
                 worker
             });
-            // one state is seen, one is written
+            // one state is published, one is written
             let each = (all - own - 2 * state) / i64::from(COUNT);
             assert!(each <= most, "{each} bytes, and {} a state", state / i64::from(COUNT));
         }
