@@ -11,7 +11,7 @@ use metachron_agents::shape::{Obstacle, Solid, ToolShape};
 use metachron_agents::soft::SoftBody;
 use metachron_agents::{Agent, AgentId, Body, CurveState, Snapshot, SoftState};
 
-/// Half the size of the slab that replaces a plane, in multiples of a figure's half diagonal plus its height above the plane.
+/// Half the size of the slab that replaces a plane, in multiples of a figure's half diagonal plus its distance from the plane.
 const SLAB_SHARE: f64 = 4.0;
 /// No part of a tool is farther from its tip than the length of its shaft plus this many shaft radii.
 const TOOL_TIP_RADII: f64 = 12.0;

@@ -25,7 +25,7 @@ pub const COMMON_KEYS: [&str; 17] = [
     "scatter_seed",
 ];
 
-/// Keys that every object has, whatever its model.
+/// Keys of every object, whatever its model.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CommonFile {

@@ -23,7 +23,7 @@ pub struct CouplingFile {
     pub at_b: Option<Spot>,
     /// Stiffness of an `attach`, or of a contact by `penalty` or `tlm`, N/m, 1e-6 … 1e9.
     pub stiffness_n_m: Option<f64>,
-    /// Damping of the same, N·s/m, 0 … 1e7. Default 0.
+    /// Damping of the same spring, N·s/m, 0 … 1e7. Default 0.
     pub damping_n_s_m: Option<f64>,
     /// Rest length of an `attach`, metres, 0 … 1e4. Default 0.
     pub rest_m: Option<f64>,

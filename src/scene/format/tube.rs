@@ -45,7 +45,7 @@ pub struct TubeFile {
     /// Fixed number of segments of the simulation, 2 … 4096; `eps_m` then applies to the picture only.
     #[schemars(range(min = 2, max = 4096))]
     pub segments: Option<u32>,
-    /// Spacing ε of the picture, metres, in the form of `eps_m`. Default: `eps_m`, or `[length / 400, length / 8]` without it.
+    /// Spacing ε of the picture, metres, with the form and limits of `eps_m`. Default: `eps_m`, or `[length / 400, length / 8]` without it.
     pub picture_eps_m: Option<OneOrRange<f64>>,
     /// Time integrator. Default `implicit-euler`.
     pub integrator: Option<Integrator>,
