@@ -1,6 +1,6 @@
 //! metachron: a real-time physics engine in which every object keeps its own time and the frame never waits.
 //!
-//! The map of the code is `docs/ARCHITECTURE.md`. Rooms do not import each other; `frame` and `cli` join them.
+//! The map of the code is `docs/ARCHITECTURE.md`. The modules below do not import each other; `frame` and `cli` join them.
 
 pub mod cli;
 pub mod compositor;

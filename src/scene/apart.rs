@@ -1,13 +1,13 @@
-//! Sets what bends, and tools, beside what they would start inside.
+//! Moves deformables and tools that would start inside another object clear of it, before the run.
 //!
-//! In: a scene as it is written. Out: the same scene in which loose agents that bend start clear of all others, and tools of all that
-//! they do not grasp; who was moved.
-//! Never here: running agents, rigid bodies inside each other (they come apart while they run, and gain no speed by it).
+//! In: a scene as it is written. Out: the same scene in which free deformables start clear of all other objects, and tools clear of all
+//! that they do not grasp; the list of moved agents.
+//! Never here: running agents, rigid bodies inside each other (contact separates them during the run without adding speed).
 //!
-//! Pushed out while it runs, what bends would be stretched and bent on its way, and spring back: a tube through a block of twice
-//! its width would leave at metres a second. Moved as a whole before anything runs, it holds no energy.
-//! The parts of a tool that is deep in a light box would each push it another way, with all the force of its drive. Drawn back along
-//! its shaft, it comes in as it would have come from outside.
+//! Pushed out during the run, a deformable would be stretched and bent on its way, and spring back: a tube through a block of twice
+//! its width would leave at metres per second. Moved as a whole before the run, it stores no energy.
+//! The parts of a tool deep inside a light box would push the box in different directions, each with the full force of the drive. Drawn
+//! back along its shaft, the tool enters as it would from outside.
 
 use super::cast::{Scene, Spec};
 use super::figure::{Figure, figure};
@@ -19,30 +19,30 @@ use metachron_geometry::Touch;
 use metachron_geometry::narrow_phase::{TouchRoom, touches};
 use std::collections::BTreeSet;
 
-/// An agent that starts elsewhere than the scene puts it, because there it would be inside another.
+/// An agent that starts elsewhere than the scene puts it, because there it would be inside another object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Moved {
     /// Its name.
     pub object: String,
-    /// From where the scene puts it to where it starts, metres.
+    /// From the position in the scene to the position at start, metres.
     pub by_m: DVec3,
 }
 
-/// Directions of which one is as good as another, metres: the first is taken.
+/// A later direction must be shorter than the best so far by more than this, metres: of equal ones the first is taken.
 const ALIKE_M: f64 = 1e-6;
-/// Normals whose cosine is above this are one direction.
+/// Normals whose cosine is above this count as one direction.
 const SAME_WAY: f64 = 0.999;
-/// Directions tried, at most.
+/// Most directions tried.
 const WAYS: usize = 16;
-/// Places tried along each, at most.
+/// Most positions tried along each direction.
 const PLACES: usize = 64;
-/// Up first: that is where a thing is put that has no room.
+/// Directions tried first. Up leads, so it wins a tie: an object without room goes on top.
 const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::NEG_Z];
 
 impl Scene {
-    /// Moves every loose agent that bends out of what it is inside, the shortest way that leaves it clear of all; of two that
-    /// bend the later one. A loose rigid body is moved out of what bends and is held, a tool out of all that it does not grasp. Where
-    /// there is no such way, nothing is moved.
+    /// Moves every free deformable out of the objects that it starts inside, along the shortest way that leaves it clear of all; of two
+    /// deformables the later one. A free rigid body is moved out of a deformable that is held, a tool out of all that it does not grasp.
+    /// Where there is no such way, nothing is moved.
     pub(super) fn set_apart(&mut self, inside: &[(AgentId, Inside, f64)]) {
         let pairs: Vec<_> = inside.iter().map(|(a, b, _)| self.movers(*a, *b)).filter(|all| !all.is_empty()).collect();
         if pairs.is_empty() {
@@ -66,7 +66,7 @@ impl Scene {
         }
     }
 
-    /// Who of two may be moved.
+    /// The agents of a pair that may be moved.
     fn movers(&self, a: AgentId, b: Inside) -> Vec<AgentId> {
         let bends = |id: AgentId| matches!(self.agents[id.0 as usize].spec, Spec::Tube(_) | Spec::Soft(_));
         let loose = |id: &AgentId| bends(*id) && self.is_loose(*id);
@@ -85,7 +85,7 @@ impl Scene {
         }
     }
 
-    /// Which of them has the shorter way out of all.
+    /// The agent of `all` with the shortest way out of everything.
     fn nearer_out(&self, all: &[AgentId], figures: &[Figure]) -> Option<AgentId> {
         if let [one] = all {
             return Some(*one);
@@ -102,14 +102,14 @@ impl Scene {
         matches!(self.agents[id.0 as usize].spec, Spec::Instrument(_))
     }
 
-    /// Whether a tool comes to its path from outside of what it starts inside: it does not grasp that, and nothing is linked to it.
+    /// Whether a tool may be drawn back out of `other`: it does not grasp it, and no attachment holds the tool.
     fn comes_back(&self, tool: AgentId, other: AgentId) -> bool {
         let Spec::Instrument(spec) = &self.agents[tool.0 as usize].spec else { return false };
         let linked = |c: &Coupling| matches!(c.kind, CouplingKind::Attach { .. }) && (c.a == tool || c.b == tool);
         !(spec.graspable.contains(&other) || self.couplings.iter().any(linked))
     }
 
-    /// Whether nothing holds an agent where the scene puts it.
+    /// Whether an agent is free: it has no joint, attachment, clamp, pin or held points, and is no tool and not synthetic.
     pub(super) fn is_loose(&self, id: AgentId) -> bool {
         let jointed = self.joints.iter().any(|joint| joint.a == id || joint.b == Some(id));
         let tied = |kind: &CouplingKind| matches!(kind, CouplingKind::Attach { .. });
@@ -123,7 +123,7 @@ impl Scene {
         !(jointed || attached || held)
     }
 
-    /// The shortest way on which `figure` gets clear of everything that it touches; back along its shaft, if that leads out, of a tool.
+    /// The shortest displacement that takes `figure` clear of everything it touches; for a tool, back along its shaft if that leads out.
     fn way_out(&self, figure: &Figure, figures: &[Figure]) -> Option<DVec3> {
         let mut around = Around { scene: self, figures, apart: self.pairs_apart(), room: TouchRoom::default() };
         let back = figure.back();
@@ -147,7 +147,7 @@ impl Scene {
     }
 }
 
-/// What an agent may be inside of.
+/// The objects that an agent may be inside of.
 struct Around<'a> {
     scene: &'a Scene,
     figures: &'a [Figure],
@@ -156,9 +156,9 @@ struct Around<'a> {
 }
 
 impl Around<'_> {
-    /// How far `figure` has to go along `way` to be clear, metres; `None` from `most_m` on.
+    /// How far `figure` has to move along `way` to be clear, metres; `None` if that is `most_m` or more.
     ///
-    /// Nowhere on the way is it clear before it has gone as far as it is deep: it goes so far and looks again.
+    /// It cannot be clear before it has moved as far as it is deep, so it moves by its depth and is tested again.
     fn clear(&mut self, figure: &Figure, way: DVec3, most_m: f64) -> Option<f64> {
         let mut far_m = 0.0;
         for _ in 0..PLACES {
@@ -174,7 +174,7 @@ impl Around<'_> {
         None
     }
 
-    /// How deep `figure` is in anything, metres, ≥ 0; visits the places.
+    /// Depth of `figure` in any other object, metres, ≥ 0; calls `visit` with every touch.
     fn deepest(&mut self, figure: &Figure, mut visit: impl FnMut(&Touch)) -> f64 {
         let (mut found, mut deep_m) = (Vec::new(), 0.0_f64);
         let mut look = |other: &Figure, room: &mut TouchRoom| {
@@ -188,7 +188,7 @@ impl Around<'_> {
         for other in others.filter(|other| self.scene.touch(figure, other, &self.apart)) {
             look(other, &mut self.room);
         }
-        // a tool passes through what is fixed
+        // a tool passes through static solids
         for obstacle in self.scene.obstacles.iter().filter(|_| figure.back().is_none()) {
             if let Some(fixed) = figure.over(obstacle) {
                 look(&fixed, &mut self.room);

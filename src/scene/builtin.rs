@@ -1,8 +1,8 @@
-//! The scenes that come with the program, embedded.
+//! The scenes built into the program.
 
 use super::Source;
 
-/// A scene that comes with the program.
+/// A scene built into the program.
 #[derive(Debug, Clone, Copy)]
 pub struct BuiltIn {
     /// Its name on the command line.
@@ -32,7 +32,7 @@ pub const ALL: [BuiltIn; 17] = [
     BuiltIn { name: "library", text: include_str!("../../scenes/library.toml") },
 ];
 
-/// Files that built-in scenes name.
+/// Files that built-in scenes refer to.
 const FILES: [(&str, &[u8]); 2] = [
     ("crystal.obj", include_bytes!("../../scenes/crystal.obj")),
     ("bracket.obj", include_bytes!("../../scenes/bracket.obj")),
@@ -53,7 +53,7 @@ impl BuiltIn {
     /// The scene as a source.
     ///
     /// # Errors
-    /// None that the tests of the built-in scenes would not have found.
+    /// As [`Source::open`]; tests of the built-in scenes rule it out.
     pub fn source(&self) -> Result<Source, super::SceneError> {
         Source::open(self.name)
     }

@@ -28,96 +28,96 @@ pub struct Scene {
     pub description: String,
     /// How agents are run.
     pub executor: ExecutorKind,
-    /// How the system ranks the threads of agents.
+    /// How the operating system schedules the threads of agents.
     pub priority: PriorityKind,
-    /// At which time states are drawn.
+    /// Time at which states are drawn.
     pub states: StatesKind,
     /// Gravity, m/s².
     pub gravity: DVec3,
-    /// The frame rate wanted and how it is held.
+    /// The target frame rate and how it is held.
     pub target: Target,
-    /// From where the scene is seen; `None` where the scene does not say.
+    /// The camera; `None` where the scene gives none.
     pub camera: Option<Camera>,
     /// The declared machine.
     pub machine: Machine,
-    /// The agents; an agent's id is its place here.
+    /// The agents; an agent's id is its index here.
     pub agents: Vec<Member>,
-    /// The solids that never move.
+    /// The static solids.
     pub obstacles: Arc<[Obstacle]>,
-    /// How each obstacle looks, in their order.
+    /// Looks of the obstacles, in their order.
     pub obstacle_looks: Vec<Look>,
-    /// What is seen and never moves; the members of a group side by side.
+    /// Objects that are only drawn and never move; the members of a group are adjacent.
     pub scenery: Vec<Scenery>,
-    /// Scenery that may be drawn as one.
+    /// Scenery that may be drawn as one mesh.
     pub groups: Vec<Group>,
-    /// Whether agents touch each other where no coupling says otherwise.
+    /// Whether agents collide with each other where no coupling says otherwise.
     pub contacts: bool,
-    /// What holds rigid agents together; each of them has all of them in its spec.
+    /// Joints between rigid agents; the spec of each rigid agent has all of them.
     pub joints: Arc<[Joint]>,
-    /// Pairs that act on each other in another way.
+    /// Pairs that interact otherwise than by the default contact.
     pub couplings: Vec<Coupling>,
     /// The points whose state is reported.
     pub probes: Vec<Probe>,
-    /// What is inside each other where the scene puts it.
+    /// Pairs that overlap where the scene puts them.
     pub overlaps: Vec<Overlap>,
-    /// What starts elsewhere because of that.
+    /// Agents that start elsewhere because of an overlap.
     pub moved: Vec<Moved>,
 }
 
-/// The frame rate wanted and how it is held.
+/// The target frame rate and how it is held.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Target {
     /// Frames per second, 1 … 1000.
     pub frame_hz: f64,
-    /// Who chooses levels.
+    /// The policy that chooses levels.
     pub policy: PolicyKind,
-    /// What an object is worth to `robin-hood`.
+    /// How `robin-hood` values an object.
     pub value: ValueKind,
-    /// Which feedback law.
+    /// The feedback law.
     pub law: LawKind,
     /// Gains of the laws.
     pub gains: Gains,
-    /// The greatest lag from reading the camera to the finished picture, seconds, and the part of what culling leaves of it that is kept
-    /// for choosing; `None` where the scene asks for none.
+    /// The greatest lag from reading the camera to the finished picture, seconds, and the share that is reserved for choosing levels of
+    /// what culling leaves of it; `None` where the scene sets no bound.
     pub lag: Option<(f64, f64)>,
-    /// Whether time that is left at the finest of everything goes into better than that.
+    /// Whether time left over when everything is at its finest is spent on still smoother shapes and softer shadows.
     pub raise: bool,
 }
 
-/// Gains of the feedback laws; what is `None` is the law's own default.
+/// Gains of the feedback laws; `None` is the law's own default.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Gains {
     /// α of the printed law.
     pub alpha: Option<f64>,
     /// β of the printed law.
     pub beta: Option<f64>,
-    /// κ of the corrected law, 0 < κ < 1.
+    /// κ of the corrected law, 0.001 … 1.99; below 1 it is stable for every scene.
     pub kappa: Option<f64>,
-    /// λ of the corrected law, 0 … 0.99.
+    /// λ of the corrected law, 0 … 1.99.
     pub lead: Option<f64>,
-    /// Share of the frame that is left free, 0 … 0.9.
+    /// Share of the frame time that is left free, 0 … 0.9.
     pub margin: Option<f64>,
 }
 
-/// From where the scene is seen.
+/// The camera of a scene.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Camera {
-    /// Always the same view.
+    /// A still view.
     Still(View),
-    /// Turns about the vertical through what it looks at.
+    /// Turns about the vertical axis through the point that it looks at.
     Orbit {
         /// The view at the start.
         start: View,
-        /// Seconds of a turn; negative turns clockwise seen from above.
+        /// Seconds per turn; negative turns clockwise seen from above.
         period_s: f64,
     },
     /// Moves along keyframes.
     Path {
         /// Times in seconds, rising, and views.
         keys: Vec<(f64, View)>,
-        /// Whether it starts again.
+        /// Whether the path repeats.
         repeat: bool,
-        /// Whether it moves evenly between keyframes, instead of starting and stopping softly at each.
+        /// Whether it moves linearly between keyframes, instead of starting and stopping softly at each.
         even: bool,
     },
 }
@@ -125,76 +125,76 @@ pub enum Camera {
 /// One view; up is +z.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Where the eye is, metres.
+    /// Position of the eye, metres.
     pub eye_m: DVec3,
-    /// What it looks at, metres.
+    /// Point that it looks at, metres.
     pub look_at_m: DVec3,
     /// Vertical angle of view, degrees, 1 … 150.
     pub fov_deg: f64,
 }
 
-/// What a scene says of the declared machine; what is `None` is the preset's.
+/// Values that a scene declares for its machine; `None` is the preset's.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Machine {
     /// The preset to start from.
     pub preset: String,
     /// Cores shared by agents and frames, 1 … 4096.
     pub cores: Option<u32>,
-    /// Prices of steps by model: (model, base in µs, µs a unit of work).
+    /// Costs of steps by model: (model, base in µs, µs per unit of work).
     pub steps: Vec<(String, Option<f64>, Option<f64>)>,
-    /// Milliseconds a frame.
+    /// Milliseconds per frame.
     pub draw_setup_ms: Option<f64>,
-    /// Microseconds an object drawn.
+    /// Microseconds per drawn object.
     pub draw_object_us: Option<f64>,
-    /// Microseconds a triangle.
+    /// Microseconds per triangle.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds a pixel.
+    /// Nanoseconds per pixel.
     pub draw_pixel_ns: Option<f64>,
-    /// Nanoseconds that culling takes an object.
+    /// Nanoseconds per object for culling.
     pub cull_object_ns: Option<f64>,
-    /// Nanoseconds that choosing takes an object in view.
+    /// Nanoseconds per object in view for choosing its level.
     pub choose_object_ns: Option<f64>,
-    /// What objects cost by their shading: flat, Gouraud, light at every pixel, textured.
+    /// Costs of objects by their shading: flat, Gouraud, per pixel, textured.
     pub shading: [ObjectCost; 4],
     /// Relative standard deviation of every cost, 0 … 1.
     pub noise: Option<f64>,
-    /// Relative standard deviation of the factor on frames that wanders, 0 … 1.
+    /// Relative standard deviation of a slowly varying factor on the frame time, 0 … 1.
     pub wander: Option<f64>,
-    /// Share of frames that take half as long again, 0 … 1.
+    /// Share of frames that take 1.5 times as long, 0 … 1.
     pub spikes: Option<f64>,
-    /// From so many wall seconds on a frame takes so many times what it is declared to; by rising time.
+    /// (seconds, factor): from this wall-clock time on a frame takes this factor times its declared time; by rising time.
     pub load: Vec<(f64, f64)>,
-    /// The same of a step.
+    /// The same for a step.
     pub step_load: Vec<(f64, f64)>,
     /// Seed of the noise.
     pub seed: Option<u64>,
 }
 
-/// What an object costs, where a scene says so.
+/// Costs of an object, where the scene declares them.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ObjectCost {
-    /// Microseconds an object.
+    /// Microseconds per object.
     pub object_us: Option<f64>,
-    /// Microseconds a triangle.
+    /// Microseconds per triangle.
     pub triangle_us: Option<f64>,
-    /// Microseconds a vertex.
+    /// Microseconds per vertex.
     pub vertex_us: Option<f64>,
-    /// Nanoseconds a pixel that it covers.
+    /// Nanoseconds per pixel that it covers.
     pub pixel_ns: Option<f64>,
 }
 
 /// An agent of the scene.
 #[derive(Debug, Clone)]
 pub struct Member {
-    /// Its number: its place in [`Scene::agents`].
+    /// Its index in [`Scene::agents`].
     pub id: AgentId,
     /// Its name, unique in the scene.
     pub name: String,
-    /// What it is made of.
+    /// Its model and values.
     pub spec: Spec,
-    /// How it keeps time.
+    /// Its rate and steps.
     pub pace: PaceWish,
-    /// The error that its steps and spacing are chosen by, metres; `None` where it keeps a rate instead.
+    /// The error tolerance by which its steps and spacing are chosen, metres; `None` where it keeps a rate instead.
     pub tolerance_m: Option<f64>,
     /// Resolutions that its simulation may take.
     pub simulation: ResolutionRange,
@@ -202,47 +202,47 @@ pub struct Member {
     pub start: Resolution,
     /// Resolutions that its picture may take.
     pub picture: ResolutionRange,
-    /// Agents whose snapshots it sees: those that may hold it, those that it may hold.
+    /// Agents whose snapshots it sees: tools that may grasp it, or agents that it may grasp.
     pub links: Vec<AgentId>,
     /// How it looks.
     pub look: Look,
-    /// What goes wrong with its clock and messages on purpose.
+    /// Faults injected into its clock and messages.
     pub faults: Faults,
 }
 
-/// Something that is seen and never moves, and nothing touches.
+/// An object that is only drawn: it never moves, and nothing collides with it.
 #[derive(Debug, Clone)]
 pub struct Scenery {
     /// Its name, unique in the scene.
     pub name: String,
-    /// What it is.
+    /// Its mesh or foliage.
     pub model: Model,
-    /// Where it stands.
+    /// Its pose and scale.
     pub at: Placement,
     /// How it looks.
     pub look: Look,
-    /// What is painted on it.
+    /// Its texture.
     pub texture: Option<Arc<Texture>>,
 }
 
 /// Most levels of a group.
 pub const GROUP_LEVELS_MAX: usize = 8;
 
-/// Scenery that may be drawn as one.
+/// Scenery that may be drawn as one mesh.
 #[derive(Debug, Clone)]
 pub struct Group {
-    /// The mesh that stands for all of it, with the group's name.
+    /// The mesh that replaces all of it, with the group's name.
     pub proxy: Scenery,
-    /// Triangles that it is drawn with, one impostor each: rising, 1 … [`GROUP_LEVELS_MAX`] of them, each a cut of the mesh.
+    /// Triangles of its impostors: 1 … [`GROUP_LEVELS_MAX`] rising numbers, each a cut of the mesh.
     pub levels: Vec<u32>,
-    /// Which of [`Scene::scenery`] it is.
+    /// Its range in [`Scene::scenery`].
     pub members: Range<usize>,
 }
 
-/// How an agent wants to keep time.
+/// Rate and steps that an agent requests.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PaceWish {
-    /// Wanted steps per second.
+    /// Requested steps per second.
     pub rate_hz: f64,
     /// Step length at the start.
     pub dt: SimSpan,
@@ -250,7 +250,7 @@ pub struct PaceWish {
     pub dt_range: (SimSpan, SimSpan),
 }
 
-/// What an agent is made of.
+/// Model of an agent, with its values.
 #[derive(Debug, Clone)]
 pub enum Spec {
     /// A soft tube.
@@ -284,30 +284,30 @@ impl Spec {
 pub struct Look {
     /// Red, green, blue (sRGB).
     pub colour: [u8; 3],
-    /// What its surface looks like.
+    /// Its material.
     pub material: Material,
-    /// Weight of its picture against the others', 0.001 … 1000.
+    /// Weight of its picture relative to that of others, 0.001 … 1000.
     pub importance: f64,
-    /// How the light on it is worked out.
+    /// Its shading.
     pub shading: ShadingKind,
 }
 
 /// A material point whose state is reported.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Probe {
-    /// Whose point it is.
+    /// The agent that the point belongs to.
     pub agent: AgentId,
     /// That agent's name.
     pub object: String,
     /// 0 start … 1 end of a tube's or rope's rest length, the first corner … the opposite one of a sheet or solid; no meaning
     /// for other models.
     pub at: f64,
-    /// Time between samples, where samples are wanted.
+    /// Time between samples, if samples are requested.
     pub every: Option<SimSpan>,
 }
 
 impl Scene {
-    /// The name of an agent; empty where there is none of that number.
+    /// The name of an agent; empty where no agent has this id.
     #[must_use]
     pub fn name_of(&self, id: AgentId) -> &str {
         self.agents.get(id.0 as usize).map_or("", |member| &member.name)
@@ -315,7 +315,7 @@ impl Scene {
 }
 
 impl Camera {
-    /// How long its path or turn takes, seconds; `None` of a still view.
+    /// Duration of its path or turn, seconds; `None` for a still view.
     #[must_use]
     pub fn length_s(&self) -> Option<f64> {
         match self {
@@ -341,7 +341,7 @@ impl Camera {
     }
 }
 
-/// Between two keyframes the view moves evenly, or by smoothstep: it starts and stops softly at each.
+/// Between two keyframes the view moves linearly (`even`), or by smoothstep: it starts and stops softly at each.
 fn view_on_path(keys: &[(f64, View)], (repeat, even): (bool, bool), seconds: f64) -> View {
     let last = keys[keys.len() - 1];
     let seconds = if repeat && last.0 > 0.0 { seconds.rem_euclid(last.0) } else { seconds };

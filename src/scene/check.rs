@@ -1,7 +1,7 @@
-//! Rules on values, collected: everything that is wrong with a scene is told at once.
+//! Checks on values, collected: all problems of a scene are reported together.
 //!
-//! In: values and the dotted path of the key they stand under. Out: the value where it keeps the rule, and problems.
-//! Never here: which rule a key has.
+//! In: values and the dotted path of their key. Out: the value, or a valid one in its place together with a problem.
+//! Never here: the rule of each key.
 
 use super::document::Document;
 use super::format::{OneOrRange, Point};
@@ -16,10 +16,10 @@ use toml::de::{DeTable, DeValue, ValueDeserializer};
 /// More names than this are counted, not listed.
 const LISTED_MAX: usize = 20;
 
-/// Keys of one table that are told to be wrong at most: each is found by reading the table once more.
+/// Most wrong keys of one table that are reported: each is found by reading the table once more.
 const TOLD_OF_A_TABLE: usize = 20;
 
-/// Takes the innermost key out of `table` under which `at` stands, and gives its name; `None` where there is none.
+/// Removes from `table` the innermost key whose key or value spans `at`, and returns its name; `None` where there is none.
 fn take_out(table: &mut DeTable<'_>, at: &Range<usize>) -> Option<String> {
     for (_, value) in table.iter_mut() {
         let inner = match value.get_mut() {
@@ -49,7 +49,7 @@ pub(super) struct Checker<'d, 't> {
     unread: Vec<String>,
 }
 
-/// The dotted path of a table, with what people call it.
+/// The dotted path of a table, and its name for messages.
 #[derive(Debug, Clone)]
 pub(super) struct Place {
     /// Dotted path, such as `object.2`.
@@ -121,12 +121,12 @@ impl<'d, 't> Checker<'d, 't> {
         self.problems
     }
 
-    /// An object of this name could not be read, which is told: that others name it is no problem of theirs.
+    /// Records an object of this name that could not be read; that is reported already, so references to it are no problems.
     pub(super) fn unread(&mut self, name: &str) {
         self.unread.push(name.to_owned());
     }
 
-    /// How many problems there are so far.
+    /// The number of problems so far.
     pub(super) fn count(&self) -> usize {
         self.problems.len()
     }
@@ -135,8 +135,8 @@ impl<'d, 't> Checker<'d, 't> {
         self.problems.push(problem);
     }
 
-    /// Reads a `table` that stands at `span`; `also` are keys that it has besides. Every key of it that is wrong is told, the first
-    /// twenty: each is taken out, so that the next is found.
+    /// Reads a `table` at `span`; `also` are further keys that it may have. Every wrong key of it is reported, up to the first twenty:
+    /// each is removed, so that the next is found.
     pub(super) fn read<T: DeserializeOwned>(
         &mut self,
         mut table: DeTable<'_>,
@@ -151,7 +151,7 @@ impl<'d, 't> Checker<'d, 't> {
                 Err(error) => error,
             };
             let missing = error.message().strip_prefix("missing field `").and_then(|rest| rest.split('`').next());
-            // what is told to be wrong, or is that key misspelt, is not missing besides
+            // a key that is reported wrong, also one that is this key misspelt, is not reported missing as well
             let told = |key: &str| taken.iter().any(|one| one == key || did_you_mean(one, [key]).is_some());
             if !missing.is_some_and(told) {
                 self.push(Problem::from_toml(&error, span.clone(), also));
@@ -162,13 +162,13 @@ impl<'d, 't> Checker<'d, 't> {
         None
     }
 
-    /// Tells that `key` is wrong: what it is, and what was expected.
+    /// Reports that `key` is wrong: its present value, and what was expected.
     pub(super) fn wrong(&mut self, place: &Place, key: &str, what: impl Display, expected: impl Into<String>) {
         let span = self.document.locate(&place.key(key));
         self.problems.push(Problem::new(span, format!("{} {what}", place.named(key))).expecting(expected));
     }
 
-    /// A number within `allowed`. Where it is not, that is told and the nearest sound number taken.
+    /// A number within `allowed`. One outside is reported and replaced by the nearest allowed number.
     pub(super) fn number(&mut self, place: &Place, key: &str, value: f64, allowed: &Allowed) -> f64 {
         if allowed.contains(value) {
             return value;
@@ -208,7 +208,7 @@ impl<'d, 't> Checker<'d, 't> {
         (*allowed.range.start(), *allowed.range.end())
     }
 
-    /// Whether `name` is one of `known`; if it is neither that nor an object that could not be read, that is told.
+    /// Whether `name` is one of `known`; one that is neither known nor an object that could not be read is reported.
     pub(super) fn reference<'n>(
         &mut self,
         place: &Place,
@@ -219,7 +219,7 @@ impl<'d, 't> Checker<'d, 't> {
         if known.clone().any(|n| n == name) {
             return true;
         }
-        // of an object on a grid, its copies are named
+        // an object on a grid is referred to by the names of its copies
         let is_copy = |of: &str| name.strip_prefix(of).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'));
         if self.unread.iter().any(|unread| is_copy(unread)) {
             return false;

@@ -1,7 +1,7 @@
-//! A scene's text as a tree that remembers where everything stands.
+//! Parses a scene's text into a tree that stores the position of every key and value in the text.
 //!
-//! In: text, and `key=value` overrides. Out: tables for serde, and for any key path its place in the text.
-//! Never here: what keys mean.
+//! In: text, and `key=value` overrides. Out: tables for serde, and the position in the text of any key path.
+//! Never here: the meaning of keys.
 
 use super::problem::Problem;
 use std::collections::BTreeMap;
@@ -12,7 +12,7 @@ use toml::de::{DeTable, DeValue};
 /// Name of the table that carries overrides at the end of the text; no scene may use it.
 const OVERRIDES: &str = "--set";
 
-/// Text with the overrides that were given on the command line: they stand at its end, so that errors can show them.
+/// Appends the overrides given on the command line to the text, so that errors can show them.
 #[must_use]
 pub(super) fn with_overrides(text: &str, overrides: &[(String, String)]) -> String {
     let newest: BTreeMap<&str, &str> = overrides.iter().map(|(k, v)| (k.as_str(), v.as_str())).collect();
@@ -71,12 +71,12 @@ impl<'t> Document<'t> {
         &self.root
     }
 
-    /// Where the text has no better place to show: its first line.
+    /// Position of a problem that has no better one: the first line.
     pub(super) fn first_line(&self) -> Range<usize> {
         0..self.text.find(['\n', '\r']).unwrap_or(self.text.len())
     }
 
-    /// Where the value at the dotted `path` stands, or else the nearest thing around it that stands in the text.
+    /// Position of the value at the dotted `path`, or of the nearest thing around it that is in the text.
     pub(super) fn locate(&self, path: &str) -> Range<usize> {
         locate(&self.root, path).unwrap_or_else(|| self.first_line())
     }
@@ -99,7 +99,7 @@ fn locate(root: &DeTable<'_>, path: &str) -> Option<Range<usize>> {
     Some(here.span())
 }
 
-/// The parts of a dotted key, where one in quotes may hold dots as in TOML; `None` where one is empty or a quote is left open.
+/// The parts of a dotted key, of which a quoted one may hold dots as in TOML; `None` where one is empty or a quote is not closed.
 fn key_parts(key: &str) -> Option<Vec<String>> {
     let (mut parts, mut rest) = (Vec::new(), key.trim());
     loop {
@@ -120,7 +120,7 @@ fn key_parts(key: &str) -> Option<Vec<String>> {
     }
 }
 
-/// Where a text that begins with `quote` has its end, past the quote that closes it.
+/// End of the quoted string that `text` begins with, past its closing `quote`.
 fn closing(text: &str, quote: char) -> Option<usize> {
     let mut escaped = false;
     for (at, c) in text.char_indices().skip(1) {
@@ -132,7 +132,7 @@ fn closing(text: &str, quote: char) -> Option<usize> {
     None
 }
 
-/// The table that an override's path names, made where it is missing. In a list, the next part of the path names the entry.
+/// The table that an override's path names, created where it is missing. In a list, the next part of the path names the entry.
 fn descend<'a, 't>(
     table: &'a mut DeTable<'t>,
     path: &[String],

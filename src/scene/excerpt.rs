@@ -1,36 +1,36 @@
-//! The lines of a scene's text around one place, cut to what can be read: a file may be one line of a megabyte.
+//! Excerpts of a scene's text around one position, cut to a readable length: a file may be one line of a megabyte.
 //!
-//! In: a text and a place in it. Out: an [`Excerpt`] with its own offsets, which knows where it was taken from; words and numbers cut
-//! as short. Never here: what is wrong there.
+//! In: a text and a position in it. Out: an [`Excerpt`] with its own offsets, and its line and column in the whole text; shortened words
+//! and numbers. Never here: what is wrong there.
 
 use miette::{MietteError, MietteSpanContents, SourceCode, SourceSpan, SpanContents};
 use std::ops::Range;
 
-/// Longest line that is shown whole, and how much of a longer one is, in characters.
+/// Longest line that is shown whole, and the length shown of a longer one, in characters.
 const WIDTH: usize = 120;
-/// Of a longer one so much stands before the place.
+/// Characters of a longer line that are shown before the position.
 const BEFORE: usize = 40;
 /// Words longer than this are cut, in characters.
 const WORDS_MAX: usize = 1500;
-/// A number with more digits is written as a power of ten: twice what tells any two numbers apart.
+/// A number with more digits is written as a power of ten: twice the digits that distinguish any two numbers.
 const DIGITS_MAX: usize = 34;
 
-/// A line with those before and after it.
+/// A line with its neighbours before and after.
 #[derive(Debug)]
 pub(super) struct Excerpt {
     name: String,
     text: String,
-    /// Where the place stands in `text`; at most to the end of its line.
+    /// Range of the position in `text`; at most to the end of its line.
     pub(super) span: Range<usize>,
-    /// Line and column of the place in the whole text, from 1.
+    /// Line and column of the position in the whole text, from 1.
     pub(super) line: usize,
     pub(super) column: usize,
-    /// How many lines of `text` stand before the place.
+    /// Lines of `text` above the position.
     above: usize,
 }
 
 impl Excerpt {
-    /// What stands around `place` in `source`, both ends of which are boundaries of characters.
+    /// The excerpt around `place` in `source`; both ends of `place` are boundaries of characters.
     pub(super) fn of(name: &str, source: &str, place: &Range<usize>) -> Self {
         let begin = source[..place.start].rfind('\n').map_or(0, |at| at + 1);
         let (above, from) = (&source[..begin], place.start - begin);
@@ -59,7 +59,7 @@ impl Excerpt {
     }
 }
 
-/// A line cut to its characters around `place`, and where that is then.
+/// A line cut to the characters around `place`, and the range of `place` in the result.
 fn cut(line: &str, place: Range<usize>) -> (String, Range<usize>) {
     let at = |chars: usize| line.char_indices().nth(chars).map_or(line.len(), |(at, _)| at);
     let whole = at(WIDTH) == line.len();
@@ -79,7 +79,7 @@ impl SourceCode for Excerpt {
         _: usize,
     ) -> Result<Box<dyn SpanContents<'a> + 'a>, MietteError> {
         let all = SourceSpan::from(0..self.text.len());
-        // without lines around it the place alone is asked for: where it stands
+        // without lines around it only the position of the place is requested
         let (line, column) =
             if lines_before == 0 { (self.line - 1, self.column - 1) } else { (self.line - 1 - self.above, 0) };
         let (name, text) = (self.name.clone(), self.text.as_bytes());
@@ -87,7 +87,7 @@ impl SourceCode for Excerpt {
     }
 }
 
-/// Words as they can be read: numbers of many digits as powers of ten, and no more words than fit on a page.
+/// Shortens a message: numbers of many digits become powers of ten, and words past a page are cut.
 pub(super) fn readable(words: &str) -> String {
     let mut out = String::with_capacity(words.len().min(4 * WORDS_MAX));
     let is_of_number = |c: char| c.is_ascii_digit() || c == '.';

@@ -1,7 +1,7 @@
-//! The shape of an agent or of a fixed solid where a scene starts it.
+//! The shape of an agent or of a static solid in its starting pose.
 //!
-//! In: a member of the scene, an obstacle. Out: its form, where it stands, and a box around it.
-//! Never here: what touches what.
+//! In: a member of the scene, an obstacle. Out: its form, its pose and a box around it.
+//! Never here: detection of contacts.
 
 use super::cast::{Member, Spec};
 use glam::{DQuat, DVec3};
@@ -12,12 +12,12 @@ use metachron_geometry::{Obstacle, Solid, ToolShape};
 use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 
-/// How far a plane's slab reaches past a figure, in sizes of it.
+/// Half the size of the slab that replaces a plane, in multiples of a figure's half diagonal plus its distance from the plane.
 const SLAB_SHARE: f64 = 4.0;
-/// Nothing of a tool is farther from its tip than its shaft is long and this many shaft radii.
+/// No part of a tool is farther from its tip than the length of its shaft plus this many shaft radii.
 const TOOL_TIP_RADII: f64 = 12.0;
 
-/// An agent's shape where it starts.
+/// An agent's shape in its starting pose.
 pub(super) struct Figure {
     pub id: AgentId,
     pub form: Form,
@@ -51,13 +51,13 @@ impl Figure {
         Self { id: self.id, form: self.form.clone(), place, low: self.low + by_m, high: self.high + by_m }
     }
 
-    /// Back along the shaft of a tool.
+    /// Direction back along the shaft of a tool; `None` for other agents.
     pub fn back(&self) -> Option<DVec3> {
         if let Pose::Tool(_, rotation, _) = &self.place { Some(*rotation * DVec3::NEG_Z) } else { None }
     }
 
-    /// A fixed solid where it stands, if this may be inside it. A plane is a slab below this figure, as high as the plane.
-    /// Meshes are left out: what is inside one of them may be in its hollow.
+    /// A static solid in its pose, if this figure may be inside it. A plane becomes a slab below this figure with its top at the plane.
+    /// Meshes are left out: a figure inside one may be in its hollow.
     pub fn over(&self, obstacle: &Obstacle) -> Option<Self> {
         if matches!(obstacle.solid, Solid::Mesh { .. }) {
             return None;
@@ -94,7 +94,7 @@ impl Figure {
     }
 }
 
-/// The shape of an agent at its start; `None` for one that nothing touches.
+/// The shape of an agent at its start; `None` for one without contact.
 pub(super) fn figure(member: &Member) -> Option<Figure> {
     let form = |kind| Form { kind, friction: 0.0, restitution: 0.0 };
     let (kind, place, low, high) = match &member.spec {
@@ -110,7 +110,7 @@ pub(super) fn figure(member: &Member) -> Option<Figure> {
             let radius = DVec3::splat(curve.radii_m.iter().copied().fold(0.0, f64::max));
             let low = curve.positions.iter().copied().reduce(DVec3::min)? - radius;
             let high = curve.positions.iter().copied().reduce(DVec3::max)? + radius;
-            // where it is held is no matter of places
+            // held ends have no effect on overlap
             (FormKind::Chain { held_ends: 0, height_j_kg: 0.0 }, Pose::Chain(curve), low, high)
         }
         Spec::Soft(spec) => {

@@ -1,7 +1,7 @@
-//! Scene files: the only reader of files.
+//! Reads and checks scene files; the only module that reads files.
 //!
 //! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
-//! [`SceneError`] that shows every problem where it stands. Never here: running agents, drawing, the command line.
+//! [`SceneError`] that shows every problem at its position. Never here: running agents, drawing, the command line.
 
 mod apart;
 mod build;
@@ -39,15 +39,15 @@ use std::sync::Arc;
 
 /// The only version of the format.
 const FORMAT: i64 = 1;
-/// Agents that may each have a thread at most, as the runtime has it.
+/// Most agents that may have a thread each, as in the runtime.
 pub const THREADED_MAX: usize = 1000;
-/// Gravity where a scene does not say, m/s².
+/// Default gravity, m/s².
 const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
 /// Strongest gravity, m/s².
 const GRAVITY_MAX: f64 = 1e4;
 
 /// Reads a scene. Each override is a dotted key, such as `target.frame_hz` or `object.NAME.rate_hz`, and a TOML value
-/// (what is no TOML is taken as text); of equal keys the last counts.
+/// (text that is not TOML is a string); of equal keys the last counts.
 ///
 /// # Errors
 /// [`SceneError`] with every problem found.
@@ -80,7 +80,7 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     }
 }
 
-/// Everything but the objects.
+/// Reads everything but the objects.
 fn read_stage(c: &mut Checker<'_, '_>) -> Option<SceneFile> {
     let document = c.document();
     let others = document.root().iter().filter(|(key, _)| key.get_ref() != "object");
@@ -111,7 +111,7 @@ fn assemble(
         c.wrong(&Place::new("", ""), "executor", what, expected);
     }
     let probes = build::probes(c, &file.probe, &objects.names);
-    // ties between objects that are wrong themselves would be told of for nothing
+    // ties between objects that are wrong themselves would give spurious problems
     let sound = c.count() == 0;
     let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
     let joints: Arc<[Joint]> = joints.into();

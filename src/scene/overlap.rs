@@ -1,8 +1,8 @@
-//! Agents that start against or inside each other or fixed solids.
+//! Finds agents that start in contact with or inside each other or static solids.
 //!
-//! In: a scene. Out: all that overlap where they would touch, and how deep; every pair that lies at rest; every pair
-//! of rigid bodies so near that turning could make them touch.
-//! Never here: what is done about it.
+//! In: a scene. Out: all pairs that overlap although they collide, and how deep; every pair of rigid bodies in contact at rest; every
+//! pair of rigid bodies so near that rotation could bring them into contact.
+//! Never here: the response to it.
 
 use super::cast::{Scene, Spec};
 use super::figure::{Figure, figure};
@@ -16,31 +16,31 @@ use std::collections::BTreeSet;
 
 /// Less than this is rounding, not overlap, metres: shapes are in single precision.
 pub(super) const OVERLAP_MIN_M: f64 = 2e-5;
-/// Bodies no farther apart than this lie against each other, metres.
+/// Bodies no farther apart than this count as in contact, metres.
 const TOUCH_MAX_M: f64 = 1e-4;
 
-/// An agent that starts inside another or inside a fixed solid.
+/// An agent that starts inside another agent or inside a static solid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Overlap {
-    /// Its name; of two agents that with the lower number.
+    /// Name of the agent; of two agents the one with the lower id.
     pub a: String,
-    /// The other's.
+    /// Name of the other.
     pub b: String,
-    /// How deep at the deepest place, metres.
+    /// Depth at the deepest point, metres.
     pub depth_m: f64,
 }
 
-/// What an agent starts inside of.
+/// The object that an agent starts inside of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(super) enum Inside {
     /// Another agent.
     Agent(AgentId),
-    /// A fixed solid, by its place in [`Scene::obstacles`].
+    /// A static solid, by its index in [`Scene::obstacles`].
     Fixed(usize),
 }
 
 impl Scene {
-    /// What is inside each other, named.
+    /// The overlaps, with names.
     pub(super) fn name_overlaps(&self, inside: &[(AgentId, Inside, f64)]) -> Vec<Overlap> {
         let name = |b: Inside| match b {
             Inside::Agent(id) => self.name_of(id).to_owned(),
@@ -50,8 +50,8 @@ impl Scene {
         inside.iter().map(named).collect()
     }
 
-    /// All that is inside each other where the scene puts it, and how deep, metres: pairs of agents in the order of their numbers,
-    /// then agents inside fixed solids.
+    /// All overlaps at the poses that the scene gives, and their depths, metres: pairs of agents in the order of their ids, then agents
+    /// inside static solids.
     pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {
         let mut pairs = Vec::new();
         self.pairs_within(0.0, |one, two, gap_m| {
@@ -64,8 +64,8 @@ impl Scene {
         pairs
     }
 
-    /// Appends the agents that start inside fixed solids. Where a tube is held it may be held to the wall of one: not before its axis is
-    /// inside is it told of.
+    /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
+    /// its axis is inside.
     fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
         let (mut room, mut found) = (TouchRoom::default(), Vec::new());
         let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Instrument(_)));
@@ -86,7 +86,7 @@ impl Scene {
         }
     }
 
-    /// Every pair of rigid agents that starts at rest against each other and touches by the ledger.
+    /// Every pair of rigid agents that starts at rest, in contact with each other by the ledger.
     #[must_use]
     pub fn resting_pairs(&self) -> Vec<(AgentId, AgentId)> {
         let still = |id: AgentId| match self.agents.get(id.0 as usize).map(|member| &member.spec) {
@@ -105,7 +105,7 @@ impl Scene {
         pairs
     }
 
-    /// Every pair of rigid agents of one rate that touches by the ledger and whose balls, those around each, overlap.
+    /// Every pair of rigid agents of equal rate that collides by the ledger and whose bounding spheres overlap.
     #[must_use]
     pub fn near_pairs(&self) -> Vec<(AgentId, AgentId)> {
         let rate = |id: AgentId| self.agents.get(id.0 as usize).map(|member| member.pace.rate_hz);
@@ -124,13 +124,13 @@ impl Scene {
         pairs
     }
 
-    /// Pairs with a law of contact that is not the ledger.
+    /// Pairs with a contact law other than the ledger.
     fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
         let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
         self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()
     }
 
-    /// Calls `visit` with every pair that touches and starts no farther apart than `reach_m`, and with its least gap.
+    /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
     fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure, f64)) {
         let (mut room, mut found) = (TouchRoom::default(), Vec::new());
         self.met(self.agents.iter().filter_map(figure).collect(), reach_m, |one, two| {
@@ -141,7 +141,7 @@ impl Scene {
         });
     }
 
-    /// Calls `visit` with every pair of `figures` that can touch and whose boxes are no farther apart than `reach_m`.
+    /// Calls `visit` with every pair of `figures` that can collide and whose boxes are no farther apart than `reach_m`.
     fn met(&self, mut figures: Vec<Figure>, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure)) {
         figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
         let apart = self.pairs_apart();
@@ -154,7 +154,7 @@ impl Scene {
         }
     }
 
-    /// Pairs whose contact differs from the scene's: with contacts those that do not touch, without those that do.
+    /// Pairs whose contact differs from the scene's `contacts`: where that is true those that do not collide, else those that do.
     pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
         let contact =
             |c: &&super::ties::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
@@ -163,7 +163,7 @@ impl Scene {
         coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()
     }
 
-    /// Whether two agents act on each other where they touch.
+    /// Whether two agents collide; two tools never do.
     pub(super) fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
         let led = |figure: &Figure| matches!(figure.form.kind, FormKind::Tool(_));
         let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));

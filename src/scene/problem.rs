@@ -1,6 +1,6 @@
-//! What is wrong with a scene, shown where it stands: file, line, column, the text underlined, what was expected.
+//! Problems of a scene, shown at their positions: file, line, column, the text underlined, the expected value.
 //!
-//! In: places in the text and what was found there. Out: [`SceneError`], for people (miette) and for programs.
+//! In: positions in the text and messages. Out: [`SceneError`], for people (miette) and for programs.
 //! Never here: the rules themselves.
 
 use super::excerpt::{Excerpt, readable};
@@ -8,22 +8,22 @@ use miette::{Diagnostic, SourceSpan};
 use std::ops::Range;
 use thiserror::Error;
 
-/// More problems than this are counted, not told.
+/// Most problems that are shown; further ones are counted.
 const SHOWN_MAX: usize = 50;
 
 /// Text longer than this is cut where a problem quotes it, in characters.
 const QUOTE_MAX: usize = 80;
 
-/// A scene that cannot be used, with everything that is wrong with it.
+/// A scene that cannot be used, with all its problems.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{}", headline(name, problems.len() + hidden))]
 pub struct SceneError {
     /// The scene's name or file.
     pub name: String,
-    /// What is wrong, in the order of the text; at least one.
+    /// The problems, in the order of the text; at least one.
     #[related]
     pub problems: Vec<SceneProblem>,
-    /// How many more problems there are than are told of.
+    /// Number of further problems that are not shown.
     pub hidden: usize,
 }
 
@@ -34,15 +34,15 @@ fn headline(name: &str, count: usize) -> String {
     }
 }
 
-/// One thing that is wrong with a scene.
+/// One problem of a scene.
 #[derive(Debug, Error, Diagnostic)]
 #[error("{message}")]
 pub struct SceneProblem {
-    /// What is wrong.
+    /// Description of the problem.
     pub message: String,
-    /// What would have been right, under the text.
+    /// The expected value, shown under the text.
     pub expected: String,
-    /// What may help besides.
+    /// A further hint.
     #[help]
     pub help: Option<String>,
     /// Line of the offending text, from 1; 0 where a file could not be read at all.
@@ -58,7 +58,7 @@ pub struct SceneProblem {
 }
 
 impl SceneError {
-    /// A scene of which nothing could be read.
+    /// The error of a scene that could not be read at all.
     #[must_use]
     pub fn unreadable(name: &str, message: String, help: Option<String>) -> Self {
         let problem = SceneProblem {
@@ -74,7 +74,7 @@ impl SceneError {
         Self { name: name.to_owned(), problems: vec![problem], hidden: 0 }
     }
 
-    /// `problems` shown in `text`, in its order.
+    /// `problems` shown in `text`, in the order of the text.
     pub(super) fn new(name: &str, text: &str, mut problems: Vec<Problem>) -> Self {
         problems.sort_by_key(|p| (p.span.start, p.span.end));
         let hidden = problems.len().saturating_sub(SHOWN_MAX);
@@ -84,7 +84,7 @@ impl SceneError {
     }
 }
 
-/// A problem before it is shown: a place in the text and words.
+/// A problem before it is shown: a position in the text, and messages.
 #[derive(Debug)]
 pub(super) struct Problem {
     span: Range<usize>,
@@ -108,7 +108,7 @@ impl Problem {
         self
     }
 
-    /// What TOML or serde found; `nearby` is where to show it when it does not say, `also` what other keys the table has.
+    /// A problem that TOML or serde found; `nearby` is its position if the error has none, `also` are further keys of the table.
     pub(super) fn from_toml(error: &toml::de::Error, nearby: Range<usize>, also: &[&str]) -> Self {
         let span = error.span().unwrap_or(nearby);
         let message = error.message();
@@ -158,10 +158,10 @@ fn floor_boundary(text: &str, at: usize) -> usize {
     (0..=at).rev().find(|i| text.is_char_boundary(*i)).unwrap_or(0)
 }
 
-/// Serde's words in the words of a scene: the message, and what was expected where it says so.
+/// Translates serde's message into terms of a scene: the message, and the expected value if it has one.
 fn plain_words(message: &str) -> (String, Option<String>) {
     let first_line = message.lines().next().unwrap_or_default();
-    // every choice in a scene is one of a list of words, and toml asks for one in words of its own
+    // every choice in a scene is one of a list of words, and toml requests one in a wording of its own
     if first_line.starts_with("wanted ") {
         return ("one word is wanted here".to_owned(), Some("expected a word in quotes, as \"auto\"".to_owned()));
     }
@@ -172,7 +172,7 @@ fn plain_words(message: &str) -> (String, Option<String>) {
     if let Some(key) = found.strip_prefix("missing field ") {
         return (format!("the key {key} is missing"), Some(format!("expected {key} in this table")));
     }
-    // serde's name of the type that a huge whole number was read as
+    // serde names the type that it read a huge integer as
     (found.replace("unknown variant", "unknown value").replace(" as i128", "").replace(" as u128", ""), expected)
 }
 

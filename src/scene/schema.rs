@@ -1,6 +1,6 @@
 //! The JSON Schema of scene files, from the types that read them.
 //!
-//! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys; a schema cannot say them all.
+//! In: nothing. Out: one schema (draft 2020-12). Never here: rules between keys, not all of which a schema can express.
 
 use super::build::AGENTS_MAX;
 use super::format::{
@@ -26,7 +26,7 @@ pub fn json_schema() -> Value {
         object::<TreeFile>(&mut generator),
     ];
     let mut root = generator.root_schema_for::<SceneFile>().to_value();
-    // made above, and the root generator forgets definitions that it does not use itself
+    // made above; the root generator drops definitions that it does not use itself
     let definitions = generator.take_definitions(true);
     root["title"] = json!("metachron scene");
     let properties = &mut root["properties"];
@@ -45,7 +45,7 @@ pub fn json_schema() -> Value {
     root
 }
 
-/// Takes `null` out of every choice: what is optional in Rust is left out in TOML, which has no null.
+/// Removes `null` from every choice: an optional field is left out in TOML, which has no null.
 fn drop_null(schema: &mut Value) {
     let is_null = |v: &Value| *v == json!("null") || *v == json!({ "type": "null" });
     if let Value::Object(table) = schema {

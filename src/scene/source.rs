@@ -1,4 +1,4 @@
-//! Where a scene comes from: built in, or a file; and the files beside it.
+//! Sources of scenes: built in, or a file; and the files next to it.
 //!
 //! In: a name or a path. Out: text and bytes. Never here: their meaning. This is the only place that reads files.
 
@@ -8,9 +8,9 @@ use std::fs::File;
 use std::io::Read;
 use std::path::{Component, Path, PathBuf};
 
-/// Longest scene file, bytes: 100000 path points and room to spare.
+/// Longest scene file, bytes: more than 100000 path points need.
 pub const SCENE_BYTES_MAX: u64 = 16 << 20;
-/// Longest file beside a scene, bytes.
+/// Longest file next to a scene, bytes.
 const SIBLING_BYTES_MAX: u64 = 64 << 20;
 
 /// A scene's text and where it comes from.
@@ -21,7 +21,7 @@ pub struct Source {
     beside: Beside,
 }
 
-/// Where the files beside a scene are.
+/// Location of the files next to a scene.
 #[derive(Debug, Clone)]
 enum Beside {
     BuiltIn,
@@ -30,10 +30,10 @@ enum Beside {
 }
 
 impl Source {
-    /// The built-in scene called `name_or_path`, or else the file there.
+    /// The built-in scene called `name_or_path`, or else the file at this path.
     ///
     /// # Errors
-    /// [`SceneError`] when neither exists, or the file cannot be read, is too long or no UTF-8.
+    /// [`SceneError`] when neither exists, or the file cannot be read, is too long or not UTF-8.
     pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
         if let Some(scene) = builtin::find(name_or_path) {
             let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
@@ -45,10 +45,10 @@ impl Source {
         Self::from_bytes(name_or_path, bytes, Beside::Folder(folder))
     }
 
-    /// A scene out of bytes that are in memory; there are no files beside it.
+    /// A scene from bytes in memory, without files next to it.
     ///
     /// # Errors
-    /// [`SceneError`] when they are too many or no UTF-8.
+    /// [`SceneError`] when they are too many or not UTF-8.
     pub fn memory(name: &str, bytes: &[u8]) -> Result<Self, SceneError> {
         if bytes.len() as u64 > SCENE_BYTES_MAX {
             let message = format!("it has {} bytes, more than {SCENE_BYTES_MAX}", bytes.len());
@@ -71,7 +71,7 @@ impl Source {
         }
     }
 
-    /// The scene's name: the built-in one's, or the path as it was given.
+    /// The scene's name: that of the built-in one, or the path as it was given.
     #[must_use]
     pub fn name(&self) -> &str {
         &self.name
@@ -83,7 +83,7 @@ impl Source {
         &self.text
     }
 
-    /// The bytes of a file beside the scene, or why there are none.
+    /// The bytes of a file next to the scene, or why there are none.
     pub(super) fn sibling(&self, name: &str) -> Result<Vec<u8>, String> {
         let path = Path::new(name);
         if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
@@ -99,9 +99,9 @@ impl Source {
     }
 }
 
-/// What a scene names is no stream: only who calls the program may have it wait for one.
+/// Reads a file that a scene names, which must not be a stream: only the caller of the program may make it wait for one.
 fn read_plain(path: &Path, most: u64) -> Result<Vec<u8>, String> {
-    // asked before it is opened: to open a pipe waits for whoever writes into it
+    // checked before opening: opening a pipe waits for a writer
     let kind = std::fs::metadata(path).map_err(|e| e.to_string())?;
     if !(kind.is_file() || kind.is_dir()) {
         return Err("it is a pipe, a device or a socket; expected a plain file".to_owned());
@@ -144,7 +144,7 @@ mod tests {
 
     #[test]
     fn what_is_no_plain_file_is_refused_and_not_waited_for() {
-        // a device that never ends; a socket stands for a pipe: both are told before they are opened
+        // an endless device, and a socket in place of a pipe: both are refused before they are opened
         let folder = tempfile::tempdir().unwrap();
         let socket = folder.path().join("socket.obj");
         let _listens = std::os::unix::net::UnixListener::bind(&socket).unwrap();
@@ -153,7 +153,7 @@ mod tests {
             assert!(told.contains("expected a plain file"), "{path:?}: {told}");
         }
         assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
-        // a scene may come out of a pipe, but never without end
+        // a scene may come from a pipe, but its length is bounded
         assert!(read_bounded(Path::new("/dev/zero"), 9).unwrap_err().contains("more than 9 bytes"));
     }
 }

@@ -1,30 +1,30 @@
-//! What ties the objects of a scene to each other: couplings, and faults on the way between them.
+//! Ties between the objects of a scene: couplings, and injected faults.
 //!
-//! In: built by [`super::load`], checked. Out: plain data that the frame loop hands to agents and to the runtime.
+//! In: built by [`super::load`], checked. Out: plain data that the frame loop passes to agents and to the runtime.
 //! Never here: the file's text, forces.
 
 use metachron_contact::Law;
 use metachron_core::{AgentId, Anchor};
 
-/// How two agents act on each other, where that is not contact by the ledger.
+/// Interaction of two agents, other than ledger contact.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Coupling {
     /// The first agent.
     pub a: AgentId,
     /// The second.
     pub b: AgentId,
-    /// What of them is coupled.
+    /// The parts that are coupled.
     pub kind: CouplingKind,
-    /// By which law.
+    /// The law of the coupling.
     pub law: Law,
 }
 
-/// What of two agents is coupled.
+/// The parts of two agents that are coupled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum CouplingKind {
-    /// Their surfaces, where they touch.
+    /// Their surfaces, where they are in contact.
     Contact,
-    /// One point of each, by a spring.
+    /// One point of each, joined by a spring.
     Attach {
         /// The point of the first.
         at_a: Anchor,
@@ -34,18 +34,18 @@ pub enum CouplingKind {
         stiffness_n_m: f64,
         /// Damping, N·s/m, ≥ 0.
         damping_n_s_m: f64,
-        /// Length at rest, metres, ≥ 0.
+        /// Rest length, metres, ≥ 0.
         rest_m: f64,
     },
 }
 
-/// What goes wrong on purpose on the way from an agent to the others.
+/// Faults injected into the clock and the messages of an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Faults {
-    /// Every step is longer or shorter by up to this share, 0 … 0.5.
+    /// Every step is longer or shorter by a random share up to this, 0 … 0.5.
     pub jitter: f64,
-    /// Share of published states that nobody sees, 0 … 0.9.
+    /// Share of published states that no other agent receives, 0 … 0.9.
     pub loss: f64,
-    /// Seed of both.
+    /// Seed of the random numbers of both.
     pub seed: u64,
 }

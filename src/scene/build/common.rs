@@ -6,11 +6,11 @@ use crate::scene::format::{CommonFile, FaultsFile, HoldKind, Material, OneOrRang
 use crate::scene::ties::Faults;
 use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 
-/// Wanted rate where a scene says neither rate nor step, hertz.
+/// Default rate, hertz, of an object for which the scene gives neither rate nor step.
 const RATE_DEFAULT_HZ: f64 = 240.0;
-/// Primitive levels of a picture where a scene does not say.
+/// Default range of primitive levels of a picture.
 const N_DEFAULT: (u8, u8) = (1, 5);
-/// A rate agrees with a step when their product is 1 within this: a rate written with 5 digits is meant.
+/// A rate agrees with a step when their product is 1 within this: a rate may be written with 5 digits.
 const RATE_AGREES: f64 = 1e-4;
 
 const RATE: Allowed = allowed(1.0..=100_000.0, "Hz");
@@ -51,7 +51,7 @@ fn wish(rate_hz: f64, dt_ms: f64, range_ms: Option<(f64, f64)>) -> PaceWish {
     PaceWish { rate_hz, dt: span(dt_ms), dt_range: (span(least), span(greatest)) }
 }
 
-/// The error that an object of this pace is to hold with the resolutions that it may take; it has no error where there are none.
+/// The error tolerance of an object, metres, if the scene gives one; refused where `range`, the resolutions it may take, is `None`.
 pub(super) fn tolerance(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -86,7 +86,7 @@ pub(super) fn tolerance(
     Some(tolerance_m)
 }
 
-/// Tells of an object without an error of its own that is to hold one.
+/// Reports `tolerance_m` and `hold = "error"` on an object that makes no error of its own.
 pub(super) fn untolerated(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) {
     let asked = [("tolerance_m", file.tolerance_m.is_some()), ("hold", file.hold == Some(HoldKind::Error))];
     if let Some((key, _)) = asked.iter().find(|(_, there)| *there) {
@@ -106,7 +106,7 @@ pub(super) fn rounded(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-/// What goes wrong on purpose: the object's own faults, and for what they leave out the world's.
+/// Injected faults: the object's own, and the world's for the keys that the object leaves out.
 pub(super) fn faults(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -122,7 +122,7 @@ pub(super) fn faults(
     }
 }
 
-/// Tells what is wrong with the world's own faults.
+/// Checks the values of `[world.faults]`.
 pub(in crate::scene) fn world_faults(c: &mut Checker<'_, '_>, file: &FaultsFile) {
     let place = Place::new("world.faults", "of `[world.faults]`");
     c.number_or(&place, "jitter", (file.jitter, 0.0), &JITTER);
@@ -145,7 +145,7 @@ pub(super) fn levels(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile) 
     N_DEFAULT
 }
 
-/// Colour and material of what nothing is painted on; `default` is the material of the model.
+/// Colour and material of an object without a texture; `default` is the material of the model.
 pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
     if file.shading == Some(ShadingKind::Textured) {
         c.wrong(place, "shading", "has nothing to draw", "expected `texture` beside it, which only a mesh can have");
@@ -153,7 +153,7 @@ pub(super) fn look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, de
     painted_look(c, place, file, default)
 }
 
-/// The same of what something may be painted on.
+/// The same for an object that may have a texture.
 pub(super) fn painted_look(c: &mut Checker<'_, '_>, place: &Place, file: &CommonFile, default: Material) -> Look {
     let material = file.material.unwrap_or(default);
     let colour = match &file.colour {

@@ -1,4 +1,4 @@
-//! The couplings of the file: which pairs act on each other in another way than by touching, by the ledger.
+//! Reads the couplings of a scene file: pairs that act on each other otherwise than by ledger contact, which is the default.
 //!
 //! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
 //! Never here: forces.
@@ -75,7 +75,7 @@ fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects
     Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law: law? })
 }
 
-/// Who is at one end: an agent with matter.
+/// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
 fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<Named> {
     let (what, expected) = match objects.names.get(name) {
         None => {
@@ -95,7 +95,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
     None
 }
 
-/// Tells of keys that have no meaning for this kind and law, and of those that are missing.
+/// Reports keys that have no meaning for this kind and law, and required keys that are missing.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
     let (kind, law) = (file.kind.unwrap_or_default(), file.law.unwrap_or_default());
     let attach = kind == Kind::Attach;
@@ -156,7 +156,7 @@ fn attach(
     Some(CouplingKind::Attach { at_a: at_a?, at_b: at_b?, stiffness_n_m, damping_n_s_m, rest_m })
 }
 
-/// The material point that `spot` means of the object `named`.
+/// The material point of the object `named` that `spot` denotes.
 fn anchor(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -205,13 +205,13 @@ fn spec_of(objects: &Objects, id: AgentId) -> Option<&Spec> {
     objects.agents.iter().find(|member| member.id == id).map(|member| &member.spec)
 }
 
-/// Rest length of a tube's skeleton; none where the tube cannot be built, which is told elsewhere.
+/// Rest length of a tube's skeleton, metres; `None` where the tube cannot be built, which is reported elsewhere.
 fn tube_length_m(objects: &Objects, id: AgentId) -> Option<f64> {
     let Spec::Tube(spec) = spec_of(objects, id)? else { return None };
     metachron_models::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
 }
 
-/// The centre of mass of a rigid object in its shape's axes; zero where there is none, as at an instrument's tip.
+/// The centre of mass of a rigid object in its shape's axes; zero for any other object, such as an instrument, whose origin is its tip.
 fn centre_of_mass(objects: &Objects, id: AgentId) -> DVec3 {
     match spec_of(objects, id) {
         Some(Spec::Rigid(spec)) => RigidBody::new(spec.clone()).map_or(DVec3::ZERO, |body| body.com_local()),

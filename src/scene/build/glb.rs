@@ -1,9 +1,9 @@
-//! glTF's binary form (.glb) as points and triangles.
+//! Reads binary glTF (.glb) as points and triangles.
 //!
-//! In: any bytes. Out: the triangles of every mesh that a node of the scene shows, placed as the nodes say, z up, and the image that is
-//! painted on them; or what is wrong with the file. Never here: light, skins, files beside the file, what an image's bytes mean. Every
-//! number in it is doubted: it may be hostile (the crate `gltf` panics on a number of an accessor that is not there, so the few tables
-//! needed are read here), and what many nodes show of one list is counted before it is read.
+//! In: any bytes. Out: the triangles of every mesh that a node of the scene instantiates, placed as the nodes say, z up, and the image
+//! of their base colour; or what is wrong with the file. Never here: lights, skins, external files, decoding of images. No number in
+//! the file is trusted, as the file may be hostile (the crate `gltf` panics on an accessor index out of range, so the few tables needed
+//! are read here), and points and primitives that many nodes instantiate are counted before they are read.
 
 mod tables;
 
@@ -12,35 +12,35 @@ use glam::{DMat4, DQuat, DVec3, DVec4, Vec2};
 use metachron_geometry::branch;
 use tables::{Node, Tables};
 
-/// What such a file begins with.
+/// First bytes of such a file.
 pub(super) const MAGIC: &[u8] = b"glTF";
-/// Most nodes that are looked at, and primitives of their meshes: a node that is its own ancestor would never end.
+/// Most nodes visited, and most primitives of their meshes: a node that is its own ancestor would never end.
 const NODES_MAX: usize = 100_000;
-/// Most points of all primitives that nodes show together: no triangle can need more than three.
+/// Most points of all primitives that nodes instantiate: no triangle needs more than three.
 const POINTS_MAX: usize = 3 * TRIANGLES_MAX;
 /// Deepest nesting of nodes.
 const DEPTH_MAX: usize = 64;
-/// glTF has y up: it becomes z.
+/// Turns glTF's y-up axes to z up.
 const UPRIGHT: DMat4 = DMat4::from_cols(DVec4::X, DVec4::Z, DVec4::NEG_Y, DVec4::W);
 
-/// A file in its two parts, and what was found in it.
+/// A file in its two parts, tables and data, and the geometry read so far.
 struct Reader<'d> {
     tables: Tables,
     data: &'d [u8],
     points: Vec<DVec3>,
     uvs: Vec<Vec2>,
     triangles: Vec<[u32; 3]>,
-    /// For each triangle how many meshes of nodes were read before its own.
+    /// For each triangle the number of its node's mesh, in the order of reading.
     objects: Vec<u32>,
     meshes: u32,
-    /// For each primitive of a mesh of a node its first point, its mesh and its number in it.
+    /// For each primitive read its first point, its mesh and its index in that mesh.
     primitives: Vec<(u32, [usize; 2])>,
     nodes: usize,
-    /// How many primitives were looked at, those of points and lines too.
+    /// Number of primitives visited, including those of points and lines.
     looked_at: usize,
 }
 
-/// Points, their places on the image of [`image`], and triangles of a file.
+/// Points, their texture coordinates on the image of [`image`], and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     let (tables, data) = tables::read(bytes)?;
     let roots = tables.scenes.get(tables.scene).ok_or("it has no scene")?.nodes.clone();
@@ -63,7 +63,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     Ok((reader.points, reader.uvs, reader.triangles))
 }
 
-/// The bytes of the one image that all base colours of a file come from; `None` where they come from none or several.
+/// The bytes of the one image that all base colours of a file use; `None` where they use none or several.
 pub(super) fn image(bytes: &[u8]) -> Result<Option<&[u8]>, String> {
     let (tables, data) = tables::read(bytes)?;
     let primitives = tables.meshes.iter().flat_map(|mesh| &mesh.primitives);
@@ -107,7 +107,7 @@ impl Reader<'_> {
         (0..mesh.primitives.len()).try_for_each(|part| self.primitive([number, part], place))
     }
 
-    /// One primitive of a mesh: triangles, strips and fans; points and lines are left out.
+    /// Reads one primitive of a mesh: triangles, strips and fans; points and lines are skipped.
     fn primitive(&mut self, [number, part]: [usize; 2], place: DMat4) -> Result<(), String> {
         let primitive = &self.tables.meshes[number].primitives[part];
         let Some(mode @ 4..=6) = Some(primitive.mode.unwrap_or(4)) else { return Ok(()) };
@@ -148,7 +148,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Whether the mesh of every node is a surface, all primitives of it together.
+    /// Checks that no edge in the mesh of a node, all its primitives together, has more than two triangles.
     fn check(&self) -> Result<(), String> {
         let Some(found) = branch(&self.points, &self.triangles, |t| self.objects[t]) else { return Ok(()) };
         let named = |corner: u32| {
@@ -168,7 +168,7 @@ impl Node {
         }
         let rotation = self.rotation.map_or(DQuat::IDENTITY, DQuat::from_array);
         let scale = self.scale.map_or(DVec3::ONE, DVec3::from);
-        // glam asks for a unit quaternion where its assertions are on
+        // glam asserts a unit quaternion where its assertions are on
         let rotation = if rotation.length_squared() > 0.0 { rotation.normalize() } else { DQuat::IDENTITY };
         DMat4::from_scale_rotation_translation(scale, rotation, self.translation.into())
     }
@@ -236,7 +236,7 @@ mod tests {
     fn a_tetrahedron_is_read_placed_and_set_upright() {
         let mesh = read(&tetrahedron(), 1.0).unwrap();
         assert_eq!((mesh.points.len(), mesh.triangles.len()), (4, 4));
-        // x 5 from the node; what was up along y is up along z
+        // x 5 from the node; y is up in the file, z here
         assert!(mesh.points.contains(&glam::DVec3::new(5.0, 0.0, 2.0)), "{:?}", mesh.points);
         let volume: f64 = mesh
             .triangles
@@ -253,7 +253,7 @@ mod tests {
     fn what_lies_outside_the_file_is_refused() {
         for bad in [json(48 + 24, 5, 12), json(48 + 24, 4, 1000), json(48 + 24, 4, 4_000_000_000), json(9000, 4, 12)] {
             let told = read(&file(&bad), 1.0).err();
-            // a longer buffer than is there is told of only where something is read past its end
+            // a buffer that claims more bytes than the file has is reported only where a read passes its end
             assert!(told.is_some() || bad == json(9000, 4, 12), "{bad}");
         }
         let whole = tetrahedron();
@@ -264,7 +264,7 @@ mod tests {
         assert!(read(&file(&ring), 1.0).is_err());
     }
 
-    /// What is said of the tetrahedron with one piece of its text put in place of another.
+    /// The error for the tetrahedron with `from` replaced by `to` in its text; empty if it is read.
     fn told(from: &str, to: &str) -> String {
         let text = json(48 + 24, 4, 12);
         assert!(text.contains(from), "{from}");

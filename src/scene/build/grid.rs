@@ -11,10 +11,10 @@ use metachron_core::AgentId;
 
 /// Most objects along one side of a grid.
 const SIDE_MAX: u32 = 1000;
-/// Farthest that neighbours of a grid may be apart, and that one may be moved at random, metres.
+/// Greatest spacing of neighbours in a grid, and greatest random displacement, metres.
 const SPACING_MAX_M: f64 = 1e4;
 
-/// Where the copies of one object stand, seen from the object's own place.
+/// Offsets of the copies of one object from the object's own position, metres.
 #[derive(Debug, Clone)]
 pub(super) struct Copies {
     offsets_m: Vec<DVec3>,
@@ -36,7 +36,7 @@ impl Copies {
         (0..self.len()).map(move |k| if self.numbered { format!("{name}-{k}") } else { name.to_owned() })
     }
 
-    /// Every copy of `member`, which is the first; numbers count up from its own.
+    /// Every copy of `member`, which is the first; ids count up from its own.
     pub(super) fn members<'a>(&'a self, member: &'a Member) -> impl Iterator<Item = Member> + 'a {
         let names = self.names(&member.name);
         (member.id.0..).zip(names).zip(&self.offsets_m).map(|((id, name), offset)| {
@@ -69,7 +69,7 @@ fn moved(spec: Spec, by: DVec3) -> Spec {
     }
 }
 
-/// Reads the copies of an object; `can_move` says whether its model has a place of its own, `most` how many there may be.
+/// Reads the copies of an object; `can_move` says whether its model has a position of its own, `most` how many there may be.
 pub(super) fn copies(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -126,16 +126,16 @@ pub(super) fn copies(
     Copies { offsets_m, numbered: true }
 }
 
-/// Which place of the grid is number `k`, counted along x, then y, then z.
+/// Grid coordinates of copy `k`, counted along x, then y, then z.
 fn grid_place([x, y, _]: [u32; 3], k: u32) -> [f64; 3] {
     [k % x, k / x % y, k / (x * y)].map(f64::from)
 }
 
-/// A point of the cube from −1 to 1, the same for the same seed and number.
+/// A pseudo-random point of the cube from −1 to 1, the same for the same seed and number.
 fn random_cube(seed: u64, number: u32) -> DVec3 {
     let mut state = seed << 32 | u64::from(number);
     DVec3::from_array(std::array::from_fn(|_| {
-        // SplitMix64 (Steele, Lea, Flood 2014): one state a coordinate
+        // SplitMix64 (Steele, Lea, Flood 2014): one state per coordinate
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = state;
         z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -163,7 +163,7 @@ mod tests {
         let all: Vec<_> = (0..4000).map(|k| random_cube(7, k)).collect();
         let mean = all.iter().sum::<DVec3>() / 4000.0;
         let square = all.iter().map(|p| *p * *p).sum::<DVec3>() / 4000.0;
-        // even on −1 … 1: mean 0, square 1/3; four standard errors of 4000 draws
+        // uniform on −1 … 1: mean 0, mean square 1/3; four standard errors of 4000 draws
         assert!(mean.abs().max_element() < 4.0 * (1.0 / 3.0_f64).sqrt() / 4000.0_f64.sqrt(), "{mean}");
         assert!(
             (square - 1.0 / 3.0).abs().max_element() < 4.0 * (4.0 / 45.0_f64).sqrt() / 4000.0_f64.sqrt(),

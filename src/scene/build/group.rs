@@ -1,7 +1,7 @@
-//! Groups of the file: whose members may be drawn as one mesh.
+//! Reads the groups of a scene file: scenery that may be drawn as one mesh.
 //!
-//! In: `[[group]]` tables and all scenery. Out: groups, and the scenery put in order so that members stand side by side.
-//! Never here: the mesh that stands for them, and when it does.
+//! In: `[[group]]` tables and all scenery. Out: groups, and the scenery reordered so that the members of a group are adjacent.
+//! Never here: the mesh that replaces them, and when it is drawn.
 
 use super::impostors::impostors;
 use super::object::{Named, Objects};
@@ -13,7 +13,7 @@ use crate::scene::source::Source;
 /// Most groups of a scene.
 const GROUPS_MAX: usize = 1000;
 
-/// Reads every group and puts the scenery in order.
+/// Reads every group and reorders the scenery.
 pub(in crate::scene) fn groups(
     c: &mut Checker<'_, '_>,
     files: &[GroupFile],
@@ -33,7 +33,7 @@ pub(in crate::scene) fn groups(
         claim(c, &place, (number, file), (objects, &mut owner));
     }
     let mut order: Vec<usize> = (0..owner.len()).collect();
-    // those of no group first, the others group by group
+    // scenery of no group first, then group by group
     order.sort_by_key(|&i| owner[i].map_or(0, |group: usize| group + 1));
     objects.scenery = order.iter().map(|&i| objects.scenery[i].clone()).collect();
     let mut start = owner.iter().filter(|group| group.is_none()).count();
@@ -49,7 +49,7 @@ pub(in crate::scene) fn groups(
     made
 }
 
-/// Marks the members of a group as its own.
+/// Assigns the members to group `number`.
 fn claim(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -80,7 +80,7 @@ fn claim(
     }
 }
 
-/// Whether a member's name means this part: itself, its leaves, or all that begin as it does before its star.
+/// Whether `wanted` selects `name`: the same name, a tree's leaves, or with a final `*` every name with that prefix.
 fn is_meant(name: &str, wanted: &str) -> bool {
     match wanted.strip_suffix('*') {
         Some(start) => name.starts_with(start),
@@ -92,7 +92,7 @@ fn is_meant(name: &str, wanted: &str) -> bool {
 mod tests {
     use crate::scene::{Source, load};
 
-    /// What is said of a group of these members beside a mesh `a1` and a ball `a2` that falls.
+    /// The problems of a scene with a group of these members, a mesh `a1` and a falling ball `a2`; empty if there are none.
     fn told(members: &str) -> String {
         let text = format!(
             "format = 1\n[[object]]\nname = \"a1\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\n[[object]]\nname = \"a2\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\nposition_m = [0, 0, 1]\n[[group]]\nname = \"g\"\nmembers = {members}\n"

@@ -1,7 +1,7 @@
-//! What stands for a group: one mesh, and the levels that it is cut to.
+//! Builds the impostor of a group: one mesh, and the levels that it is cut to.
 //!
-//! In: a `[[group]]` table, the scenery that it names. Out: the mesh as scenery, and the triangles of each impostor.
-//! Never here: who belongs to a group, which level is drawn. Theory: `docs/theory/multiresolution.md`, section 2.
+//! In: a `[[group]]` table, the scenery that it names. Out: the mesh as scenery, and the triangles of each level.
+//! Never here: membership of groups, choice of the level drawn. Theory: `docs/theory/multiresolution.md`, section 2.
 
 use super::scenery::mesh_model;
 use crate::scene::cast::{GROUP_LEVELS_MAX, Look, Scenery};
@@ -12,13 +12,13 @@ use glam::{DQuat, DVec3};
 use metachron_geometry::{Model, Placement, Tom, proxy};
 use std::sync::Arc;
 
-/// The finest impostor has this share of its members' triangles where a scene does not say, within these bounds.
+/// By default the finest level has this share of its members' triangles, within these bounds.
 const SHARE: f64 = 0.05;
 const TRIANGLES: (u32, u32) = (12, 2000);
-/// Each coarser one has so many times fewer triangles.
+/// Each coarser level has this many times fewer triangles.
 const COARSER: u32 = 4;
 
-/// The mesh of a group and its levels; `None` where something is wrong, which is told.
+/// The mesh of a group and its levels; `None` where something is wrong, which is reported.
 pub(super) fn impostors(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -56,7 +56,7 @@ pub(super) fn impostors(
     Some((Scenery { name: file.name.clone(), model: Model::Mesh(tom), at, look, texture: None }, levels))
 }
 
-/// Tells what is wrong with levels whatever they are cut from.
+/// Reports levels that are wrong whatever mesh they are cut from.
 fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
     if levels.is_empty() || levels.len() > GROUP_LEVELS_MAX {
         let expected = format!("expected 1 to {GROUP_LEVELS_MAX} numbers of triangles");
@@ -72,12 +72,12 @@ fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
     }
 }
 
-/// The first level with more triangles than there are, and its key.
+/// The first level with more triangles than `has`, and its key.
 fn past(levels: &[u32], has: u32) -> Option<(String, u32)> {
     levels.iter().enumerate().find(|(_, count)| **count > has).map(|(at, count)| (format!("levels.{at}"), *count))
 }
 
-/// A mesh made of all members.
+/// One mesh made of all members.
 fn made_of(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -98,7 +98,7 @@ fn made_of(
     }
 }
 
-/// The triangles that a mesh really has at each level; `None` where two are alike or one is below its coarsest, which is told.
+/// The triangles that the mesh has at each level; `None` where two levels are equal or one is below its coarsest, which is reported.
 fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Tom)) -> Option<Vec<u32>> {
     let (least, most) = tom.range();
     let mut made: Vec<u32> = Vec::with_capacity(levels.len());
@@ -117,7 +117,7 @@ fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Tom)) -
     Some(made)
 }
 
-/// All that a mesh has, and coarser levels as long as they have enough triangles to be seen as a shape.
+/// Default levels: all triangles of the mesh, then coarser levels as long as they have enough triangles to show a shape.
 fn usual(tom: &Tom) -> Vec<u32> {
     let (least, most) = tom.range();
     let coarser = |count: &u32| Some(count / COARSER).filter(|count| *count >= TRIANGLES.0.max(least));
@@ -128,7 +128,7 @@ fn usual(tom: &Tom) -> Vec<u32> {
     levels
 }
 
-/// The members' colours, each as often as it has triangles.
+/// Mean colour of the members, weighted by their triangles.
 fn mean_colour(members: &[Scenery]) -> [u8; 3] {
     let weight = |m: &Scenery| f64::from(m.model.range().1);
     let all: f64 = members.iter().map(weight).sum();
@@ -141,7 +141,7 @@ fn mean_colour(members: &[Scenery]) -> [u8; 3] {
 mod tests {
     use crate::scene::{Scene, SceneError, Source, load};
 
-    /// A wood of 25 balls of 200 triangles as a group with these keys beside its name and members.
+    /// A forest of 25 balls of 200 triangles as a group with these keys in addition to its name and members.
     fn wood(keys: &str) -> Result<Scene, SceneError> {
         let text = format!(
             "format = 1\n[[object]]\nname = \"b\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\ntriangles = 200\ngrid = [5, 5, 1]\nspacing_m = [3, 3, 0]\n[[group]]\nname = \"g\"\nmembers = [\"b-*\"]\n{keys}\n"
@@ -162,7 +162,7 @@ mod tests {
     fn levels_are_cuts_of_one_mesh_with_the_triangles_asked_for() {
         let made = levels("levels = [20, 80, 320]");
         assert_eq!(made.len(), 3, "{made:?}");
-        // a vertex takes two triangles with it, in a chain of substitutes a few more
+        // removing a vertex removes two triangles, in a chain of substitutes a few more
         assert!(made.iter().zip([20, 80, 320]).all(|(cut, asked)| *cut <= asked && cut + 6 > asked), "{made:?}");
         let sphere = "proxy = { generate = \"sphere\", triangles = 320, scale = 8 }";
         assert_eq!(levels(&format!("{sphere}\nlevels = [20, 320]")).len(), 2);

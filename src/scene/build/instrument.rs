@@ -1,4 +1,4 @@
-//! An instrument of the file as a [`ToolSpec`].
+//! Reads an instrument of a scene file as a [`ToolSpec`].
 
 use super::POSITION_MAX_M;
 use super::object::{Given, Named, Names};
@@ -12,12 +12,12 @@ use std::ops::RangeInclusive;
 
 /// Most keyframes of a script.
 const KEYFRAMES_MAX: usize = 10_000;
-/// How far jaws reach where a scene does not say, metres.
+/// Default reach of the jaws, metres.
 const REACH_DEFAULT_M: f64 = 0.02;
-/// What a tool's drive pushes with at most where a scene does not say, newtons: what an arm holds against without effort.
+/// Default limit of the force of a tool's drive, newtons: an arm holds against it without effort.
 const FORCE_DEFAULT_N: f64 = 50.0;
-/// What it may push with. Its tip weighs 6 g a newton (docs/theory/coupling.md, eq. 9e): past a kilonewton that presses 50 g by
-/// millimetres into the floor under it, past a hundred through it.
+/// Allowed limits of that force. The tip has a mass of 6 g per newton (docs/theory/coupling.md, eq. 9e): past a kilonewton it presses
+/// an object of 50 g millimetres into the floor, past a hundred kilonewtons through it.
 const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
 /// See [`FORCES_N`].
 const FORCES_WHY: &str = "N: a stronger drive would press what is light into what it stands on";
@@ -58,7 +58,7 @@ fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &InstrumentFile, name
     found
 }
 
-/// What something is that jaws cannot hold.
+/// Description of an object that jaws cannot hold; `None` for one that they can.
 const fn ungraspable(named: Named) -> Option<&'static str> {
     match named {
         Named::Fixed => Some("a fixed object"),

@@ -1,7 +1,7 @@
-//! The joints of the file: who is held, where, and whether that can be.
+//! Reads the joints of a scene file: the objects at both ends, the anchors, and whether the joint can hold there.
 //!
 //! In: [`JointFile`]s and the objects of the scene. Out: [`Joint`]s that can hold from the first step on, problems to the
-//! [`Checker`]. Never here: what a joint does.
+//! [`Checker`]. Never here: solving joints.
 
 use super::POSITION_MAX_M;
 use super::joint_keys::{Leaves, leaves};
@@ -19,7 +19,7 @@ const JOINTS_MAX: usize = 10_000;
 /// The name of the world in joints: no object may have it.
 pub(super) const WORLD: &str = "world";
 
-/// What one end of a joint holds, and where that stands at the start.
+/// One end of a joint, and its pose at the start.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct End {
     /// `None` is the world.
@@ -74,7 +74,7 @@ fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objec
     check_start(c, &held).then_some(held)
 }
 
-/// Who is at one end: an object, a fixed one as a place in the world, or the world.
+/// One end of a joint: a rigid object, the world, or a fixed object, which becomes a pose in the world.
 fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<End> {
     if name == WORLD {
         if key == "a" {
@@ -122,7 +122,7 @@ fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), object
     }
 }
 
-/// Where `b` is held, in the world: as the file says, or where `a` is held, or at the origin of `b` for what has a length.
+/// The anchor on `b`, in the world: `at_b_m` if given; else the anchor on `a`, or for springs and ropes the origin of `b`.
 fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, (b, from): (End, DVec3)) -> Option<DVec3> {
     let given = |c: &mut Checker<'_, '_>, at: Point| b.to_world(c.point(place, "at_b_m", at, POSITION_MAX_M));
     match (file.at_b_m, file.kind) {
@@ -142,8 +142,8 @@ fn collide(file: &JointFile) -> bool {
 }
 
 impl Held {
-    /// The joint with an agent as `a`. Where the file has the world there, ends and axis change places: b's motion against a
-    /// about `axis` is a's against b about the opposite axis.
+    /// The joint with an agent as `a`. Where `a` is fixed in the file, the ends are swapped and the axis is reversed: b's motion relative
+    /// to a about `axis` is a's relative to b about the opposite axis.
     fn joint(self) -> Option<Joint> {
         let Self { ends: [a, b], anchors: [from, to], .. } = self;
         match (a.agent, b.agent) {
@@ -172,7 +172,7 @@ impl Held {
             }
             Leaves::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
         };
-        // the world's axes are what a joint to the world is held in
+        // a joint to the world is given in the world's axes
         let (anchor_b_m, rotation_b) = match other {
             Some(_) => (b.to_local(to), b.rotation),
             None => (to, DQuat::IDENTITY),

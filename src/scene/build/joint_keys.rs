@@ -1,4 +1,4 @@
-//! The keys of a joint: which belong to its kind, and what they say it leaves free.
+//! Reads the keys of a joint: which belong to its kind, and the motion that they leave free.
 
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{JointFile, JointKind as Kind};
@@ -11,7 +11,7 @@ const AXIS_MIN: f64 = 1e-9;
 /// Largest coordinate of an axis.
 const AXIS_MAX: f64 = 1e6;
 
-/// What a joint leaves free, as its keys say; axes of length 1 in the axes of `a`.
+/// The motion that a joint leaves free, as its keys say; axes are unit vectors in the axes of `a`.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Leaves {
     Nothing,
@@ -22,7 +22,7 @@ pub(super) enum Leaves {
     Rope { length_m: Option<f64> },
 }
 
-/// The keys that each kind takes, of those that not all take; the first few are needed.
+/// The keys of each kind that not all kinds have: required ones, then optional ones.
 const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
     match kind {
         Kind::Fixed | Kind::Spherical => (&[], &[]),
@@ -33,7 +33,7 @@ const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str
     }
 }
 
-/// Reads what the joint leaves free.
+/// Reads the motion that the joint leaves free.
 pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<Leaves> {
     if !check_keys(c, place, file) {
         return None;
@@ -73,7 +73,7 @@ pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -
     })
 }
 
-/// Tells of keys that belong to another kind, and of those that are missing.
+/// Reports keys that belong to another kind, and required keys that are missing; returns whether none is missing.
 fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool {
     let (needs, takes) = keys_of(file.kind);
     let name = file.kind.name();

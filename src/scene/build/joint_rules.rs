@@ -1,4 +1,4 @@
-//! Whether joints can hold: each where its objects stand at the start, and all joints of one pair together.
+//! Checks that joints can hold: each with its objects as they start, and all joints of one pair together.
 
 use super::joint::End;
 use super::joint_keys::Leaves;
@@ -11,13 +11,13 @@ use std::collections::BTreeMap;
 /// Directions that differ by less than this are one direction: sine of the angle.
 const SAME_DIRECTION: f64 = 1e-3;
 
-/// A joint before it is handed on, seen in the world at the start.
+/// A joint while it is checked, in world coordinates at the start.
 #[derive(Debug, Clone)]
 pub(super) struct Held {
     pub(super) place: Place,
-    /// Who is held, `a` and `b`.
+    /// The ends `a` and `b`.
     pub(super) ends: [End; 2],
-    /// Where, in the world.
+    /// The anchors on `a` and `b`, in the world.
     pub(super) anchors: [DVec3; 2],
     pub(super) leaves: Leaves,
     pub(super) collide: bool,
@@ -47,7 +47,7 @@ impl Held {
     }
 }
 
-/// Tells of anchors that are not where the joint can hold them.
+/// Reports anchors that start where the joint cannot hold them; returns whether it can.
 pub(super) fn check_start(c: &mut Checker<'_, '_>, held: &Held) -> bool {
     let apart = held.anchors[1] - held.anchors[0];
     let along = apart.dot(held.axis());
@@ -84,7 +84,7 @@ pub(super) fn check_start(c: &mut Checker<'_, '_>, held: &Held) -> bool {
     false
 }
 
-/// Tells of joints of one pair that leave nothing of what each of them promises.
+/// Reports joints of one pair that together leave less free than each of them should.
 pub(super) fn contradictions(c: &mut Checker<'_, '_>, all: &[Held]) {
     let mut pairs: BTreeMap<_, Vec<&Held>> = BTreeMap::new();
     for held in all {
@@ -97,7 +97,7 @@ pub(super) fn contradictions(c: &mut Checker<'_, '_>, all: &[Held]) {
     }
 }
 
-/// Why two joints of the same pair cannot both be meant.
+/// Why two joints of the same pair contradict each other.
 fn contradiction(first: &Held, second: &Held) -> Option<&'static str> {
     use Leaves::{Nothing, Rope, Slide, Spring, Turn, Turns};
     match (first.leaves, second.leaves) {

@@ -1,11 +1,11 @@
-//! Files of triangles as points and triangles: OBJ by [`super::obj`], and glTF's binary form by [`super::glb`].
+//! Reads files of triangles: OBJ by [`super::obj`], and binary glTF by [`super::glb`].
 //!
-//! In: any bytes. Out: a surface with sound corner numbers, within bounds and manifold, or what is wrong with the file. What is drawn
-//! and what is touched come through this one door. Never here: the file system.
+//! In: any bytes. Out: a surface with valid indices, within bounds and manifold, or what is wrong with the file. Meshes for drawing and
+//! for contact are both read here. Never here: the file system.
 //!
-//! Manifold is judged where points stand, not by their numbers: a seam of points that are doubled for their places on a texture or their
-//! normals is no rim, and hides no branch. It is judged object by object (of an OBJ file `o` and `g`, of glTF the mesh of a node): boxes
-//! side by side are no branch. Open rims are sound; a face that is there twice counts twice; one without an area does not count.
+//! Manifold is judged by positions, not by indices: a seam of points that are doubled for their texture coordinates or normals is no
+//! rim, and hides no branch. It is judged object by object (of an OBJ file `o` and `g`, of glTF the mesh of a node): boxes side by side
+//! are no branch. Open rims are sound; a face that is there twice counts twice; one without an area does not count.
 
 use super::{POSITION_MAX_M, glb, obj};
 use glam::{DVec3, Vec2};
@@ -18,15 +18,15 @@ pub(super) const TRIANGLES_MAX: usize = 1_000_000;
 pub(super) struct Mesh {
     /// In the file's own unit.
     pub(super) points: Vec<DVec3>,
-    /// The place of each point on a texture, from the top left; empty where it has none.
+    /// Texture coordinates of each point, from the top left; empty where the mesh has none.
     pub(super) uvs: Vec<Vec2>,
     pub(super) triangles: Vec<[u32; 3]>,
 }
 
-/// Points, their places on a texture (none, if empty) and triangles.
+/// Points, their texture coordinates (empty if there are none) and triangles.
 pub(super) type Parts = (Vec<DVec3>, Vec<Vec2>, Vec<[u32; 3]>);
 
-/// Reads a file of either kind, told apart by its first bytes; `scale` is what its coordinates will be multiplied by.
+/// Reads a file of either format, recognised by its first bytes; `scale` is the factor that its coordinates will be multiplied by.
 pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
     let (points, uvs, triangles) = match bytes {
         [] => return Err("it is empty".to_owned()),
@@ -42,7 +42,7 @@ pub(super) fn read(bytes: &[u8], scale: f64) -> Result<Mesh, String> {
     Ok(Mesh { points, uvs, triangles })
 }
 
-/// Whether a mesh that reaches so far in its own unit stays within what a scene can hold.
+/// Checks that a mesh whose coordinates go up to `reach` in its own unit stays within the bounds of a scene.
 pub(super) fn within(reach: f64, scale: f64) -> Result<(), String> {
     let metres = reach * scale;
     if metres <= POSITION_MAX_M {
@@ -51,7 +51,7 @@ pub(super) fn within(reach: f64, scale: f64) -> Result<(), String> {
     Err(format!("it reaches {metres:.3e} m from where its axes start, more than {POSITION_MAX_M:.0} m"))
 }
 
-/// Tells bytes that cannot be a text.
+/// Refuses bytes that cannot be text.
 fn text(bytes: &[u8]) -> Result<&[u8], String> {
     if bytes.trim_ascii_start().starts_with(b"{") {
         return Err("it is no OBJ file; if it is glTF's text form, expected the binary one, .glb".to_owned());
@@ -133,7 +133,7 @@ mod tests {
         }
     }
 
-    /// Why a file is refused.
+    /// Why a file is refused; empty if it is read.
     fn told(bytes: impl AsRef<[u8]>) -> String {
         read(bytes.as_ref(), 1.0).err().unwrap_or_default()
     }
@@ -148,7 +148,7 @@ mod tests {
         }
         assert!(told("{\"asset\":{\"version\":\"2.0\"}}").contains("expected the binary one"));
         assert!(told("hello world\n").contains("no faces"));
-        // bytes that are no UTF-8 in what is not read do no harm
+        // bytes that are not UTF-8 are harmless in text that is not read
         assert!(read(&[b"# Gr\xf6\xdfe\n", TETRAHEDRON.as_bytes()].concat(), 1.0).is_ok());
     }
 

@@ -1,4 +1,4 @@
-//! From the typed file to a scene that can be run: rules, defaults, names.
+//! Builds a scene that can be run from the typed file: rules, defaults, names.
 //!
 //! In: [`super::format`] types and the document they came from. Out: [`Scene`] parts, problems to the [`Checker`].
 //! Never here: text and its syntax.

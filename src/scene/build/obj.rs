@@ -1,39 +1,39 @@
-//! OBJ files as points and triangles, line by line.
+//! Reads OBJ files as points and triangles, line by line.
 //!
-//! In: any bytes. Out: the triangles of every face, with the places of their corners on a texture, and what is wrong with the file,
-//! with its line. Never here: materials, normals (they are counted only), curves; a line that says something else is passed over.
+//! In: any bytes. Out: the triangles of every face, with the texture coordinates of their corners, or what is wrong with the file, with
+//! its line. Never here: materials, normals (they are only counted), curves; lines with other keywords are skipped.
 //!
-//! What is told of a file that was cut short: a line that is not whole, and faces whose points are missing. A cut at the end of a line,
-//! or inside of its last number, leaves a sound file.
-//! (The crate `tobj` tells no line, takes faces of two corners for lines, and puts places on a texture to the wrong points where not
-//! all corners have one.)
+//! A truncated file is recognised by an incomplete line or by faces whose points are missing. A cut at the end of a line, or inside
+//! its last number, leaves a valid file.
+//! (The crate `tobj` reports no line, takes faces of two corners for lines, and assigns texture coordinates to the wrong points where not
+//! all corners have them.)
 
 use super::mesh::{Parts, TRIANGLES_MAX};
 use glam::{DVec3, Vec2};
 use metachron_geometry::branch;
 use std::collections::HashMap;
 
-/// What editors of texts put before UTF-8; it says nothing.
+/// Byte order mark that text editors put before UTF-8; skipped.
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
-/// Stands for the number of what a corner does not have.
+/// Index of an attribute that a corner does not have.
 const NONE: u32 = u32::MAX;
 
-/// Most corners of one face: the slivers of a fan all lie in each other's boxes, and the search for what is nearest among them
-/// takes time that grows faster than they do.
+/// Most corners of one face: the bounding boxes of a fan's slivers all overlap, and the search for the nearest of them takes time that
+/// grows faster than their number.
 const CORNERS_MAX: usize = 1 << 16;
 
-/// Numbers of a corner's point, place on the texture and normal, from 0.
+/// Indices of a corner's point, texture coordinate and normal, from 0.
 type Corner = [u32; 3];
-/// What the numbers of a corner are of.
+/// The lists that the indices of a corner refer to.
 const LISTS: [&str; 3] = ["vertex", "texture coordinate", "normal"];
 
-/// A file as far as it was read.
+/// The part of a file that has been read.
 #[derive(Default)]
 struct Reader {
     points: Vec<DVec3>,
     places: Vec<Vec2>,
     normals: usize,
-    /// How many objects and groups began before.
+    /// Number of objects and groups begun so far.
     object: u32,
     faces: Vec<Face>,
 }
@@ -45,7 +45,7 @@ struct Face {
     object: u32,
 }
 
-/// Points, their places on a texture and triangles of a file.
+/// Points, their texture coordinates and triangles of a file.
 pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     let bytes = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
     let mut reader = Reader::default();
@@ -53,7 +53,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Parts, String> {
     let last = bytes.split(|b| *b == b'\n').count();
     for (number, line) in (1..).zip(bytes.split(|b| *b == b'\n')) {
         let line = line.trim_ascii_end();
-        // a backslash at its end carries a line on
+        // a backslash at its end continues a line
         if let Some(line) = line.strip_suffix(b"\\") {
             begun.extend_from_slice(line);
             begun.push(b' ');
@@ -116,7 +116,7 @@ impl Reader {
         Ok(())
     }
 
-    /// Whether everything that corners name is there: also what stands below them.
+    /// Checks that everything that corners refer to exists, also if it is defined further down.
     fn check(&self) -> Result<(), String> {
         let counts = [self.points.len(), self.places.len(), self.normals];
         for face in &self.faces {
@@ -130,7 +130,7 @@ impl Reader {
         Ok(())
     }
 
-    /// A point for each pair of a position and a place that corners have.
+    /// Makes one point for each distinct pair of a position and a texture coordinate.
     fn parts(&self) -> Result<Parts, String> {
         let mut known = HashMap::new();
         let (mut used, mut triangles) = (Vec::new(), Vec::with_capacity(self.faces.len()));
@@ -156,7 +156,7 @@ impl Reader {
     }
 }
 
-/// The first `N` of at least as many numbers, and at most `most`.
+/// The first `N` numbers of a line that must have at least `N` and at most `most`.
 fn numbers<'w, const N: usize>(
     words: impl Iterator<Item = &'w [u8]>,
     what: &str,
@@ -202,7 +202,7 @@ mod tests {
 
     const SQUARE: &str = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n";
 
-    /// What is said of a file of this text.
+    /// The error for a file of this text; empty if it is read.
     fn told(text: &str) -> String {
         read(text.as_bytes()).err().unwrap_or_default()
     }
@@ -271,12 +271,12 @@ mod tests {
             star(|i| if i == 0 { "v 0 0 0\nv 0 0 1\nf 201 202 1\n".into() } else { format!("f 201 202 {}\n", i + 1) });
         let why = "200 triangles share the edge from vertex 201 to vertex 202, and only two can";
         assert_eq!(told(&shared), format!("line 205: it is not manifold: {why}"));
-        // each face on two vertices of its own at the same places
+        // each face on two vertices of its own at the same positions
         let doubled = star(|i| format!("v 0 0 0\nv 0 0 1\nf -2 -1 {}\n", i + 1));
         assert!(told(&doubled).contains("line 209: it is not manifold: 200 triangles"), "{}", told(&doubled));
-        // pages that are objects of their own merely touch
+        // pages that are separate objects merely touch
         assert_eq!(told(&star(|i| format!("g page {i}\nv 0 0 0\nv 0 0 1\nf -2 -1 {}\n", i + 1))), "");
-        // a face that is there again, and faces of no area
+        // a duplicate face, and faces without area
         assert!(told(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 2 3 1\n")).contains("line 7: it is not manifold: 3"));
         assert_eq!(told(&format!("{SQUARE}f 1 2 3\nf 1 3 4\nf 1 1 3\nf 1 3 3\n")), "");
     }

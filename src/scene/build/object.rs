@@ -1,4 +1,4 @@
-//! The objects of a scene: read one by one by their model, named, linked.
+//! Reads the objects of a scene: each by its model, with names and links.
 
 use super::common::{faults, levels, look, pace, tolerance, untolerated};
 use super::grid::{Copies, copies};
@@ -29,14 +29,14 @@ use std::sync::Arc;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-/// Most agents of a scene: each that can be touched remembers something of every other one.
+/// Most agents of a scene: each agent that can be touched stores something for every other one.
 pub(in crate::scene) const AGENTS_MAX: usize = 10_000;
 /// Most fixed objects of a scene.
 pub(super) const OBSTACLES_MAX: usize = 10_000;
 /// Longest name, in characters.
 const NAME_MAX: usize = 64;
 
-/// Everything that stands in a scene.
+/// All objects of a scene.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Objects {
     pub(in crate::scene) agents: Vec<Member>,
@@ -58,7 +58,7 @@ impl Objects {
     }
 }
 
-/// What a model's reader is given beside its own table.
+/// Input of a model's reader in addition to its own table.
 pub(super) struct Given<'a> {
     pub(super) place: &'a Place,
     pub(super) source: &'a Source,
@@ -68,7 +68,7 @@ pub(super) struct Given<'a> {
     pub(super) sleep: bool,
 }
 
-/// Who has which name.
+/// Names and what each denotes.
 #[derive(Debug, Default)]
 pub(in crate::scene) struct Names(BTreeMap<String, Named>);
 
@@ -76,7 +76,7 @@ pub(in crate::scene) struct Names(BTreeMap<String, Named>);
 pub(in crate::scene) enum Named {
     /// A fixed object.
     Fixed,
-    /// What is seen only.
+    /// A mesh or tree, which is only drawn.
     Scenery,
     /// A rigid object that moves.
     Rigid(AgentId),
@@ -91,7 +91,7 @@ pub(in crate::scene) enum Named {
 }
 
 impl Named {
-    /// What jaws can hold if a scene says so: what has a body of its own.
+    /// The id of an object that jaws can grasp if a scene allows it: one that has matter and moves freely.
     pub(super) const fn graspable(self) -> Option<AgentId> {
         match self {
             Self::Rigid(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
@@ -99,7 +99,7 @@ impl Named {
         }
     }
 
-    /// The number of what moves.
+    /// The id of an object that is an agent.
     pub(in crate::scene) const fn agent(self) -> Option<AgentId> {
         match self {
             Self::Fixed | Self::Scenery => None,
@@ -117,7 +117,7 @@ impl Names {
         self.0.iter().filter(|(_, n)| n.agent().is_some()).map(|(name, _)| name.as_str())
     }
 
-    /// The names of those that `wanted` takes.
+    /// The names of the objects that `wanted` accepts.
     pub(super) fn only(&self, wanted: impl Fn(Named) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
         self.0.iter().filter(move |(_, n)| wanted(**n)).map(|(name, _)| name.as_str())
     }
@@ -157,13 +157,13 @@ pub(super) enum ModelFile {
 }
 
 impl ModelFile {
-    /// Whether it is seen only.
+    /// Whether it is only drawn.
     const fn is_scenery(&self) -> bool {
         matches!(self, Self::Mesh(_) | Self::Tree(_))
     }
 }
 
-/// What all objects of a scene stand in.
+/// Input that all objects of a scene share.
 pub(in crate::scene) struct Around<'a> {
     pub(in crate::scene) source: &'a Source,
     pub(in crate::scene) gravity: DVec3,
@@ -219,7 +219,7 @@ fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>
     let model = model_name(c, table, item.span())?;
     let (mut common, mut own) = (DeTable::new(), DeTable::new());
     for (key, value) in table {
-        // sides that hold a soft body are the model's own
+        // `hold` with a list of sides is a key of the soft models, not the common one
         let sides = key.get_ref() == "hold" && matches!(value.get_ref(), DeValue::Array(_));
         let shared = COMMON_KEYS.contains(&key.get_ref().as_ref()) && !sides;
         let into = if shared { &mut common } else { &mut own };
@@ -268,7 +268,7 @@ fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: 
     c.read(table, span, &[&COMMON_KEYS[..], &["model"]].concat())
 }
 
-/// Gives every object its name and every agent its number, in the order of the file.
+/// Gives every object its name and every agent its id, in the order of the file.
 fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
     let mut names = Names::default();
     let mut next = 0;
@@ -311,7 +311,7 @@ fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) ->
     let mut found = (Vec::new(), Vec::new());
     for entry in entries.iter().filter(|e| e.fixed) {
         let ModelFile::Rigid(file) = &entry.model else { continue };
-        // read for their own sake: a fixed object has no steps, but a wrong rate is still wrong
+        // checked although not used: a fixed object has no steps, but a wrong rate is still wrong
         pace(c, &entry.place, &entry.common);
         untolerated(c, &entry.place, &entry.common);
         levels(c, &entry.place, &entry.common);
@@ -364,7 +364,7 @@ fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Sta
     members
 }
 
-/// Tells what only the model can say of an object: the object is built once, for the verdict alone.
+/// Reports what only the model can find wrong with an object: builds it once and drops it.
 fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
     let verdict = match member.spec.clone() {
         Spec::Tube(spec) => match Tube::new(spec) {
@@ -411,7 +411,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     };
     let look = look(c, place, common, material);
     let levels = given.levels;
-    // a body without length has one interval: its ε is of no consequence
+    // a body without length has one interval: its ε has no effect
     let unit = Resolution { eps_m: 1.0, n: levels.1 };
     let flat = ResolutionRange { eps_m: (1.0, 1.0), n: levels };
     let (spec, start, simulation, picture) = match model {
@@ -436,7 +436,7 @@ fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (
     Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
 }
 
-/// Tools and what they can hold see each other.
+/// Links each tool with the agents that it can grasp, in both directions.
 fn link(members: &mut [Member]) {
     let mut pairs = Vec::new();
     for member in members.iter() {

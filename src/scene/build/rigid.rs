@@ -25,7 +25,7 @@ pub(super) fn rotation(degrees: DVec3) -> DQuat {
     DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
 }
 
-/// Whether the object never moves; says so where the file contradicts itself.
+/// Whether the object never moves; reports a plane with `fixed = false`.
 pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
     let plane = file.shape == Shape::Plane;
     if plane && file.fixed == Some(false) {
@@ -57,7 +57,7 @@ pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>
     let place = given.place;
     let before = c.count();
     let solid = solid(c, place, file, given.source)?;
-    // the mass of a wrong shape is wrong too: one problem is told, not two
+    // a wrong shape gives a wrong mass: one problem is reported, not two
     let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
     let (position, rotation) = pose(c, place, file);
     let (restitution, friction) = surface(c, place, file);
@@ -108,7 +108,7 @@ const fn keys_of(shape: Shape) -> &'static [&'static str] {
     }
 }
 
-/// Tells of keys that belong to another shape, and of those that are missing.
+/// Reports keys that belong to another shape, and required keys that are missing; returns whether none is missing.
 fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
     let takes = keys_of(file.shape);
     let given = [
@@ -226,7 +226,7 @@ fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid)
     mass
 }
 
-/// Whether given triangles enclose next to nothing of the box around them: volumes are found in single precision.
+/// Whether triangles enclose next to nothing of the box around them: volumes are computed in single precision.
 fn is_flat(solid: &Solid, volume: f64) -> bool {
     let (Solid::Hull { points_m } | Solid::Mesh { points_m, .. }) = solid else { return false };
     let corners = points_m.iter().copied().reduce(DVec3::min).zip(points_m.iter().copied().reduce(DVec3::max));
@@ -256,7 +256,7 @@ mod tests {
 
     #[test]
     fn rotations_turn_about_the_worlds_axes_in_turn() {
-        // z goes to -y about x, then to -y about z by 90 degrees to x
+        // about x, z goes to -y; about z, -y goes to x
         let turned = rotation(DVec3::new(90.0, 0.0, 90.0)) * DVec3::Z;
         assert!(turned.distance(DVec3::X) < 1e-15, "{turned}"); // two rotations, one ulp each
     }

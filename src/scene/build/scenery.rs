@@ -1,4 +1,4 @@
-//! Meshes and trees of the file as scenery.
+//! Reads meshes and trees of a scene file as scenery.
 //!
 //! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
 
@@ -16,19 +16,19 @@ use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, g
 use std::collections::BTreeMap;
 use std::sync::Arc;
 
-/// Triangles of a generated mesh where a scene does not say.
+/// Default triangles of a generated mesh.
 const TRIANGLES_DEFAULT: u32 = 1000;
-/// Boughs and leaves of a tree where a scene does not say: the first of (RH05, §6).
+/// Default boughs and leaves of a tree: the first of (RH05, §6).
 const TREE_DEFAULT: (u32, u32) = (62, 240);
 /// Most boughs, most leaves.
 const PIECES_MAX: f64 = 1e5;
-/// Leaves weigh less than the trunk (RH05, §6 gives no number).
+/// Leaves are less important than the trunk (RH05, §6 gives no number).
 const LEAVES_IMPORTANCE: f64 = 0.5;
-/// Colours where a scene does not say.
+/// Default colours.
 const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
 const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
 
-/// Meshes that were made and how far they reach in their own unit, by what they were made from: equal ones are one.
+/// Meshes already made and their greatest coordinate in their own unit, by what they were made from: equal ones are shared.
 type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<Tom>, f64)>;
 
 /// Reads every mesh and tree.
@@ -61,7 +61,7 @@ pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) 
     scenery
 }
 
-/// The mesh of a file or a formula, as a table of `place` asks for it.
+/// The mesh of a file or a generator, as the table at `place` requests it.
 pub(super) fn mesh_model(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -140,7 +140,7 @@ fn reach(tom: &Tom) -> f64 {
     tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
 }
 
-/// Whether a mesh that reaches so far in its own unit can stand in a scene at this scale; tells where it cannot.
+/// Whether a mesh whose coordinates go up to `reach` in its own unit is within the bounds of a scene at this scale; reports it if not.
 fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, (scale, reach): (f64, f64)) -> bool {
     let within = mesh::within(reach, scale);
     if let Err(why) = &within {
@@ -171,10 +171,10 @@ fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<P
     Placement { position, rotation, scale: 1.0 }
 }
 
-/// One copy's parts, each with what its name ends in.
+/// The parts of one copy, each with the suffix of its name.
 pub(super) type Parts = Vec<(String, Scenery)>;
 
-/// Reads what scenery has no use for, for its own sake: it has no steps, but a wrong rate is still wrong.
+/// Checks common keys that scenery does not use: it has no steps, but a wrong rate is still wrong.
 fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
     pace(c, &entry.place, &entry.common);
     levels(c, &entry.place, &entry.common);
@@ -231,7 +231,7 @@ fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts 
     vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]
 }
 
-/// Along every edge of a ball of triangles about `at`: what reaches from −1 to 1 on its z axis reaches from end to end.
+/// Placements along every edge of a geodesic sphere about `at`: −1 … 1 on a copy's z axis spans its edge from end to end.
 fn dome_places(at: Placement, radius_m: f64) -> impl Iterator<Item = Placement> {
     geodesic_edges().into_iter().map(move |[a, b]| {
         let along = b - a;

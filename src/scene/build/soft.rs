@@ -1,4 +1,4 @@
-//! A sheet, solid or rope of the file as a [`SoftSpec`].
+//! Reads a sheet, solid or rope of a scene file as a [`SoftSpec`].
 
 use super::POSITION_MAX_M;
 use super::object::Given;
@@ -59,7 +59,7 @@ pub(super) fn sheet(c: &mut Checker<'_, '_>, file: &SheetFile, given: &Given<'_>
     spec(c, given, SoftShape::Sheet { size_m, thickness_m, segments }, pose, shared)
 }
 
-/// Reads a solid; `None` where its measures are not there.
+/// Reads a solid; `None` where its dimensions are missing.
 pub(super) fn solid(c: &mut Checker<'_, '_>, file: &SolidFile, given: &Given<'_>) -> Option<SoftSpec> {
     let place = given.place;
     let shape = solid_shape(c, place, file)?;
@@ -143,7 +143,7 @@ fn segments(c: &mut Checker<'_, '_>, place: &Place, key: &str, count: u32) -> u3
     c.number(place, key, f64::from(count), &SEGMENTS) as u32
 }
 
-/// Where the first corner of a body is whose middle lies `half` from it in its own axes, and its rotation.
+/// Position of the first corner, and rotation, of a body whose middle is `half` from that corner in its own axes.
 fn pose(c: &mut Checker<'_, '_>, place: &Place, at: (Option<Point>, Option<Point>), half: DVec3) -> (DVec3, DQuat) {
     let position = at.0.map_or(DVec3::ZERO, |at| c.point(place, "position_m", at, POSITION_MAX_M));
     let rotation = at.1.map_or(DQuat::IDENTITY, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6)));
@@ -184,7 +184,7 @@ pub(super) fn along(spec: &SoftSpec, share: f64) -> Option<Anchor> {
     Some(Anchor::Vertex((share * f64::from(segments)).round() as u32))
 }
 
-/// The vertex nearest to a point in the body's own axes from its middle, metres; none where the body cannot be built.
+/// The vertex nearest to `at`, a point in the body's axes from its middle, metres; `None` where the body cannot be built.
 pub(super) fn nearest(spec: &SoftSpec, at: DVec3) -> Option<Anchor> {
     let half = match spec.shape {
         SoftShape::Sheet { size_m: [x, y], .. } => DVec3::new(0.5 * x, 0.5 * y, 0.0),

@@ -1,4 +1,4 @@
-//! Target, camera, machine and probes of the file.
+//! Reads target, camera, machine and probes of a scene file.
 
 use super::{Names, POSITION_MAX_M};
 use crate::scene::cast::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
@@ -8,11 +8,11 @@ use crate::scene::problem::{Problem, did_you_mean};
 use glam::DVec3;
 use metachron_core::SimSpan;
 
-/// The part of the lag that is kept for choosing where a scene does not say: what (GB99) needed at most.
+/// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
 const OPTIMISER_SHARE: f64 = 0.05;
-/// Frames per second where a scene does not say.
+/// Default frames per second.
 const FRAME_DEFAULT_HZ: f64 = 60.0;
-/// Vertical angle of view where a scene does not say, degrees.
+/// Default vertical angle of view, degrees.
 const FOV_DEFAULT_DEG: f64 = 40.0;
 /// Most keyframes of a camera.
 const KEYFRAMES_MAX: usize = 10_000;
@@ -22,13 +22,13 @@ const LOADS_MAX: usize = 1000;
 const PROBES_MAX: usize = 1000;
 /// The machines that a scene can name.
 const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
-/// An eye nearer than this to what it looks at has no direction, metres.
+/// An eye nearer than this to the point it looks at has no direction, metres.
 const EYE_NEAREST_M: f64 = 1e-6;
 
 const FOV: Allowed = allowed(1.0..=150.0, "degrees");
 const TIME: Allowed = allowed(0.0..=1e6, "s");
 
-/// The frame rate wanted and how it is held.
+/// The target frame rate and how it is held.
 pub(in crate::scene) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
     let place = Place::new("target", "of `[target]`");
     let frame_hz = file.and_then(|f| f.frame_hz);
@@ -64,7 +64,7 @@ fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Opt
     Some((c.number(place, "lag_ms", lag_ms, &allowed(1.0..=1000.0, "ms")) * 1e-3, part))
 }
 
-/// From where the scene is seen.
+/// Reads the camera of the scene.
 pub(in crate::scene) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Option<Camera> {
     let file = file?;
     let place = Place::new("camera", "of `[camera]`");
@@ -113,7 +113,7 @@ fn view(c: &mut Checker<'_, '_>, place: &Place, (eye, look_at): ([f64; 3], [f64;
     View { eye_m, look_at_m, fov_deg }
 }
 
-/// The views of a path, each with its time.
+/// The views of a path, each with its time in seconds.
 fn camera_keys(
     c: &mut Checker<'_, '_>,
     place: &Place,
@@ -143,7 +143,7 @@ fn camera_keys(
     Some(keys)
 }
 
-/// What the scene says of the declared machine.
+/// The values that the scene declares for its machine.
 pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Machine {
     let default = MachineFile::default();
     let file = file.unwrap_or(&default);
@@ -188,7 +188,7 @@ pub(in crate::scene) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFi
     }
 }
 
-/// What else the machine has to do, as (seconds, factor).
+/// Reads additional load of the machine, as (seconds, factor).
 fn load(c: &mut Checker<'_, '_>, place: &Place, (key, entries): (&str, &[LoadFile])) -> Vec<(f64, f64)> {
     if entries.len() > LOADS_MAX {
         let expected = format!("expected at most {LOADS_MAX}");
@@ -208,7 +208,7 @@ fn load(c: &mut Checker<'_, '_>, place: &Place, (key, entries): (&str, &[LoadFil
     steps
 }
 
-/// Costs of objects by their shading, in the order of control.
+/// Costs of objects by their shading, in control's order: flat, Gouraud, per pixel, textured.
 fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 4] {
     let Some(files) = &file.shading else { return Default::default() };
     let all = [

@@ -1,4 +1,4 @@
-//! A synthetic agent of the file as a [`SyntheticSpec`].
+//! Reads a synthetic agent of a scene file as a [`SyntheticSpec`].
 
 use super::object::Given;
 use crate::scene::check::{Checker, allowed};
@@ -6,7 +6,7 @@ use crate::scene::format::SyntheticFile;
 use metachron_core::ResolutionRange;
 use metachron_models::synthetic::SyntheticSpec;
 
-/// Spacing where a scene does not say, metres.
+/// Default spacing, metres.
 const EPS_DEFAULT_M: f64 = 0.01;
 
 /// Reads a synthetic agent, and the resolutions that it may take.

@@ -1,4 +1,4 @@
-//! What is painted on the meshes of a scene: patterns, PNG and JPEG files, and the image inside a .glb file.
+//! Reads the textures of the meshes of a scene: patterns, PNG and JPEG files, and the image inside a .glb file.
 //!
 //! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or what is wrong with the image. Never here: drawing.
 
@@ -16,15 +16,15 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::sync::Arc;
 
-/// Most pixels of an image across and down.
+/// Most pixels of an image along each side.
 const SIDE_MAX: u32 = 4096;
-/// Most bytes that reading an image may need.
+/// Most bytes that decoding an image may allocate.
 const BYTES_MAX: u64 = 1 << 28;
 
-/// Textures that were made, by what they were made from and the bits of their size.
+/// Textures already made, by what they were made from and the bits of their size.
 pub(super) type Textures = BTreeMap<(String, u64), Option<Arc<Texture>>>;
 
-/// The parts of a mesh with what is painted on them.
+/// Applies the texture of a mesh, if it has one, to its parts.
 pub(super) fn painted(
     c: &mut Checker<'_, '_>,
     entry: &Entry,
@@ -60,7 +60,7 @@ fn texture_of(
     let metres = c.number_or(place, "texture_m", (file.texture_m, 1.0), &allowed(1e-3..=1e3, "m"));
     let (key, name) = match (&file.texture, &file.file) {
         (Some(name), _) => ("texture", name),
-        // what is wrong with a file that gave no mesh was told
+        // errors of a file that gave no mesh have been reported
         (None, Some(name)) if !parts.is_empty() => ("file", name),
         (None, _) => return None,
     };
@@ -82,7 +82,7 @@ fn texture_of(
     textures.entry(made_from).or_insert(texture.map(Arc::new)).clone()
 }
 
-/// A pattern, or an image beside the scene.
+/// A pattern, or an image file next to the scene.
 fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Texture, String> {
     if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
         return Ok(pattern.texture(metres as f32));
@@ -90,13 +90,13 @@ fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Tex
     decode(&source.sibling(name)?, wrap)
 }
 
-/// Whether the file of a mesh says where its corners are on a texture.
+/// Whether the file of a mesh has texture coordinates.
 fn has_places(parts: &Parts) -> bool {
     let says = |model: &Model| matches!(model, Model::Mesh(tom) if tom.vertices().iter().any(|v| v.uv != Vec2::ZERO));
     parts.iter().any(|(_, part)| says(&part.model))
 }
 
-/// The image inside a mesh's file. What is wrong with the file besides is told where its triangles are read.
+/// The image inside a mesh's .glb file. Other errors of that file are reported where its triangles are read.
 fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
     let Ok(bytes) = source.sibling(name) else { return Ok(None) };
     if !bytes.starts_with(glb::MAGIC) {
@@ -165,7 +165,7 @@ mod tests {
             assert!(why.contains(told), "{why}");
         }
         assert!(decode(&png(SIDE_MAX + 1, 1), Wrap::Corners).is_err());
-        // a header that promises far more pixels than there are
+        // a header that declares far more pixels than there are
         let mut hostile = png(4, 4);
         hostile[16..24].copy_from_slice(&[0, 0, 0x0f, 0xff, 0, 0, 0x0f, 0xff]);
         assert!(decode(&hostile, Wrap::Corners).is_err());

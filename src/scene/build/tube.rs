@@ -1,4 +1,4 @@
-//! A tube of the file as a [`TubeSpec`].
+//! Reads a tube of a scene file as a [`TubeSpec`].
 
 use super::POSITION_MAX_M;
 use super::object::Given;
@@ -16,13 +16,13 @@ use std::sync::Arc;
 const PATH_MAX: usize = 100_000;
 /// Most segments of a tube.
 const SEGMENTS_MAX: u32 = 4096;
-/// Segments where a scene says neither ε nor their number.
+/// Default number of segments, where a scene gives neither ε nor their number.
 const SEGMENTS_DEFAULT: f64 = 64.0;
-/// Finest and coarsest picture where a scene does not say, in intervals a tube.
+/// Default finest and coarsest picture, in intervals per tube.
 const PICTURE_INTERVALS: (f64, f64) = (400.0, 8.0);
 /// Points nearer than this are the same point, metres.
 const SAME_POINT_M: f64 = 1e-9;
-/// Most stretches of a mesentery.
+/// Most attached parts of a tube (stretches of a mesentery).
 const ATTACH_MAX: usize = 1000;
 
 const RADIUS: Allowed = allowed(1e-6..=100.0, "m");
@@ -33,7 +33,7 @@ const STIFFNESS: Allowed = allowed(1e-15..=1e15, "");
 const TWIST: Allowed = allowed(-36_000.0..=36_000.0, "°");
 const SHARE: Allowed = allowed(0.0..=1.0, "");
 
-/// A tube and the resolutions it may take.
+/// A tube and the resolutions that its picture may take.
 pub(super) struct BuiltTube {
     pub(super) spec: TubeSpec,
     pub(super) picture: ResolutionRange,
@@ -84,7 +84,7 @@ const fn integrator(file: Method) -> Integrator {
     }
 }
 
-/// Tells where the longest step of a tube is too long for its integrator (docs/theory/rod.md, 13).
+/// Reports a longest step that is too long for the tube's integrator (docs/theory/rod.md, 13).
 pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, longest_s: f64) {
     let TubeSpec { integrator, substeps, .. } = tube.spec();
     let Some(limit_s) = tube.longest_substep_s() else { return };
@@ -126,12 +126,12 @@ fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec
     path
 }
 
-/// The section from modulus, density and measures, each of its numbers overridden where the file gives it.
+/// The section and the mass per length, kg/m, from modulus, density and dimensions; numbers that the file gives override them.
 fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section, f64) {
     let radius_m = c.number(place, "radius_m", file.radius_m, &RADIUS);
     let wall_m = file.wall_m.unwrap_or(radius_m);
     let sound_wall = wall_m > 0.0 && wall_m <= radius_m;
-    // a wall that is too thick for a wrong radius only: one problem is told, not two
+    // a wall that is too thick only because the radius is wrong is not reported: one problem, not two
     if !sound_wall && (radius_m == file.radius_m || wall_m.is_nan() || wall_m <= 0.0) {
         let expected = format!("expected a number above 0 and at most `radius_m`, {radius_m} m");
         c.wrong(place, "wall_m", format_args!("is {wall_m}"), expected);
@@ -208,12 +208,12 @@ fn resolutions(
         None => eps.unwrap_or((usual, usual)),
     };
     let picture = picture.or(eps).unwrap_or((length_m / PICTURE_INTERVALS.0, length_m / PICTURE_INTERVALS.1));
-    // the finest first: the controller coarsens what the machine cannot carry
+    // starts at the finest: the controller coarsens it where the machine is too slow
     let start = Resolution { eps_m: simulation.0, n: levels.1 };
     (start, ResolutionRange { eps_m: simulation, n: levels }, ResolutionRange { eps_m: picture, n: levels })
 }
 
-/// The limit as a message can show it, not above the exact one.
+/// The limit rounded down to four digits, so that a message can show it.
 fn rounded_up(value: f64) -> f64 {
     let digits = 10f64.powi(3 - value.log10().floor() as i32);
     (value * digits).floor() / digits

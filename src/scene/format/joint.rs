@@ -1,4 +1,4 @@
-//! `[[joint]]`: what holds two rigid objects together, or one to the world.
+//! `[[joint]]`: a joint between two rigid objects, or between one and the world.
 
 use super::Point;
 use schemars::JsonSchema;
@@ -8,53 +8,53 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JointFile {
-    /// What it leaves free. `fixed`: nothing. `revolute`: a turn about `axis`. `spherical`: every turn. `prismatic`: a slide
-    /// along `axis`. `spring`: everything, against a spring. `rope`: everything up to `length_m`.
+    /// Motion that it leaves free. `fixed`: none. `revolute`: rotation about `axis`. `spherical`: any rotation. `prismatic`: sliding
+    /// along `axis`. `spring`: all, against a spring. `rope`: all, up to a distance of `length_m`.
     pub kind: JointKind,
     /// Name of a rigid object.
     pub a: String,
     /// Name of another rigid object, or `world`.
     pub b: String,
-    /// Where it holds `a`, in the axes of its shape, metres. Default their origin.
+    /// Anchor on `a`, in the axes of its shape, metres. Default: their origin.
     pub at_a_m: Option<Point>,
-    /// Where it holds `b`, in the axes of its shape, or in the world's, metres. Default: where `at_a_m` is at the start;
-    /// for a spring or rope the origin of `b`.
+    /// Anchor on `b`, in the axes of its shape, or the world's if `b` is `world`, metres. Default: the position of `at_a_m` at the start;
+    /// for a spring or rope the origin of `b`, where `b` is not `world`.
     pub at_b_m: Option<Point>,
     /// Axis of a `revolute` or `prismatic` joint in the axes of `a`; its length has no meaning.
     pub axis: Option<Point>,
-    /// How far `at_b_m` may be from `at_a_m` along the axis of a `prismatic` joint, metres: `[least, greatest]`, each up to 1e4
-    /// in magnitude. Default without end.
+    /// Range of the position of `at_b_m` relative to `at_a_m` along the axis of a `prismatic` joint, metres: `[least, greatest]`, each up
+    /// to 1e4 in magnitude. Default: unlimited.
     pub range_m: Option<[f64; 2]>,
-    /// How far a `revolute` joint turns, degrees from where it is at the start: `[least, greatest]`, 0 among them, each up to
-    /// 180 in magnitude. Default without end.
+    /// Range of the angle of a `revolute` joint, degrees from that at the start: `[least, greatest]`, containing 0, each up to 180 in
+    /// magnitude. Default: unlimited.
     pub range_deg: Option<[f64; 2]>,
     /// Stiffness of a `spring`, N/m, 1e-6 … 1e9.
     pub stiffness_n_m: Option<f64>,
     /// Damping of a `spring`, N·s/m, 0 … 1e7. Default 0.
     pub damping_n_s_m: Option<f64>,
-    /// Length of a `spring` at rest, metres, 0 … 1e4. Default: its length at the start.
+    /// Rest length of a `spring`, metres, 0 … 1e4. Default: its length at the start.
     pub rest_m: Option<f64>,
     /// Greatest length of a `rope`, metres, 1e-6 … 1e4. Default: its length at the start.
     pub length_m: Option<f64>,
-    /// Whether the two objects still touch each other. Default true for a spring or rope, false for the rest.
+    /// Whether the two objects can collide with each other. Default true for a spring or rope, false for the others.
     pub collide: Option<bool>,
 }
 
-/// What a joint leaves free.
+/// Motion that a joint leaves free.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum JointKind {
-    /// Nothing.
+    /// None.
     Fixed,
-    /// A turn about one axis.
+    /// Rotation about one axis.
     Revolute,
-    /// Every turn about one point.
+    /// Any rotation about one point.
     Spherical,
-    /// A slide along one axis.
+    /// Sliding along one axis.
     Prismatic,
-    /// Everything, against a spring between two points.
+    /// All motion, against a spring between two points.
     Spring,
-    /// Everything up to a distance of two points.
+    /// All motion, up to a distance between two points.
     Rope,
 }
 

@@ -1,7 +1,7 @@
-//! The scene file as it is written: serde types, one a table, and their documentation in the JSON Schema.
+//! The scene file as it is written: serde types, one per table, whose doc comments are the descriptions of the JSON Schema.
 //!
 //! In: TOML values. Out: the same values, typed; keys that do not exist are refused.
-//! Never here: defaults that depend on other keys, and rules between keys (`build` has them).
+//! Never here: defaults that depend on other keys, and rules between keys (see `build`).
 
 mod common;
 mod coupling;

@@ -4,7 +4,7 @@ use super::Point;
 use schemars::JsonSchema;
 use serde::Deserialize;
 
-/// A rigid body, or a fixed solid that others touch.
+/// A rigid body, or a static solid that others collide with.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RigidFile {
@@ -17,11 +17,11 @@ pub struct RigidFile {
     pub half_extents_m: Option<Point>,
     /// Half the length of a cylinder, or of a capsule's straight part, metres, 1e-6 … 1e4.
     pub half_height_m: Option<f64>,
-    /// A .glb file (+y up) or an OBJ file (+z up), its path relative to the scene's: the points of a hull, the triangles of a mesh.
+    /// A .glb file (+y up) or an OBJ file (+z up), its path relative to the scene file: the points of a hull, the triangles of a mesh.
     pub file: Option<String>,
-    /// What the file's coordinates are multiplied by to be metres, 1e-6 … 1e6. Default 1.
+    /// Factor that converts the file's coordinates to metres, 1e-6 … 1e6. Default 1.
     pub scale: Option<f64>,
-    /// Where the shape's axes start, metres. Default the origin.
+    /// Position of the origin of the shape's axes, metres. Default: the world's origin.
     pub position_m: Option<Point>,
     /// Rotation by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
@@ -29,11 +29,11 @@ pub struct RigidFile {
     pub velocity_m_s: Option<Point>,
     /// Angular velocity at the start about the world's axes, rad/s, up to 1e4. Default none.
     pub spin_rad_s: Option<Point>,
-    /// Mass, kilograms, 1e-9 … 1e9. Contradicts `density_kg_m3`.
+    /// Mass, kilograms, 1e-9 … 1e9. Not together with `density_kg_m3`.
     pub mass_kg: Option<f64>,
     /// Density, kg/m³, 1e-3 … 1e6. Default 1000 where no mass is given.
     pub density_kg_m3: Option<f64>,
-    /// Coefficient of restitution, 0 … 1; of a pair the larger counts. Default 0.2.
+    /// Coefficient of restitution, 0 … 1; a pair takes the larger one. Default 0.2.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub restitution: Option<f64>,
     /// Coulomb friction coefficient, 0 … 10; a pair takes the geometric mean. Default 0.5.

@@ -1,4 +1,4 @@
-//! The tables of a scene besides its objects.
+//! The tables of a scene other than its objects.
 
 use super::{CouplingFile, FaultsFile, GroupFile, JointFile, Point};
 use schemars::JsonSchema;
@@ -6,7 +6,7 @@ use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
-/// A scene file without its `[[object]]` tables, which are read one by one, each by its model.
+/// A scene file without its `[[object]]` tables, which are read one by one according to their models.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SceneFile {
@@ -18,81 +18,81 @@ pub struct SceneFile {
     /// How agents are run. Default `auto`: `threads` for a few, `pool` for many.
     /// `lockstep` runs them on one thread in virtual time, with declared costs.
     pub executor: Option<ExecutorKind>,
-    /// How the system ranks the threads of agents. Default `normal`.
+    /// How the operating system schedules the threads of agents. Default `normal`.
     pub priority: Option<PriorityKind>,
-    /// At which time states are drawn. Default `interpolate`.
+    /// Time at which states are drawn. Default `interpolate`.
     pub states: Option<StatesKind>,
-    /// What surrounds the objects.
+    /// Surroundings of the objects.
     pub world: Option<WorldFile>,
-    /// The frame rate wanted and how it is held.
+    /// The target frame rate and how it is held.
     pub target: Option<TargetFile>,
-    /// From where the scene is seen. Default: from far enough to see all of it.
+    /// The camera. Default: far enough away to see the whole scene.
     pub camera: Option<CameraFile>,
-    /// The declared machine: what lockstep charges instead of measuring.
+    /// The declared machine: costs that lockstep charges instead of measuring them.
     pub machine: Option<MachineFile>,
     /// Material points whose position and velocity are reported; at most 1000.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub probe: Vec<ProbeFile>,
-    /// What holds rigid objects together; at most 10000. Objects in a joint keep one common clock.
+    /// Joints between rigid objects; at most 10000. Objects connected by joints share one clock.
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub joint: Vec<JointFile>,
-    /// Pairs of objects that act on each other in another way than by touching, by the ledger; at most 10000.
+    /// Pairs of objects that interact otherwise than by the default ledger contact; at most 10000.
     #[serde(default)]
     #[schemars(length(max = 10_000))]
     pub coupling: Vec<CouplingFile>,
-    /// Meshes and trees that may be drawn as one; at most 1000.
+    /// Meshes and trees that may be drawn as one mesh; at most 1000.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub group: Vec<GroupFile>,
-    /// Known here as a key only: each object is read by its model.
+    /// Accepted here as a key only: each object is read by its model.
     #[serde(default)]
     #[schemars(skip)]
     pub object: IgnoredAny,
 }
 
-/// `[world]`: what surrounds the objects.
+/// `[world]`: the surroundings of the objects.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WorldFile {
     /// Gravity, m/s², up to 1e4. Default `[0, 0, -9.81]`.
     pub gravity_m_s2: Option<Point>,
-    /// Whether objects that move touch each other. Default true; with false only pairs that a `[[coupling]]` names do.
+    /// Whether moving objects collide with each other. Default true; with false only pairs that a `[[coupling]]` names do.
     pub contacts: Option<bool>,
-    /// What goes wrong with every object's clock and messages on purpose.
+    /// Faults injected into the clock and messages of every object.
     pub faults: Option<FaultsFile>,
 }
 
-/// `[target]`: the frame rate wanted and how it is held.
+/// `[target]`: the target frame rate and how it is held.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TargetFile {
-    /// Wanted frames per second, 1 … 1000. Default 60.
+    /// Target frames per second, 1 … 1000. Default 60.
     #[schemars(range(min = 1.0, max = 1000.0))]
     pub frame_hz: Option<f64>,
-    /// Who chooses the level of every visible object. Default `adaptive`.
+    /// Policy that chooses the level of every visible object. Default `adaptive`.
     pub policy: Option<PolicyKind>,
-    /// What an object is worth to `robin-hood`. Default `plain`.
+    /// How `robin-hood` values an object. Default `plain`.
     pub value: Option<ValueKind>,
-    /// Which feedback law. Default `corrected`.
+    /// Feedback law. Default `corrected`.
     pub law: Option<LawKind>,
     /// Gain α of the printed law, 1e-9 … 1. Default 1e-4.
     pub alpha: Option<f64>,
     /// Gain β of the printed law, 1e-6 … 1e3. Default 5.
     pub beta: Option<f64>,
-    /// Gain κ of the corrected law, above 0, below 1. Default: the law's own.
+    /// Gain κ of the corrected law, 0.001 … 1.99; below 1 it is stable for every scene. Default: the law's own.
     pub kappa: Option<f64>,
-    /// Gain λ of the corrected law on the error's change, 0 … 0.99. Default: the law's own.
+    /// Gain λ of the corrected law on the error's change, 0 … 1.99. Default: the law's own.
     pub lead: Option<f64>,
-    /// Share of the frame that is left free, 0 … 0.9. Default: of feedback its law's own, of policies that predict 0.02.
+    /// Share of the frame time that is left free, 0 … 0.9. Default: for feedback its law's own, for policies that predict 0.02.
     pub margin: Option<f64>,
-    /// The greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and
-    /// the camera is drawn where it will be by then. Default: none is asked for, and the camera is drawn where it was read.
+    /// Greatest lag from reading the camera to the finished picture, milliseconds, 1 … 1000: levels are chosen so that it is kept, and the
+    /// camera is drawn at its predicted pose for that time. Default: no bound, and the camera is drawn where it was read.
     pub lag_ms: Option<f64>,
-    /// The part of what culling leaves of `lag_ms` that is kept for choosing levels, 0.001 … 0.5. Default 0.05.
+    /// Share that is reserved for choosing levels, of what culling leaves of `lag_ms`, 0.001 … 0.5. Default 0.05.
     pub optimiser_share: Option<f64>,
-    /// Whether `adaptive` and `robin-hood` spend time that is left when everything is at its finest on still smoother shapes and softer
+    /// Whether `adaptive` and `robin-hood` spend time left over when everything is at its finest on still smoother shapes and softer
     /// shadows. Default false.
     pub raise: Option<bool>,
 }
@@ -104,66 +104,66 @@ pub enum ExecutorKind {
     /// Threads for a few agents, the pool for many.
     #[default]
     Auto,
-    /// One named OS thread an agent; at most 1000 agents.
+    /// One named OS thread per agent; at most 1000 agents.
     Threads,
-    /// A worker a core for any number of agents; each keeps its own clock as on a thread of its own.
+    /// One worker per core for any number of agents; each agent keeps its own clock as on its own thread.
     Pool,
     /// One thread, virtual time, declared costs: bit-identical on every run.
     Lockstep,
 }
 
-/// How the system ranks the threads of agents.
+/// How the operating system schedules the threads of agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PriorityKind {
-    /// As all threads.
+    /// Ordinary priority.
     #[default]
     Normal,
-    /// Before all threads of ordinary priority, the frame loop included, where the system grants that; where it does not, a
-    /// note says so and agents run at ordinary priority. Agents that want all cores leave nothing for pictures then.
+    /// Before all threads of ordinary priority, including the frame loop, where the operating system permits that; where it does not, a
+    /// note says so and agents run at ordinary priority. Agents that use all cores then leave no time for pictures.
     Realtime,
 }
 
-/// Who chooses levels.
+/// Policy that chooses levels.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PolicyKind {
-    /// The finest of everything, whatever it costs.
+    /// The finest level of everything, at any cost.
     Full,
     /// The finest level whose polygons cover 1024 pixels each (FS93).
     Static,
-    /// The same with a threshold that follows the time of the frame before (FS93).
+    /// The same with a threshold that follows the time of the previous frame (FS93).
     Threshold,
     /// Levels in falling benefit per cost (FS93).
     Greedy,
-    /// The same from the levels of the frame before (FS93).
+    /// The same, starting from the levels of the previous frame (FS93).
     GreedyIncremental,
-    /// The better of the greedy answer and the best single object.
+    /// The better of the greedy solution and the best single object.
     GreedyRepaired,
-    /// Objects and groups, from the cut of the frame before (MB97).
+    /// Objects and groups, starting from the cut of the previous frame (MB97).
     Hierarchical,
     /// Objects and groups in falling benefit per cost (MB97).
     HierarchicalFlat,
-    /// Objects and groups, always the most important opened next (MS95).
+    /// Objects and groups, always refining the most important one next (MS95).
     MacielShirley,
-    /// Every object its part of the time by value (RH05).
+    /// A share of the time for every object, by its value (RH05).
     RobinHood,
     /// Any number of triangles, the exact optimum (GB99).
     Convex,
     /// Any number of triangles, by interior point (GB99).
     ConvexBarrier,
-    /// Steps in falling gain per cost, to the first that does not fit.
+    /// Refinement steps in falling gain per cost, up to the first that does not fit.
     MarginalStop,
-    /// The same, and then whatever still fits.
+    /// The same, followed by every later step that still fits.
     MarginalFill,
     /// Feedback on (ε, n) from the measured frame work (GDC04).
     Feedback,
-    /// Steps in falling gain per cost, by prices that learn, with hysteresis and a certificate.
+    /// Refinement steps in falling gain per cost, with costs learned from measurements, hysteresis and a certificate of optimality.
     #[default]
     Adaptive,
 }
 
-/// What an object is worth to `robin-hood` (RH05, eq. 8 … 11): its surface a over its depth z, or over its distance d from what
+/// How `robin-hood` values an object (RH05, eq. 8 … 11): from its surface a and its depth z, or its distance d from the point that
 /// the camera looks at.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -181,7 +181,7 @@ pub enum ValueKind {
     FocusSteep,
 }
 
-/// Which feedback law.
+/// Feedback law.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum LawKind {
@@ -192,14 +192,14 @@ pub enum LawKind {
     Printed,
 }
 
-/// At which time states are drawn.
+/// Time at which states are drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum StatesKind {
-    /// Between the two newest states, a little late.
+    /// Interpolated between the two newest states, slightly late.
     #[default]
     Interpolate,
-    /// The newest state carried on to the frame's time.
+    /// The newest state extrapolated to the frame's time.
     Extrapolate,
     /// The newest state as it is.
     Latest,
@@ -209,76 +209,77 @@ pub enum StatesKind {
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraFile {
-    /// Where the eye is, metres. Not with `keyframe`.
+    /// Position of the eye, metres. Not with `keyframe`.
     pub eye_m: Option<Point>,
-    /// What it looks at, metres. Default the origin.
+    /// Point that it looks at, metres. Default: the origin.
     pub look_at_m: Option<Point>,
     /// Vertical angle of view, degrees, 1 … 150. Default 40.
     pub fov_deg: Option<f64>,
-    /// Seconds of one turn about `look_at_m`, 0.1 … 1e5 in magnitude; negative turns clockwise seen from above.
+    /// Seconds per turn about `look_at_m`, 0.1 … 1e5 in magnitude; negative turns clockwise seen from above.
     pub period_s: Option<f64>,
     /// A path: 2 … 10000 keyframes.
     pub keyframe: Option<Vec<CameraKeyFile>>,
-    /// Whether the path starts again. Default false.
+    /// Whether the path repeats. Default false.
     pub repeat: Option<bool>,
-    /// Whether it moves evenly from keyframe to keyframe, instead of starting and stopping softly at each. Default false.
+    /// Whether it moves linearly from keyframe to keyframe, instead of starting and stopping softly at each. Default false.
     pub even: Option<bool>,
 }
 
-/// Where the camera is at one time.
+/// View of the camera at one time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CameraKeyFile {
     /// Seconds from the start, 0 … 1e6, later than the keyframe before.
     pub at_s: f64,
-    /// Where the eye is, metres.
+    /// Position of the eye, metres.
     pub eye_m: Point,
-    /// What it looks at, metres.
+    /// Point that it looks at, metres.
     pub look_at_m: Point,
     /// Vertical angle of view, degrees, 1 … 150. Default: the camera's `fov_deg`.
     pub fov_deg: Option<f64>,
 }
 
-/// `[machine]`: a preset, and what differs from it.
+/// `[machine]`: a preset, and the values that differ from it.
 #[derive(Debug, Clone, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MachineFile {
-    /// The machine to start from: `two-cores-software` (default) or `workstation`.
+    /// The preset to start from: `two-cores-software` (default) or `workstation`.
     pub preset: Option<String>,
     /// Cores that agents and frames share, 1 … 4096.
     #[schemars(range(min = 1, max = 4096))]
     pub cores: Option<u32>,
-    /// What a step of each model costs, by the model's name.
+    /// Costs of a step of each model, by the model's name.
     #[serde(default)]
     pub step: BTreeMap<String, ModelCostFile>,
-    /// Milliseconds a frame costs before anything is drawn, 0 … 1e4.
+    /// Milliseconds per frame before anything is drawn, 0 … 1e4.
     pub draw_setup_ms: Option<f64>,
-    /// Microseconds an object drawn, 0 … 1e6.
+    /// Microseconds per drawn object, 0 … 1e6.
     pub draw_object_us: Option<f64>,
-    /// Microseconds a triangle, 0 … 1e4.
+    /// Microseconds per triangle, 0 … 1e4.
     pub draw_triangle_us: Option<f64>,
-    /// Nanoseconds a pixel of the picture, 0 … 1e6.
+    /// Nanoseconds per pixel of the picture, 0 … 1e6.
     pub draw_pixel_ns: Option<f64>,
-    /// Nanoseconds that finding out whether it is seen takes an object, 0 … 1e6. Default 0.
+    /// Nanoseconds per object for culling, 0 … 1e6. Default 0.
     pub cull_object_ns: Option<f64>,
-    /// Nanoseconds that choosing its level takes an object in view, 0 … 1e6. Default 0.
+    /// Nanoseconds per object in view for choosing its level, 0 … 1e6. Default 0.
     pub choose_object_ns: Option<f64>,
-    /// What objects of one shading cost that differs from `draw_object_us` and `draw_triangle_us`.
+    /// Costs of objects by their shading, where they differ from `draw_object_us` and `draw_triangle_us`.
     pub shading: Option<ShadingCostsFile>,
     /// Relative standard deviation of every cost, 0 … 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub noise: Option<f64>,
-    /// Relative standard deviation of a factor on frames that keeps nine tenths of itself from frame to frame, 0 … 1. Default 0.
+    /// Relative standard deviation of a slowly varying factor on the frame time, which keeps nine tenths of itself from frame to frame,
+    /// 0 … 1. Default 0.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub wander: Option<f64>,
-    /// Share of frames that take half as long again, 0 … 1. Default 0.
+    /// Share of frames that take 1.5 times as long, 0 … 1. Default 0.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub spikes: Option<f64>,
-    /// What else the machine has to do while frames are drawn, by rising time; at most 1000 entries.
+    /// Additional load of the machine while frames are drawn, by rising time; at most 1000 entries.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub load: Vec<LoadFile>,
-    /// What else it has to do while agents step, by rising time; at most 1000 entries.
+    /// Additional load of the machine while agents step, by rising time; at most 1000 entries.
     #[serde(default)]
     #[schemars(length(max = 1000))]
     pub step_load: Vec<LoadFile>,
@@ -286,51 +287,52 @@ pub struct MachineFile {
     pub seed: Option<u32>,
 }
 
-/// `[[machine.load]]` and `[[machine.step_load]]`: from a time on every frame, and every step, takes so many times what it is declared to.
+/// `[[machine.load]]` and `[[machine.step_load]]`: from a time on every frame, or every step, takes a factor times its declared time.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct LoadFile {
-    /// Wall seconds after the start, 0 … 1e6; above that of the entry before.
+    /// Wall-clock seconds after the start, 0 … 1e6; later than the entry before.
     pub at_s: f64,
-    /// The factor from then on, 0.01 … 100: 2.5 is a machine that is 2.5 times as slow, 0.4 one that is 2.5 times as fast.
+    /// The factor from then on, 0.01 … 100: 2.5 is a machine 2.5 times as slow, 0.4 one 2.5 times as fast.
     pub factor: f64,
 }
 
-/// `[machine.shading]`: what objects cost by the way the light on them is worked out.
+/// `[machine.shading]`: costs of objects by their shading.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, rename_all = "kebab-case")]
 pub struct ShadingCostsFile {
-    /// One colour a triangle.
+    /// One colour per triangle.
     pub flat: Option<ShadingCostFile>,
-    /// Colours at corners.
+    /// Colours at vertices, interpolated between them.
     pub gouraud: Option<ShadingCostFile>,
-    /// Light at every pixel.
+    /// Lighting at every pixel.
     pub per_pixel: Option<ShadingCostFile>,
-    /// Light at every pixel on what is painted on it.
+    /// Lighting at every pixel of a textured surface.
     pub textured: Option<ShadingCostFile>,
 }
 
-/// What an object costs: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
+/// Cost of an object: object + max(triangle · triangles + vertex · vertices, pixel · pixels that it covers).
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ShadingCostFile {
-    /// Microseconds an object, 0 … 1e6.
+    /// Microseconds per object, 0 … 1e6.
     pub object_us: Option<f64>,
-    /// Microseconds a triangle, 0 … 1e4.
+    /// Microseconds per triangle, 0 … 1e4.
     pub triangle_us: Option<f64>,
-    /// Microseconds a vertex, 0 … 1e4. Default 0.
+    /// Microseconds per vertex, 0 … 1e4. Default 0.
     pub vertex_us: Option<f64>,
-    /// Nanoseconds a pixel that the object covers, 0 … 1e6. Default 0.
+    /// Nanoseconds per pixel that the object covers, 0 … 1e6. Default 0.
     pub pixel_ns: Option<f64>,
 }
 
-/// What a step of a model costs: base + unit · work.
+/// Cost of a step of a model: base + unit · work.
 #[derive(Debug, Clone, Copy, Default, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ModelCostFile {
-    /// Microseconds a step, 0 … 1e9.
+    /// Microseconds per step, 0 … 1e9.
     pub base_us: Option<f64>,
-    /// Microseconds a unit of work (tube: a segment of a system solved, one a substep or more; synthetic: a declared microsecond; others: a step), 0 … 1e9.
+    /// Microseconds per unit of work (tube: one segment in one solved system, with one or more systems per substep; synthetic: a declared
+    /// microsecond; others: a step), 0 … 1e9.
     pub unit_us: Option<f64>,
 }
 
@@ -340,11 +342,11 @@ pub struct ModelCostFile {
 pub struct ProbeFile {
     /// Name of the object.
     pub object: String,
-    /// Which point of a tube: 0 start … 1 end, arc length along the rest shape. Default 1.
+    /// Point of a tube: 0 start … 1 end, arc length along the rest shape. Default 1.
     /// A rigid object reports its centre of mass, an instrument its tip.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub at: Option<f64>,
-    /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` too. Default: only the last state.
+    /// Milliseconds between samples, 0.01 … 1e6: the report then has `samples` as well. Default: only the last state.
     pub every_ms: Option<f64>,
 }
 

@@ -8,7 +8,7 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SheetFile {
-    /// Length along its x and y, metres, each 1e-6 … 1e4.
+    /// Length along its x and y axes, metres, each 1e-6 … 1e4.
     pub size_m: [f64; 2],
     /// Cells along x and y; at most 2048 vertices in all.
     pub segments: [u32; 2],
@@ -23,11 +23,11 @@ pub struct SheetFile {
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Where its middle is, metres. Default the origin.
+    /// Position of its middle, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    /// Velocity of the whole sheet at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
     /// Sides whose vertices never move. Default none.
     pub hold: Option<Vec<SheetSide>>,
@@ -42,11 +42,11 @@ pub struct SheetFile {
 pub struct SolidFile {
     /// Its shape. `box`: `size_m`. `ball`: `radius_m`.
     pub shape: SoftShapeKind,
-    /// Length of a box along its x, y and z, metres, each 1e-6 … 1e4.
+    /// Length of a box along its x, y and z axes, metres, each 1e-6 … 1e4.
     pub size_m: Option<Point>,
     /// Radius of a ball, metres, 1e-6 … 1e4.
     pub radius_m: Option<f64>,
-    /// Cells along x, y and z, of a ball the same three times; at most 2048 vertices in all.
+    /// Cells along x, y and z, for a ball three equal numbers of at least 2; at most 2048 vertices in all.
     pub segments: [u32; 3],
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
@@ -57,11 +57,11 @@ pub struct SolidFile {
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Where its middle is, metres. Default the origin.
+    /// Position of its middle, metres. Default: the origin.
     pub position_m: Option<Point>,
     /// Rotation about its middle by angles about the world's x, then y, then z axis, degrees. Default none.
     pub rotation_deg: Option<Point>,
-    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    /// Velocity of the whole solid at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
     /// Faces of a box whose vertices never move. Default none.
     pub hold: Option<Vec<SolidSide>>,
@@ -70,15 +70,15 @@ pub struct SolidFile {
     pub friction: Option<f64>,
 }
 
-/// A rope: it stretches, and neither bends stiffly nor twists.
+/// A rope: it stretches, and has no stiffness against bending or twisting.
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RopeFile {
-    /// Points of its course at rest, metres: at least two.
+    /// Points of its centre line at rest, metres: at least two.
     pub path_m: Vec<Point>,
     /// Radius, metres, 1e-6 … 1e4.
     pub radius_m: f64,
-    /// Pieces, 1 … 2047.
+    /// Number of segments, 1 … 2047.
     pub segments: u32,
     /// Young's modulus, Pa, 1 … 1e11.
     pub young_pa: f64,
@@ -86,7 +86,7 @@ pub struct RopeFile {
     pub density_kg_m3: Option<f64>,
     /// Mass-proportional damping, 1/s, 0 … 1e4. Default 0.
     pub damping_per_s: Option<f64>,
-    /// Velocity of all of it at the start, m/s, up to 1e4. Default none.
+    /// Velocity of the whole rope at the start, m/s, up to 1e4. Default: none.
     pub velocity_m_s: Option<Point>,
     /// Ends that never move. Default none.
     pub hold: Option<Vec<RopeEnd>>,

@@ -1,4 +1,4 @@
-//! `model = "synthetic"`: an agent with declared cost and error and no matter.
+//! `model = "synthetic"`: an agent with declared cost and error and without matter.
 
 use super::OneOrRange;
 use schemars::JsonSchema;
@@ -16,7 +16,7 @@ pub struct SyntheticFile {
     pub error_m: Option<f64>,
     /// How the error falls with refinement: error · (ε / coarsest)^order, 0 … 8. Default 2.
     pub error_order: Option<f64>,
-    /// Spacing ε, metres, 1e-6 … 1e3: one number fixes it, `[finest, coarsest]` is what the controller may use.
+    /// Spacing ε, metres, 1e-6 … 1e3: one number fixes it; `[finest, coarsest]` is the range that the controller may use.
     /// Default 0.01, fixed.
     pub eps_m: Option<OneOrRange<f64>>,
 }

@@ -8,13 +8,13 @@ use serde::Deserialize;
 #[derive(Debug, Clone, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TubeFile {
-    /// Points of the centre line at the start in metres: 2 … 100000, no two neighbours alike; free of stress unless
-    /// `straight` or `twist_deg` say otherwise. Two points make a straight line, more a smooth curve through all of them.
+    /// Points of the centre line at the start, metres: 2 … 100000, no two consecutive ones equal; free of stress unless
+    /// `straight` or `twist_deg` is given. Two points make a straight line, more a smooth curve through all of them.
     #[schemars(length(min = 2, max = 100_000))]
     pub path_m: Vec<Point>,
-    /// Whether it is straight where nothing bends it: the path is then what it was bent to. Default false.
+    /// Whether its rest shape is straight: the path is then a bent shape under stress. Default false.
     pub straight: Option<bool>,
-    /// How far its end is turned about the tube against its start when the scene begins, degrees, -36000 … 36000, evenly
+    /// Angle by which its end is turned about the tube relative to its start when the scene begins, degrees, -36000 … 36000, uniform
     /// along it; it springs back unless both ends are clamped. Default 0.
     pub twist_deg: Option<f64>,
     /// Outer radius at rest, metres, 1e-6 … 100.
@@ -39,15 +39,15 @@ pub struct TubeFile {
     pub gj_n_m2: Option<f64>,
     /// Mass per length, kg/m; overrides density and section.
     pub mass_per_length_kg_m: Option<f64>,
-    /// Spacing ε of the simulation along the tube, metres: one number fixes it, `[finest, coarsest]` is what the
-    /// controller may use, who starts with the finest; length / 4096 … 10 lengths. Default: length / 64, fixed.
+    /// Spacing ε of the simulation along the tube, metres, length / 4096 … 10 lengths: one number fixes it; `[finest, coarsest]` is the
+    /// range that the controller may use, starting at the finest. Default: length / 64, fixed.
     pub eps_m: Option<OneOrRange<f64>>,
-    /// Number of segments of the simulation, 2 … 4096: fixes it; `eps_m` then speaks of the picture alone.
+    /// Fixed number of segments of the simulation, 2 … 4096; `eps_m` then applies to the picture only.
     #[schemars(range(min = 2, max = 4096))]
     pub segments: Option<u32>,
-    /// Spacing ε of the picture, metres, as `eps_m`. Default: `eps_m`, or `[length / 400, length / 8]` without it.
+    /// Spacing ε of the picture, metres, with the form and limits of `eps_m`. Default: `eps_m`, or `[length / 400, length / 8]` without it.
     pub picture_eps_m: Option<OneOrRange<f64>>,
-    /// How it is integrated in time. Default `implicit-euler`.
+    /// Time integrator. Default `implicit-euler`.
     pub integrator: Option<Integrator>,
     /// Least number of substeps in a step, 1 … 1000. Default 1.
     #[schemars(range(min = 1, max = 1000))]
@@ -58,15 +58,15 @@ pub struct TubeFile {
     pub clamp: Option<Vec<End>>,
     /// Ends held in place, free to turn. Default none.
     pub pin: Option<Vec<End>>,
-    /// Springs between stretches of the tube and where they were at rest (a mesentery).
+    /// Springs between parts of the tube and their rest positions (a mesentery).
     pub attach: Option<Vec<AttachFile>>,
     /// A travelling wave of the radius.
     pub peristalsis: Option<PeristalsisFile>,
-    /// Pressure inside above that outside, Pa, 0 … 1e7: widens the tube. Default 0.
+    /// Pressure inside relative to outside, Pa, 0 … 1e7: widens the tube. Default 0.
     pub pressure_pa: Option<f64>,
     /// Whether the tube collides with itself. Default true.
     pub self_contact: Option<bool>,
-    /// Coulomb friction coefficient of the skin, 0 … 10; a pair takes the geometric mean. Default 0.2.
+    /// Coulomb friction coefficient of the surface, 0 … 10; a pair takes the geometric mean. Default 0.2.
     pub friction: Option<f64>,
 }
 
@@ -80,30 +80,30 @@ pub enum End {
     End,
 }
 
-/// How a tube is integrated in time.
+/// Time integrator of a tube.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Integrator {
-    /// Explicit, first order: for soft, coarse tubes in short substeps; refused where they are too long for it.
+    /// Explicit, first order: for soft, coarse tubes with short substeps; refused where substeps are too long for it.
     SymplecticEuler,
-    /// Compliant constraints, projected one by one: for comparison; refused where substeps are too long to bend as stiffly.
+    /// Compliant constraints, projected one by one: for comparison; refused where substeps are too long for its bending stiffness.
     Xpbd,
     /// Linearly implicit Euler with one Newton step: stable at large steps, damps fast motion.
     ImplicitEuler,
-    /// Backward differences of second order: damps motion little; implicit Euler wherever the tube touches or is held.
+    /// Backward differences of second order, with little damping; implicit Euler while the tube is in contact or held.
     Bdf2,
-    /// Keeps energy and momentum of a tube that nobody touches; implicit Euler wherever it touches or is held.
+    /// Conserves energy and momentum of a tube without contact; implicit Euler while it is in contact or held.
     EnergyMomentum,
 }
 
-/// Springs along a stretch of a tube.
+/// Springs along a part of a tube.
 #[derive(Debug, Clone, Copy, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AttachFile {
-    /// Where the stretch begins, as a share of the rest length, 0 … 1.
+    /// Start of the part, as a share of the rest length, 0 … 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub from: f64,
-    /// Where it ends, above `from`, at most 1.
+    /// End of the part, above `from`, at most 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub to: f64,
     /// Stiffness per length, N/m², 0 … 1e9.

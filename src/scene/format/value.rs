@@ -1,4 +1,4 @@
-//! Values that a scene writes in more than one way.
+//! Values that a scene may write in more than one form.
 
 use metachron_core::N_MAX;
 use schemars::JsonSchema;
@@ -10,7 +10,7 @@ use std::marker::PhantomData;
 /// A point or a direction: `[x, y, z]`.
 pub type Point = [f64; 3];
 
-/// One number, which fixes a value, or `[least, greatest]`, which leaves it to a controller.
+/// One number, which fixes a value, or `[least, greatest]`, within which a controller chooses.
 #[derive(Debug, Clone, Copy, PartialEq, JsonSchema)]
 #[schemars(untagged)]
 pub enum OneOrRange<T> {
@@ -41,9 +41,9 @@ impl<T: Copy> OneOrRange<T> {
     }
 }
 
-/// A number type that [`OneOrRange`] reads: how it comes from TOML's integers and floats.
+/// A number type that [`OneOrRange`] reads: its conversion from TOML's integers and floats.
 pub trait Number: Sized {
-    /// What the error calls it.
+    /// Name of the type in error messages.
     fn name() -> String;
     /// The value of a TOML integer, if it has one.
     fn from_integer(value: i64) -> Option<Self>;
@@ -63,7 +63,7 @@ impl Number for f64 {
     }
 }
 
-/// Levels of primitives alone are written so.
+/// Only levels of primitives have this type.
 impl Number for u8 {
     fn name() -> String {
         format!("a whole number from 0 to {N_MAX}, or a range [least, greatest]")

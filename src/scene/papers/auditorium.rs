@@ -1,6 +1,6 @@
 //! The auditorium of (FS93, §8): 384 seats in rising rows, 16 pieces of a stage, and a walk with half a turn in six frames.
 //!
-//! In: a seed. Out: its text. At ten frames a second the walk has the paper's 250: A, many seats across the view (frame 40);
+//! In: a seed. Out: the scene's text. At ten frames a second the walk has the paper's 250: A, many seats across the view (frame 40);
 //! B, few and small ones (130); C, the sudden turn from the stage to the seats (178 … 184).
 
 use super::way::{Way, stop};
@@ -10,7 +10,7 @@ use super::{FLOOR, head};
 const SEAT: u32 = 186;
 const SINGER: u32 = 1004;
 const WREATH: u32 = 1014;
-/// What is open at its border can have an odd count, as the sum has.
+/// A mesh with an open border can have an odd number of triangles, as the sum has.
 const CURTAIN: u32 = 1011;
 const CURTAIN_SEED: u32 = 3;
 

@@ -1,18 +1,18 @@
-//! The domes of (MB97, §8): 8 balls of 120 struts each, and a coarse ball for each from afar.
+//! The domes of (MB97, §8): 8 spheres of 120 struts each, and a coarse sphere that replaces each from afar.
 //!
-//! In: nothing. Out: its text. A strut has 4 to 24 triangles, so the cheapest picture without groups has the paper's 3840.
-//! In the paper domes spin and swing; here the camera goes round them, to and fro.
+//! In: nothing. Out: the scene's text. A strut has 4 to 24 triangles, so the cheapest picture without groups has the paper's 3840.
+//! In the paper domes spin and swing; here the camera circles them at a varying distance.
 
 use super::head;
 use super::way::{Stop, Way, point};
 use glam::DVec3;
 use std::f64::consts::TAU;
 
-/// Domes along x and y, and their distances, metres.
+/// Number of domes along x and y, and their spacing, metres.
 const GRID: [u32; 2] = [2, 4];
 const APART_M: [f64; 2] = [5.0, 3.4];
 const FIRST_M: DVec3 = DVec3::new(-2.5, -5.1, 0.0);
-/// The ways of the camera: round them in so many seconds, with so many stops, this far off and this much to and fro.
+/// Path of the camera: seconds of one turn, number of stops, mean distance and its amplitude, metres.
 const ROUND_S: f64 = 24.0;
 const STOPS: u32 = 36;
 const FAR_M: (f64, f64) = (13.0, 4.0);

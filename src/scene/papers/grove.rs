@@ -1,7 +1,7 @@
-//! The grove of (RH05, §6): trees of three kinds on a square, and two ways through it.
+//! The grove of (RH05, §6): trees of three kinds on a square, and two camera paths through it.
 //!
-//! In: how many trees, which way, whether they have levels, a seed. Out: its text. At twenty frames a second the linear way has
-//! 1000 frames, most in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
+//! In: the number of trees, which path, whether trees have levels, a seed. Out: the scene's text. At twenty frames a second the linear
+//! path has 1000 frames, with most trees in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
 
 use super::way::{Way, stop};
 use super::{Choices, FLOOR, head};
@@ -9,7 +9,7 @@ use super::{Choices, FLOOR, head};
 /// Boughs (10 triangles each) and leaves (2 each) of each kind: 620 + 480, 890 + 720, 1740 + 1800 triangles.
 const KINDS: [(&str, u32, u32, &str); 3] =
     [("birch", 62, 240, "#7fa650"), ("beech", 89, 360, "#5a8a42"), ("oak", 174, 900, "#47713c")];
-/// A side of the square in which 600 trees stand, metres; more stand in a larger one.
+/// Side of the square for 600 trees, metres; the area grows with their number.
 const SIDE_M: f64 = 240.0;
 const TREES: f64 = 600.0;
 

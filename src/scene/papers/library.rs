@@ -1,12 +1,12 @@
 //! The library of (FS93, fig. 11): a textured room whose shading is chosen with its triangles.
 //!
-//! In: nothing. Out: its text. 32 chairs, 8 tables, 24 shelves, 10 doors and 96 sets of books are 19,800 triangles; the paper has
+//! In: nothing. Out: the scene's text. 32 chairs, 8 tables, 24 shelves, 10 doors and 96 sets of books are 19,800 triangles; the paper has
 //! 19,821.
 
 use super::way::{Way, stop};
 use super::{FLOOR, head};
 
-/// First place, how many along x, y, z, their distances, turn about z.
+/// Position of the first, numbers along x, y, z, spacing (metres), rotation about z (degrees).
 type Row = ([f64; 3], [u32; 3], [f64; 3], f64);
 
 /// Furniture of one kind.

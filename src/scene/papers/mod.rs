@@ -1,7 +1,7 @@
 //! The scenes of the papers' experiments, written as scene files.
 //!
-//! In: which one, a seed, what of it can be chosen. Out: its text, a few dozen lines of TOML. Never here: reading it, drawing.
-//! Counts of objects and triangles and the events of the paths are the papers'; places, shapes and times are ours.
+//! In: which one, a seed, options. Out: its text, a few dozen lines of TOML. Never here: reading it, drawing.
+//! Numbers of objects and triangles and the events of the paths are the papers'; positions, shapes and times are ours.
 
 mod auditorium;
 mod domes;
@@ -25,21 +25,21 @@ pub enum Paper {
     Library,
 }
 
-/// What of a scene can be chosen.
+/// Options of a scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Choices {
     /// Seed of everything random; equal seeds give equal text.
     pub seed: u32,
     /// Trees of the grove, 3 … 3000.
     pub trees: u32,
-    /// Whether the way through the grove is the one with two sudden turns.
+    /// Whether the path through the grove is the one with two sudden turns.
     pub zigzag: bool,
-    /// Whether its trees have no levels: what is paid for is drawn of the full mesh.
+    /// Whether its trees have no levels: as much of the full mesh is drawn as there is time for.
     pub prefix: bool,
 }
 
 impl Default for Choices {
-    /// What the built-in scenes are written with.
+    /// The options of the built-in scenes.
     fn default() -> Self {
         Self { seed: 1, trees: 600, zigzag: false, prefix: false }
     }
@@ -74,7 +74,7 @@ impl Paper {
     }
 }
 
-/// The head of a file: what it is, its description, its target, its camera's way.
+/// The head of a file: comment, description, target, path of the camera.
 fn head(comment: &str, description: &str, way: &way::Way) -> String {
     format!("# {comment}\nformat = 1\ndescription = \"{description}\"\n\n[target]\nframe_hz = 30.0\n\n{}", way.text())
 }
@@ -93,7 +93,7 @@ mod tests {
         load(&Source::memory(paper.name(), text.as_bytes()).unwrap(), &[]).unwrap()
     }
 
-    /// Fewest and all triangles of everything that stands in a scene, proxies left out.
+    /// Fewest and most triangles of all scenery of a scene, without proxies.
     fn triangles(scene: &Scene) -> (u32, u32) {
         let ranges = scene.scenery.iter().map(|it| it.model.range());
         ranges.fold((0, 0), |(least, most), range| (least + range.0, most + range.1))
@@ -135,7 +135,7 @@ mod tests {
         assert_eq!(triangles(&scene), (3840, 23_040));
         assert_eq!((scene.scenery.len(), scene.groups.len()), (8 * 120, 8));
         assert!(scene.groups.iter().all(|group| group.members.len() == 120 && group.proxy.model.range().1 == 20));
-        // both ends of every strut lie on its dome
+        // both ends of every strut are on the sphere of its dome
         for group in &scene.groups {
             for strut in &scene.scenery[group.members.clone()] {
                 for end in [-1.0, 1.0] {

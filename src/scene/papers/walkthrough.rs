@@ -1,15 +1,15 @@
 //! The walk of (GB99): 200 meshes of 1.5 million triangles, which leave the view one by one until a sudden turn shows nearly all.
 //!
-//! In: a seed. Out: its text. The paper's counts are lost; these are ours: ten sizes, log-normal, twenty copies of each.
+//! In: a seed. Out: the scene's text. The paper's counts are lost; these are ours: ten sizes, log-normal, twenty copies of each.
 
 use super::way::{Way, stop};
 use super::{FLOOR, head};
 
 const TRIANGLES: f64 = 1.5e6;
-/// Copies of each mesh before the walker, and behind.
+/// Copies of each mesh in front of the camera, and behind it.
 const AHEAD: u32 = 2;
 const BEHIND: u32 = 18;
-/// Quantiles of the normal distribution at 0.05, 0.15, … 0.95: sizes go with their exponentials.
+/// Quantiles of the normal distribution at 0.05, 0.15, … 0.95: sizes are proportional to their exponentials.
 const NORMAL: [f64; 10] = [-1.6449, -1.0364, -0.6745, -0.3853, -0.1257, 0.1257, 0.3853, 0.6745, 1.0364, 1.6449];
 const KINDS: [&str; 3] = ["blob", "torus", "sphere"];
 const COLOURS: [&str; 5] = ["#b07a5a", "#6f8faf", "#8fa35e", "#a887b5", "#c2a65a"];
@@ -30,7 +30,7 @@ pub(super) fn text(seed: u32) -> String {
     text + FLOOR
 }
 
-/// Copies of one mesh in a box: its middle along x, and how far they lie from there along x and y.
+/// Copies of one mesh in a box: its middle along x, and its half sizes along x and y, metres.
 fn meshes(
     (seed, number): (u32, u32),
     triangles: f64,
@@ -39,7 +39,7 @@ fn meshes(
 ) -> String {
     let (kind, colour) = (KINDS[number as usize % KINDS.len()], COLOURS[number as usize % COLOURS.len()]);
     let scatter_seed = 100 * seed + 10 * u32::from(name == "ahead") + number;
-    // a ring and a ball are the same from any seed
+    // a torus and a sphere do not depend on the seed
     let shape_seed = if kind == "blob" { format!("\nseed = {}", seed + number) } else { String::new() };
     format!(
         r##"

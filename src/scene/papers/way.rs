@@ -1,41 +1,42 @@
-//! The way of a camera through a scene, as keyframes of its file.
+//! The path of a camera through a scene, as keyframes of its file.
 //!
-//! In: stops with a place and a direction. Out: a `[camera]` table. Never here: the scene.
+//! In: stops with a position and a direction. Out: a `[camera]` table. Never here: the scene.
 
 use glam::DVec3;
 
-/// Two views further apart than this get others between them, so that what is looked at never passes through the eye, degrees.
+/// Consecutive views that differ by more than this get others between them, so that the point looked at never passes through the eye,
+/// degrees.
 const TURN_MOST: f64 = 45.0;
-/// How far ahead of the eye the point is that it looks at, metres.
+/// Distance from the eye to the point that it looks at, metres.
 const AHEAD_M: f64 = 10.0;
 
-/// Where the eye is at a time, and where it looks.
+/// Position and direction of the camera at one time.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Stop {
     /// Seconds from the start.
     pub at_s: f64,
-    /// Place, metres.
+    /// Position, metres.
     pub eye_m: DVec3,
-    /// About z from x, degrees; 360 more is a whole turn on the way there.
+    /// Yaw about z from x, degrees; 360 more is a full turn on the way there.
     pub yaw_deg: f64,
-    /// Above the horizon, degrees.
+    /// Pitch above the horizon, degrees.
     pub pitch_deg: f64,
 }
 
-/// A way, evenly from stop to stop.
+/// A path, linear from stop to stop.
 #[derive(Debug, Clone)]
 pub(super) struct Way {
     pub stops: Vec<Stop>,
     pub fov_deg: f64,
 }
 
-/// A stop in one line.
+/// Makes a stop.
 pub(super) const fn stop(at_s: f64, [x, y, z]: [f64; 3], yaw_deg: f64, pitch_deg: f64) -> Stop {
     Stop { at_s, eye_m: DVec3::new(x, y, z), yaw_deg, pitch_deg }
 }
 
 impl Way {
-    /// The table.
+    /// The `[camera]` table.
     pub(super) fn text(&self) -> String {
         let mut text = format!("[camera]\nfov_deg = {:?}\neven = true\nrepeat = true\nkeyframe = [\n", self.fov_deg);
         for pair in self.stops.windows(2) {

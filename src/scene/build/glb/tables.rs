@@ -1,16 +1,16 @@
-//! The tables of a .glb file, and the lists of numbers that they tell of.
+//! Reads the JSON tables of a .glb file, and the lists of numbers that they describe.
 //!
-//! In: any bytes. Out: tables, points, places on a texture, corners, the bytes of an image; every one checked to lie inside the file.
-//! Never here: nodes, what triangles make of it.
+//! In: any bytes. Out: tables, points, texture coordinates, corners, the bytes of an image; all checked to lie inside the file.
+//! Never here: the hierarchy of nodes, building triangles.
 
 use glam::{DVec3, Vec2};
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 
-/// What is said of data that is not in the file.
+/// Message for data that is not in the file.
 const OUTSIDE: &str = "its data lies outside the file: it is cut short, or kept in another";
-/// Extensions that change nothing of what is read here begin so: looks of materials, lights.
+/// Prefixes of extensions that change nothing of what is read here: material properties, lights.
 const UNREAD: [&str; 2] = ["KHR_materials_", "KHR_lights_"];
 
 /// The tables of the file's text, as far as triangles need them.
@@ -119,7 +119,7 @@ pub(super) struct Buffer {
     pub(super) uri: Option<IgnoredAny>,
 }
 
-/// A file in its two parts.
+/// Splits a file into its tables and its data; refuses required extensions that are not understood.
 pub(super) fn read(bytes: &[u8]) -> Result<(Tables, &[u8]), String> {
     let (text, data) = parts(bytes)?;
     let tables: Tables = serde_json::from_slice(text).map_err(|error| format!("its text is wrong: {error}"))?;
@@ -154,7 +154,7 @@ fn parts(bytes: &[u8]) -> Result<(&[u8], &[u8]), String> {
 }
 
 impl Tables {
-    /// What the base colour of a primitive comes from, if from an image.
+    /// The texture of a primitive's base colour, if it has one.
     pub(super) fn painted(&self, primitive: &Primitive) -> Option<&TextureUse> {
         self.materials.get(primitive.material?)?.pbr_metallic_roughness.base_color_texture.as_ref()
     }
@@ -166,7 +166,7 @@ impl Tables {
         entry.source.ok_or_else(|| format!("its texture {texture} has no image that is understood"))
     }
 
-    /// How many items an accessor says that it has.
+    /// The number of items that an accessor declares.
     pub(super) fn count(&self, accessor: usize) -> Result<usize, String> {
         self::accessor(self, accessor).map(|accessor| accessor.count)
     }
@@ -195,7 +195,7 @@ pub(super) fn points(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<
     Ok(items.map(|bytes| DVec3::new(number(bytes, 0), number(bytes, 4), number(bytes, 8))).collect())
 }
 
-/// Places on a texture: floats, or parts of the greatest whole number.
+/// Texture coordinates: floats, or integers as shares of the greatest integer of their type.
 pub(super) fn uvs(tables: &Tables, number: usize, data: &[u8]) -> Result<Vec<Vec2>, String> {
     let accessor = accessor(tables, number)?;
     let (size, number): (usize, fn(&[u8]) -> f32) = match (accessor.component_type, accessor.kind.as_str()) {
