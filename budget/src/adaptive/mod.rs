@@ -98,7 +98,7 @@ pub struct Plan {
     pub value: f64,
     /// The certificate: no choice within the budget has more; 0 where there is none.
     pub upper: f64,
-    /// λ: gain of one more tick; 0 where everything is at its most.
+    /// λ: gain of one more tick; 0 where everything is at its finest.
     pub lambda: f64,
 }
 
