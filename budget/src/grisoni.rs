@@ -1,7 +1,7 @@
 //! The frame-rate law exactly as printed (GDC04, eq. 1): a difference of rates moves ε, and ε moves n.
 //!
-//! In: the frame rate wanted and the one measured, in frames per second. Out: ε̂, ρ and n.
-//! Never here: repairs. Its gain depends on the machine; [`crate::log_law`] is the law that mends that.
+//! In: the target frame rate and the measured one, in frames per second. Out: ε̂, ρ and n. Never here: corrections. The loop gain depends
+//! on the machine; [`crate::log_law`] is the corrected law.
 //! Theory: `docs/theory/control.md`, eq. 1 … 6.
 
 use crate::{Bound, within};
@@ -10,7 +10,7 @@ use crate::{Bound, within};
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
     /// α: change of ε̂ for each frame per second that is missing; > 0.
-    /// Past 2 / (df/dε̂) the loop swings for ever (control.md, eq. 4).
+    /// Past 2 / (df/dε̂) the loop oscillates without end (control.md, eq. 4).
     pub alpha: f64,
     /// β: change of ρ for each unit of ε̂; > 0. Where β ε̂ ln 2 > 1, coarsening makes frames slower (control.md, eq. 6).
     pub beta: f64,
@@ -23,7 +23,7 @@ impl Default for Gains {
     }
 }
 
-/// Where ε̂ and n must stay; both ends are included.
+/// Ranges of ε̂ and n; both ends are included.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Finest and coarsest ε̂, `0 < finest <= coarsest`.
@@ -50,10 +50,10 @@ impl GrisoniLaw {
         Self { gains, limits, eps: within(eps, limits.eps), rho, rest: None }
     }
 
-    /// Learns that a frame ran at `f_hz` where `f0_hz` was wanted.
+    /// Updates the law: a frame ran at `f_hz`, the target is `f0_hz`.
     ///
     /// ε ← ε + α (f₀ − f), ρ ← ρ + β (ε' − ε) (GDC04, eq. 1), with ε' clamped before ρ follows it.
-    /// Gives `false`, and learns nothing, where a rate is not above zero and finite, or a gain is not finite.
+    /// Gives `false`, and changes nothing, if a rate is not above zero and finite, or a gain is not finite.
     pub fn observe(&mut self, f0_hz: f64, f_hz: f64) -> bool {
         let real = |f: f64| f.is_finite() && f > 0.0;
         let wish = self.eps + self.gains.alpha * (f0_hz - f_hz);
@@ -89,18 +89,18 @@ impl GrisoniLaw {
         within(libm::floor(self.rho), (f64::from(self.limits.n.0), f64::from(self.limits.n.1))) as u8
     }
 
-    /// The end at which ε̂ was stopped by the last lesson.
+    /// The end of the range at which the last update clamped ε̂.
     #[must_use]
     pub fn rest(&self) -> Option<Bound> {
         self.rest
     }
 
-    /// Takes other gains from the next lesson on; the state stays.
+    /// Sets other gains from the next update on; the state stays.
     pub fn set_gains(&mut self, gains: Gains) {
         self.gains = gains;
     }
 
-    /// Takes other limits; ε̂ moves inside them and ρ goes with it.
+    /// Sets other limits; ε̂ moves inside them and ρ follows.
     pub fn set_limits(&mut self, limits: Limits) {
         let eps = within(self.eps, limits.eps);
         let rho = self.rho + self.gains.beta * (eps - self.eps);

@@ -1,4 +1,4 @@
-//! An integer level from a real number that does not chatter when the number trembles about a whole one.
+//! An integer level from a real number, with hysteresis: no chatter when the number fluctuates about an integer.
 //!
 //! In: ρ. Out: ⌊ρ⌋, held until ρ is a quarter past an edge. Never here: where ρ comes from.
 //! Theory: `docs/theory/control.md`, eq. 15.
@@ -8,7 +8,7 @@ pub const BAND: f64 = 0.25;
 
 /// The level for `rho` when `held` is the present one: `held` as long as held − ¼ ≤ ρ < held + 1¼, otherwise ⌊ρ⌋.
 ///
-/// With no level held, ⌊ρ⌋. The answer is inside `0..=255`; a ρ that is no number keeps the level, or gives 0.
+/// With no level held, ⌊ρ⌋. The result is inside `0..=255`; a NaN keeps the level, or gives 0.
 #[must_use]
 pub fn floor(held: Option<u8>, rho: f64) -> u8 {
     match held {
@@ -26,7 +26,7 @@ mod tests {
         let mut held = Some(2);
         let mut switches = 0;
         for k in 0..1000 {
-            // slowly from 2.9 to 3.9, trembling by ± 0.2 < BAND
+            // slowly from 2.9 to 3.9, with an alternating ± 0.2 < BAND
             let rho = 2.9 + 0.001 * f64::from(k) + if k % 2 == 0 { 0.2 } else { -0.2 };
             let n = floor(held, rho);
             switches += u32::from(held != Some(n));

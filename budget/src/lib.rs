@@ -29,13 +29,13 @@ pub mod share;
 /// An end of a range of resolutions.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Bound {
-    /// As fine as is allowed: there is time left that nothing may use.
+    /// As fine as allowed: there is time left that cannot be used.
     Finest,
-    /// As coarse as is allowed: the time wanted cannot be reached.
+    /// As coarse as allowed: the target time cannot be reached.
     Coarsest,
 }
 
-/// `x` inside `lo..=hi`; `hi` where `x` is no number. Never panics, unlike `f64::clamp`.
+/// `x` inside `lo..=hi`; `hi` if `x` is NaN. Never panics, unlike `f64::clamp`.
 pub(crate) fn within(x: f64, (lo, hi): (f64, f64)) -> f64 {
     if x.is_nan() { hi } else { x.max(lo).min(hi) }
 }

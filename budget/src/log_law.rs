@@ -1,29 +1,28 @@
-//! The corrected law: ln ε ← ln ε + κ ln(t / T), a gain that no machine changes.
+//! The corrected law: ln ε ← ln ε + κ ln(t / T), whose gain does not depend on the machine.
 //!
-//! In: measured time over wanted time. Out: ln ε, inside its range, and whether it rests there.
-//! Never here: what ε is, or where the time was measured. Theory: `docs/theory/control.md`, eq. 7 … 12.
+//! In: measured time over target time. Out: ln ε, inside its range, and the state of the law ([`Rest`]). Never here: the meaning of ε, or
+//! where the time was measured. Theory: `docs/theory/control.md`, eq. 7 … 12.
 
 use crate::{Bound, within};
 
-/// The most that one lesson counts, |ln(t/T)|: a frame four times too slow. At κ = ½ it halves the work at most.
+/// Clamp of the error of one update, |ln(t/T)|: a frame four times too slow. At κ = ½ one update halves the work at most.
 pub const LESSON_MAX: f64 = 2.0 * core::f64::consts::LN_2;
 
-/// The most that a *surprise* counts, ln 1.5: an error larger than this counts in full only if the one before was as large, on
-/// the same side. So a single frame of five times its time costs e^(−κ ln 1.5) = 18 % of the polygons, and a load that stays
-/// is believed one frame later.
+/// Clamp of an unconfirmed error, ln 1.5: a larger error counts in full only if the one before was as large, on the same side. So a single
+/// frame of five times its time costs e^(−κ ln 1.5) = 18 % of the polygons, and a load that stays counts in full one frame later.
 pub const SURPRISE_MAX: f64 = 0.405_465_108_108_164_4;
 
-/// Nearer to the wanted time than this, |ln(t/T)|, a time that no level improves is as good as settled.
+/// Nearer to the target time than this, |ln(t/T)|, a time that no level improves counts as settled.
 const NEAR: f64 = 0.05;
 
 /// The gain and the dead zone.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Gains {
-    /// κ, 0.01 … 1.99: the share of an error (of logarithms) that one lesson removes where all time is work that ε scales.
-    /// Below 1 the loop is stable in every scene, also where a measurement comes one frame late; from there on where the share s of work that ε
-    /// scales keeps κ s below 1 (control.md, eq. 8).
+    /// κ, 0.01 … 1.99: the share of an error (of logarithms) that one update removes if all time is work that ε scales. Below 1 the loop is
+    /// stable in every scene, also if a measurement comes one frame late; from 1 on only where the share s of work that ε scales keeps κ s
+    /// below 1 (control.md, eq. 8).
     pub kappa: f64,
-    /// λ, 0 … 1.99: the share of an error's change that a lesson adds: a PI law, with κ as its integral part. 0 is the law of eq. 7.
+    /// λ, 0 … 1.99: the share of an error's change that an update adds: a PI law, with κ as its integral part. 0 is the law of eq. 7.
     pub lead: f64,
     /// ln(T/t) above which a frame was early enough to refine; ≥ 0.
     pub early: f64,
@@ -32,8 +31,8 @@ pub struct Gains {
 }
 
 impl Default for Gains {
-    /// κ = ½, dead within 2 % to either side: settles from ε four times wrong within 20 frames
-    /// wherever a third of the wanted time is work that ε scales (control.md, table 1).
+    /// κ = ½, dead zone of 2 % to either side: settles from ε four times wrong within 20 frames if at least a third of the target time is
+    /// work that ε scales (control.md, table 1).
     fn default() -> Self {
         Self { kappa: 0.5, lead: 0.0, early: 0.02, late: 0.02 }
     }
@@ -47,14 +46,14 @@ impl Gains {
     }
 }
 
-/// What the law did with its last lesson.
+/// The outcome of the last update.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Rest {
-    /// It moved.
+    /// ε moved.
     Moving,
-    /// The time was as wanted, within the dead zone.
+    /// The time was on target, within the dead zone.
     Settled,
-    /// It wants to go past this end of its range and stays there.
+    /// The law would pass this end of its range and stays there.
     Clamped(Bound),
     /// There is time left, but not enough for the next finer level that the picture has.
     BetweenLevels,
@@ -66,9 +65,9 @@ pub struct LogLaw {
     gains: Gains,
     range: (f64, f64),
     value: f64,
-    /// The error before this one; `None` before the first, which is no surprise.
+    /// The error before this one; `None` before the first, which counts as confirmed.
     before: Option<f64>,
-    /// As much of it as was believed.
+    /// The error after clamping.
     believed: Option<f64>,
     rest: Rest,
 }
@@ -87,10 +86,10 @@ impl LogLaw {
         }
     }
 
-    /// Learns that work took `ratio` = t/T of the time it should (control.md, eq. 7), and says what came of it.
+    /// Updates the law: work took `ratio` = t/T of its target time (control.md, eq. 7). Gives the outcome.
     ///
-    /// `granted` is ln ε as the picture really had it, where levels are coarser than what was asked (control.md, eq. 12);
-    /// `None` where the picture follows exactly. A ratio that is not above zero and finite teaches nothing.
+    /// `granted` is ln ε of the picture actually shown, where levels are coarser than requested (control.md, eq. 12); `None` where the
+    /// picture follows exactly. A ratio that is not above zero and finite is ignored.
     pub fn observe(&mut self, ratio: f64, granted: Option<f64>) -> Rest {
         if !(ratio.is_finite() && ratio > 0.0) {
             return self.rest;
@@ -109,7 +108,7 @@ impl LogLaw {
         self.rest
     }
 
-    /// The error as far as it is believed (control.md, eq. 9).
+    /// The error after clamping: tighter if the one before does not confirm it (control.md, eq. 9).
     fn believed(&mut self, error: f64) -> f64 {
         let seen_before = self.before.is_none_or(|before| before * error > 0.0 && before.abs() > SURPRISE_MAX);
         self.before = Some(error);
@@ -125,7 +124,7 @@ impl LogLaw {
 
     fn refine(&mut self, error: f64, change: f64, granted: Option<f64>) -> Rest {
         let wish = self.value + self.gains.kappa * (error + self.gains.early) + change;
-        // were all of the time work that ε scales, finer than this would be late
+        // if all of the time were work that ε scales, anything finer than this would be late
         let soonest = granted.map_or(f64::NEG_INFINITY, |g| g + error - self.gains.late);
         self.value = within(wish.max(soonest), self.range);
         match (wish < self.range.0, wish < soonest) {
@@ -142,7 +141,7 @@ impl LogLaw {
         self.value
     }
 
-    /// What came of the last lesson.
+    /// The outcome of the last update.
     #[must_use]
     pub fn rest(&self) -> Rest {
         self.rest
@@ -154,18 +153,18 @@ impl LogLaw {
         self.range
     }
 
-    /// Takes another range (finest, coarsest; finite); the value moves inside it.
+    /// Sets another range (finest, coarsest; finite); the value moves inside it.
     pub fn set_range(&mut self, range: (f64, f64)) {
         self.range = range;
         self.value = within(self.value, range);
     }
 
-    /// Goes to `value`, or the end of the range nearest to it: a start, or a disturbance from outside.
+    /// Moves to `value`, or the end of the range nearest to it: a start, or a disturbance from outside.
     pub fn set_value(&mut self, value: f64) {
         self.value = within(value, self.range);
     }
 
-    /// Takes other gains from the next lesson on; the value stays. κ is brought inside 0.01 … 1.99.
+    /// Sets other gains from the next update on; the value stays. κ is clamped to 0.01 … 1.99.
     pub fn set_gains(&mut self, gains: Gains) {
         self.gains = gains.sound();
     }

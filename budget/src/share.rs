@@ -1,37 +1,37 @@
-//! One budget shared out by weight: everybody gets weight × level, inside their own least and most.
+//! One budget shared by weight: each party gets weight × level, inside its own least and most.
 //!
 //! In: a budget and [`Share`]s. Out: the water level μ at which the shares add up to the budget.
-//! Never here: what the budget is made of. Theory: `docs/theory/control.md`, eq. 14.
+//! Never here: the composition of the budget. Theory: `docs/theory/control.md`, eq. 14.
 
-/// What one party may get of a budget.
+/// The claim of one party on a budget.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Share {
-    /// What it gets for each unit of the level; finite, > 0.
+    /// Amount per unit of the level; finite, > 0.
     pub weight: f64,
-    /// What it gets at least; finite, ≥ 0.
+    /// Least amount; finite, ≥ 0.
     pub least: f64,
-    /// What it gets at most; finite, ≥ `least`.
+    /// Greatest amount; finite, ≥ `least`.
     pub most: f64,
 }
 
 impl Share {
-    /// What it gets at level `mu`: weight · μ inside its least and most.
+    /// Amount at level `mu`: weight · μ inside the least and the most.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
         crate::within(self.weight * mu, (self.least, self.most))
     }
 }
 
-/// The sum is met to this part of the budget: far below one polygon of any picture.
+/// Tolerance of the sum, relative to the budget: far below one polygon of any picture.
 const TOLERANCE: f64 = 1e-9;
 
-/// Halvings that take any bracket of doubles to its end.
+/// Halvings that exhaust any bracket of doubles.
 const ROUNDS_MAX: u32 = 200;
 
-/// The level μ ≥ 0 at which the shares add up to `budget`; the nearest that is possible where they cannot.
+/// The level μ ≥ 0 at which the shares add up to `budget`; the nearest possible level if they cannot.
 ///
-/// The sum is piecewise linear and rising in μ: Newton's method, exact on its last piece, inside a bracket that keeps it.
-/// `start` is a guess (the last frame's level): with a good one two or three passes over the shares suffice.
+/// The sum is piecewise linear and rising in μ: Newton's method, exact on its last piece, safeguarded by a bracket. `start` is a guess (the
+/// last frame's level): with a good one two or three passes over the shares suffice.
 #[must_use]
 pub fn water_level<I>(budget: f64, shares: I, start: f64) -> f64
 where
@@ -41,7 +41,7 @@ where
     let lo = shares.clone().map(|s| s.least / s.weight).fold(f64::INFINITY, f64::min);
     let hi = shares.clone().map(|s| s.most / s.weight).fold(0.0, f64::max);
     if lo > hi {
-        return 0.0; // nobody is there
+        return 0.0; // no shares
     }
     let (mut below, mut above) = (lo, hi);
     let mut mu = crate::within(start, (lo, hi));
@@ -66,7 +66,7 @@ where
     mu
 }
 
-/// The middle of a bracket: in proportion where it spans a factor, by difference where it starts at zero.
+/// The middle of a bracket: geometric if it spans a factor of more than 2, arithmetic otherwise or if it starts at zero.
 fn between(below: f64, above: f64) -> f64 {
     if below > 0.0 && above > 2.0 * below { libm::sqrt(below) * libm::sqrt(above) } else { 0.5 * (below + above) }
 }

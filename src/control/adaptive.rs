@@ -1,9 +1,9 @@
-//! The default: every frame's time goes where it gains most, by prices that are corrected while it runs.
+//! The default policy: spends every frame's time where it gains most, by prices that are corrected by measurements.
 //!
-//! In: ladders, groups, a time; what frames took. Out: a rung or an impostor for everything in view, and a promise with its
+//! In: ladders, groups, a time; measured frame times. Out: a rung or an impostor for everything in view, and a promise with its
 //! certificate.
-//! Never here: the law (`metachron_budget::adaptive` has it). Theory: `docs/theory/budget.md`, section 7; `docs/theory/control.md`,
-//! section 6.
+//! Never here: the law (`metachron_budget::adaptive` has it). Theory: `docs/theory/budget.md`, section 7; `docs/theory/control.md`, section
+//! 6.
 
 use super::ask::{Ask, Promise, TICKS, demand};
 use super::closing::Closing;
@@ -16,27 +16,27 @@ use metachron_budget::Bound;
 use metachron_budget::adaptive::{Adaptive, Offer, Plan, Settings, Time};
 use metachron_core::AgentId;
 
-/// A weight that moved by less than this, in proportion, is the weight it was: what trembles changes no level.
+/// A smaller relative change of a weight is ignored: weights fluctuate, and levels should not follow that.
 const TREMBLE: f64 = 0.05;
 
-/// The stage of `budget` that drawing is.
+/// The stage of `budget` used for drawing.
 const DRAWING: usize = 0;
 
-/// This near to what was promised, as a part of the target, a frame is as was wanted.
+/// A frame whose time is this near to the promise, as a fraction of the target, is on target.
 const ON_TARGET: f64 = 0.05;
 
-/// What of an object is on the menu.
+/// The entry of an object in the law.
 #[derive(Debug, Clone, Copy)]
 struct Dish {
     id: AgentId,
-    /// The ladder it was put there with, 0 while it is not on it; and how many of its rungs.
+    /// Version of the ladder last given to the law, 0 while the object is not there; and the number of its rungs.
     version: u64,
     rungs: usize,
-    /// What its gains were last multiplied by.
+    /// The weight last given to the law.
     weight: Option<f64>,
 }
 
-/// A choice that is drawn.
+/// The choice that is being drawn.
 #[derive(Debug, Clone, Copy, Default)]
 struct Drawn {
     frame: u64,
@@ -44,19 +44,19 @@ struct Drawn {
     fixed_s: f64,
 }
 
-/// The law, and what is on its menu.
+/// The law and the objects given to it.
 #[derive(Debug, Clone)]
 pub(super) struct AdaptiveChoice {
     law: Adaptive,
-    /// In the order in which objects are given.
+    /// In the order in which the objects are given.
     dishes: Vec<Dish>,
     closing: Closing,
     offers: Vec<Offer>,
     fixed_s: f64,
-    /// Number of the frame chosen for last, as the law counts them.
+    /// Number of the last frame chosen for, as the law counts them.
     frame: u64,
     plan: Plan,
-    /// What the frame that is drawn was chosen with.
+    /// The plan of the frame that is being drawn.
     drawn: Drawn,
     status: Status,
     kept: Settings,
@@ -81,7 +81,7 @@ impl Default for AdaptiveChoice {
 }
 
 impl AdaptiveChoice {
-    /// Chooses; `levels` has one entry an object.
+    /// Chooses; `levels` has one entry per object.
     pub fn choose(&mut self, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         self.set_margin(ask);
         self.closing.decide(ask, groups, (self.plan.lambda, self.kappa()));
@@ -95,12 +95,13 @@ impl AdaptiveChoice {
         self.promise()
     }
 
-    /// What was chosen last is drawn now.
+    /// Marks the last choice as the one being drawn.
     pub fn take_up(&mut self) {
         self.drawn = Drawn { frame: self.frame, plan: self.plan, fixed_s: self.fixed_s };
     }
 
-    /// Learns what the frame that is drawn took: the drawing of what was chosen, and all of it, and what was kept for others; seconds.
+    /// Reports times of the frame that was drawn, seconds: `drawn_s` for drawing the choice, `work_s` in all, `others_s` reserved for
+    /// others.
     pub fn observe(&mut self, drawn_s: f64, (work_s, others_s): (f64, f64), target_s: f64) {
         let Drawn { frame, plan, fixed_s } = self.drawn;
         self.law.observe(frame, DRAWING, TICKS * drawn_s);
@@ -116,7 +117,7 @@ impl AdaptiveChoice {
         };
     }
 
-    /// Something outside made frames unlike others: the next few teach nothing.
+    /// Reports an outside disturbance: measurements of the next few frames are ignored.
     pub fn disturb(&mut self) {
         self.law.disturb();
     }
@@ -130,12 +131,12 @@ impl AdaptiveChoice {
         self.law.planned_kappa(DRAWING)
     }
 
-    /// What one more second is worth, as the gains of what is on the menu are; 0 where everything is at its most.
+    /// Gain of one more second, in the unit of the objects' gains; 0 where everything is at its finest.
     pub fn lambda(&self) -> f64 {
         TICKS * self.plan.lambda
     }
 
-    /// The part of the target that is left free now.
+    /// The fraction of the target that is left free now.
     pub fn margin(&self) -> f64 {
         self.law.margin()
     }
@@ -149,7 +150,7 @@ impl AdaptiveChoice {
         }
     }
 
-    /// Puts on the menu what is in view, and takes off what is not.
+    /// Gives the objects in view to the law, and removes the others.
     fn lay(&mut self, ask: &Ask<'_>, groups: &Groups) {
         let same = self.dishes.len() == ask.views.len();
         if !same || self.dishes.iter().zip(ask.views).any(|(dish, (view, _))| dish.id != view.id) {
@@ -177,7 +178,7 @@ impl AdaptiveChoice {
         }
     }
 
-    /// Offers the first of a ladder's rungs, or all.
+    /// Offers the given rungs of a ladder: of a group, only its useful impostors.
     fn put_on(&mut self, at: usize, (ladder, rungs): (&Ladder, &[Rung]), weight: f64) {
         let dish = &mut self.dishes[at];
         let id = u64::from(dish.id.0);
@@ -201,7 +202,7 @@ impl AdaptiveChoice {
         }
     }
 
-    /// Takes everything off the menu: prices are others, or objects have come or gone.
+    /// Removes everything from the law: prices have changed, or objects have come or gone.
     pub fn clear(&mut self) {
         (0..self.dishes.len()).for_each(|at| self.take_off(at));
         self.dishes.clear();

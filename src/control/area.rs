@@ -1,32 +1,32 @@
-//! What a triangle costs by the area that it covers (RH05, §4.1): no law is assumed, times between the measured areas lie on lines.
+//! Cost of a triangle by the area that it covers (RH05, §4.1): no model is assumed, times between the measured areas are interpolated.
 //!
 //! In: measured objects. Out: seconds of an object. Never here: a measurement, a shading. Theory: `docs/theory/budget.md`, eq. 44.
 
 use metachron_budget::cost::curve::{Curve, between};
 
-/// The areas at which a triangle is priced, pixels: regular steps, on a scale of factors because they span four orders.
+/// The areas at which a triangle is priced, pixels: geometric steps, because they span four decades.
 pub const AREAS_PX: [f64; 7] = [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0];
 
-/// What objects of one shading cost.
+/// Prices of objects of one shading.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Areas {
-    /// An object, however small, seconds, ≥ 0.
+    /// Fixed cost of an object, seconds, ≥ 0.
     pub setup: f64,
-    /// A triangle that covers as many pixels as [`AREAS_PX`] says, seconds, ≥ 0 and never falling.
+    /// Cost of a triangle that covers as many pixels as [`AREAS_PX`] says, seconds, ≥ 0 and never falling.
     pub polygon: [f64; AREAS_PX.len()],
 }
 
-/// Measured objects are priced at the step that is this near, as a factor.
+/// A measured object is used for the step that its mean area is this near to, as a factor.
 const NEAR: f64 = 1.25;
 
 impl Areas {
-    /// Whether all prices are numbers that are not negative.
+    /// Whether all prices are finite and not negative.
     #[must_use]
     pub fn is_sound(&self) -> bool {
         [self.setup].iter().chain(&self.polygon).all(|price| price.is_finite() && *price >= 0.0)
     }
 
-    /// Seconds of an object of so many triangles that cover so many pixels together: setup + n · price(A/n).
+    /// Seconds of an object of `polygons` triangles that cover `pixels` together: setup + n · price(A/n).
     #[must_use]
     pub fn time(&self, polygons: f64, pixels: f64) -> f64 {
         let points: [(f64, f64); AREAS_PX.len()] = std::array::from_fn(|k| (AREAS_PX[k], self.polygon[k]));
@@ -34,8 +34,8 @@ impl Areas {
         self.setup + polygons * price
     }
 
-    /// The prices that objects (triangles, pixels, seconds) were measured to have; `None` where the least and the greatest area are
-    /// missing, or where no area was measured with two numbers of triangles, which tell the setup.
+    /// Prices from measured objects (triangles, pixels, seconds); `None` if the least or the greatest area is missing, or if no area was
+    /// measured with two numbers of triangles, which determine the setup.
     #[must_use]
     pub fn fitted(objects: &[(f64, f64, f64)]) -> Option<Self> {
         let step = |&(n, pixels, _): &(f64, f64, f64)| {
@@ -51,7 +51,7 @@ impl Areas {
     }
 }
 
-/// What an object without triangles would take: the median over pairs of one area (SEN68).
+/// Time of an object without triangles: the median over pairs of equal area (SEN68).
 fn setup(steps: &[(usize, (f64, f64, f64))]) -> Option<f64> {
     let mut found = Vec::new();
     for (i, (at, (n, _, t))) in steps.iter().enumerate() {
@@ -67,12 +67,12 @@ fn setup(steps: &[(usize, (f64, f64, f64))]) -> Option<f64> {
 mod tests {
     use super::*;
 
-    /// A machine on which geometry and pixels follow each other, with a price of edges between: no max of two lines.
+    /// A machine on which geometry and pixels run one after the other, with a cost of edges between: not a max of two lines.
     fn machine(n: f64, pixels: f64) -> f64 {
         2e-6 + n * (0.15e-6 + 4e-9 * (pixels / n).sqrt()) + 3e-9 * pixels
     }
 
-    /// Objects of several numbers of triangles at every area, which tremble by 3 %.
+    /// Objects of several numbers of triangles at every area, with noise of 3 %.
     fn objects() -> Vec<(f64, f64, f64)> {
         let pairs = AREAS_PX.into_iter().flat_map(|area| [12.0, 48.0, 192.0].map(|n| (n, n * area)));
         let tremble = |k: usize| 1.0 + 0.03 * ((k * 7919 % 13) as f64 / 6.0 - 1.0);

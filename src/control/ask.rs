@@ -1,4 +1,4 @@
-//! What every policy that looks at costs is asked, and what it promises.
+//! The input of every cost-based policy, and the promise that it gives.
 //!
 //! In: the objects with their ladders, the time. Out: [`Ask`] and [`Promise`]. Never here: a choice.
 
@@ -14,44 +14,44 @@ use metachron_core::Resolution;
 /// Ticks of a second: costs are whole nanoseconds.
 pub(super) const TICKS: f64 = 1e9;
 
-/// Benefit is told in parts of a pixel, so that the whole numbers of a knapsack tell fine levels apart.
+/// Benefit is given in parts of a pixel, so that the integers of a knapsack resolve fine levels.
 const PARTS_OF_A_PIXEL: f64 = 4096.0;
 
-/// A level that costs no number is taken to cost twice this, ticks: a small object on a slow machine.
+/// A level whose cost is invalid is assumed to cost twice this, ticks: a small object on a slow machine.
 const USUAL: f64 = 1e5;
 
-/// What a policy is asked for one frame.
+/// The input of a policy for one frame.
 #[derive(Clone, Copy)]
 pub(super) struct Ask<'a> {
     pub views: &'a [Seen],
     pub ladders: &'a Ladders,
     pub sliders: &'a Sliders,
-    /// What an object is worth to Robin Hood.
+    /// The value formula of Robin Hood.
     pub value: Value,
-    /// What a frame may take, seconds, > 0.
+    /// Target time of a frame, seconds, > 0.
     pub target_s: f64,
-    /// What choosing may take, seconds, where somebody says so.
+    /// Time limit for choosing, seconds, if one is set.
     pub choose_s: Option<f64>,
-    /// The part of it that is left free at least, 0 … 0.9.
+    /// The fraction of the target that is left free at least, 0 … 0.9.
     pub margin: f64,
-    /// What is taken whatever is chosen, seconds, ≥ 0.
+    /// Time that is spent whatever is chosen, seconds, ≥ 0.
     pub fixed_s: f64,
 }
 
-/// What a choice promises.
+/// The prediction of a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Promise {
-    /// Time for what is chosen, seconds; below 0 where other things take the whole frame.
+    /// Time for the choice, seconds; below 0 where other work takes the whole frame.
     pub budget_s: f64,
-    /// What the frame is to take in all, seconds; 0 where the policy predicts nothing.
+    /// Predicted time of the whole frame, seconds; 0 where the policy predicts nothing.
     pub predicted_s: f64,
-    /// What the choice is worth, in a unit of its own.
+    /// Value of the choice, in the policy's own unit.
     pub value: f64,
-    /// The certificate: no choice within the budget is worth more; 0 where the policy gives none.
+    /// The certificate: no choice within the budget has a greater value; 0 where the policy gives none.
     pub upper: f64,
     /// Whether the cheapest choice fits the budget.
     pub feasible: bool,
-    /// Objects in view that are left out for want of time.
+    /// Objects in view that are left out for lack of time.
     pub holes: u32,
 }
 
@@ -64,7 +64,7 @@ impl Promise {
 }
 
 impl Ask<'_> {
-    /// Time for what is chosen, seconds.
+    /// Time for the choice, seconds.
     pub fn budget_s(&self) -> f64 {
         self.target_s * (1.0 - self.margin) - self.fixed_s
     }
@@ -75,13 +75,13 @@ impl Ask<'_> {
         libm::floor(self.budget_s() * TICKS) as i64
     }
 
-    /// Numbers of the objects in view that are drawn as themselves.
+    /// Numbers of the objects in view that are drawn as themselves, not as groups.
     pub fn drawable(&self) -> impl Iterator<Item = usize> + '_ {
         let itself = |at: &usize| !self.views[*at].0.is_group() && !self.ladders.of(*at).rungs.is_empty();
         (0..self.views.len()).filter(|at| self.views[*at].0.visible).filter(itself)
     }
 
-    /// What an object in view is worth at an accuracy of 1.
+    /// Benefit of an object in view at an accuracy of 1.
     pub fn weight(&self, at: usize) -> f64 {
         worth::weight(&self.views[at].0, self.sliders, self.ladders.of(at).polygon_px())
     }
@@ -97,7 +97,7 @@ pub(super) fn demand(at: usize, views: &[Seen], rung: &Rung) -> LevelDemand {
     LevelDemand { id: views[at].0.id, resolution: rung.resolution, polygons: rung.polygons, shading: rung.shading }
 }
 
-/// What an object has that is left out of the picture: its coarsest, without triangles.
+/// The demand of an object that is left out of the picture: its coarsest resolution, no triangles.
 pub(super) fn left_out(at: usize, views: &[Seen], ladder: &Ladder) -> LevelDemand {
     let view = &views[at].0;
     let usual = Resolution { eps_m: view.range.eps_m.1, n: view.range.n.0 };

@@ -1,11 +1,11 @@
-//! How often levels change, and change back: what the eye sees of a policy's unrest.
+//! How often levels change, and change back: a measure of visible flicker.
 //!
 //! In: the levels of every frame. Out: counts. Never here: a choice.
 
 use super::plan::{LevelDemand, Seen};
 use metachron_core::AgentId;
 
-/// So many frames back a level that returns is a reversal.
+/// A level that returns within this many frames is a reversal.
 const REMEMBERED: usize = 3;
 
 /// The last levels of one object, newest first.
@@ -22,7 +22,7 @@ pub(super) struct Changes {
 }
 
 impl Changes {
-    /// Takes the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
+    /// Stores the levels of a frame; gives how many objects in view changed, and how many of these went back (A, B, A).
     pub fn count(&mut self, views: &[Seen], levels: &[LevelDemand]) -> (u32, u32) {
         let unknown = Past { id: AgentId(0), levels: [None; REMEMBERED] };
         self.past.resize(views.len(), unknown);

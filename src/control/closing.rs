@@ -1,27 +1,27 @@
-//! Which groups the default draws by an impostor: those whose members are worth less than their time at its price.
+//! The groups that the default policy draws by an impostor: those whose members gain less than their time costs at the present price.
 //!
-//! In: groups, λ and κ of the last plan. Out: which are closed. Never here: by which impostor, or levels of members.
+//! In: groups, λ and κ of the last plan. Out: which groups are closed. Never here: the choice of the impostor, or levels of members.
 //! Theory: `docs/theory/control.md`, eq. 24.
 //!
-//! At a price λ of a second every part of a tree can be decided by itself: it is closed where the best of its impostors leaves more of its
-//! worth after its cost is paid than the best of its members do. Where even the least of what is open does not fit, those are closed that
-//! lose least. A group that was opened too soon waits longer the next time.
+//! At a price λ of a second every part of a tree can be decided by itself: a group is closed if the best of its impostors leaves more net
+//! benefit (benefit minus cost at λ) than its members at their best. If even the least of all open groups does not fit, those are closed
+//! that lose least. A group that was opened too soon waits longer the next time.
 
 use super::ask::{Ask, TICKS};
 use super::groups::{Groups, Impostors};
 use super::ladder::Rung;
 
-/// A group changes where that gains this part of what its members cost at least: the price trembles.
+/// A group changes if that gains at least this fraction of its members' least cost: the price fluctuates.
 const WORTH_IT: f64 = 0.1;
 
-/// The share of a new price in the one that groups go by, about ten frames of memory: one group changes the price of all others, and by
-/// the price of one frame they would all change at once.
+/// Share of a new price in the smoothed one that groups use, about ten frames of memory. One group changes the price of all others, so with
+/// the price of a single frame all would change simultaneously.
 const PRICE_NEWS: f64 = 0.1;
 
-/// Frames that a closed group waits at first and at most before it may open again.
+/// Frames that a closed group waits before it may open again: initial and greatest.
 const PATIENCE: (u32, u32) = (8, 512);
 
-/// One group.
+/// The open or closed state of one group.
 #[derive(Debug, Clone, Copy)]
 struct Door {
     closed: bool,
@@ -30,12 +30,12 @@ struct Door {
     patience: u32,
 }
 
-/// What an object, or all of a group, comes to.
+/// Totals of an object, or of all of a group.
 #[derive(Debug, Clone, Copy, Default)]
 struct Sum {
-    /// Worth that is left after the price is paid, each part at its best.
+    /// Benefit minus cost at the present price, each part at its best.
     net: f64,
-    /// What it costs at least, ticks by the prices.
+    /// Least cost, ticks by the prices.
     least: f64,
 }
 
@@ -50,7 +50,7 @@ pub(super) struct Closing {
 }
 
 impl Closing {
-    /// Decides at `lambda` (gain of a tick) and `kappa` (ticks for one by the prices).
+    /// Decides at `lambda` (gain of a tick) and `kappa` (measured ticks per tick by the prices).
     pub fn decide(&mut self, ask: &Ask<'_>, groups: &Groups, (lambda, kappa): (f64, f64)) {
         self.doors.resize(ask.views.len(), None);
         if groups.all().is_empty() {
@@ -72,7 +72,7 @@ impl Closing {
             let taken = match closed {
                 Some(closed) => door.pass((open, closed), WORTH_IT * price * open.least, &mut spare),
                 None => {
-                    // its members cost less than any impostor
+                    // the members cost less than any impostor
                     if door.closed {
                         door.open();
                     }
@@ -109,19 +109,19 @@ impl Closing {
         }
     }
 
-    /// Ticks by the prices that are left when everything costs its least as the doors are; below 0 where that does not fit.
+    /// Ticks by the prices left over when everything open or closed has its least cost; below 0 if that does not fit.
     fn spare(&self, ask: &Ask<'_>, groups: &Groups, kappa: f64) -> f64 {
         TICKS * ask.budget_s() / kappa - self.least(ask, groups)
     }
 
-    /// A group drawn by the impostor that is best at this price; `None` where its members in their lowest forms are cheaper than any.
+    /// A group drawn by the best impostor at this price; `None` if its members in their lowest forms are cheaper than any.
     fn closed(&self, ask: &Ask<'_>, group: usize, price: f64) -> Option<Sum> {
         let (rungs, worth) = (self.impostors.rungs(ask, group), self.impostors.worth(group));
         let nets = rungs.iter().map(|rung| worth * rung.accuracy - price * (TICKS * rung.cost_s));
         Some(Sum { net: nets.fold(f64::NEG_INFINITY, f64::max), least: TICKS * rungs.first()?.cost_s })
     }
 
-    /// What is drawn by itself, summed into its group.
+    /// Sums objects that are drawn as themselves into their groups.
     fn sum_leaves(&mut self, ask: &Ask<'_>, groups: &Groups, price: f64) {
         self.sums.clear();
         self.sums.resize(ask.views.len(), Sum::default());
@@ -136,7 +136,7 @@ impl Closing {
         }
     }
 
-    /// What everything costs at least as the doors are, ticks.
+    /// Least cost of everything at the present open and closed groups, ticks.
     fn least(&self, ask: &Ask<'_>, groups: &Groups) -> f64 {
         let cost = |at: usize| {
             let hidden = groups.parent(at).is_some() && groups.is_within(at, |group| self.is_closed(group));
@@ -155,7 +155,7 @@ impl Closing {
         self.doors.get(at).copied().flatten().is_some_and(|door| door.closed)
     }
 
-    /// What a closed group can be drawn by, and what the finest that it has is worth; its coarsest where nothing of it is in view.
+    /// The impostors that a closed group can be drawn by, and the benefit of its finest; only its coarsest if nothing of it is in view.
     pub fn impostors<'a>(&self, ask: &Ask<'a>, group: usize) -> (&'a [Rung], f64) {
         let (rungs, ladder) = (self.impostors.rungs(ask, group), ask.ladders.of(group));
         let drawn = if rungs.is_empty() { &ladder.rungs[..ladder.rungs.len().min(1)] } else { rungs };
@@ -171,7 +171,7 @@ impl Sum {
 }
 
 impl Door {
-    /// Closes or opens where that gains more than `bar` and `spare` ticks allow it; gives what the group then comes to.
+    /// Closes or opens the group if that gains more than `bar` and `spare` ticks allow it; gives the resulting totals.
     fn pass(&mut self, (open, closed): (Sum, Sum), bar: f64, spare: &mut f64) -> Sum {
         let more = open.least - closed.least;
         if !self.closed && closed.net > open.net + bar {
@@ -185,7 +185,7 @@ impl Door {
     }
 
     fn close(&mut self) {
-        // it was opened too soon
+        // a short time since the last change means that it was opened too soon
         let soon = self.still < 4 * self.patience;
         self.patience = if soon { (2 * self.patience).min(PATIENCE.1) } else { PATIENCE.0 };
         (self.closed, self.still) = (true, 0);

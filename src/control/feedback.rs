@@ -1,8 +1,8 @@
 //! Feedback: one loop variable for the scene, a pair (ε, n) for every object in view (GDC04).
 //!
-//! In: what is in view, then what the frame took. Out: demands. Never here: prices, the other policies.
-//! The corrected law steers the polygons of the whole scene through ln ε̂, and the objects share them by what they cover, how far
-//! they are and how fast they move; the printed law steers ε̂ and n of all tubes alike.
+//! In: the objects in view, then the time of the frame. Out: demands. Never here: prices, the other policies. The corrected law controls
+//! the polygons of the whole scene through ln ε̂, and the objects share them by covered area, distance and speed; the printed law controls
+//! ε̂ and n of all tubes alike.
 //! Theory: `docs/theory/control.md`, eq. 1, 7, 13 and 14.
 
 use super::level::{self, Held};
@@ -18,26 +18,26 @@ use metachron_core::{AgentId, N_MAX, Resolution};
 /// Intervals of a tube at ε̂ = 1: ε̂ = 40 ε/L.
 const INTERVALS_AT_ONE: f64 = 40.0;
 
-/// Polygons of one tube at ε̂ = 1 and n = 0: by it the polygons of a scene are told as ε̂ (control.md, eq. 13).
+/// Polygons of one tube at ε̂ = 1 and n = 0: converts the polygons of a scene to ε̂ (control.md, eq. 13).
 pub(super) const POLYGONS_AT_ONE: f64 = 12.0 * INTERVALS_AT_ONE;
 
-/// Where ε̂ and n of the printed law move while no tube is in view and n alone counts.
+/// Limits of ε̂ and n of the printed law while no tube is in view and n alone counts.
 const LIMITS_WITHOUT_TUBES: Limits = Limits { eps: (0.005, 1.0), n: (0, N_MAX) };
 
-/// The laws, and what they remember.
+/// The laws and their state.
 #[derive(Debug, Clone)]
 pub(super) struct Feedback {
     law: Law,
     corrected: LogLaw,
     pub(super) printed: GrisoniLaw,
     status: Status,
-    /// Whether the loop variable has a value: from the first plan with something to choose on.
+    /// Whether the loop variable has a value: from the first plan in which there is something to choose.
     started: bool,
-    /// ln of what [`Feedback::coarsen`] asked for before that.
+    /// ln of the factor that [`Feedback::coarsen`] requested before that.
     pushed: f64,
-    /// The level of the last sharing: a guess for the next.
+    /// The water level of the last sharing: the starting guess for the next.
     water: f64,
-    /// What each object was drawn with, in the order in which they are given.
+    /// The last cut of each object, in the order in which they are given.
     held: Vec<(AgentId, Held)>,
 }
 
@@ -56,7 +56,7 @@ impl Feedback {
         }
     }
 
-    /// Learns what a frame of so many polygons took, seconds, > 0.
+    /// Updates the law: a frame of `polygons` polygons took `work_s` seconds, > 0.
     pub fn observe(&mut self, work_s: f64, target_hz: f64, polygons: f64) {
         if !self.started {
             return;
@@ -97,9 +97,9 @@ impl Feedback {
         }
     }
 
-    /// The polygons that ln ε̂ stands for, shared out (control.md, eq. 13 and 14).
+    /// Shares the polygons that ln ε̂ represents among the objects (control.md, eq. 13 and 14).
     ///
-    /// Bodies, whose levels are few and far apart, choose first; tubes, which follow exactly, share what is then left.
+    /// Bodies, whose levels are few and far apart, choose first; tubes, which follow exactly, share the rest.
     fn plan_corrected(&mut self, views: &[Seen], levels: &mut Vec<LevelDemand>) {
         self.bound_corrected(views);
         let budget = POLYGONS_AT_ONE * libm::exp(-self.corrected.value());
@@ -114,7 +114,7 @@ impl Feedback {
         self.choose((views, levels), water, is_tube);
     }
 
-    /// Chooses the level of those in view that are `of` the kind, by their shares at `water`.
+    /// Chooses the level of the objects in view that are `of` the kind, by their shares at `water`.
     fn choose(&mut self, (views, levels): (&[Seen], &mut [LevelDemand]), water: f64, of: impl Fn(&ObjectView) -> bool) {
         let all = views.iter().zip(levels).zip(&mut self.held);
         for ((seen, level), (_, held)) in all.filter(|(((view, _), _), _)| view.visible && of(view)) {
@@ -122,16 +122,16 @@ impl Feedback {
         }
     }
 
-    /// Keeps ln ε̂ between all finest and all coarsest of what is in view now.
+    /// Keeps ln ε̂ between all objects in view at their finest and all at their coarsest.
     fn bound_corrected(&mut self, views: &[Seen]) {
         let (least, most) = in_view(views).fold((0.0, 0.0), |(l, m), (_, span)| (l + span.least, m + span.most));
         if least <= 0.0 {
-            return; // nothing is in view: wait with what is known
+            return; // nothing is in view: keep the present state
         }
         let range = (libm::log(POLYGONS_AT_ONE / most), libm::log(POLYGONS_AT_ONE / least));
         self.corrected.set_range(range);
         if !self.started && steers(views) {
-            // whatever `coarsen` asked for before there was anything to see
+            // includes the requests to `coarsen` before anything was in view
             self.corrected.set_value(0.5 * (range.0 + range.1) + self.pushed);
             self.started = true;
         }
@@ -180,7 +180,7 @@ impl Feedback {
         self.printed.set_gains(law.printed_gains());
     }
 
-    /// Puts both laws where the last plan is.
+    /// Sets both laws to the state of the last plan.
     pub fn take_over(&mut self, views: &[Seen], levels: &[LevelDemand], polygons: f64) {
         self.status = Status::Waiting;
         if polygons <= 0.0 {
@@ -205,7 +205,7 @@ impl Feedback {
         self.pushed += if self.started { 0.0 } else { libm::log(factor) };
     }
 
-    /// Puts the corrected law at `share` of the way from its finest to its coarsest ln ε̂; without effect before it has a range.
+    /// Sets ln ε̂ of the corrected law to the fraction `share` from its finest to its coarsest; without effect before it has a range.
     pub fn seek(&mut self, share: f64) {
         let (finest, coarsest) = self.corrected.range();
         if share.is_finite() && self.started {
@@ -217,7 +217,7 @@ impl Feedback {
         self.status
     }
 
-    /// The loop variable ε̂: as printed, or of the corrected law (480 over the scene's polygons).
+    /// The loop variable ε̂: of the printed law, or of the corrected law (480 over the scene's polygons).
     pub fn eps_hat(&self) -> f64 {
         match self.law {
             Law::Corrected { .. } => libm::exp(self.corrected.value()),
@@ -245,18 +245,18 @@ fn is_tube(view: &ObjectView) -> bool {
     matches!(view.kind, Kind::Tube { .. })
 }
 
-/// What an object in view may get of the polygons (control.md, eq. 14).
+/// The claim of an object in view on the polygons (control.md, eq. 14).
 fn share((view, span): &Seen) -> Share {
     Share { weight: 2.0 * view.surface_m2() / view.coarseness_m2(), least: span.least, most: span.most }
 }
 
-/// What is drawn of an object out of sight: its coarsest, for its shadow.
+/// The demand of an object out of view: its coarsest, for its shadow.
 pub(super) fn unseen(view: &ObjectView) -> LevelDemand {
     let resolution = coarsest(view);
     LevelDemand { id: view.id, resolution, polygons: level::polygons(view, resolution), shading: view.shading.1 }
 }
 
-/// Groups are opened by this law, always: their members make room for each other.
+/// The coarsest resolution. This law always draws the members of groups, which share the polygons among themselves.
 fn coarsest(view: &ObjectView) -> Resolution {
     let n = if view.is_group() { level::open(view) } else { view.range.n.0 };
     Resolution { eps_m: view.range.eps_m.1, n }
@@ -266,7 +266,7 @@ fn weight(view: &ObjectView, mean: f64) -> f64 {
     view.coarseness_m2() / mean
 }
 
-/// ε̂ of a tube for each metre of its ε; `None` for a primitive.
+/// ε̂ of a tube per metre of its ε; `None` for other kinds.
 fn eps_hat(view: &ObjectView, mean: f64) -> Option<f64> {
     let Kind::Tube { length_m, .. } = view.kind else { return None };
     Some(INTERVALS_AT_ONE / (length_m * weight(view, mean)))

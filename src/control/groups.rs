@@ -1,6 +1,6 @@
-//! Which objects belong to which group, and which impostors of a group are to be had and what they are worth.
+//! Membership of objects in groups, and the useful impostors of a group with their benefits.
 //!
-//! In: objects of which some are groups. Out: a forest, and [`Impostors`]. Never here: which group is opened.
+//! In: objects of which some are groups. Out: a forest, and [`Impostors`]. Never here: the choice of the groups to open.
 //! Theory: `docs/theory/budget.md`, section 4 (MB97, §3).
 
 use super::ask::Ask;
@@ -8,8 +8,8 @@ use super::ladder::Rung;
 use super::plan::Seen;
 use super::view::Kind;
 
-/// What a group's finest impostor is worth of what its members are worth in their lowest forms: less than any form of theirs, as (MB97,
-/// §3) assumes.
+/// Benefit of a group's finest impostor relative to its members in their lowest forms: less than any form of the members, as (MB97, §3)
+/// assumes.
 const IMPOSTOR_WORTH: f64 = 0.5;
 
 /// The groups among the objects, members before their groups.
@@ -17,12 +17,12 @@ const IMPOSTOR_WORTH: f64 = 0.5;
 pub(super) struct Groups {
     /// For each object the number of its group.
     parent: Vec<Option<usize>>,
-    /// Numbers of the groups, rising.
+    /// Numbers of the groups, ascending.
     groups: Vec<usize>,
 }
 
 impl Groups {
-    /// Reads the groups anew. An object belongs to the first group that names it; what stands after its group belongs to none.
+    /// Reads the groups anew. An object belongs to the first group that names it; an object given after its group belongs to none.
     pub fn update(&mut self, views: &[Seen]) {
         self.parent.clear();
         self.parent.resize(views.len(), None);
@@ -46,7 +46,7 @@ impl Groups {
         self.parent[at]
     }
 
-    /// Whether an object belongs to a group of which `closed` says yes, or to a group in such a group.
+    /// Whether `closed` holds for a group of the object at any level above it.
     pub fn is_within(&self, at: usize, closed: impl Fn(usize) -> bool) -> bool {
         self.above(at).any(closed)
     }
@@ -57,17 +57,17 @@ impl Groups {
     }
 }
 
-/// What the members of groups come to in their lowest forms, and so which impostors are to be had for less.
+/// Benefit and cost of the members of groups in their lowest forms, and so which impostors cost less.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Impostors {
-    /// Of a group what its finest impostor is worth, of others what they are worth in their lowest form; 0 of what is out of view.
+    /// For a group the benefit of its finest impostor, for others the benefit of their lowest form; 0 out of view.
     worth: Vec<f64>,
-    /// Of a group what its members cost in their lowest forms, of others what they do, seconds.
+    /// For a group the cost of its members in their lowest forms, for others their own lowest cost, seconds.
     least_s: Vec<f64>,
 }
 
 impl Impostors {
-    /// Looks at the members again: what is in view, and how large, is another in every frame.
+    /// Recomputes the sums: the objects in view and their sizes change in every frame.
     pub fn update(&mut self, ask: &Ask<'_>, groups: &Groups) {
         for sums in [&mut self.worth, &mut self.least_s] {
             sums.clear();
@@ -85,7 +85,7 @@ impl Impostors {
         }
     }
 
-    /// What an object is worth and costs in its lowest form: a group by its coarsest impostor, or its members where none is to be had.
+    /// Benefit and cost of an object in its lowest form: a group by its coarsest impostor, or its members if it has no cheaper impostor.
     fn lowest(&self, ask: &Ask<'_>, at: usize) -> (f64, f64) {
         if !ask.views[at].0.is_group() {
             return (self.worth[at], self.least_s[at]);
@@ -94,25 +94,25 @@ impl Impostors {
         coarsest.map_or((self.members_worth(at), self.least_s[at]), |it| (self.worth[at] * it.accuracy, it.cost_s))
     }
 
-    /// The impostors of a group that cost less than its members in their lowest forms: who pays for more has the members, which are worth
-    /// more. None of a group of which nothing is in view.
+    /// The impostors of a group that cost less than its members in their lowest forms: a more expensive one is pointless, since the members
+    /// have a greater benefit. Empty for a group out of view.
     pub fn rungs<'a>(&self, ask: &Ask<'a>, group: usize) -> &'a [Rung] {
         let rungs = &ask.ladders.of(group).rungs;
         let cheaper = rungs.iter().take_while(|rung| rung.cost_s < self.least_s[group]).count();
         if self.is_in_view(group) { &rungs[..cheaper] } else { &[] }
     }
 
-    /// What a group's finest impostor is worth.
+    /// Benefit of a group's finest impostor.
     pub fn worth(&self, group: usize) -> f64 {
         self.worth[group]
     }
 
-    /// What a group's members are worth in their lowest forms.
+    /// Benefit of a group's members in their lowest forms.
     pub fn members_worth(&self, group: usize) -> f64 {
         self.worth[group] / IMPOSTOR_WORTH
     }
 
-    /// Whether anything of a group is in view that is worth something.
+    /// Whether anything of a group is in view and has a benefit.
     pub fn is_in_view(&self, group: usize) -> bool {
         self.worth[group] > 0.0
     }

@@ -14,7 +14,7 @@ use metachron_budget::select::{Entry, Level, maciel, mason, mason_flat};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
-/// What these policies remember from frame to frame.
+/// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Hierarchy {
     /// The cut of the frame before.
@@ -22,7 +22,7 @@ pub(super) struct Hierarchy {
     impostors: Impostors,
 }
 
-/// The tree of a frame: below a root without a picture all groups in view, below them what is in view of their members.
+/// The tree of a frame: below a root without a picture all groups in view, below them their members in view.
 struct Forest {
     nodes: Vec<Node>,
     /// The object of every node; the root has none.
@@ -30,7 +30,7 @@ struct Forest {
 }
 
 impl Hierarchy {
-    /// Chooses by `policy`; `levels` has one entry an object.
+    /// Chooses by `policy`; `levels` has one entry per object.
     pub fn choose(&mut self, policy: Policy, ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         self.impostors.update(ask, groups);
         let forest = Forest::of(ask, groups, &self.impostors);
@@ -72,7 +72,7 @@ impl Forest {
     fn of(ask: &Ask<'_>, groups: &Groups, impostors: &Impostors) -> Self {
         let mut forest = Self { nodes: vec![Node { parent: None, impostors: Vec::new() }], objects: vec![None] };
         let mut place = vec![0; ask.views.len()];
-        // groups stand after their members, so backwards they come before them
+        // groups are given after their members, so in reverse order each group comes before its members
         for &group in groups.all().iter().rev().filter(|group| impostors.is_in_view(**group)) {
             let worth = impostors.worth(group);
             let entries = impostors.rungs(ask, group).iter().map(|rung| ask.entry(worth, rung)).collect();
@@ -93,7 +93,7 @@ impl Forest {
     }
 }
 
-/// Whatever belongs to a group that is drawn by an impostor is left out, in view or not.
+/// Leaves out all members of groups that are drawn by an impostor, in view or not.
 pub(super) fn leave_out_members(ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) {
     for at in 0..levels.len() {
         let closed = |group: usize| levels[group].polygons > 0.0;
@@ -129,7 +129,7 @@ mod tests {
     use metachron_budget::select::tree_exact::exact;
     use metachron_core::ResolutionRange;
 
-    /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a mesh by itself.
+    /// Two rows of four meshes, each row a group of two levels, both rows together a group of two more, and a separate mesh.
     fn rows() -> Vec<Seen> {
         let row =
             |first: usize| Kind::Group { radius_m: 1.0, members: (first, 4), impostors: [12, 48, 0, 0, 0, 0, 0, 0] };
@@ -150,7 +150,7 @@ mod tests {
         views.map(|view| (view, Span::of(&view))).collect()
     }
 
-    /// What a frame of so many seconds beyond nothing asks of everything in view.
+    /// The input of a frame with `budget_s` seconds, all available for the choice, with everything in view.
     fn ask<'a>(views: &'a [Seen], ladders: &'a Ladders, sliders: &'a Sliders, budget_s: f64) -> Ask<'a> {
         let value = Value::Plain;
         Ask { views, ladders, sliders, value, target_s: budget_s, choose_s: None, margin: 0.0, fixed_s: 0.0 }
@@ -181,7 +181,7 @@ mod tests {
                 assert_eq!(promise.feasible, best.feasible, "{policy:?} at {budget_s}");
                 let late = promise.predicted_s > budget_s * (1.0 + 1e-9);
                 assert!(!(best.feasible && late), "{policy:?} at {budget_s}: {promise:?}");
-                // entries are rounded down to whole numbers, the default's gains are not: a unit a node
+                // entries are rounded down to integers, the default's gains are not: allow one unit per node
                 let most = best.value as f64 + 12.0;
                 assert!(
                     promise.value <= most || !best.feasible,
@@ -196,13 +196,13 @@ mod tests {
                 outer += usize::from(levels[10].polygons == 16.0);
             }
         }
-        // none of them promises a part of the best (budget.md, section 4); the default decides groups in groups by one price, and a group
+        // none of them guarantees a part of the optimum (budget.md, section 4); the default decides nested groups by one price, and a group
         // that would take most of the time has none
         assert!(least[0] > 0.8 && least[1] > 0.6 && least[2] > 0.5, "{least:?}");
         assert!(inner > 0 && outer > 0, "finer impostors are drawn: {inner} {outer}");
     }
 
-    /// The default after sixty frames; its value in the unit of the others.
+    /// The default policy after sixty frames; its value in the unit of the others.
     fn settled(ask: &Ask<'_>, groups: &Groups, levels: &mut [LevelDemand]) -> Promise {
         let (mut choice, mut promise) = (AdaptiveChoice::default(), Promise::default());
         let usual = levels.to_vec();
@@ -215,7 +215,7 @@ mod tests {
         Promise { value: 4096.0 * promise.value, ..promise }
     }
 
-    /// By how many pictures each mesh is drawn: its own, its row's, that of both rows.
+    /// The number of pictures that show each mesh: its own, its row's, that of both rows.
     fn covered(views: &[Seen], levels: &[LevelDemand]) -> Vec<usize> {
         let of = |at: usize| {
             let holds = |group: &usize| match views[*group].0.kind {

@@ -1,7 +1,7 @@
-//! The levels that an object can be drawn at, as rungs with a cost and an accuracy: what selections choose among.
+//! The levels that an object can be drawn at, as rungs with a cost and an accuracy: the options of a selection.
 //!
-//! In: what objects are, prices. Out: a [`Ladder`] an object, made anew only where something it depends on has changed.
-//! Never here: a choice, or what an object is worth now ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
+//! In: descriptions of objects, prices. Out: a [`Ladder`] per object, recomputed only if something it depends on has changed. Never here: a
+//! choice, or the present benefit of an object ([`super::worth`]). Theory: `docs/theory/control.md`, eq. 23.
 
 use super::level::{Held, Span, open, polygons};
 use super::plan::Seen;
@@ -12,16 +12,16 @@ use metachron_budget::cost::benefit::Sliders;
 use metachron_budget::hysteresis;
 use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange};
 
-/// Rungs of all objects together, an octave of polygons each: one object may have fine steps, of hundreds each has coarse ones.
+/// Total rungs per octave of polygons, divided by the number of objects: a single object may have fine steps, hundreds get coarse ones.
 const STEPS: usize = 256;
 
-/// Fewest and most rungs an octave: past the most, a step is below a twentieth of an object.
+/// Fewest and most rungs per octave: past the most, a step is below a twentieth of an object.
 const STEPS_AN_OCTAVE: (usize, usize) = (2, 16);
 
-/// What each step beyond what an object asks for adds to its accuracy.
+/// Accuracy added by each step beyond the object's requested range.
 const RAISED: f64 = 1e-12;
 
-/// Lengths and radii that differ by less than this factor make the same ladder: a tube that breathes keeps its own.
+/// Lengths and radii that differ by less than this factor give the same ladder: a tube that stretches slightly keeps its own.
 const SAME: f64 = 1.1;
 
 /// One level of an object.
@@ -32,32 +32,32 @@ pub(super) struct Rung {
     pub shading: Shading,
     /// Seconds by the prices.
     pub cost_s: f64,
-    /// Part of the object's pixels that it draws right, 0 … 1; of a group's impostor, of what the finest of them draws right.
+    /// Fraction of the object's pixels drawn correctly, 0 … 1; for an impostor, relative to the finest impostor.
     pub accuracy: f64,
 }
 
-/// What the rungs depend on.
+/// The inputs that the rungs depend on.
 #[derive(Debug, Clone, Copy)]
 struct Key {
     id: AgentId,
     kind: Kind,
     range: ResolutionRange,
     shading: (Shading, Shading),
-    /// Pixels that it covers, in half octaves.
+    /// Pixels covered, in half octaves.
     size: u8,
     steps: usize,
-    /// Whether it may be drawn better than it asks for.
+    /// Whether the object may be drawn better than its requested range.
     raise: bool,
 }
 
-/// The levels of one object, cheapest first; of a group its impostors.
+/// The levels of one object, cheapest first; for a group its impostors.
 #[derive(Debug, Clone)]
 pub(super) struct Ladder {
     key: Key,
-    /// Another number whenever the rungs are others.
+    /// Changes whenever the rungs change.
     pub version: u64,
     pub rungs: Vec<Rung>,
-    /// How many of the rungs it asks for itself; those after them raise its quality further.
+    /// Number of rungs inside the object's requested range; the rungs after them raise its quality further.
     pub asked: usize,
 }
 
@@ -66,13 +66,13 @@ pub(super) struct Ladder {
 pub(super) struct Ladders {
     all: Vec<Ladder>,
     made: u64,
-    /// The unlike ones of those that were made for this frame: after a turn of the camera hundreds of objects need a new one at once,
-    /// and copies of one object that are as large need the same.
+    /// Distinct ladders made for this frame: after a turn of the camera hundreds of objects need a new one simultaneously, and copies of
+    /// one object at one size share it.
     new: Vec<usize>,
 }
 
 impl Ladders {
-    /// Brings the ladders of all objects in view up to date.
+    /// Updates the ladders of all objects in view.
     pub fn update(&mut self, views: &[Seen], raise: bool, prices: &Prices, sliders: &Sliders) {
         let steps = steps_an_octave(views);
         self.all.truncate(views.len());
@@ -80,7 +80,7 @@ impl Ladders {
         for (at, (view, span)) in views.iter().enumerate() {
             let before = self.all.get(at).map(|ladder| ladder.key);
             let known = before.filter(|before| before.id == view.id);
-            // what nobody sees keeps what it had
+            // an object out of view keeps its ladder
             if known.is_some() && !view.visible {
                 continue;
             }
@@ -104,12 +104,12 @@ impl Ladders {
         }
     }
 
-    /// Forgets all ladders: prices or sliders are others.
+    /// Deletes all ladders: prices or sliders have changed.
     pub fn clear(&mut self) {
         self.all.clear();
     }
 
-    /// The same, of any number.
+    /// The ladder of object `at`, if there is one.
     pub fn get(&self, at: usize) -> Option<&Ladder> {
         self.all.get(at)
     }
@@ -120,7 +120,7 @@ impl Ladders {
     }
 }
 
-/// Rungs an octave: the more objects there are, the less it matters that one of them is rounded.
+/// Rungs per octave: the more objects there are, the less the rounding of a single one matters.
 fn steps_an_octave(views: &[Seen]) -> usize {
     let objects = views.iter().filter(|(_, span)| span.full > span.least).count().max(1);
     let wish = (STEPS / objects).clamp(STEPS_AN_OCTAVE.0, STEPS_AN_OCTAVE.1);
@@ -149,12 +149,12 @@ impl Key {
                 == (other.range, other.shading, other.size, other.steps, other.raise)
     }
 
-    /// Whether the rungs of an object with this key are those of one with the other to the bit: meshes of one size.
+    /// Whether both keys give bit-identical rungs: meshes of one size.
     fn is_copy(&self, other: &Self) -> bool {
         matches!((self.kind, other.kind), (Kind::Counted { .. }, Kind::Counted { .. })) && self.is_same(other)
     }
 
-    /// The middle of its half octave of pixels.
+    /// Pixels at the middle of the half octave.
     fn pixels(&self) -> f64 {
         libm::exp2(0.5 * f64::from(self.size) + 0.25)
     }
@@ -184,7 +184,7 @@ impl Ladder {
         Self { key, version, rungs, asked }
     }
 
-    /// What its triangles are to the eye, pixels across, halfway up the ladder: by it the blur of motion is judged.
+    /// Size of a triangle on the screen, pixels across, at the geometric middle of the ladder: used for motion blur.
     pub fn polygon_px(&self) -> f64 {
         let ends =
             self.rungs.first().zip(self.rungs[..self.asked].last()).map(|(a, b)| libm::sqrt(a.polygons * b.polygons));
@@ -193,9 +193,9 @@ impl Ladder {
 }
 
 impl Key {
-    /// The shapes that it can be cut to, each once, in rising polygons.
+    /// The distinct shapes that the object can be cut to, in ascending polygons.
     fn cuts(&self, view: &ObjectView, span: Span) -> Vec<(Resolution, f64)> {
-        // finer than one triangle a pixel nothing more is seen
+        // below one pixel per triangle no difference is visible
         let most = span.full.min(self.pixels()).max(span.least);
         let fine = 1.0 / self.steps as f64;
         let octaves = libm::log2(most / span.least);
@@ -207,7 +207,7 @@ impl Key {
         cuts
     }
 
-    /// The impostors of a group, each with the best shading; their accuracy is told of the finest, whose worth [`super::groups`] knows.
+    /// The impostors of a group, each with the best shading; accuracy is relative to the finest, whose benefit is in [`super::groups`].
     fn impostors(&self, view: &ObjectView, rung: impl Fn((Resolution, f64), Shading) -> Rung) -> Vec<Rung> {
         let at = |n| Resolution { eps_m: self.range.eps_m.1, n };
         let one = |n| rung((at(n), polygons(view, at(n))), self.shading.1);
@@ -217,8 +217,8 @@ impl Key {
         rungs
     }
 
-    /// Adds what is better than the best that it asks for: a smoother shape, soft shadows, both. They are worth next to nothing, so that
-    /// nobody gets them while anything else can be had for the time.
+    /// Adds rungs above the requested range: a smoother shape, soft shadows, both. Their added accuracy is negligible, so none is taken
+    /// while anything else can use the time.
     fn raise(&self, view: &ObjectView, rungs: &mut Vec<Rung>, rung: impl Fn((Resolution, f64), Shading) -> Rung) {
         let Some(full) = rungs.iter().copied().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy)) else { return };
         let Resolution { eps_m, n } = full.resolution;
@@ -276,7 +276,7 @@ mod tests {
             rungs.iter().map(|r| (r.resolution.n, r.polygons)).collect::<Vec<_>>(),
             [(0, 20.0), (1, 80.0), (2, 320.0)]
         );
-        // 1 - 1/2 a coarsest: half, 7/8 and 31/32 of what they cover; nothing better is offered of a group
+        // 1 - 1/2 a coarsest: half, 7/8 and 31/32 of the covered pixels; a group gets no rungs above its range
         let parts: Vec<f64> = rungs.iter().map(|rung| rung.accuracy).collect();
         let expected = [0.5 / (31.0 / 32.0), (7.0 / 8.0) / (31.0 / 32.0), 1.0];
         assert!(parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12) && asked == 3, "{parts:?}");

@@ -1,14 +1,14 @@
-//! How one object spends its share of the polygons: the pair (ε, n) that is nearest to square quads, and does not chatter.
+//! Conversion of an object's share of the polygons to the pair (ε, n) with quads nearest to square, with hysteresis.
 //!
-//! In: a wanted number of polygons. Out: (ε, n), and the polygons it really makes.
-//! Never here: how much there is to share. Theory: `docs/theory/control.md`, eq. 15 and 16.
+//! In: a requested number of polygons. Out: (ε, n), and the polygons that they make. Never here: the amount to share. Theory:
+//! `docs/theory/control.md`, eq. 15 and 16.
 
 use super::view::{Kind, ObjectView};
 use metachron_budget::hysteresis::{self, BAND};
 use metachron_core::{N_MAX, Resolution, ResolutionRange};
 use std::f64::consts::PI;
 
-/// How many levels n a primitive has: `0..=N_MAX`.
+/// Number of levels n of a primitive: `0..=N_MAX`.
 pub const PRIMITIVE_LEVELS: usize = N_MAX as usize + 1;
 
 /// Most impostors of a group.
@@ -17,22 +17,22 @@ pub const IMPOSTORS_MAX: usize = 8;
 /// Triangles of a tube's patch at level 0; level n has 2ⁿ times as many (6·2^⌈n/2⌉ sides, 2^⌊n/2⌋ rings of quads).
 const PATCH_TRIANGLES: f64 = 12.0;
 
-/// A picture is cut anew only when its wish moved by this much, |Δ ln polygons|: less than the law's dead zone is wide (0.04),
-/// so that there is always a picture at which the loop rests.
+/// A picture is recut only if the request moved by this much, |Δ ln polygons|: less than the width of the law's dead zone (0.04), so that
+/// there is always a picture at which the loop rests.
 const HOLD: f64 = 0.03;
 
 /// Ranges of ε narrower than this factor leave no room between two switches of n (a level and the band at both its ends).
 const NARROW: f64 = 2.83;
 
-/// Shares are met to 1e-9: a wish this near to an end of its range, in proportion, is that end.
+/// Shares are met to 1e-9: a request this near to an end of its range, relatively, counts as that end.
 const AT_AN_END: f64 = 1e-6;
 
-/// How many polygons an object can have.
+/// The range of an object's polygon count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Span {
     /// At its coarsest.
     pub least: f64,
-    /// At its finest, or one a pixel where that is fewer.
+    /// At its finest, or one polygon per pixel if that is fewer.
     pub most: f64,
     /// At its finest.
     pub full: f64,
@@ -45,7 +45,7 @@ impl Span {
             Kind::Tube { length_m, .. } => (count(length_m, eps.1, n.0), count(length_m, eps.0, n.1)),
             Kind::Primitive { triangles, .. } => (f64::from(triangles[level(n.0)]), f64::from(triangles[level(n.1)])),
             Kind::Counted { least, most, .. } => (f64::from(least.max(1)), f64::from(most)),
-            // its members have polygons of their own
+            // the members have polygons of their own
             Kind::Group { .. } => (0.0, 0.0),
         };
         let full = full.max(least);
@@ -54,24 +54,24 @@ impl Span {
     }
 }
 
-/// What an object was last drawn with.
+/// The last cut of an object.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(super) struct Held {
-    /// The polygons wished for when it was last cut, and the level n that was chosen; `None` while it is out of sight.
+    /// The polygons requested when it was last cut, and the level n chosen; `None` while it is out of view.
     cut: Option<(f64, u8)>,
 }
 
 impl Held {
-    /// The object went out of sight: what it was drawn with says nothing any more.
+    /// Clears the last cut when the object goes out of view.
     pub fn forget(&mut self) {
         *self = Self::default();
     }
 
-    /// The pair (ε, n) for about `wish` polygons, and the polygons it makes.
+    /// The pair (ε, n) for about `wish` polygons, and the polygons that it makes.
     pub fn choose(&mut self, view: &ObjectView, span: Span, wish: f64) -> (Resolution, f64) {
         let at = self.resolution(view, span, wish);
         let makes = match (view.kind, self.cut) {
-            // any count will do: no level of it is rounded to
+            // any count is possible: no rounding to a level
             (Kind::Counted { .. }, Some((cut, _))) => libm::floor(within(cut, span)),
             _ => polygons(view, at),
         };
@@ -107,7 +107,7 @@ impl Held {
     }
 }
 
-/// ε at which an object of level `n` has about `polygons` (control.md, eq. 16); a primitive has none and gives its coarsest.
+/// ε at which an object of level `n` has about `polygons` (control.md, eq. 16); kinds without a spacing give their coarsest.
 fn spacing_m(view: &ObjectView, polygons: f64, n: u8) -> f64 {
     match view.kind {
         Kind::Tube { length_m, .. } => PATCH_TRIANGLES * two_to(n) * length_m / polygons,
@@ -115,7 +115,7 @@ fn spacing_m(view: &ObjectView, polygons: f64, n: u8) -> f64 {
     }
 }
 
-/// Triangles an object really has at `at`.
+/// The actual number of triangles of an object at `at`.
 pub(super) fn polygons(view: &ObjectView, at: Resolution) -> f64 {
     match view.kind {
         Kind::Tube { length_m, .. } => count(length_m, at.eps_m, at.n),
@@ -123,12 +123,12 @@ pub(super) fn polygons(view: &ObjectView, at: Resolution) -> f64 {
         Kind::Counted { least, most, .. } => {
             (f64::from(least.max(1)) * two_to(at.n)).min(f64::from(most.max(least).max(1)))
         }
-        // its members have polygons of their own
+        // the members have polygons of their own; an open group has none
         Kind::Group { impostors, .. } => impostors.get(usize::from(at.n)).map_or(0.0, |count| f64::from(*count)),
     }
 }
 
-/// Level n of a group whose members are drawn as themselves, one past its finest impostor; 0 of what is no group.
+/// Level n at which a group's members are drawn as themselves, one past its finest impostor; 0 for other kinds.
 pub(super) fn open(view: &ObjectView) -> u8 {
     let Kind::Group { impostors, .. } = view.kind else { return 0 };
     impostors.iter().take_while(|count| **count > 0).count() as u8
@@ -138,9 +138,9 @@ fn within(polygons: f64, span: Span) -> f64 {
     polygons.max(span.least).min(span.full)
 }
 
-/// Whole doublings, 0 where there is none.
+/// Whole doublings, 0 if there is none.
 fn octaves(times: f64) -> u8 {
-    // a cast of floats saturates, and takes NaN to 0
+    // a cast of floats saturates, and maps NaN to 0
     (libm::floor(libm::log2(times)) as u8).min(N_MAX)
 }
 
@@ -172,7 +172,7 @@ fn tube_level(polygons: f64, (length_m, radius_m): (f64, f64), range: Resolution
     hysteresis::floor(before, rho)
 }
 
-/// The highest level whose triangles fit, a quarter of an octave of room before it goes up and of patience before it goes down.
+/// The highest level whose triangles fit, with hysteresis of a quarter of an octave in both directions.
 fn primitive_level(wish: f64, triangles: &[u32; PRIMITIVE_LEVELS], range: (u8, u8), before: Option<u8>) -> u8 {
     let band = if before.is_some() { libm::exp2(BAND) } else { 1.0 };
     let at = |n: u8| f64::from(triangles[level(n)]);
@@ -210,7 +210,7 @@ mod tests {
         let mut wish = 1300.0;
         while wish < 4e5 {
             let (at, _) = held.choose(&view, span, wish);
-            // the hold, and one interval of rounding in the 45 or more that there are
+            // HOLD, and the rounding of one interval in the 45 or more that there are
             assert!((polygons(&view, at) / wish).ln().abs() <= HOLD + 1.0 / 45.0, "{wish}: {at:?}");
             // half an octave to either side of the level, and the band
             assert!(libm::log2(aspect(at)).abs() <= 1.0 + BAND + 0.05, "{wish}: {at:?} aspect {}", aspect(at));

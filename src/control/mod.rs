@@ -1,6 +1,7 @@
-//! Numbers in, demands out: who decides how finely things are drawn and simulated.
+//! Controllers that choose how finely things are drawn and simulated: numbers in, demands out.
 //!
-//! In: what is in view ([`ObjectView`]) and the frame's measured work ([`FrameWork`]); what an agent's turns take ([`TurnMeasure`]).
+//! In: the objects in view ([`ObjectView`]) and the frame's measured work ([`FrameWork`]); the measured time of an agent's turns
+//! ([`TurnMeasure`]).
 //! Out: a level for every picture ([`Plan`]), dt and ε for every agent ([`RateDemand`]).
 //! Never here: agents, threads, scenes, the GPU. Theory: `docs/theory/control.md`, after (GDC04), and `docs/theory/budget.md`.
 

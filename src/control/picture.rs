@@ -1,7 +1,7 @@
-//! The picture's controller: a level for every object in view, by whichever policy is asked for.
+//! The controller of the picture: a level for every object in view, by the selected policy.
 //!
-//! In: what is in view, then what the frame took. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule.
-//! A frame is `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
+//! In: the objects in view, then the time of the frame. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule. A frame is
+//! `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
 
 mod ahead;
 mod wishes;
@@ -31,15 +31,15 @@ use metachron_core::{AgentId, Resolution};
 /// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
 const SPEED_NEWS: f64 = 0.2;
 
-/// The share of a new measurement in what a frame takes besides drawing.
+/// The share of a new measurement in the smoothed time of a frame outside drawing.
 const OVERHEAD_NEWS: f64 = 0.1;
 
-/// The fixed part of a frame that moved by less than this part of the target is what it was: what trembles changes no level.
+/// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
 const FIXED_TREMBLE: f64 = 0.01;
 
-/// The part of a frame that policies with a prediction leave free where nobody says otherwise.
+/// The fraction of a frame that policies with a prediction leave free by default.
 const MARGIN: f64 = 0.02;
-/// The same of a lag, which is a bound and no goal: a camera that sets off makes a frame 2.4 % dearer than was foretold.
+/// The same for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
 const LAG_MARGIN: f64 = 0.03;
 
 /// Chooses the level of every picture.
@@ -47,26 +47,26 @@ const LAG_MARGIN: f64 = 0.03;
 pub struct PictureControl {
     policy: Policy,
     target_hz: f64,
-    /// The part of a frame to be left free, where somebody says so.
+    /// The fraction of a frame to be left free, if the user sets one.
     margin: Option<f64>,
     sliders: Sliders,
     value: Value,
     prices: Prices,
     backdrop: Backdrop,
     frozen: bool,
-    /// Where quality may be raised beyond what objects ask for: whether it is.
+    /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
     raise: Option<Raise>,
-    /// What a frame takes besides drawing, seconds, smoothed.
+    /// Time of a frame outside drawing, seconds, smoothed.
     overhead_s: Option<f64>,
-    /// What a frame takes whatever is chosen, seconds, as the last choice was made with.
+    /// Time of a frame that is spent whatever is chosen, seconds, as used for the last choice.
     fixed_s: f64,
-    /// What others take of the frame's time, seconds.
+    /// Time of the frame used by others, seconds.
     reserve_s: f64,
-    /// The same, and what is kept for choosing, as the last choice was made with.
+    /// The same plus the time reserved for choosing, as used for the last choice.
     others_s: f64,
-    /// Where the lag is bounded: by how much, and how it is shared.
+    /// The bound of the lag and how it is shared, if the lag is bounded.
     pipeline: Option<Pipeline>,
-    /// What culling took of the frame that is chosen for, seconds.
+    /// Culling time of the frame that is chosen for, seconds.
     cull_s: f64,
     feedback: Feedback,
     select: Select,
@@ -79,14 +79,14 @@ pub struct PictureControl {
     speeds: Vec<(AgentId, Option<f64>)>,
     views: Vec<Seen>,
     plan: Plan,
-    /// What was chosen for the next frame while this one is drawn.
+    /// The choice for the next frame, made while this one is drawn.
     ahead: Option<Ahead>,
-    /// What the levels of this frame were to take for one second that they take as they are seen now, both by the prices.
+    /// Predicted time of this frame's levels when they were chosen over their predicted time as seen now, both by the prices.
     chosen_part: f64,
 }
 
 impl PictureControl {
-    /// A controller for `target_hz` frames a second (finite, > 0), which begins in the middle of what it may do.
+    /// A controller for `target_hz` frames a second (finite, > 0), which starts in the middle of its range.
     #[must_use]
     pub fn new(policy: Policy, law: Law, target_hz: f64) -> Self {
         Self {
@@ -120,7 +120,7 @@ impl PictureControl {
         }
     }
 
-    /// Learns what the frame drawn by the last [`PictureControl::plan`] took.
+    /// Reports the time of the frame drawn by the last [`PictureControl::plan`].
     pub fn observe(&mut self, frame: FrameWork) {
         let (work_s, drawn_s) = (frame.work.as_secs_f64(), frame.draw.min(frame.work).as_secs_f64());
         if frame.skip {
@@ -176,12 +176,12 @@ impl PictureControl {
         Promise { feasible: true, ..Promise::default() }
     }
 
-    /// What a frame may take: its share of a second, or the lag where that is less.
+    /// Target time of a frame: its share of a second, or the lag if that is less.
     fn target_s(&self) -> f64 {
         self.pipeline.map_or(f64::INFINITY, |pipeline| pipeline.lag).min(1.0 / self.target_hz)
     }
 
-    /// The part of a frame that is left free by policies with a prediction.
+    /// The fraction of a frame that is left free by policies with a prediction.
     fn margin_now(&self) -> f64 {
         let bound = self.pipeline.is_some_and(|pipeline| pipeline.lag * self.target_hz < 1.0);
         self.margin.unwrap_or(if bound { LAG_MARGIN } else { MARGIN })
@@ -219,23 +219,23 @@ impl PictureControl {
         if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
             raise.observe(&ask, levels, &promise);
         }
-        // what is kept for others is not taken
+        // time reserved for others is not spent by the frame
         promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
         promise
     }
 
-    /// What the last frame was to be drawn with.
+    /// The plan of the last frame.
     #[must_use]
     pub fn last_plan(&self) -> &Plan {
         &self.plan
     }
 
-    /// Keeps what is in view with its polygons, its speed smoothed.
+    /// Stores the objects in view with their polygon ranges and smoothed speeds.
     fn look(&mut self, objects: &[ObjectView]) {
         self.views.truncate(objects.len());
         self.speeds.resize(objects.len(), (AgentId(0), None));
         for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {
-            // what stays out of sight as it is has no speed and the polygons that it had
+            // an unchanged object that stays out of view has no speed, and its polygon range stays
             if !object.visible && held.is_none() && self.views.get(at).is_some_and(|(known, _)| known == object) {
                 continue;
             }
@@ -256,7 +256,7 @@ impl PictureControl {
         }
     }
 
-    /// Sums up the plan.
+    /// Updates the totals of the plan.
     fn count(&mut self) {
         let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
         self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
@@ -272,8 +272,8 @@ impl PictureControl {
         }));
     }
 
-    /// What the default would take of a frame if nobody else wanted any, seconds, and what one more second is worth to it, pixels: 0
-    /// where it has all. `None` of policies that know no price.
+    /// Time that the default policy would take of a frame without competition, seconds, and the gain of one more second, pixels: 0 if it
+    /// has all it can use. `None` for policies without a price.
     #[must_use]
     pub fn wants(&self) -> Option<(f64, f64)> {
         if self.policy != Policy::Adaptive || self.plan.levels.is_empty() {
@@ -284,14 +284,14 @@ impl PictureControl {
         Some((if lambda > 0.0 { all_s } else { self.plan.promise.predicted_s }, lambda))
     }
 
-    /// What the object given as number `at` was worth to the last choice at an accuracy of 1, pixels; 0 where that is not known.
+    /// The benefit of object `at` in the last choice at an accuracy of 1, pixels; 0 if unknown.
     #[must_use]
     pub fn weight(&self, at: usize) -> f64 {
         let Some((view, _)) = self.views.get(at) else { return 0.0 };
         self.ladders.get(at).map_or(0.0, |ladder| worth::weight(view, &self.sliders, ladder.polygon_px()))
     }
 
-    /// What the controller is doing; its text is for the viewer and the report.
+    /// The state of the controller; its text is for the viewer and the report.
     #[must_use]
     pub fn status(&self) -> Status {
         match self.policy {
@@ -303,7 +303,7 @@ impl PictureControl {
         }
     }
 
-    /// The loop variable ε̂: of feedback its law's, of other policies 480 over the polygons in view.
+    /// The loop variable ε̂: for feedback that of its law, for other policies 480 over the polygons in view.
     #[must_use]
     pub fn eps_hat(&self) -> f64 {
         match self.policy {
@@ -312,7 +312,7 @@ impl PictureControl {
         }
     }
 
-    /// The work a frame is to take, seconds: T_set = (1 − margin)/target.
+    /// Target work of a frame, seconds: T_set = (1 − margin)/target.
     #[must_use]
     pub fn set_point_s(&self) -> f64 {
         let share = match self.policy {
@@ -335,14 +335,14 @@ impl PictureControl {
         self.feedback.law()
     }
 
-    /// The wanted frame rate, frames a second.
+    /// The target frame rate, frames per second.
     #[must_use]
     pub fn target_hz(&self) -> f64 {
         self.target_hz
     }
 }
 
-/// Size, accuracy and importance count as they are, motion by half: what the eye follows is not judged as strictly as what rests.
+/// Size, accuracy and importance count in full, motion by half: moving objects are judged less strictly than resting ones.
 fn usual_sliders() -> Sliders {
     Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
 }

@@ -1,6 +1,6 @@
-//! What control says of a frame: a level for every object, and what the choice promises.
+//! The result of control for a frame: a level for every object, and the promise of the choice.
 //!
-//! In: nothing but words. Out: [`Plan`], and [`FrameWork`] that answers it. Never here: a choice.
+//! In: nothing; data types only. Out: [`Plan`], and [`FrameWork`] as its measurement. Never here: a choice.
 
 use super::ask::Promise;
 use super::level::{self, Span};
@@ -8,34 +8,34 @@ use super::view::{ObjectView, Shading};
 use metachron_core::{AgentId, Resolution};
 use std::time::Duration;
 
-/// What the last frame took.
+/// Measured times of the last frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct FrameWork {
     /// The work of the frame: gather, choose, draw. Without any wait for a display or for the frame's time to come.
     pub work: Duration,
-    /// Of it the drawing of the picture, which is what levels change; `work` at most.
+    /// The part of it spent drawing the picture, which levels affect; `work` at most.
     pub draw: Duration,
-    /// Whether the frame must not teach: one of the first three, one with a new size or a new pipeline, a hidden window,
-    /// the first after a gap of more than five frames.
+    /// Whether the frame must not be used for learning: one of the first three, one with a new size or a new pipeline, a hidden window, the
+    /// first after a gap of more than five frames.
     pub skip: bool,
 }
 
-/// What to draw one object with.
+/// The level to draw one object with.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LevelDemand {
-    /// Which one.
+    /// Id of the object.
     pub id: AgentId,
-    /// Its pair (ε, n), inside its range; of a group n is the number of its impostor, past the last its members.
+    /// The pair (ε, n), inside the object's range; for a group n is the number of its impostor, or one past the last for its members.
     pub resolution: Resolution,
-    /// Triangles to draw it with: of what is cut by triangles exactly so many. 0: it is left out of the picture, as members of a group
-    /// are that is drawn by an impostor, and groups that are drawn as their members. Out of sight: its coarsest, for its shadow.
+    /// Triangles to draw it with, exact for kinds with a free triangle count. 0: left out of the picture, as are members of a group that is
+    /// drawn by an impostor, and groups that are drawn as their members. Out of view: its coarsest, for its shadow.
     pub polygons: f64,
-    /// How to shade it.
+    /// Shading to draw it with.
     pub shading: Shading,
 }
 
-/// How much of what it can have an object is drawn with: 0 its coarsest … 1 its finest, by the logarithm of its triangles; of a group
-/// by its levels, of which its members are the finest.
+/// Position of the level in the object's range: 0 its coarsest … 1 its finest, by the logarithm of its triangles; for a group by its
+/// levels, of which the members are the finest.
 #[must_use]
 pub fn detail(view: &ObjectView, demand: &LevelDemand) -> f64 {
     if view.is_group() {
@@ -46,7 +46,7 @@ pub fn detail(view: &ObjectView, demand: &LevelDemand) -> f64 {
     if part.is_nan() { 1.0 } else { part.clamp(0.0, 1.0) }
 }
 
-/// What to draw the next frame with.
+/// The levels for the next frame.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Plan {
     /// One entry for each object, in the order they were given.
@@ -55,18 +55,18 @@ pub struct Plan {
     pub polygons: f64,
     /// Triangles of everything in view at its finest: what the policy `full` would draw.
     pub full_polygons: f64,
-    /// What the choice promises; zeros where the policy predicts nothing.
+    /// The promise of the choice; zeros if the policy predicts nothing.
     pub promise: Promise,
-    /// Objects in view whose level is another than in the frame before.
+    /// Objects in view whose level differs from the frame before.
     pub changes: u32,
-    /// Of these, objects that are back at a level which they had two or three frames before.
+    /// Of these, objects that are back at a level of two or three frames before.
     pub reversals: u32,
 }
 
-/// An object and the polygons that it can have.
+/// An object and its range of polygons.
 pub(super) type Seen = (ObjectView, Span);
 
-/// Those in view.
+/// The objects in view.
 pub(super) fn in_view(views: &[Seen]) -> impl Iterator<Item = &Seen> + Clone {
     views.iter().filter(|(view, _)| view.visible)
 }

@@ -1,11 +1,11 @@
-//! Who chooses levels: the policies by name, and the feedback law with its gains.
+//! The policies that choose levels, by name, and the feedback law with its gains.
 //!
-//! In: a name, gains. Out: words for [`super::PictureControl`]. Never here: a choice.
+//! In: a name, gains. Out: settings for [`super::PictureControl`]. Never here: a choice.
 
 use super::price::Prices;
 use metachron_budget::{grisoni, log_law};
 
-/// Who chooses the level of every visible object. Theory and papers: `docs/theory/budget.md`.
+/// The policy that chooses the level of every visible object. Theory and papers: `docs/theory/budget.md`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Policy {
     /// The finest of everything, whatever it costs.
@@ -24,27 +24,27 @@ pub enum Policy {
     Hierarchical,
     /// Objects and groups in falling benefit per cost (MB97, §6).
     HierarchicalFlat,
-    /// Objects and groups, always the most important opened next (MS95).
+    /// Objects and groups, always refining the most important next (MS95).
     MacielShirley,
-    /// Every object its part of the time by value (RH05).
+    /// Every object gets its share of the time by value (RH05).
     RobinHood,
     /// Any number of triangles, the exact optimum (GB99).
     Convex,
     /// Any number of triangles, by interior point (GB99).
     ConvexBarrier,
-    /// Steps of concave hulls in falling gain per cost, to the first that does not fit.
+    /// Steps of concave hulls in falling gain per cost, up to the first that does not fit.
     MarginalStop,
-    /// The same, and then whatever still fits.
+    /// The same, and then any that still fit.
     MarginalFill,
     /// Feedback on (ε, n) from the measured work of frames (GDC04).
     Feedback,
-    /// Concave hulls, a cost table that learns, hysteresis on marginal value, a certificate every frame.
+    /// Concave hulls, a cost table corrected by measurements, hysteresis on marginal value, a certificate every frame.
     #[default]
     Adaptive,
 }
 
 impl Policy {
-    /// All of them.
+    /// All policies.
     pub const ALL: [Self; 16] = [
         Self::Full,
         Self::Static,
@@ -64,7 +64,7 @@ impl Policy {
         Self::Adaptive,
     ];
 
-    /// The name as scenes and the command line write it.
+    /// The name in scenes and on the command line.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -87,14 +87,14 @@ impl Policy {
         }
     }
 
-    /// Whether it predicts what levels cost.
+    /// Whether the policy predicts the cost of levels.
     #[must_use]
     pub const fn predicts(self) -> bool {
         !matches!(self, Self::Full | Self::Static | Self::Threshold | Self::Feedback)
     }
 
-    /// What it knows of prices: of every area where it is Robin Hood's (RH05), else two stages (FS93). The default goes by the stages
-    /// too: areas that objects hide from each other are priced in full, and its κ is learnt for what is left (control.md, section 7).
+    /// The prices that the policy uses: by area for Robin Hood (RH05), else two stages (FS93). The default uses the stages too: areas that
+    /// objects occlude from each other are priced in full, and its κ is fitted to the remainder (control.md, section 7).
     pub(super) fn prices(self, known: &Prices) -> Prices {
         if self == Self::RobinHood { *known } else { known.by_lines() }
     }
@@ -111,7 +111,7 @@ impl Policy {
 pub enum Law {
     /// The law as printed (GDC04, eq. 1), on ε̂ = 40 ε/L.
     Printed {
-        /// α: change of ε̂ for each frame per second that is missing, > 0. Past 2/(df/dε̂) the loop swings for ever.
+        /// α: change of ε̂ for each frame per second that is missing, > 0. Past 2/(df/dε̂) the loop oscillates without end.
         alpha: f64,
         /// β: change of ρ for each unit of ε̂, > 0.
         beta: f64,
@@ -122,7 +122,7 @@ pub enum Law {
         kappa: f64,
         /// λ, 0 … 1.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
         lead: f64,
-        /// The share of the frame that is left free, 0 … 0.9: T_set = (1 − margin) T.
+        /// The fraction of the frame that is left free, 0 … 0.9: T_set = (1 − margin) T.
         margin: f64,
     },
 }
@@ -136,11 +136,11 @@ impl Law {
     /// The range of λ.
     pub const LEAD: (f64, f64) = (0.0, 1.99);
 
-    /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses
-    /// (is past 1.05 T in) fewer than 1 frame in 100.
+    /// The corrected law; a tenth of the frame stays free: work that scatters by 5 % then misses (exceeds 1.05 T) in fewer than 1 frame in
+    /// 100.
     pub const CORRECTED: Self = Self::Corrected { kappa: 0.5, lead: 0.0, margin: 0.1 };
 
-    /// The share of the frame's time that the work is to take: T_set/T.
+    /// Target work as a fraction of the frame's time: T_set/T.
     #[must_use]
     pub fn set_share(self) -> f64 {
         match self {

@@ -1,5 +1,5 @@
-//! What drawing costs: by lines, two stages for each shading of which the slower counts; by areas, a price of a triangle for every area
-//! that it may cover; and the picture itself.
+//! Cost of drawing: by lines, two stages for each shading of which the slower counts; by areas, a price per triangle for every area that it
+//! may cover; and the picture itself.
 //!
 //! In: coefficients, declared, or fitted to measured pictures. Out: seconds. Never here: a measurement.
 //! Theory: `docs/theory/budget.md`, eq. 41 … 44.
@@ -10,22 +10,22 @@ use super::view::{ObjectView, Shading};
 use metachron_budget::cost::fit::{Sample, fit};
 use metachron_budget::cost::stages::{Stages, Work};
 
-/// Vertices of a closed mesh for each of its triangles (Euler: half as many and two more).
+/// Vertices of a closed mesh per triangle (Euler: half as many and two more).
 const VERTICES_A_TRIANGLE: f64 = 0.5;
 
-/// How many times as long a pixel in soft shadow takes: thirteen comparisons and four depths more.
+/// Cost factor of a pixel in soft shadow: thirteen more comparisons and four more depths.
 const SOFTER: f64 = 2.5;
 
-/// What drawing costs on one machine, seconds.
+/// Cost of drawing on one machine, seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prices {
-    /// A picture with nothing in it, ≥ 0.
+    /// An empty picture, ≥ 0.
     pub frame_s: f64,
-    /// Each pixel of the picture, whatever covers it, ≥ 0.
+    /// Each pixel of the picture, independent of its content, ≥ 0.
     pub pixel_s: f64,
     /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
     pub shading: [Stages; 4],
-    /// The same by the area of its triangles, where that was measured: then it counts in place of the stages.
+    /// The same by the area of its triangles, if that was measured: then it replaces the stages.
     pub areas: Option<[Areas; 4]>,
 }
 
@@ -34,7 +34,7 @@ pub struct Prices {
 pub struct Measured {
     /// Pixels of the picture.
     pub picture_px: f64,
-    /// Objects in it; 0 for what a picture costs by itself.
+    /// Objects in the picture; 0 to measure the cost of an empty picture.
     pub objects: f64,
     /// Triangles of each.
     pub polygons: f64,
@@ -42,21 +42,21 @@ pub struct Measured {
     pub pixels: f64,
     /// How they are shaded.
     pub shading: Shading,
-    /// What the picture took.
+    /// Measured time of the picture.
     pub seconds: f64,
 }
 
-/// What is in a picture whatever is chosen.
+/// The part of a picture that is independent of the choice.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Backdrop {
     /// Pixels of the picture, ≥ 0.
     pub pixels: f64,
-    /// Triangles that nobody chooses: fixed solids, the floor; ≥ 0.
+    /// Triangles that are not subject to a choice: fixed solids, the floor; ≥ 0.
     pub triangles: f64,
 }
 
 impl Default for Prices {
-    /// Two cores with Mesa, as they were measured once: what to believe before anything better is known.
+    /// Two cores with Mesa, from one measurement: the assumption until better prices are known.
     fn default() -> Self {
         let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
         Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4], areas: None }
@@ -64,7 +64,7 @@ impl Default for Prices {
 }
 
 impl Prices {
-    /// The same prices; a number that is none, or below 0, is twice what the default has in its place.
+    /// The same prices; an invalid or negative number is replaced by twice the default.
     #[must_use]
     pub fn sound(self) -> Self {
         let usual = Self::default();
@@ -83,13 +83,13 @@ impl Prices {
         }
     }
 
-    /// The same prices without those by area: what policies are told that know two stages and no more (FS93, MB97, GB99).
+    /// The same prices without those by area: for policies that use two stages only (FS93, MB97, GB99).
     #[must_use]
     pub fn by_lines(self) -> Self {
         Self { areas: None, ..self }
     }
 
-    /// The prices that predict measured pictures best; `None` with too few of them: two sizes without an object, and of each shading
+    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, and for each shading
     /// eight pictures of objects.
     #[must_use]
     pub fn fitted(pictures: &[Measured]) -> Option<Self> {
@@ -110,14 +110,14 @@ impl Prices {
         Some(Self { frame_s, pixel_s, shading, areas: areas() })
     }
 
-    /// What a measured picture should have taken, seconds.
+    /// Predicted time of a measured picture, seconds.
     #[must_use]
     pub fn predict_s(&self, picture: &Measured) -> f64 {
         let backdrop = Backdrop { pixels: picture.picture_px, triangles: 0.0 };
         self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
     }
 
-    /// The coefficients of a shading; of [`Shading::Shadowed`] those of textured light, whose pixels it takes 2.5 times as long for.
+    /// The coefficients of a shading; for [`Shading::Shadowed`] those of textured light with 2.5 times the time per pixel.
     #[must_use]
     pub fn of(&self, shading: Shading) -> Stages {
         match shading {
@@ -129,7 +129,7 @@ impl Prices {
         }
     }
 
-    /// Seconds of an object with so many triangles that covers so many pixels.
+    /// Seconds of an object with `polygons` triangles that covers `pixels`.
     #[must_use]
     pub fn object_s(&self, shading: Shading, polygons: f64, pixels: f64) -> f64 {
         match (&self.areas, shading) {
@@ -146,7 +146,7 @@ impl Prices {
         drawn.map(|(view, level)| self.object_s(level.shading, level.polygons, view.pixels)).fold(0.0, |sum, s| sum + s)
     }
 
-    /// Seconds of a picture in which nothing is chosen.
+    /// Seconds of a picture's part that is independent of the choice.
     #[must_use]
     pub fn backdrop_s(&self, backdrop: Backdrop) -> f64 {
         let part = |x: f64| if x > 0.0 { x } else { 0.0 };
@@ -159,7 +159,7 @@ fn work(polygons: f64, pixels: f64) -> Work {
     Work { polygons, vertices: VERTICES_A_TRIANGLE * polygons + 2.0, pixels }
 }
 
-/// Slope and start of the line through points by least squares, neither below 0; `None` with fewer than two abscissas.
+/// Slope and intercept of the least-squares line through points, neither below 0; `None` with fewer than two abscissas.
 fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<(f64, f64)> {
     let sound = points.filter(|(x, y)| x.is_finite() && y.is_finite());
     let (n, x, y) = sound.clone().fold((0.0, 0.0, 0.0), |(n, x, y), p| (n + 1.0, x + p.0, y + p.1));
@@ -174,7 +174,7 @@ fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<(f64, f64)> 
 mod tests {
     use super::*;
 
-    /// Pictures of a machine that trembles by 3 %; one of twenty is interrupted.
+    /// Pictures of a machine with noise of 3 %; one of twenty is interrupted.
     fn pictures(seed: u32, machine: &Prices) -> Vec<Measured> {
         let (mut state, mut all) = (u64::from(seed), Vec::new());
         let mut random = || {
@@ -205,7 +205,7 @@ mod tests {
             areas: None,
         };
         let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
-        // without the stalls of others: no model foresees an interruption
+        // without interruptions: no model predicts those
         let others = pictures(2, &machine);
         let calm = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
         let mut errors: Vec<_> = calm.map(|p| (found.predict_s(p) / p.seconds - 1.0).abs()).collect();

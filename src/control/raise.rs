@@ -1,23 +1,23 @@
-//! When objects may be drawn better than they ask for: only while all of them have all that they ask for, and time is left.
+//! The rule for drawing objects better than requested: only while all of them have their requested best, and time is left.
 //!
-//! In: what was chosen for a frame. Out: whether better rungs are offered in the next. Never here: the rungs ([`super::ladder`]), a choice.
+//! In: the choice of a frame. Out: whether better rungs are offered in the next. Never here: the rungs ([`super::ladder`]), a choice.
 //! Theory: `docs/theory/control.md`, section 6; (RH05, §7.2) proposes it for time that would stay unspent.
 
 use super::ask::{Ask, Promise};
 use super::plan::LevelDemand;
 
-/// Frames in which all must have had all, before more is offered: half a second at 60 Hz …
+/// Frames in which all objects must have had their best before more is offered: half a second at 60 Hz …
 const PATIENCE: u32 = 30;
-/// … and the most that this grows to where it was offered too soon.
+/// … and the greatest value that this grows to if the offer was too early.
 const PATIENCE_MAX: u32 = 960;
-/// What must be left of the target, as a part of it.
+/// Time that must be left, as a fraction of the target.
 const SPARE: f64 = 0.1;
 
-/// Whether more is offered than objects ask for.
+/// Whether more than the requested quality is offered.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Raise {
     open: bool,
-    /// Frames since it opened, or in which all had all.
+    /// Frames since it opened, or frames in a row in which all objects had their best.
     frames: u32,
     patience: u32,
 }
@@ -34,13 +34,13 @@ impl Raise {
         self.open
     }
 
-    /// Learns what was chosen.
+    /// Updates the rule with a choice.
     pub fn observe(&mut self, ask: &Ask<'_>, levels: &[LevelDemand], promise: &Promise) {
         let has_all = promise.feasible && ask.drawable().all(|at| has_all(ask, at, &levels[at]));
         let spare = promise.predicted_s < (1.0 - SPARE) * ask.target_s;
         self.frames = if has_all && (self.open || spare) { self.frames.saturating_add(1) } else { 0 };
         if self.open && !has_all {
-            // what did not last ten times as long as it was waited for was offered too soon
+            // an offer that did not last ten times its waiting time was too early
             let lasted = self.frames > 10 * self.patience;
             self.patience = if lasted { PATIENCE } else { (2 * self.patience).min(PATIENCE_MAX) };
             self.open = false;
@@ -50,7 +50,7 @@ impl Raise {
     }
 }
 
-/// Whether an object is drawn as well as it asks for: what is left out for its group asks for nothing.
+/// Whether an object is drawn as well as requested; an object left out for its group requests nothing.
 fn has_all(ask: &Ask<'_>, at: usize, level: &LevelDemand) -> bool {
     let ladder = ask.ladders.of(at);
     let best = ladder.rungs[..ladder.asked].iter().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy));

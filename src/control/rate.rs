@@ -1,7 +1,7 @@
-//! An agent's own controller: dt and ε of its simulation from what its turns take.
+//! The rate controller of an agent: dt and ε of its simulation from the measured time of its turns.
 //!
-//! In: a [`TurnMeasure`] after every turn. Out: now and then a [`RateDemand`]. Never here: agents, clocks.
-//! One loop variable climbs two stairs: first ε grows to its coarsest, then dt to its longest; it comes down the other way.
+//! In: a [`TurnMeasure`] after every turn. Out: occasionally a [`RateDemand`]. Never here: agents, clocks. One loop variable z moves
+//! through two ranges in series: first ε grows to its coarsest, then dt to its longest; back in the reverse order.
 //! Theory: `docs/theory/control.md`, eq. 17 … 19.
 
 mod full_load;
@@ -10,33 +10,33 @@ use full_load::{FullLoad, IN_A_ROW};
 use metachron_budget::Bound;
 use metachron_budget::log_law::LESSON_MAX;
 
-/// What a turn took.
+/// Measured times of a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TurnMeasure {
     /// Time the turn took, seconds, > 0.
     pub work_s: f64,
-    /// Time between turns at the rate that the scene wants, seconds, > 0: at a dt of [`RateLimits::dt_wanted_s`].
+    /// Time between turns at the rate that the scene requests, seconds, > 0: at a dt of [`RateLimits::dt_wanted_s`].
     pub wanted_period_s: f64,
-    /// Time between turns as it is, seconds, > 0, smoothed over a few of them.
+    /// Actual time between turns, seconds, > 0, smoothed over a few of them.
     pub real_period_s: f64,
-    /// Length of the step that the agent made, simulated seconds, > 0.
+    /// Length of the step made, simulated seconds, > 0.
     pub dt_s: f64,
 }
 
-/// What a controller may ask of an agent.
+/// Limits of the demands to an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateLimits {
-    /// Length of a step at the rate that is wanted, simulated seconds, > 0.
+    /// Length of a step at the requested rate, simulated seconds, > 0.
     pub dt_wanted_s: f64,
-    /// Longest step, simulated seconds. Not above `dt_wanted_s` means: the rate is fixed.
+    /// Longest step, simulated seconds. If not above `dt_wanted_s`, the rate is fixed.
     pub dt_max_s: f64,
-    /// Finest and coarsest ε of the simulation, metres; alike means: ε is fixed. `None` for a model without ε.
+    /// Finest and coarsest ε of the simulation, metres; equal values fix ε. `None` for a model without ε.
     pub eps_m: Option<(f64, f64)>,
-    /// The share of its period that the agent's work may take, 0.01 … 1. Cores over agents, and some room, is fair.
+    /// The fraction of its period that the agent's work may take, 0.01 … 1. Cores over agents, less some reserve, is fair.
     pub share: f64,
 }
 
-/// What an agent is asked for.
+/// The requested step and spacing of an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RateDemand {
     /// Length of a step, simulated seconds.
@@ -45,35 +45,35 @@ pub struct RateDemand {
     pub eps_m: Option<f64>,
 }
 
-/// A lesson is the mean of this long, seconds: many turns, so that one hiccup is none.
+/// Measurements are averaged over this long, seconds: many turns, so that a single hiccup has no effect …
 const WINDOW_S: f64 = 0.25;
 
 /// … and of at least this many turns.
 const WINDOW_TURNS: u32 = 8;
 
-/// A turn of more than this many times the mean of the last windows counts as this many: the scheduler's hiccups are not the agent's.
+/// A turn of more than this many times the mean of the last windows is clamped to it: such delays are due to the scheduler, not the agent.
 const SPIKE: f64 = 8.0;
 
-/// Later than this, real over wanted period, an agent is kept late by others, where its own work does not account for it.
+/// Above this ratio of real to wanted period, beyond what the agent's own work explains, the agent counts as delayed by others.
 const LATE: f64 = 1.03;
 
-/// κ: the share of such a lateness (of logarithms) that one demand removes.
+/// κ: the share of such a delay (of logarithms) that one demand removes.
 const KAPPA: f64 = 0.5;
 
-/// Least |Δ ln| of a demand: re-meshing costs accuracy, 10 % of ε are not worth it.
+/// Least |Δ ln| of a demand: re-meshing costs accuracy, which 10 % of ε do not justify.
 const RETUNE_MIN: f64 = 0.095;
 
-/// Windows without lateness before anything gets finer: a second at first, doubled whenever that turns out to have been too soon.
+/// Windows without delay before anything gets finer: initially a second, doubled whenever that turns out to have been too early.
 const PATIENCE: (u32, u32) = (4, 128);
 
-/// The most that one demand refines who was kept late by others, ln 1.25: it finds out cheaply that they still are there.
+/// Greatest refinement by one demand after delays by others, ln 1.25: a small step tests whether they are still there.
 const REFINE_MAX: f64 = 0.223;
-/// … and else the part of the way that it goes.
+/// … otherwise the fraction of the distance that one demand refines.
 const REFINE_PART: f64 = 0.5;
 
 /// The dead zone of ln(load/share), 80 % … 105 %: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
 const DEAD: (f64, f64) = (-0.223, 0.049);
-/// Where in it an agent is sent.
+/// Target inside the dead zone.
 const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
 
 #[derive(Debug, Clone, Copy, Default)]
@@ -82,39 +82,39 @@ struct Window {
     span_s: f64,
     work_s: f64,
     wanted_s: f64,
-    /// Of the work what did not fit into its own turn's period.
+    /// The part of the work that exceeds its own turn's period.
     over_s: f64,
     late: f64,
 }
 
-/// Steers dt and ε of one agent.
+/// Controls dt and ε of one agent.
 #[derive(Debug, Clone)]
 pub struct RateControl {
     limits: RateLimits,
-    /// ln(coarsest ε / finest ε): where the first stair ends; and where the second does.
+    /// Upper ends of the two ranges of z: ln(coarsest ε / finest ε), and that plus ln(longest dt / wanted dt).
     landing: f64,
     top: f64,
     window: Window,
     full: FullLoad,
-    /// Where on the stairs it belongs, as far as is known.
+    /// Best known target of the loop variable z.
     aim: f64,
-    /// The same at the last demand.
+    /// z at the last change of the target for the agent's own load.
     asked: f64,
-    /// ln(ε that somebody may tell from a finer one / finest ε), from 0.
+    /// ln(finest ε that makes a visible difference / finest ε), from 0.
     plain: f64,
-    /// Where on the stairs the agent was last sent.
+    /// z of the last demand sent to the agent.
     sent: f64,
-    /// Windows in a row in which others kept it late, and in which they did not.
+    /// Windows in a row in which others delayed the agent, and in which they did not.
     late: usize,
     calm: u32,
     patience: u32,
-    /// The loop variable before the last demand, if that was for something finer and has not proved itself yet.
+    /// z before the last demand, if that refined and is not confirmed yet.
     refined_from: Option<f64>,
     rest: Option<Bound>,
 }
 
 impl RateControl {
-    /// A controller of an agent that steps by `dt_wanted_s` and simulates at `eps_m` now.
+    /// A controller of an agent that presently steps by `dt_wanted_s` and simulates at `eps_m`.
     #[must_use]
     pub fn new(limits: RateLimits, eps_m: Option<f64>) -> Self {
         let landing = limits.eps_m.map_or(0.0, |(fine, coarse)| ratio_ln(coarse, fine));
@@ -140,52 +140,52 @@ impl RateControl {
         }
     }
 
-    /// Whether there is anything to steer: fixed values switch it off.
+    /// Whether anything can be controlled: fixed values switch the controller off.
     #[must_use]
     pub fn steers(&self) -> bool {
         self.top > 0.0
     }
 
-    /// Changes the share of its period that the agent's work may take: 0.001 … 1; anything else is ignored.
+    /// Changes the fraction of its period that the agent's work may take: clamped to 0.001 … 1; not above 0 is ignored.
     pub fn set_share(&mut self, share: f64) {
         if share > 0.0 {
             self.limits.share = share.clamp(1e-3, 1.0);
         }
     }
 
-    /// The share of its period that the agent's work may take.
+    /// The fraction of its period that the agent's work may take.
     #[must_use]
     pub fn share(&self) -> f64 {
         self.limits.share
     }
 
-    /// Says which ε is as fine as anybody can see, metres, > 0; +∞ where nobody looks. Until it is said again the agent is asked for
-    /// nothing finer, and comes back to where it was when it may.
+    /// Sets the finest ε that makes a visible difference, metres, > 0; +∞ if the agent is not seen. Until the next call no finer ε is
+    /// demanded; afterwards the agent returns to its own target.
     pub fn set_plain(&mut self, eps_m: f64) {
         if let Some((fine, _)) = self.limits.eps_m {
             self.plain = if eps_m == f64::INFINITY { self.landing } else { ratio_ln(eps_m, fine).min(self.landing) };
         }
     }
 
-    /// Where on the stairs the agent belongs.
+    /// The present target of z: by load, and by visibility.
     fn held(&self) -> f64 {
         self.asked.max(self.plain)
     }
 
-    /// What the agent would take of a core at its finest ε and the rate that is wanted, from 0, in the mean of the last windows; `None`
-    /// before anything was measured. Work falls as 1/ε and as 1/dt.
+    /// Load of one core at the finest ε and the wanted rate, from 0, as the mean of the last windows; `None` before the first measurement.
+    /// Work falls as 1/ε and as 1/dt.
     #[must_use]
     pub fn full_load(&self) -> Option<f64> {
         self.full.mean()
     }
 
-    /// The least part of that load that it can do with, 0 … 1: at its coarsest ε and longest dt.
+    /// The least fraction of that load, 0 … 1: at the coarsest ε and the longest dt.
     #[must_use]
     pub fn least_part(&self) -> f64 {
         libm::exp(-self.top)
     }
 
-    /// Learns what a turn took; gives a demand when it is time for another dt or ε.
+    /// Reports the time of a turn; gives a demand when dt or ε should change.
     pub fn after_turn(&mut self, turn: &TurnMeasure) -> Option<RateDemand> {
         if !self.steers() || !self.collect(turn) {
             return None;
@@ -196,13 +196,13 @@ impl RateControl {
         self.demand_if_worth_it()
     }
 
-    /// Adds a turn to the window; `true` when the window is full. A measure that is none is left out.
+    /// Adds a turn to the window; `true` when the window is full. An invalid measurement is left out.
     fn collect(&mut self, turn: &TurnMeasure) -> bool {
         let all = [turn.work_s, turn.wanted_period_s, turn.real_period_s, turn.dt_s];
         if !all.iter().all(|x| x.is_finite() && *x > 0.0) {
             return false;
         }
-        // the period that belongs to the step the agent makes now
+        // the period that belongs to the present step
         let wanted_s = turn.wanted_period_s * turn.dt_s / self.limits.dt_wanted_s;
         if !(wanted_s.is_finite() && wanted_s > 0.0) {
             return false;
@@ -219,8 +219,8 @@ impl RateControl {
         window.span_s >= WINDOW_S && window.turns >= WINDOW_TURNS
     }
 
-    /// On both stairs the load falls as e⁻ᶻ (control.md, eq. 18). What an agent does with less work than it may says nothing of what it
-    /// could bear, where that is known.
+    /// Stores the load scaled to the finest level: in both ranges it falls as e⁻ᶻ (control.md, eq. 18). While the agent does less work than
+    /// it may (for lack of visibility), the measurement says nothing of its full load and is skipped, unless none is known.
     fn note(&mut self, window: &Window) {
         let load = window.work_s / window.wanted_s;
         let eased = self.sent > self.asked && load <= self.limits.share * libm::exp(DEAD.1);
@@ -229,7 +229,7 @@ impl RateControl {
         }
     }
 
-    /// Where the agent belongs by its own work, and by what others leave it (control.md, eq. 19).
+    /// Updates the target of z by the agent's own work, and by delays from others (control.md, eq. 19).
     fn learn(&mut self, window: &Window) {
         let lateness = window.late / f64::from(window.turns) - window.over_s / window.wanted_s;
         self.late = if lateness > LATE { self.late + 1 } else { 0 };
@@ -251,7 +251,7 @@ impl RateControl {
             () => None,
         };
         if step > DEAD.1 {
-            // not onto the second stair where the first will do
+            // not into the range of dt if the range of ε suffices
             let end = if wish <= self.landing + DEAD.1 { self.landing } else { self.top };
             self.aim = (wish - MIDDLE).min(end);
         } else if step < DEAD.0 && !eased {
@@ -259,7 +259,7 @@ impl RateControl {
         }
     }
 
-    /// Kept late by others: what was refined last was too much, is taken back, and tried again after twice as long.
+    /// Delayed by others: the last refinement was too much, is reverted, and tried again after twice the wait.
     fn give_way(&mut self, lateness: f64) {
         self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(LESSON_MAX)).min(self.top);
         if let Some(before) = self.refined_from.take() {
@@ -268,7 +268,7 @@ impl RateControl {
         }
     }
 
-    /// With time to spare: finer, once others have kept it late for long enough no more.
+    /// With time to spare: refines, once delays by others have ceased for long enough.
     fn rise(&mut self, to: f64) {
         if self.calm >= self.patience {
             let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.asked - to) } else { 0.0 };
@@ -294,7 +294,7 @@ impl RateControl {
         to != from && ((to - from).abs() >= RETUNE_MIN || to <= 0.0 || to >= self.top)
     }
 
-    /// What is asked for at present (control.md, eq. 17).
+    /// The present demand (control.md, eq. 17).
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
@@ -303,14 +303,14 @@ impl RateControl {
         RateDemand { dt_s, eps_m }
     }
 
-    /// The end at which the agent rests: finest with time to spare, or coarsest and still late.
+    /// The end of the range at which the agent rests: finest with time to spare, or coarsest and still late.
     #[must_use]
     pub fn rest(&self) -> Option<Bound> {
         self.rest
     }
 }
 
-/// ln(a/b), 0 where b is not below a or one of them is no length.
+/// ln(a/b); 0 if b is not below a or one of them is not a valid length.
 fn ratio_ln(a: f64, b: f64) -> f64 {
     if a.is_finite() && b > 0.0 && a > b { libm::log(a / b) } else { 0.0 }
 }

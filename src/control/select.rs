@@ -1,7 +1,7 @@
-//! The policies of the papers that choose for every object by itself, as they would choose for this frame.
+//! The policies of the papers that choose for every object separately, applied to one frame.
 //!
-//! In: ladders, a time. Out: a rung for every object in view, and a promise. Never here: trees ([`super::hierarchy`]), what learns
-//! from frames ([`super::adaptive`]). Theory: `docs/theory/budget.md`, sections 2, 3, 5 and 6.
+//! In: ladders, a time. Out: a rung for every object in view, and a promise. Never here: trees ([`super::hierarchy`]), policies that are
+//! corrected by measured frames ([`super::adaptive`]). Theory: `docs/theory/budget.md`, sections 2, 3, 5 and 6.
 
 use super::ask::{Ask, Promise, TICKS, demand, left_out};
 use super::level::Held;
@@ -18,13 +18,13 @@ use metachron_budget::select::{Level, Mode, Problem, Selection};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
 
-/// What a Newton step of the interior point takes a mesh, seconds.
+/// Time of a Newton step of the interior point per mesh, seconds.
 const NEWTON_S: f64 = 60e-9;
 
-/// The interior point ends within a hundredth of the best and comes nearer the next time: what moves by less than this stays.
+/// The interior point stops within a hundredth of the optimum and may come nearer the next time: a smaller relative change of r is ignored.
 const SAME_R: f64 = 0.02;
 
-/// What these policies remember from frame to frame.
+/// State of these policies from frame to frame.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Select {
     threshold: threshold::Feedback,
@@ -35,12 +35,12 @@ pub(super) struct Select {
 }
 
 impl Select {
-    /// Learns what a frame took: for the threshold that follows it.
+    /// Reports the time of a frame, for the threshold that follows it.
     pub fn observe(&mut self, work_s: f64, target_s: f64) {
         self.threshold.observe(work_s, target_s);
     }
 
-    /// Chooses by `policy`; `levels` has one entry an object, of which those in view that have rungs are set.
+    /// Chooses by `policy`; `levels` has one entry per object, of which those in view with rungs are set.
     pub fn choose(&mut self, policy: Policy, ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
         match policy {
             Policy::RobinHood => robin_hood(ask, levels),
@@ -49,7 +49,7 @@ impl Select {
         }
     }
 
-    /// Every object has one rung; the cheapest of all where even they do not fit.
+    /// Every object has one rung; the cheapest of all if even those do not fit.
     fn knapsack(&mut self, policy: Policy, ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
         let mut problem = Problem::new(Mode::ExactlyOne, ask.budget());
         let objects: Vec<_> = ask.drawable().collect();
@@ -87,7 +87,7 @@ impl Select {
         }
     }
 
-    /// Any number of triangles (GB99); what has few levels is rounded down to one of them.
+    /// Any number of triangles (GB99); objects with few levels are rounded down to one of them.
     fn convex(&mut self, by_barrier: bool, ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
         let objects: Vec<_> = ask.drawable().collect();
         let meshes: Vec<_> = objects.iter().map(|&at| mesh(ask, at)).collect();
@@ -95,7 +95,7 @@ impl Select {
         let budget_s = ask.budget_s();
         let found = if by_barrier {
             let last = |at: &usize| self.last_r.get(&ask.views[*at].0.id).copied();
-            // a warm start is one for all: a single newcomer has no resolution to start from
+            // a warm start needs all objects: a single new one has no resolution to start from
             let last: Option<Vec<_>> = objects.iter().map(last).collect();
             interior_point(budget_s, setups, &meshes, &last.unwrap_or_default(), limits(ask, objects.len()))
         } else {
@@ -117,7 +117,7 @@ impl Select {
     }
 }
 
-/// The optimiser's time limit as steps, of which each is linear in the number of meshes.
+/// The optimiser's time limit as a number of steps, each linear in the number of meshes.
 fn limits(ask: &Ask<'_>, meshes: usize) -> Limits {
     let usual = Limits::default();
     let step_s = NEWTON_S * meshes.max(1) as f64;
@@ -158,7 +158,7 @@ fn promise(ask: &Ask<'_>, selection: &Selection) -> Promise {
     }
 }
 
-/// Every object its part of the time by value; what cannot pay for its cheapest form is not drawn (RH05, §1).
+/// Gives every object its share of the time by value; an object that cannot pay for its cheapest form is not drawn (RH05, §1).
 fn robin_hood(ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
     let objects: Vec<_> = ask.drawable().collect();
     let instance = |&at: &usize| {
@@ -182,13 +182,13 @@ fn robin_hood(ask: &Ask<'_>, levels: &mut [LevelDemand]) -> Promise {
     Promise { budget_s, predicted_s: ask.fixed_s + spent_s, value, upper: 0.0, feasible, holes }
 }
 
-/// What an instance is worth to Robin Hood: its surface is the area, its distance the depth.
+/// Value of an instance for Robin Hood: its surface is the area, its distance the depth.
 fn value(ask: &Ask<'_>, at: usize) -> f64 {
     let view = &ask.views[at].0;
     ask.value.of(view.surface_m2(), view.distance_m, view.from_focus_m, view.importance)
 }
 
-/// A mesh of any resolution: below its least, and above one triangle a pixel, there is nothing to choose.
+/// A mesh of continuous resolution, from its least to one triangle per pixel.
 fn mesh(ask: &Ask<'_>, at: usize) -> Mesh {
     let span = &ask.views[at].1;
     let full_s = cost_s(ask, at, span.full) - setup_s(ask, at);
@@ -196,7 +196,7 @@ fn mesh(ask: &Ask<'_>, at: usize) -> Mesh {
     Mesh { weight: ask.weight(at), time: full_s, least: part(span.least), most: part(span.most) }.sound(full_s)
 }
 
-/// Seconds of an object with so many triangles, on the line through the ends of its ladder.
+/// Seconds of an object with `polygons` triangles, on the line through the ends of its ladder.
 fn cost_s(ask: &Ask<'_>, at: usize, polygons: f64) -> f64 {
     let rungs = &ask.ladders.of(at).rungs;
     let (Some(first), Some(last)) = (rungs.first(), rungs.last()) else { return 0.0 };
@@ -204,7 +204,7 @@ fn cost_s(ask: &Ask<'_>, at: usize, polygons: f64) -> f64 {
     first.cost_s + rise * (polygons - first.polygons)
 }
 
-/// What of an object's time no number of triangles saves.
+/// The part of an object's time that is independent of its triangles.
 fn setup_s(ask: &Ask<'_>, at: usize) -> f64 {
     cost_s(ask, at, 0.0).max(0.0)
 }

@@ -1,29 +1,29 @@
-//! What a controller says of itself: whether it moves, rests, or is stopped at an end of what it may do.
+//! The state of a controller as it reports it: moving, resting, or stopped at an end of its range.
 //!
-//! In: the laws' own words. Out: [`Status`], and its sentence for the viewer and the report. Never here: state.
+//! In: the states of the laws. Out: [`Status`], and its sentence for the viewer and the report. Never here: state.
 
 use super::ask::Promise;
 use metachron_budget::Bound;
 use metachron_budget::log_law::Rest;
 use std::fmt;
 
-/// What the picture's controller is doing.
+/// The present activity of the picture's controller.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Status {
-    /// No frame has taught it anything yet.
+    /// No frame has been measured yet.
     #[default]
     Waiting,
-    /// It moves (ε, n) towards the wanted time.
+    /// The controller moves (ε, n) towards the target time.
     Moving,
-    /// The work is as wanted.
+    /// The work is on target.
     Settled,
-    /// It is stopped at this end of what the objects in view allow.
+    /// The controller is stopped at this end of the range of the objects in view.
     Clamped(Bound),
     /// There is time left, but the next finer level would be late.
     BetweenLevels,
     /// Nothing in view can be drawn in more than one way.
     Fixed,
-    /// The policy asks for the finest and does not look at the time.
+    /// The policy requests the finest level and ignores the time.
     Full,
 }
 
@@ -39,12 +39,12 @@ impl From<Rest> for Status {
 }
 
 impl Status {
-    /// Of a policy that predicts and does not learn: it is where it promises to be.
+    /// The status of a policy that predicts without feedback: its promise.
     pub(super) fn of_promise(promise: &Promise) -> Self {
         if promise.feasible { Self::Settled } else { Self::Clamped(Bound::Coarsest) }
     }
 
-    /// The end at which it is stopped.
+    /// The end at which the controller is stopped.
     #[must_use]
     pub fn clamped(self) -> Option<Bound> {
         if let Self::Clamped(bound) = self { Some(bound) } else { None }

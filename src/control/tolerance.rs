@@ -1,65 +1,65 @@
-//! An agent's own controller where it holds an error: the longest steps and the coarsest ε that its tolerance allows.
+//! The error controller of an agent: the longest steps and the coarsest ε that its tolerance allows.
 //!
-//! In: after every turn what the agent says of its own error, in space and in time ([`ErrorMeasure`]). Out: now and then a
-//! [`RateDemand`]. Never here: agents, clocks, how an error is estimated. Theory: `docs/theory/control.md`, eq. 34 … 36.
+//! In: after every turn the agent's own error estimate, in space and in time ([`ErrorMeasure`]). Out: occasionally a [`RateDemand`]. Never
+//! here: agents, clocks, error estimation. Theory: `docs/theory/control.md`, eq. 34 … 36.
 
 use super::rate::RateDemand;
 use metachron_budget::Bound;
 
-/// What an agent says of its own error after a turn.
+/// An agent's own error estimate after a turn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorMeasure {
-    /// The error that its spacing makes, metres, ≥ 0.
+    /// The error caused by its spacing, metres, ≥ 0.
     pub space_m: f64,
-    /// The error that its steps have made, metres, ≥ 0.
+    /// The error caused by its steps, metres, ≥ 0.
     pub time_m: f64,
-    /// Length of the step that it made, simulated seconds, > 0.
+    /// Length of the step made, simulated seconds, > 0.
     pub dt_s: f64,
 }
 
-/// What a controller may ask of an agent.
+/// Limits of the demands to an agent.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ErrorLimits {
-    /// The error that is to be held, metres, > 0.
+    /// The greatest allowed error, metres, > 0.
     pub tolerance_m: f64,
-    /// Shortest and longest step, simulated seconds; alike means: the step is fixed.
+    /// Shortest and longest step, simulated seconds; equal values fix the step.
     pub dt_s: (f64, f64),
-    /// Finest and coarsest ε of the simulation, metres; alike means: ε is fixed. `None` for a model without ε.
+    /// Finest and coarsest ε of the simulation, metres; equal values fix ε. `None` for a model without ε.
     pub eps_m: Option<(f64, f64)>,
 }
 
-/// Nothing is decided on less than this, simulated seconds: what longer steps did wrong must first be forgotten.
+/// Shortest window of a decision, simulated seconds: errors of earlier, longer steps must have faded …
 const WINDOW_S: f64 = 1.0;
-/// … and on fewer turns: an agent judges its steps twice in 96 of them.
+/// … and fewest turns: an agent estimates its step error twice in 96 of them.
 const WINDOW_TURNS: u32 = 192;
-/// An error is brought to this share of what is allowed.
+/// Target of the error as a fraction of the allowed one.
 const SET: f64 = 0.7;
-/// Above this share, and up to all, an error is left as it is.
+/// Between this fraction and the whole of the allowed error nothing changes.
 const LEAST: f64 = 0.45;
-/// One decision makes things at most so much coarser, and at most so much finer.
+/// Greatest coarsening by one decision, and greatest refinement.
 const COARSEN_MAX: f64 = 1.5;
 const REFINE_MAX: f64 = 4.0;
-/// Least |Δ ln| of a demand: re-meshing costs accuracy, 10 % of ε are not worth it.
+/// Least |Δ ln| of a demand: re-meshing costs accuracy, which 10 % of ε do not justify.
 const DEMAND_MIN: f64 = 0.095;
-/// Windows within the tolerance before anything gets coarser; doubled whenever that turns out to have been too soon.
+/// Windows within the tolerance before anything gets coarser; doubled whenever that turns out to have been too early.
 const PATIENCE: (u32, u32) = (1, 32);
-/// What was made coarser has proved itself after so many times its patience: a motion that comes and goes within it has not.
+/// A coarsening counts as confirmed after this many times the patience: a motion that comes and goes within it does not confirm it.
 const PROOF: u32 = 16;
 
-/// One value that may be chosen, and how the error grows with it.
+/// One controlled value, and how the error grows with it.
 #[derive(Debug, Clone, Copy)]
 struct Stair {
     range: (f64, f64),
     value: f64,
-    /// Orders of the error: the greatest it may have, by which it is coarsened, and the least, by which it is refined.
+    /// Orders of the error: the greatest possible, used to coarsen, and the least, used to refine.
     orders: (f64, f64),
     calm: u32,
     patience: u32,
-    /// The value before it was coarsened last, if that has not proved itself yet.
+    /// The value before the last coarsening, if that is not confirmed yet.
     coarsened_from: Option<f64>,
 }
 
-/// Steers dt and ε of one agent so that its error stays below a tolerance.
+/// Controls dt and ε of one agent so that its error stays below a tolerance.
 #[derive(Debug, Clone)]
 pub struct ErrorControl {
     tolerance_m: f64,
@@ -91,7 +91,7 @@ impl Stair {
         self.value >= self.range.1
     }
 
-    /// Learns an error of which `allowed` is wanted at most; whether the value has changed (eq. 35, 36).
+    /// Updates the value with an error of which at most `allowed_m` is allowed; gives whether the value has changed (eq. 35, 36).
     fn learn(&mut self, error_m: f64, allowed_m: f64) -> bool {
         let before = self.value;
         if error_m > allowed_m {
@@ -133,7 +133,7 @@ impl Stair {
 }
 
 impl ErrorControl {
-    /// A controller of an agent that steps and simulates as `now` says.
+    /// A controller of an agent with the present dt and ε of `now`.
     #[must_use]
     pub fn new(limits: &ErrorLimits, now: RateDemand) -> Self {
         let eps = limits.eps_m.zip(now.eps_m).map(|(range, eps)| Stair::new(range, eps, (2.0, 2.0)));
@@ -148,13 +148,13 @@ impl ErrorControl {
         }
     }
 
-    /// Whether there is anything to steer.
+    /// Whether anything can be controlled.
     #[must_use]
     pub fn steers(&self) -> bool {
         self.dt.steers() || self.eps.is_some_and(|eps| eps.steers())
     }
 
-    /// Learns how wrong a turn is; gives a demand when it is time for another dt or ε. A measure that is none is left out.
+    /// Reports the error after a turn; gives a demand when dt or ε should change. An invalid measurement is left out.
     pub fn after_turn(&mut self, turn: &ErrorMeasure) -> Option<RateDemand> {
         let ErrorMeasure { space_m, time_m, dt_s } = *turn;
         let sound = [space_m, time_m].iter().all(|error| error.is_finite() && *error >= 0.0);
@@ -173,7 +173,7 @@ impl ErrorControl {
         self.decide(space_m, time_m).then(|| self.demand())
     }
 
-    /// Judges a window; whether anything is to change (eq. 34).
+    /// Evaluates a window; gives whether anything is to change (eq. 34).
     fn decide(&mut self, space_m: f64, time_m: f64) -> bool {
         let whole = self.tolerance_m;
         let left = |other: &Stair, error_m: f64| {
@@ -196,7 +196,7 @@ impl ErrorControl {
         changed
     }
 
-    /// What is asked for at present.
+    /// The present demand.
     #[must_use]
     pub fn demand(&self) -> RateDemand {
         RateDemand { dt_s: self.dt.value, eps_m: self.eps.map(|eps| eps.value) }

@@ -1,32 +1,32 @@
-//! What control is told of the objects: what they are, and how the camera sees them.
+//! Input of control about the objects: their kind, and their appearance to the camera.
 //!
 //! In: plain numbers. Out: the weight by which an object shares in the picture's polygons. Never here: state.
 
 use super::level::{IMPOSTORS_MAX, PRIMITIVE_LEVELS};
 use metachron_core::{AgentId, ResolutionRange};
 
-/// How the light on a surface is worked out: the rendering algorithm of (FS93), cheapest first.
+/// How the light on a surface is computed: the rendering algorithm of (FS93), cheapest first.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Shading {
-    /// One colour a triangle.
+    /// One colour per triangle.
     Flat,
     /// Colours at corners, interpolated between them.
     Gouraud,
-    /// Light at every pixel.
+    /// Lighting at every pixel.
     #[default]
     PerPixel,
-    /// The same on what is painted on it.
+    /// The same with a texture.
     Textured,
-    /// With soft shadows: better than an object asks for ([`super::PictureControl::set_raise`]).
+    /// With soft shadows: better than an object's requested range ([`super::PictureControl::set_raise`]).
     Shadowed,
 }
 
 impl Shading {
-    /// Those that objects ask for and prices are known of, cheapest first.
+    /// The shadings that objects request and that have prices, cheapest first.
     pub const ALL: [Self; 4] = [Self::Flat, Self::Gouraud, Self::PerPixel, Self::Textured];
 }
 
-/// What is drawn.
+/// The kind of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Kind {
     /// A tube: patches of 12·2ⁿ triangles, one for each interval ε of its length.
@@ -36,25 +36,25 @@ pub enum Kind {
         /// Mean radius, metres, > 0.
         radius_m: f64,
     },
-    /// Anything that is one mesh a level.
+    /// A shape with one mesh per level.
     Primitive {
-        /// Radius of a ball that holds it, metres, > 0.
+        /// Radius of a bounding ball, metres, > 0.
         radius_m: f64,
-        /// Triangles at each level n; rising, or the same from some level on.
+        /// Triangles at each level n; rising, or constant from some level on.
         triangles: [u32; PRIMITIVE_LEVELS],
     },
-    /// A mesh that can be cut at any number of triangles.
+    /// A mesh that can be drawn with any number of triangles.
     Counted {
-        /// Radius of a ball that holds it, metres, > 0.
+        /// Radius of a bounding ball, metres, > 0.
         radius_m: f64,
-        /// The fewest triangles that it is drawn with, ≥ 1.
+        /// The fewest triangles to draw it with, ≥ 1.
         least: u32,
         /// All its triangles, ≥ `least`.
         most: u32,
     },
     /// Objects that can be drawn as one: at n = 0, 1 … by an impostor, at n past the last of them as themselves.
     Group {
-        /// Radius of a ball that holds it, metres, > 0.
+        /// Radius of a bounding ball, metres, > 0.
         radius_m: f64,
         /// Its members among the objects given with it: the number of the first, and how many.
         members: (usize, usize),
@@ -66,44 +66,44 @@ pub enum Kind {
 /// An object as the camera sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ObjectView {
-    /// Which one: its level is remembered under this number from frame to frame.
+    /// Id under which the object's level is stored from frame to frame.
     pub id: AgentId,
-    /// What is drawn.
+    /// The kind of the object.
     pub kind: Kind,
-    /// The pairs (ε, n) that its picture may have. Of a primitive, n alone counts; of what is cut by triangles or a group, neither.
+    /// The pairs (ε, n) allowed for the picture. For a primitive only n counts; for a mesh with a free triangle count or a group, neither.
     pub range: ResolutionRange,
-    /// The cheapest and the best shading that it may have, alike where it is fixed.
+    /// The cheapest and the best shading allowed, equal if it is fixed.
     pub shading: (Shading, Shading),
-    /// Area it covers, pixels, ≥ 0. No object gets more than one triangle a pixel.
+    /// Covered area, pixels, ≥ 0. No object gets more than one triangle per pixel.
     pub pixels: f64,
     /// Distance of its centre from the eye, metres, > 0.
     pub distance_m: f64,
-    /// How fast it crosses the picture, pixels a second, ≥ 0.
+    /// Speed across the picture, pixels per second, ≥ 0.
     pub speed_px_s: f64,
     /// Weight against the others, > 0; 1 is usual.
     pub importance: f64,
-    /// Distance of its centre from the middle of the picture, as a part of half the diagonal, ≥ 0.
+    /// Distance of its centre from the middle of the picture, as a fraction of half the diagonal, ≥ 0.
     pub off_centre: f64,
     /// Distance of its centre from the point that the camera looks at, metres, ≥ 0.
     pub from_focus_m: f64,
-    /// Whether any of it may be in the picture.
+    /// Whether any part of it may be in the picture.
     pub visible: bool,
 }
 
-/// Nearer than this the eye is inside the object, metres; polygons are not made smaller still.
+/// Least distance, metres: nearer, the eye is inside the object, and smaller polygons are pointless.
 const DISTANCE_MIN_M: f64 = 0.05;
 
-/// Speed on the screen at which an object gets half the polygons, pixels a second: at 30 frames/s it moves by 20 pixels a frame,
-/// about the size of a polygon.
+/// Speed on the screen at which an object gets half the polygons, pixels per second: at 30 frames/s 20 pixels a frame, about the size of a
+/// polygon.
 const SPEED_HALF_PX_S: f64 = 600.0;
 
 impl ObjectView {
-    /// Whether it stands for others.
+    /// Whether the object is a group.
     pub(super) fn is_group(&self) -> bool {
         matches!(self.kind, Kind::Group { .. })
     }
 
-    /// Area of a quad in square metres for each steradian of the scene's quads (control.md, eq. 14): far or fast is coarser.
+    /// Area of a quad in square metres per steradian of the scene's quads (control.md, eq. 14): coarser if far or fast.
     pub(super) fn coarseness_m2(&self) -> f64 {
         let distance = if self.distance_m.is_finite() { self.distance_m.max(DISTANCE_MIN_M) } else { 1.0 };
         let speed = if self.speed_px_s.is_finite() { self.speed_px_s.max(0.0) } else { 0.0 };
@@ -125,7 +125,7 @@ impl ObjectView {
 
 #[cfg(test)]
 impl ObjectView {
-    /// Seen whole and still, a metre away, in a hundred pixels and one resolution: tests say what is else.
+    /// An object in full view at rest, a metre away, with a hundred pixels and one resolution: tests override fields.
     pub(super) fn plain(id: u32, kind: Kind) -> Self {
         Self {
             id: AgentId(id),

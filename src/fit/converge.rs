@@ -1,28 +1,28 @@
-//! The answer to which ever finer ones lead, and how far it still is from it.
+//! The limit of a sequence of refined runs, and an estimate of the remaining error.
 //!
-//! In: the same run, each time at half the step and half the spacing. Out: the finest and an estimate of its error from the
-//! rate at which the differences fall. Never here: what is run.
+//! In: the same run, each time at half the step and half the spacing. Out: the finest and an estimate of its error from the rate at which
+//! the differences fall. Never here: the run itself.
 
 use super::path::{Path, farthest_m};
 
-/// The finest answer that was worked out.
+/// The finest result computed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Converged {
-    /// Where each point was.
+    /// The path of each point.
     pub paths: Vec<Path>,
     /// How often step and spacing were halved for it.
     pub level: u32,
-    /// How far it may still be from the answer, metres.
+    /// Estimated remaining error, metres.
     pub error_m: f64,
 }
 
-/// Differences that fall more slowly than this are taken not to fall at all.
+/// Slowest ratio of consecutive differences in the estimate; slower counts as no convergence …
 const SLOWEST: f64 = 0.9;
-/// … and faster than this, the fourth order, is not believed.
+/// … and the fastest, the fourth order; a faster ratio is clamped to it.
 const FASTEST: f64 = 1.0 / 16.0;
 
-/// Refines until the answer is known to `wanted_m`, or `levels` times. `play` is asked for the paths of a level, and gives none
-/// where it was stopped or the run failed.
+/// Refines until the estimated error is at most `wanted_m`, or `levels` times. `play` gives the paths of a level, and `None` if it was
+/// stopped or the run failed.
 pub fn converge(levels: u32, wanted_m: f64, play: &mut dyn FnMut(u32) -> Option<Vec<Path>>) -> Option<Converged> {
     let mut paths = play(0)?;
     let mut before: Option<f64> = None;

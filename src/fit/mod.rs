@@ -1,8 +1,8 @@
-//! The cheapest steps, divisions and methods that a tolerance allows: numbers only.
+//! The cheapest steps, divisions and integrators that a tolerance allows: numbers only.
 //!
-//! In: what may be chosen for every object, and a way to try choices out. Out: the converged answer with its own error, the
-//! cheapest choice within a tolerance of it, and what limits one that cannot be met.
-//! Never here: scenes, agents, files. What is tried, and at what price, is told by who asks.
+//! In: the options for every object, and a function that tries a choice. Out: the converged answer with its own error, the cheapest choice
+//! within a tolerance of it, and the limiting factor if the tolerance cannot be met.
+//! Never here: scenes, agents, files. The caller defines the trials and their costs.
 
 mod converge;
 mod path;

@@ -1,18 +1,18 @@
-//! Where a point was over time, and how far two of them are apart.
+//! The path of a point over time, and the distance between two paths.
 //!
-//! In: samples at any times. Out: distances at the times of one of them. Never here: who moved.
+//! In: samples at any times. Out: distances at the times of one of them. Never here: the moving object.
 
 use glam::DVec3;
 
-/// Where one point was.
+/// The path of one point.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Path {
-    /// Times, seconds, rising, and places, metres.
+    /// Times, seconds, ascending, and positions, metres.
     pub samples: Vec<(f64, DVec3)>,
 }
 
 impl Path {
-    /// Where it was at a time, straight between samples; `None` before the first and after the last.
+    /// The position at a time, linear between samples; `None` before the first and after the last.
     #[must_use]
     pub fn at(&self, time_s: f64) -> Option<DVec3> {
         let after = self.samples.partition_point(|(t, _)| *t < time_s);
@@ -24,14 +24,14 @@ impl Path {
         Some(x0.lerp(x1, (time_s - t0) / (t1 - t0)))
     }
 
-    /// The greatest distance from where `other` was at the same times, metres; infinite where the two share no time.
+    /// The greatest distance from `other` at the same times, metres; infinite if the two share no time.
     #[must_use]
     pub fn farthest_m(&self, other: &Self) -> f64 {
         let apart = self.samples.iter().filter_map(|(t, x)| other.at(*t).map(|y| x.distance(y)));
         apart.reduce(f64::max).unwrap_or(f64::INFINITY)
     }
 
-    /// The greatest distance from where it began, metres.
+    /// The greatest distance from the starting position, metres.
     #[must_use]
     pub fn extent_m(&self) -> f64 {
         let start = self.samples.first().map_or(DVec3::ZERO, |(_, x)| *x);
@@ -52,7 +52,7 @@ impl Path {
     }
 }
 
-/// The greatest distance of any of `paths` from its own in `others`, metres.
+/// The greatest distance of any of `paths` from its counterpart in `others`, metres.
 #[must_use]
 pub fn farthest_m(paths: &[Path], others: &[Path]) -> f64 {
     paths.iter().zip(others).map(|(path, other)| path.farthest_m(other)).fold(0.0, f64::max)

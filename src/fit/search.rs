@@ -1,76 +1,76 @@
-//! The cheapest settings within a tolerance: object by object, longer steps and fewer pieces as long as the answer holds.
+//! The cheapest settings within a tolerance: object by object, longer steps and fewer pieces as long as the error stays within it.
 //!
-//! In: what may be chosen, a setting that holds, a way to try one. Out: the cheapest that was found to hold.
-//! Never here: what a trial runs, how its error is measured.
+//! In: the options, a setting within the tolerance, a function that tries one. Out: the cheapest setting found within the tolerance. Never
+//! here: the content of a trial, the measurement of its error.
 
 /// How one object is simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Setting {
     /// Length of a step, seconds.
     pub dt_s: f64,
-    /// Into how many pieces its length is divided; zero where it is not.
+    /// Number of pieces that the object's length is divided into; zero if it is not divided.
     pub pieces: u32,
-    /// The number of its method among those that it may have.
+    /// Number of the integrator among those allowed.
     pub method: usize,
 }
 
-/// What may be chosen for one object.
+/// The options for one object.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
-    /// The longest step, seconds; the present one where it may not change.
+    /// The longest step, seconds; the present one if it may not change.
     pub dt_max_s: f64,
     /// The fewest pieces.
     pub pieces_min: u32,
-    /// The methods, by number, that may be tried.
+    /// The integrators, by number, that may be tried.
     pub methods: Vec<usize>,
 }
 
-/// What a trial came to.
+/// The result of a trial.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Trial {
-    /// How far the answer is from the converged one, metres; infinite where the run failed.
+    /// Distance from the converged answer, metres; infinite if the run failed.
     pub error_m: f64,
-    /// What each object costs, seconds of one core a simulated second.
+    /// Cost of each object, seconds of one core per simulated second.
     pub costs_s: Vec<f64>,
 }
 
-/// Tries settings of all objects; `None` where it was stopped.
+/// Tries settings of all objects; `None` if it was stopped.
 pub type Try<'a> = &'a mut dyn FnMut(&[Setting]) -> Option<Trial>;
 
-/// A search, and what it goes by.
+/// A search with its parameters.
 pub struct Search<'a> {
-    /// What may be chosen, object by object.
+    /// The options, object by object.
     pub choices: &'a [Choice],
-    /// The greatest error that is wanted, metres.
+    /// The greatest allowed error, metres.
     pub tolerance_m: f64,
-    /// No more trials than this.
+    /// The greatest number of trials.
     pub trials_max: u32,
-    /// How a setting is tried.
+    /// The function that tries a setting.
     pub attempt: Try<'a>,
 }
 
-/// What a search found.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// The cheapest settings that hold.
+    /// The cheapest settings within the tolerance.
     pub settings: Vec<Setting>,
-    /// What they came to.
+    /// The trial of these settings.
     pub trial: Trial,
-    /// How many were tried.
+    /// Number of settings tried.
     pub tried: u32,
-    /// Whether it was stopped, or ran out of trials, before its end.
+    /// Whether the search was stopped, or ran out of trials, before its end.
     pub cut_short: bool,
 }
 
-/// Steps and pieces are changed by these factors, the coarse one first.
+/// Factors by which steps and pieces are changed, the coarse one first.
 const FACTORS: [f64; 2] = [2.0, std::f64::consts::SQRT_2];
-/// A change that saves less than this share is none.
+/// A change that saves less than this share is not taken.
 const SAVING_MIN: f64 = 0.02;
-/// Two costs within this share of each other are alike: the lesser error decides.
+/// Two costs within this share of each other count as equal: the smaller error decides.
 const ALIKE: f64 = 0.25;
 
 impl Trial {
-    /// What all objects cost.
+    /// Cost of all objects together.
     #[must_use]
     pub fn cost_s(&self) -> f64 {
         self.costs_s.iter().sum()
@@ -78,7 +78,7 @@ impl Trial {
 }
 
 impl Search<'_> {
-    /// Finds the cheapest settings from `start`, which came to `trial` within the tolerance.
+    /// Finds the cheapest settings from `start`, whose result `trial` is within the tolerance.
     pub fn run(mut self, start: Vec<Setting>, trial: Trial) -> Found {
         let mut order: Vec<usize> = (0..start.len()).collect();
         order.sort_by(|a, b| trial.costs_s[*b].total_cmp(&trial.costs_s[*a]));
@@ -96,7 +96,7 @@ impl Search<'_> {
         let own = best.settings[object].method;
         for &method in self.choices[object].methods.iter().filter(|method| **method != own) {
             let mut settings = best.settings.clone();
-            // another method may bear longer steps; it begins where the scene did
+            // another integrator may allow longer steps; it starts from the scene's setting
             settings[object] = Setting { method, ..start };
             let Some(trial) = self.attempt(&settings, best) else { return };
             if trial.error_m > self.tolerance_m {
@@ -111,7 +111,7 @@ impl Search<'_> {
         }
     }
 
-    /// Takes longer steps and fewer pieces for one object as long as that is cheaper and holds.
+    /// Takes longer steps and fewer pieces for one object as long as that is cheaper and within the tolerance.
     fn descend(&mut self, object: usize, best: &mut Found) {
         for factor in FACTORS {
             while let Some((settings, trial)) = self.coarser(object, factor, best) {
@@ -120,7 +120,7 @@ impl Search<'_> {
         }
     }
 
-    /// The better of the two moves that are left to an object, if one holds and is cheaper.
+    /// The better of the two remaining moves of an object, if one is within the tolerance and cheaper.
     fn coarser(&mut self, object: usize, factor: f64, best: &mut Found) -> Option<(Vec<Setting>, Trial)> {
         let mut found: Option<(Vec<Setting>, Trial)> = None;
         for setting in self.choices[object].moves(best.settings[object], factor) {
@@ -158,7 +158,7 @@ impl Trial {
 }
 
 impl Choice {
-    /// A longer step, and fewer pieces.
+    /// The possible moves: a longer step, and fewer pieces.
     fn moves(&self, now: Setting, factor: f64) -> impl Iterator<Item = Setting> + use<> {
         let dt_s = rounded(now.dt_s * factor).min(self.dt_max_s);
         let pieces = (f64::from(now.pieces) / factor).ceil() as u32;
@@ -169,7 +169,7 @@ impl Choice {
     }
 }
 
-/// Three digits of a step: what people can read and write.
+/// A step rounded to three digits, for readability.
 fn rounded(dt_s: f64) -> f64 {
     let unit = 10_f64.powi(dt_s.log10().floor() as i32 - 2);
     (dt_s / unit).round() * unit

@@ -1,6 +1,6 @@
-//! What may hold a picture at its time: a feedback law with its gains, or the policy that predicts.
+//! The candidates for holding a picture at its target time: a feedback law with its gains, or the policy that predicts.
 //!
-//! In: gains. Out: the controller that draws, ready for a plant, and its loop near the set point. Never here: a judgement.
+//! In: gains. Out: the controller as used for drawing, set up for a plant, and its linearised loop. Never here: a judgement.
 //! Theory: `docs/theory/control.md`, eq. 4, 8, 27 and 30; `docs/theory/budget.md`, eq. 34.
 
 use super::margins::Loop;
@@ -13,15 +13,14 @@ use crate::control::{Law, PictureControl, Policy, Prices, Stages};
 pub enum Contender {
     /// Feedback from the measured time (GDC04), by this law.
     Feedback(Law),
-    /// The policy `adaptive`: prices, and a Kalman filter on how much slower the machine is than they say.
+    /// The policy `adaptive`: prices, and a Kalman filter for how much slower the machine is than the prices say.
     Adaptive {
-        /// The least part of a frame that is left free, 0 … 0.5.
+        /// The least fraction of a frame that is left free, 0 … 0.5.
         margin: f64,
     },
 }
 
-/// How much κ is taken to wander from one frame to the next where errors have nothing in common, and the least deviation of a
-/// measurement, as (budget.md, eq. 34 … 36) have them.
+/// Least process noise of κ per frame, for uncorrelated errors, and least deviation of a measurement, as in (budget.md, eq. 34 … 36).
 const WANDER: f64 = 2e-4;
 const SIGMA_LEAST: f64 = 0.01;
 
@@ -32,10 +31,10 @@ impl From<Law> for Contender {
 }
 
 impl Contender {
-    /// The policy as scenes have it that say nothing of a margin.
+    /// The policy with the margin of scenes that do not set one.
     pub const ADAPTIVE: Self = Self::Adaptive { margin: 0.02 };
 
-    /// The share of the frame's time that the work is to take: T_set/T.
+    /// Target work as a fraction of the frame's time: T_set/T.
     #[must_use]
     pub fn set_share(self) -> f64 {
         match self {
@@ -44,7 +43,7 @@ impl Contender {
         }
     }
 
-    /// The controller that draws; one that predicts is told what `plant` costs.
+    /// The controller as used for drawing; one that predicts gets the prices of `plant`.
     pub(super) fn control(self, plant: &Plant, target_hz: f64) -> PictureControl {
         match self {
             Self::Feedback(law) => PictureControl::new(Policy::Feedback, law, target_hz),
@@ -63,7 +62,7 @@ impl Contender {
         }
     }
 
-    /// The loop near the set point on a machine `speed` times as fast; `None` where the picture cannot take that time.
+    /// The loop near the set point on a machine `speed` times as fast; `None` if the picture cannot take that time.
     #[must_use]
     pub fn local_loop(self, plant: &Plant, target_hz: f64, speed: f64) -> Option<Loop> {
         let set_s = self.set_share() / target_hz;
@@ -82,8 +81,8 @@ impl Contender {
     }
 }
 
-/// The share of an error of κ that the Kalman filter removes in a frame once it has settled (control.md, eq. 30): g² R + g Q = Q, less
-/// what the fixed part of a frame, priced for another machine, puts back.
+/// The share of an error of κ that the Kalman filter removes in a frame in the steady state (control.md, eq. 30): g² R + g Q = Q, less the
+/// error reintroduced by the fixed part of a frame, which is priced for another machine.
 fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
     let fixed_s = plant.line.intercept.max(0.0);
     let (chosen_s, table_s) = (set_s - fixed_s, speed * set_s - fixed_s);
@@ -96,7 +95,7 @@ fn learning(plant: &Plant, set_s: f64, target_hz: f64, speed: f64) -> f64 {
     filter * (set_s - fixed_s / speed) / chosen_s
 }
 
-/// ε̂ with which a law begins that is put where the frame takes its time.
+/// The starting ε̂ of a law that is placed at the target time.
 fn rest_of(contender: Contender, plant: &Plant, target_hz: f64, speed: f64) -> f64 {
     let trial = Trial { speed, start: Start::Target, seconds: 0.5 / target_hz, ..Trial::calm(contender, target_hz) };
     play(plant, &trial).first().map_or(1.0, |beat| beat.eps_hat)

@@ -1,36 +1,36 @@
-//! What upsets a loop: loads, spikes, drift, a turn of the camera, another speed of the machine.
+//! Disturbances of a loop: loads, spikes, drift, a turn of the camera, another speed of the machine.
 //!
-//! In: how much of a trial has passed, random numbers. Out: factors on the work, and what of the scene is in view.
+//! In: the elapsed fraction of a trial, random numbers. Out: factors on the work, and the part of the scene in view.
 //! Never here: the loop.
 
 use crate::control::ObjectView;
 
-/// What happens in a trial, beside the noise.
+/// A disturbance of a trial, in addition to the noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Disturbance {
-    /// Nothing.
+    /// No disturbance.
     Nothing,
-    /// From a third to two thirds of the trial every frame takes so many times its time, > 0.
+    /// In the middle third of the trial every frame takes this many times its time, > 0.
     Load(f64),
     /// One frame in a hundred takes five times its time.
     Spikes,
     /// The work drifts by 30 % up and down once in the trial.
     Drift,
-    /// From a third to two thirds the camera looks away from every second object; a single one is seen from twice as far.
+    /// In the middle third the camera turns away from every second object; a single object is seen from twice as far.
     CameraTurn,
-    /// From a third on the machine is so many times as fast, > 0.
+    /// After the first third the machine is this many times as fast, > 0.
     Speed(f64),
 }
 
-/// The share of frames that spike.
+/// The fraction of frames that spike.
 const SPIKES: f64 = 0.01;
-/// How long they take.
+/// Factor on the time of a spike.
 const SPIKE: f64 = 5.0;
-/// How far the work drifts.
+/// Amplitude of the drift.
 const DRIFT: f64 = 0.3;
 
 impl Disturbance {
-    /// All that a law is judged by.
+    /// All disturbances used to judge a law.
     pub const ALL: [Self; 8] = [
         Self::Nothing,
         Self::Load(1.4),
@@ -42,13 +42,13 @@ impl Disturbance {
         Self::Speed(0.5),
     ];
 
-    /// Whether it differs from one seed to another.
+    /// Whether the disturbance depends on the seed.
     #[must_use]
     pub fn is_by_chance(self) -> bool {
         self == Self::Spikes
     }
 
-    /// The factor on the work of a frame when the share `passed` of the trial is over; `random` is uniform in 0 … 1.
+    /// The factor on the work of a frame after the fraction `passed` of the trial; `random` is uniform in 0 … 1.
     #[must_use]
     pub fn load(self, passed: f64, random: f64) -> f64 {
         match self {
@@ -60,7 +60,7 @@ impl Disturbance {
         }
     }
 
-    /// Changes what is in view when the share `passed` of the trial is over.
+    /// Changes the objects in view after the fraction `passed` of the trial.
     pub fn look(self, passed: f64, views: &mut [ObjectView]) {
         if self != Self::CameraTurn || !in_the_middle(passed) {
             return;
@@ -79,7 +79,7 @@ fn in_the_middle(passed: f64) -> bool {
     (1.0 / 3.0..2.0 / 3.0).contains(&passed)
 }
 
-/// Random numbers that are the same on every machine.
+/// Random numbers that are identical on every machine.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Dice(u64);
 

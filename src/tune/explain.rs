@@ -1,7 +1,7 @@
-//! Why a pair of gains is slow, swings, or is fine.
+//! Explains why a pair of gains is slow, oscillates, or is fine.
 //!
-//! In: a plant, a contender with its gains, a target. Out: the loop near its set point, where it can rest, and two sentences that a
-//! person can act on. Never here: other gains than those that were asked about.
+//! In: a plant, a contender with its gains, a target. Out: the loop near its set point, its fixed points, and two sentences of advice.
+//! Never here: a search for other gains.
 
 use super::contender::Contender;
 use super::margins::Loop;
@@ -15,38 +15,38 @@ use crate::control::Law;
 /// A contender on a plant, explained.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Explanation {
-    /// What the picture can take at all.
+    /// The range of times that the picture can take.
     pub reach: Reach,
-    /// The time that is to be held, seconds.
+    /// The target time, seconds.
     pub set_s: f64,
-    /// s: the share of that time that goes with polygons.
+    /// s: the share of that time that scales with polygons.
     pub share: f64,
-    /// The loop near the set point; `None` where the set point is out of reach.
+    /// The loop near the set point; `None` if the set point is out of reach.
     pub near: Option<Loop>,
-    /// The places at which it can rest, by rising ε̂.
+    /// The fixed points, by rising ε̂.
     pub rests: Vec<FixedPoint>,
-    /// From 0.4 and from 2.5 times the wanted rate, without noise.
+    /// Measures of trials started at 0.4 and at 2.5 times the target rate, without noise.
     pub from: [Measures; 2],
-    /// The swing that is left from a start between a quarter and four times the wanted rate, if there is one.
+    /// The remaining oscillation after a start between a quarter and four times the target rate, if there is one.
     pub cycle: Option<Cycle>,
-    /// Levels n that change in a frame when it should be at rest, the worst of the same starts.
+    /// Changes of levels n per frame when the loop should be at rest, the worst of the same starts.
     pub chatter: f64,
-    /// What that means.
+    /// The explanation in words.
     pub sentences: String,
 }
 
-/// Starts that are played, in parts of the wanted rate.
+/// Starts of the trials, as fractions of the target rate.
 const STARTS: [f64; 7] = [0.25, 0.4, 0.63, 1.0, 1.6, 2.5, 4.0];
-/// Seconds that a calm trial is watched.
+/// Duration of a calm trial, seconds.
 const WATCH_S: f64 = 12.0;
-/// A loop whose ε̂ stays within this part of itself stands.
+/// A loop whose ε̂ stays within this relative range is at rest.
 const STANDS: f64 = 1e-4;
-/// Slower than this is slow, seconds.
+/// A longer settling time counts as slow, seconds.
 const SLOW_S: f64 = 1.0;
-/// A loop nearer than this factor to swinging has little room.
+/// A gain margin below this factor counts as small.
 const LITTLE_ROOM: f64 = 2.0;
 
-/// Explains what `contender` does to `plant` at `target_hz`.
+/// Explains the behaviour of `contender` on `plant` at `target_hz`.
 #[must_use]
 pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -> Explanation {
     let contender = contender.into();
@@ -64,7 +64,7 @@ pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -
         near: contender.local_loop(plant, target_hz, 1.0),
         rests: match contender {
             Contender::Feedback(_) => with_ends(fixed_points(plant, contender, target_hz), &played),
-            // what it was given to learn from differs from start to start
+            // its fixed point from each start depends on the start
             Contender::Adaptive { .. } => fixed_points(plant, contender, target_hz),
         },
         cycle: runs.iter().find_map(|measured| measured.cycle),
@@ -76,7 +76,7 @@ pub fn explain(plant: &Plant, contender: impl Into<Contender>, target_hz: f64) -
     explanation
 }
 
-/// Adds the places off the set point at which loops were left: where ε̂ and n are at ends of their ranges there is no line to follow.
+/// Adds the fixed points off the set point at which trials ended: where ε̂ and n are at ends of their ranges there is no line to follow.
 fn with_ends(mut rests: Vec<FixedPoint>, played: &[Vec<Beat>]) -> Vec<FixedPoint> {
     for end in played.iter().filter_map(|beats| left_at(beats)) {
         if rests.iter().all(|rest| (rest.ratio - end.ratio).abs() > BAND) {
@@ -87,7 +87,7 @@ fn with_ends(mut rests: Vec<FixedPoint>, played: &[Vec<Beat>]) -> Vec<FixedPoint
     rests
 }
 
-/// Where a loop stood for its last second, if it did.
+/// The state of a loop that was at rest for its last second, if it was.
 fn left_at(beats: &[Beat]) -> Option<FixedPoint> {
     let last = beats.last()?;
     let mut second = beats.iter().rev().take_while(|beat| beat.time_s > last.time_s - 1.0);
@@ -97,8 +97,8 @@ fn left_at(beats: &[Beat]) -> Option<FixedPoint> {
     stands.then_some(FixedPoint { eps_hat: last.eps_hat, ratio: last.ratio, clamped })
 }
 
-/// Why no gain can bring `plant` to `target_hz`; `None` where one can, on this machine or, where the finest picture leaves time, on a slower
-/// one. Two sentences.
+/// Why no gain can bring `plant` to `target_hz`; `None` if one can, on this machine or, if the finest picture leaves time, on a slower one.
+/// Two sentences.
 #[must_use]
 pub fn refusal(plant: &Plant, target_hz: f64) -> Option<String> {
     let reach = plant.reach(1.0);
@@ -107,7 +107,7 @@ pub fn refusal(plant: &Plant, target_hz: f64) -> Option<String> {
         .then(|| tell_of_the_range(reach, 1.0 / target_hz, target_hz))
 }
 
-/// A time that is out of reach, and what to ask for instead.
+/// Sentences on a target time that is out of reach, and on a better request.
 fn tell_of_the_range(Reach { least_s, most_s }: Reach, set_s: f64, target_hz: f64) -> String {
     let (end, why) = if set_s < least_s { ("coarsest", "too long") } else { ("finest", "less than it may") };
     format!(
@@ -122,7 +122,7 @@ fn tell_of_the_range(Reach { least_s, most_s }: Reach, set_s: f64, target_hz: f6
 }
 
 impl Explanation {
-    /// Two sentences: what it does and why, and what to change.
+    /// Two sentences: the behaviour with its cause, and the advice.
     fn tell(&self, contender: Contender, target_hz: f64) -> String {
         let Some(near) = self.near else {
             return tell_of_the_range(self.reach, self.set_s, target_hz);
@@ -178,7 +178,7 @@ impl Explanation {
         }
     }
 
-    /// The policy that predicts has no gain to be set: its filter weighs what it measures.
+    /// Sentences on the policy that predicts: it has no gain to set, since its filter weighs the measurements.
     fn tell_of_prices(&self, near: Loop, settle: Option<f64>) -> String {
         let learns = 100.0 * near.gain;
         match settle {
@@ -220,7 +220,7 @@ impl Explanation {
     }
 }
 
-/// The gain that makes a law fast or slow.
+/// The gain that determines the speed of a law.
 fn knob(law: Law) -> (&'static str, f64) {
     match law {
         Law::Corrected { kappa, .. } => ("κ", kappa),
@@ -246,7 +246,7 @@ mod tests {
 
     #[test]
     fn advice_on_the_printed_gains_leads_to_gains_that_work_or_to_another_law() {
-        // the tube's plant: whatever is advised is followed, for as long as it names a gain of the printed law
+        // the tube's plant: all advice is followed, for as long as it names a gain of the printed law
         for target_hz in [30.0, 60.0] {
             let mut law = Law::PRINTED;
             for _ in 0..4 {
@@ -276,7 +276,7 @@ mod tests {
 
     #[test]
     fn a_gain_that_is_too_high_swings() {
-        // 5 times the slope's boundary of 2 ε̂/(s f)
+        // 5 times the boundary of the slope, 2 ε̂/(s f)
         let near = Contender::from(Law::PRINTED).local_loop(&plant(), 30.0, 1.0).unwrap();
         let alpha = 1e-4 * 5.0 * near.gain_margin();
         let told = explain(&plant(), Law::Printed { alpha, beta: 1e-6 }, 30.0);

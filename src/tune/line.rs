@@ -1,6 +1,6 @@
-//! A straight line through points of which some are wild, with the interval its slope lies in.
+//! A robust straight line through points with outliers, with a confidence interval of its slope.
 //!
-//! In: points. Out: intercept and slope by the median of all pairwise slopes (SEN68). Never here: what the points mean.
+//! In: points. Out: intercept and slope by the median of all pairwise slopes (SEN68). Never here: the meaning of the points.
 
 /// y = intercept + slope · x.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -9,21 +9,21 @@ pub struct Line {
     pub intercept: f64,
     /// dy/dx.
     pub slope: f64,
-    /// The slope lies in here with 95 % confidence.
+    /// The 95 % confidence interval of the slope.
     pub slope_95: (f64, f64),
-    /// Typical distance of a point from the line, as a part of the line's own value: 1.4826 times the median.
+    /// Typical distance of a point from the line, relative to the line's own value: 1.4826 times the median.
     pub scatter: f64,
 }
 
-/// Points beyond this many are thinned: pairs grow with their square.
+/// More points than this are thinned: the number of pairs grows with their square.
 const POINTS_MAX: usize = 600;
-/// Fewer points fix no line.
+/// Least number of points for a line.
 const POINTS_MIN: usize = 8;
-/// Standard deviations of a normal distribution that hold 95 % of it.
+/// Standard deviations of a normal distribution that contain 95 % of it.
 const Z_95: f64 = 1.96;
 
 impl Line {
-    /// Fits a line to at least eight points that are finite and of which not all share one x; else `None`.
+    /// Fits a line to at least eight finite points that do not all share one x; else `None`.
     #[must_use]
     pub fn through(points: &[(f64, f64)]) -> Option<Self> {
         let points: Vec<_> = points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect();
@@ -81,7 +81,7 @@ fn interval(slopes: &[f64], points: usize) -> (f64, f64) {
     (at(centre - half), at(centre + half))
 }
 
-/// The median of sorted numbers, not empty.
+/// The median of a non-empty sorted list.
 fn middle(sorted: &[f64]) -> f64 {
     let half = sorted.len() / 2;
     if sorted.len() % 2 == 1 { sorted[half] } else { 0.5 * (sorted[half - 1] + sorted[half]) }
@@ -91,7 +91,7 @@ fn middle(sorted: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// Numbers that look random in −0.5 … 0.5, the same on every machine.
+    /// Pseudo-random numbers in −0.5 … 0.5, identical on every machine.
     fn noise(k: u64) -> f64 {
         (k.wrapping_mul(0x9e37_79b9_7f4a_7c15).rotate_left(17).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11) as f64
             / 2f64.powi(53)

@@ -1,6 +1,6 @@
-//! How far a loop is from swinging for ever, by the roots of its characteristic polynomial.
+//! Stability margins of a loop, by the roots of its characteristic polynomial.
 //!
-//! In: what one frame removes of an error, and after how many frames it shows. Out: margins. Never here: a law, a scene.
+//! In: the share of an error removed by one frame, and the delay in frames. Out: margins. Never here: a law, a scene.
 //! Theory: `docs/theory/control.md`, eq. 27 and 28.
 
 /// A loop near its set point, ln ε against ln t: one integrator, a proportional part, a delay.
@@ -10,16 +10,16 @@ pub struct Loop {
     pub gain: f64,
     /// Share of an error's change that one frame adds to that.
     pub lead: f64,
-    /// Frames after which a change shows.
+    /// Frames until a change shows.
     pub dead_time: usize,
 }
 
-/// The largest factor, and the most frames, that a margin is told up to.
+/// The largest factor, and the most frames, that a margin is reported up to.
 const MARGIN_MAX: f64 = 1000.0;
 const DELAY_MAX: usize = 12;
 
 impl Loop {
-    /// The largest root of zᵈ⁺² − zᵈ⁺¹ + (g + l) z − l (eq. 27): the factor by which an error shrinks each frame in the end.
+    /// The largest root of zᵈ⁺² − zᵈ⁺¹ + (g + l) z − l (eq. 27): the asymptotic factor by which an error shrinks each frame.
     #[must_use]
     pub fn radius(self) -> f64 {
         let degree = self.dead_time + 2;
@@ -31,13 +31,13 @@ impl Loop {
         largest_root(&coefficients)
     }
 
-    /// Whether errors die away.
+    /// Whether errors decay.
     #[must_use]
     pub fn is_stable(self) -> bool {
         self.gain > 0.0 && self.radius() < 1.0
     }
 
-    /// The factor on the gains at which it begins to swing for ever; below 1 it does already, at most 1000.
+    /// The factor on the gains at which the loop becomes unstable; below 1 it already is, at most 1000.
     #[must_use]
     pub fn gain_margin(self) -> f64 {
         let stable = |factor: f64| Self { gain: self.gain * factor, lead: self.lead * factor, ..self }.radius() < 1.0;
@@ -55,7 +55,7 @@ impl Loop {
         low
     }
 
-    /// How many more frames a change may take to show before it swings for ever; at most 12.
+    /// The number of additional frames of delay at which the loop is still stable; at most 12.
     #[must_use]
     pub fn delay_margin(self) -> usize {
         let later = |frames: usize| Self { dead_time: self.dead_time + frames, ..self };
@@ -63,7 +63,7 @@ impl Loop {
     }
 }
 
-/// The largest modulus of the roots, by Durand and Kerner's iteration on all of them at once.
+/// The largest modulus of the roots, by Durand and Kerner's simultaneous iteration.
 fn largest_root(coefficients: &[f64]) -> f64 {
     let degree = coefficients.len() - 1;
     let multiply = |a: (f64, f64), b: (f64, f64)| (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0);
@@ -77,7 +77,7 @@ fn largest_root(coefficients: &[f64]) -> f64 {
             (next.0 + c, next.1)
         })
     };
-    // starts on a circle, at angles that are no symmetry of the polynomial
+    // starts on a circle, at angles without a symmetry of the polynomial
     let angle = |k: usize| 0.4 + std::f64::consts::TAU * k as f64 / degree as f64;
     let mut roots: Vec<_> = (0..degree).map(|k| (0.9 * libm::cos(angle(k)), 0.9 * libm::sin(angle(k)))).collect();
     for _ in 0..200 {

@@ -1,24 +1,24 @@
-//! What a played loop is worth: how soon it settles, how far it overshoots, how often it is late, whether it swings.
+//! Measures of a simulated loop: settling time, overshoot, late frames, oscillation.
 //!
-//! In: the frames of a trial. Out: numbers. Never here: what they weigh against each other.
+//! In: the frames of a trial. Out: numbers. Never here: their relative weights.
 
 use super::play::Beat;
 
-/// Settled: the median of nine frames lies within this part of the set point, and stays there.
+/// Settled: the median of nine frames is within this fraction of the set point, and stays there.
 pub const BAND: f64 = 0.05;
-/// A frame is late past this part of the time it may take.
+/// A frame is late beyond this multiple of its allowed time.
 pub const LATE: f64 = 1.05;
 /// Frames of the running median.
 const MEDIAN: usize = 9;
-/// Frames within which two turns of the loop variable are a reversal.
+/// Frames within which two opposite changes of the loop variable are a reversal.
 const REVERSAL: usize = 3;
-/// A swing below this part of the set point is a level or a dead zone, not a cycle.
+/// A smaller amplitude, as a fraction of the set point, is due to a level or a dead zone and is not a cycle.
 const CYCLE_LEAST: f64 = 0.05;
 
-/// A swing that does not die away.
+/// A persistent oscillation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
-    /// Half the way from its lowest to its highest t/T_set.
+    /// Half the distance from its lowest to its highest t/T_set.
     pub amplitude: f64,
     /// Its period, wall seconds.
     pub period_s: f64,
@@ -27,25 +27,26 @@ pub struct Cycle {
 /// One trial in numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Measures {
-    /// Wall seconds after which it stays within ± 5 % of the set point, or where what is in view allows no more; `None` where it does not.
+    /// Wall seconds after which it stays within ± 5 % of the set point, or at the end of the range of the objects in view; `None` if it
+    /// does not.
     pub settle_s: Option<f64>,
-    /// How far t/T_set went past 1 on the other side of where it began, ≥ 0.
+    /// How far t/T_set passed 1 to the side opposite the start, ≥ 0.
     pub overshoot: f64,
-    /// Share of frames that took 5 % longer than they may.
+    /// Fraction of frames that exceeded their time by 5 %.
     pub miss_share: f64,
-    /// The same without a step: a frame counts nothing up to its time, 1 from 5 % past it, and by a straight line between.
+    /// The same without a step: a frame counts 0 up to its time, 1 from 5 % past it, and linearly between.
     pub overrun: f64,
-    /// Mean |t/T_set − 1|, 0 where what is in view allows no more.
+    /// Mean |t/T_set − 1|, 0 at the end of the range of the objects in view.
     pub error: f64,
-    /// Turns back within three frames, a frame.
+    /// Reversals within three frames, per frame.
     pub reversals: f64,
-    /// Levels n that changed in the second half, a frame.
+    /// Changes of levels n in the second half, per frame.
     pub chatter: f64,
-    /// Mean share of the polygons that the whole time of a frame would have paid for, 0 … 1.
+    /// Mean fraction of the polygons that the whole time of a frame would have allowed, 0 … 1.
     pub quality: f64,
-    /// The swing that is left in the last third, if there is one; to be asked of trials without noise alone.
+    /// The oscillation in the last third, if there is one; meaningful only for trials without noise.
     pub cycle: Option<Cycle>,
-    /// Whether it ends where what is in view allows no more.
+    /// Whether the trial ends at the end of the range of the objects in view.
     pub clamped: bool,
 }
 
@@ -75,15 +76,15 @@ fn error(beat: &Beat) -> f64 {
     if beat.at_end { 0.0 } else { (beat.ratio - 1.0).abs() }
 }
 
-/// Wall seconds after which a trial stays within ± 5 %, or rests where nothing better is to be had.
+/// Wall seconds after which a trial stays within ± 5 %, or rests where nothing better is possible.
 fn settle_s(beats: &[Beat]) -> Option<f64> {
     let rows: Vec<_> = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
     settled_after(&rows, |at| beats[at].at_end)
 }
 
-/// The time of the frame after the last at which the running median of nine (time, t/T_set) is past ± 5 % and which does not `rest`
-/// on a limit; `None` where the last is still past. Of the first frames the median is taken of as many after as before: a loop that
-/// comes home within four frames is not there from the start.
+/// The time of the frame after the last at which the running median of nine (time, t/T_set) is past ± 5 % and which does not `rest` on a
+/// limit; `None` if the last frame is still past. For the first frames the median is taken of as many frames before as after: otherwise a
+/// loop that settles within four frames would count as settled from the start.
 #[must_use]
 pub fn settled_after(rows: &[(f64, f64)], rests: impl Fn(usize) -> bool) -> Option<f64> {
     let mut window = [0.0; MEDIAN];
@@ -102,14 +103,14 @@ pub fn settled_after(rows: &[(f64, f64)], rests: impl Fn(usize) -> bool) -> Opti
     }
 }
 
-/// How far the loop went past the set point on the far side, before it first came to rest there.
+/// How far the loop passed the set point to the side opposite its start.
 fn overshoot(beats: &[Beat]) -> f64 {
     let Some(first) = beats.first() else { return 0.0 };
     let past = |b: &Beat| if first.ratio >= 1.0 { 1.0 - b.ratio } else { b.ratio - 1.0 };
     beats.iter().filter(|b| !b.at_end).map(past).fold(0.0, f64::max)
 }
 
-/// How often ε̂ went one way and within three frames the other.
+/// How often ε̂ reversed its direction within three frames.
 fn reversals(beats: &[Beat]) -> u32 {
     let way =
         |w: &[Beat]| (w[1].eps_hat / w[0].eps_hat - 1.0).signum() * f64::from(u8::from(w[1].eps_hat != w[0].eps_hat));
@@ -121,7 +122,7 @@ fn reversals(beats: &[Beat]) -> u32 {
     count
 }
 
-/// The swing of frames that should be at rest.
+/// The oscillation of frames that should be at rest.
 fn cycle(tail: &[Beat]) -> Option<Cycle> {
     let (low, high) = tail.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), b| (l.min(b.ratio), h.max(b.ratio)));
     let amplitude = 0.5 * (high - low);
@@ -132,7 +133,7 @@ fn cycle(tail: &[Beat]) -> Option<Cycle> {
     let rises = tail.windows(2).filter(|w| w[0].ratio < middle && w[1].ratio >= middle);
     let times: Vec<_> = rises.map(|w| w[1].time_s).collect();
     match times[..] {
-        // once up and never down again is a drift
+        // a single rise without a second one is a drift
         [] | [_] => None,
         [first, .., last] => Some(Cycle { amplitude, period_s: (last - first) / (times.len() - 1) as f64 }),
     }

@@ -1,8 +1,9 @@
-//! Gains that are found, explained and safe: how a scene's picture answers to its resolution, and which law holds it best.
+//! Tuning: finds, explains and checks gains. How a scene's frame time responds to its resolution, and which law holds it best.
 //!
-//! In: frames of an experiment ([`Observed`]). Out: the plant behind them ([`Plant`]), what a law does to it ([`explain`], [`judge`])
-//! and the gains that do best ([`search()`]). Closed loops are played with the controller that draws, [`crate::control::PictureControl`],
-//! on the fitted plant, so that what is found is what runs. Never here: scenes, threads of agents, drawing, files.
+//! In: frames of an experiment ([`Observed`]). Out: the plant behind them ([`Plant`]), the behaviour of a law on it ([`explain`],
+//! [`judge`]) and the best gains ([`search()`]). Closed loops are simulated with the controller used for drawing,
+//! [`crate::control::PictureControl`], on the fitted plant, so that the gains found apply to the real loop. Never here: scenes, threads of
+//! agents, drawing, files.
 //! Theory: `docs/theory/control.md`, section 8.
 
 mod contender;

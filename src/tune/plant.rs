@@ -1,7 +1,7 @@
-//! How the time of a frame answers to its polygons: what an experiment shows of a scene on a machine.
+//! The response of the frame time to polygons, identified from an experiment with a scene on a machine.
 //!
-//! In: frames drawn at resolutions that a design chose. Out: t = fixed + c · polygons, the noise around it, and after how many
-//! frames a change shows. Never here: who drew the frames, a law.
+//! In: frames drawn at designed resolutions. Out: t = fixed + c · polygons, the noise around it, and the delay in frames until a change
+//! shows. Never here: the drawing of the frames, a law.
 //! Theory: `docs/theory/control.md`, eq. 26.
 
 use super::line::Line;
@@ -10,22 +10,22 @@ use crate::control::{Law, ObjectView, PictureControl, Policy};
 /// One frame of an experiment.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Observed {
-    /// What was in view.
+    /// The objects in view.
     pub views: Vec<ObjectView>,
-    /// Triangles that the controller asked for.
+    /// Triangles requested by the controller.
     pub polygons: f64,
-    /// What the frame took, seconds.
+    /// Time of the frame, seconds.
     pub work_s: f64,
 }
 
-/// A scene's picture on a machine, as its controller feels it.
+/// A scene's picture on a machine, as its controller sees it.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Plant {
-    /// Seconds a frame against polygons.
+    /// Seconds per frame as a function of polygons.
     pub line: Line,
     /// Frames after which a change of polygons shows in the measured time; 0: in the same frame.
     pub dead_time: usize,
-    /// What was in view, frame by frame; never empty.
+    /// The objects in view, frame by frame; never empty.
     pub frames: Vec<Vec<ObjectView>>,
     /// Points of the experiment: polygons, and the seconds of the frame in which they showed.
     pub points: Vec<(f64, f64)>,
@@ -38,7 +38,7 @@ pub enum NoPlant {
     /// No object in view can be drawn in more than one way.
     #[error("nothing in view can be drawn at more than one resolution: there is nothing to control")]
     NothingToControl,
-    /// Time does not go up with polygons.
+    /// Time does not increase with polygons.
     #[error(
         "the time of a frame does not answer to its polygons ({slope_ns:.2} ns each, 95 % between {low_ns:.2} and {high_ns:.2}): \
          no gain can hold it"
@@ -51,15 +51,15 @@ pub enum NoPlant {
         /// Upper end of its interval.
         high_ns: f64,
     },
-    /// Too few frames, or times that are no numbers.
+    /// Too few frames, or invalid times.
     #[error("{frames} frames with a sound time are too few to tell how they answer: at least 30 are needed")]
     TooFew {
-        /// How many there were.
+        /// Number of usable frames.
         frames: usize,
     },
 }
 
-/// The times that a plant can be brought to.
+/// The range of times that a plant can take.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reach {
     /// With everything in view at its coarsest, seconds.
@@ -69,25 +69,25 @@ pub struct Reach {
 }
 
 impl Reach {
-    /// Whether a time lies in it.
+    /// Whether a time is within the range.
     #[must_use]
     pub fn holds(self, time_s: f64) -> bool {
         self.least_s <= time_s && time_s <= self.most_s
     }
 }
 
-/// The longest dead time that is looked for, frames.
+/// The longest dead time tested, frames.
 const DEAD_TIME_MAX: usize = 4;
-/// A dead time is believed where it leaves this part of the scatter, or less, that a shorter one leaves.
+/// A longer dead time is accepted if its scatter is below this fraction of that of the best shorter one.
 const BETTER: f64 = 0.9;
-/// Fewer frames teach nothing.
+/// Least number of frames for an identification.
 const FRAMES_MIN: usize = 30;
 
 impl Plant {
     /// Fits a plant to the frames of an experiment, in their order.
     ///
     /// # Errors
-    /// [`NoPlant`] where there is none.
+    /// [`NoPlant`] if there is none.
     pub fn identify(observed: &[Observed]) -> Result<Self, NoPlant> {
         let sound = |o: &&Observed| o.work_s.is_finite() && o.work_s > 0.0 && o.polygons.is_finite();
         let frames = observed.iter().filter(sound).count();
@@ -99,7 +99,7 @@ impl Plant {
         if most <= least {
             return Err(NoPlant::NothingToControl);
         }
-        // polygons may come and go with what is in view though none of it has a choice
+        // polygons may come and go with the objects in view though none of these has a choice
         let (coarsest, finest) = ends(&observed[0].views);
         let (dead_time, line) =
             best_dead_time(observed).filter(|_| finest > coarsest).ok_or(NoPlant::NothingToControl)?;
@@ -111,10 +111,10 @@ impl Plant {
         Ok(Self { line, dead_time, frames, points: delayed(observed, dead_time) })
     }
 
-    /// Seconds that `polygons` take on a machine `speed` times as fast.
+    /// Time of `polygons` on a machine `speed` times as fast, seconds.
     #[must_use]
     pub fn seconds(&self, polygons: f64, speed: f64) -> f64 {
-        // a fit through few large frames may put the fixed part below zero; a frame takes some time
+        // a fit through few large frames may give a negative fixed part; a frame takes some time
         self.line.at(polygons).max(1e-3 * self.line.slope * polygons).max(1e-9) / speed
     }
 
@@ -129,7 +129,7 @@ impl Plant {
         plant
     }
 
-    /// What was in view in frame `k`; the experiment runs forth and back for ever.
+    /// The objects in view in frame `k`; the experiment runs forwards and backwards without end.
     #[must_use]
     pub fn views(&self, k: usize) -> &[ObjectView] {
         let last = self.frames.len() - 1;
@@ -137,21 +137,21 @@ impl Plant {
         &self.frames[if place > last { 2 * last - place } else { place }]
     }
 
-    /// What the picture can take between its coarsest and its finest, on a machine `speed` times as fast.
+    /// The range of times of the picture between its coarsest and its finest, on a machine `speed` times as fast.
     #[must_use]
     pub fn reach(&self, speed: f64) -> Reach {
         let (least, most) = ends(self.views(0));
         Reach { least_s: self.seconds(least, speed), most_s: self.seconds(most, speed) }
     }
 
-    /// s: the share of a frame of `time_s` seconds that goes with its polygons (control.md, eq. 3).
+    /// s: the share of a frame of `time_s` seconds that scales with its polygons (control.md, eq. 3).
     #[must_use]
     pub fn share(&self, time_s: f64, speed: f64) -> f64 {
         (1.0 - self.line.intercept.max(0.0) / speed / time_s).clamp(0.0, 1.0)
     }
 }
 
-/// Polygons of what is in view at its coarsest, and as fine as a controller draws it.
+/// Polygons of the objects in view at their coarsest, and as fine as a controller draws them.
 pub(super) fn ends(views: &[ObjectView]) -> (f64, f64) {
     let end = |factor: f64| {
         let mut control = PictureControl::new(Policy::Feedback, Law::CORRECTED, 30.0);
@@ -162,7 +162,7 @@ pub(super) fn ends(views: &[ObjectView]) -> (f64, f64) {
     (end(1e12), end(1e-12))
 }
 
-/// The shortest dead time that no longer one betters clearly.
+/// The shortest dead time that no longer one clearly improves on.
 fn best_dead_time(observed: &[Observed]) -> Option<(usize, Line)> {
     let mut best: Option<(usize, Line)> = None;
     for frames in 0..=DEAD_TIME_MAX {
@@ -174,7 +174,7 @@ fn best_dead_time(observed: &[Observed]) -> Option<(usize, Line)> {
     best
 }
 
-/// Polygons beside the time of the frame so many later.
+/// Pairs of polygons and the time of the frame `frames` later.
 fn delayed(observed: &[Observed], frames: usize) -> Vec<(f64, f64)> {
     observed.iter().zip(observed.iter().skip(frames)).map(|(cause, effect)| (cause.polygons, effect.work_s)).collect()
 }
@@ -212,19 +212,19 @@ pub(super) mod tests {
         ]
     }
 
-    /// A long thin tube whose ε̂ reaches from 0.01 to 1.
+    /// A long thin tube whose ε̂ ranges from 0.01 to 1.
     pub fn tube_alone() -> ObjectView {
         let [tube, _] = <[ObjectView; 2]>::try_from(views()).unwrap();
         ObjectView { range: ResolutionRange { eps_m: (4e-4, 0.04), n: (0, 5) }, ..tube }
     }
 
-    /// A plant without noise, with these in view.
+    /// A plant without noise, with these objects in view.
     pub fn plant_of(views: Vec<ObjectView>, fixed_s: f64, polygon_s: f64) -> Plant {
         let points: Vec<_> = (1..40).map(|k| (1e3 * f64::from(k), fixed_s + polygon_s * 1e3 * f64::from(k))).collect();
         Plant { line: Line::through(&points).unwrap(), dead_time: 0, frames: vec![views], points }
     }
 
-    /// An experiment on a plant of `fixed_s` and `polygon_s` that answers `dead_time` frames late.
+    /// An experiment on a plant of `fixed_s` and `polygon_s` with a delay of `dead_time` frames.
     pub fn observed(fixed_s: f64, polygon_s: f64, dead_time: usize) -> Vec<Observed> {
         let polygons = |k: usize| 2e3 * (1.0 + ((k * 7919) % 97) as f64);
         let frame = |k: usize| {

@@ -1,7 +1,7 @@
-//! One closed loop played to its end: a law, a plant, a disturbance.
+//! Simulation of one closed loop: a law, a plant, a disturbance.
 //!
-//! In: a [`Trial`]. Out: its frames. The controller is the one that draws; the plant is the fitted one. Equal trials give equal
-//! frames on every machine. Never here: what makes a trial good.
+//! In: a [`Trial`]. Out: its frames. The controller is the one used for drawing; the plant is the fitted one. Equal trials give equal
+//! frames on every machine. Never here: the rating of a trial.
 
 use super::contender::Contender;
 use super::disturb::{Dice, Disturbance};
@@ -10,33 +10,33 @@ use crate::control::{FrameWork, Law, ObjectView, PictureControl, Status};
 use metachron_budget::Bound;
 use std::time::Duration;
 
-/// Where a trial begins.
+/// The starting point of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Start {
-    /// Where the frame takes its time.
+    /// At the target time of a frame.
     Target,
-    /// Where frames come at so many times the wanted rate, > 0; or at the end of the range that is nearest to that.
+    /// At this many times the target rate, > 0; or at the end of the range that is nearest to that.
     Rate(f64),
 }
 
-/// One loop to be played.
+/// One loop to be simulated.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Trial {
-    /// Who holds the picture.
+    /// The controller of the picture.
     pub contender: Contender,
-    /// Frames a second that are wanted, > 0.
+    /// Target rate, frames per second, > 0.
     pub target_hz: f64,
-    /// How many times as fast as the plant's machine this one is, > 0.
+    /// Speed of this machine relative to the plant's, > 0.
     pub speed: f64,
-    /// Where it begins.
+    /// The starting point.
     pub start: Start,
-    /// What upsets it.
+    /// The disturbance.
     pub disturbance: Disturbance,
-    /// Deviation of a frame's time, as a part of it, ≥ 0.
+    /// Relative deviation of a frame's time, ≥ 0.
     pub noise: f64,
     /// Equal seeds give equal noise.
     pub seed: u64,
-    /// How long it is watched, wall seconds, > 0.
+    /// Duration, wall seconds, > 0.
     pub seconds: f64,
 }
 
@@ -60,34 +60,34 @@ impl Trial {
 /// One frame of a trial.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Beat {
-    /// When it was finished, wall seconds after the start.
+    /// Time of completion, wall seconds after the start.
     pub time_s: f64,
-    /// Its time over the wanted one, t/T_set.
+    /// Frame time over the target time, t/T_set.
     pub ratio: f64,
-    /// Its time over what a frame may take, t/T.
+    /// Frame time over the whole time of a frame, t/T.
     pub part: f64,
     /// The loop variable ε̂.
     pub eps_hat: f64,
     /// Triangles drawn.
     pub polygons: f64,
-    /// Triangles that would have taken just T, the whole time of a frame, as far as the range reaches: what a margin costs shows here.
+    /// Triangles that would have taken exactly T, the whole time of a frame, as far as the range allows: shows the cost of a margin.
     pub polygons_ideal: f64,
-    /// Objects whose level n is not the one of the frame before.
+    /// Objects whose level n differs from the frame before.
     pub switches: u32,
-    /// What the controller says of itself.
+    /// Status of the controller.
     pub status: Status,
-    /// Whether it rests where what is in view allows no more: not at a limit that is its own alone.
+    /// Whether the loop rests at the end of the range of the objects in view, and not only at a limit of the law itself.
     pub at_end: bool,
 }
 
-/// Frames in which a policy that learns comes to rest before a trial: κ falls by 5 % a frame at most, and by four times here.
+/// Frames in which the predicting policy settles before a trial: κ falls by 5 % a frame at most, and by a factor of four here.
 const WARM_UP: usize = 80;
-/// So near to an end of the range, in proportion, is that end: a tube has whole intervals.
+/// Relative distance that counts as an end of the range: a tube has whole intervals.
 const NEAR: f64 = 0.03;
-/// Corrections to a start: levels are coarser than what is asked for.
+/// Corrections of a start: levels are coarser than requested.
 const AIMS: usize = 4;
 
-/// Plays a trial.
+/// Simulates a trial.
 #[must_use]
 pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
     let mut control = trial.contender.control(plant, trial.target_hz);
@@ -136,8 +136,8 @@ pub fn play(plant: &Plant, trial: &Trial) -> Vec<Beat> {
     beats
 }
 
-/// Whether a controller of this status that draws so many polygons cannot do better. The printed law ties n to ε̂, so that an end of its ε̂
-/// is not always an end of the picture.
+/// Whether a controller of this status that draws `polygons` cannot do better. The printed law ties n to ε̂, so an end of its ε̂ is not
+/// always an end of the picture's range.
 fn is_at_end(contender: Contender, status: Status, polygons: f64, views: &[ObjectView]) -> bool {
     let printed = matches!(contender, Contender::Feedback(Law::Printed { .. }));
     match status {
@@ -157,17 +157,17 @@ fn plan_full(control: &PictureControl) -> f64 {
     control.last_plan().full_polygons.max(1.0)
 }
 
-/// Brings the picture to where the trial begins.
+/// Brings the picture to the start of the trial.
 fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64) {
     let rate = match trial.start {
         Start::Target => 1.0,
         Start::Rate(rate) => rate,
     };
     if matches!(trial.contender, Contender::Adaptive { .. }) {
-        // its state is what it has learnt: it comes from a machine on which this picture takes just its time
+        // its state is its κ: the start is the settled state on a machine on which this picture takes exactly its time
         return learn(control, plant, trial.speed / rate);
     }
-    // it was at rest before: what comes is a surprise to it
+    // the loop was at rest before: the first error is unconfirmed
     control.plan(plant.views(0));
     control.observe(FrameWork {
         work: Duration::from_secs_f64(set_s),
@@ -181,7 +181,7 @@ fn place(control: &mut PictureControl, plant: &Plant, trial: &Trial, set_s: f64)
     }
 }
 
-/// Lets a policy that predicts come to rest on a machine so fast.
+/// Lets the predicting policy settle on a machine of this speed.
 fn learn(control: &mut PictureControl, plant: &Plant, speed: f64) {
     for _ in 0..WARM_UP {
         let polygons = control.plan(plant.views(0)).polygons;

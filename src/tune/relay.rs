@@ -1,19 +1,19 @@
-//! Gains by a relay: the classic way to tune a loop that one cannot calculate (AH84), and Ziegler and Nichols' rule (ZN42).
+//! Gains by a relay experiment (AH84), the classic method for a loop without a model, and Ziegler and Nichols' rule (ZN42).
 //!
-//! In: a plant. Out: the PI gains that the rule gives, to be compared with those that are found. Never here: a judgement.
+//! In: a plant. Out: the PI gains of the rule, for comparison with those of the search. Never here: a judgement.
 
 use super::plant::Plant;
 use crate::control::{FrameWork, Law, PictureControl, Policy};
 use std::time::Duration;
 
-/// The relay moves ln ε by so much to either side.
+/// The relay moves ln ε by this much to either side.
 const HEIGHT: f64 = 0.2;
-/// Frames of the experiment, and those that are left out at its start.
+/// Frames of the experiment, and of its start that is ignored.
 const FRAMES: usize = 240;
 const WARM_UP: usize = 60;
 
-/// The PI law that Ziegler and Nichols' rule gives for what a relay makes of the loop at `target_hz`, as far as the law takes such gains;
-/// `None` where it does not swing.
+/// The PI law that Ziegler and Nichols' rule gives for the relay's oscillation of the loop at `target_hz`, clamped to the range of the law;
+/// `None` if it does not oscillate.
 #[must_use]
 pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     let errors = relay(plant, target_hz, margin);
@@ -31,7 +31,7 @@ pub fn relay_gains(plant: &Plant, target_hz: f64, margin: f64) -> Option<Law> {
     Some(Law::Corrected { kappa, lead: proportional.min(Law::LEAD.1), margin })
 }
 
-/// ln(t/T_set) of frames whose ln ε a relay moves against it, without noise.
+/// ln(t/T_set) of frames whose ln ε is moved against it by a relay, without noise.
 fn relay(plant: &Plant, target_hz: f64, margin: f64) -> Vec<f64> {
     let mut control =
         PictureControl::new(Policy::Feedback, Law::Corrected { kappa: 0.5, lead: 0.0, margin }, target_hz);

@@ -1,7 +1,7 @@
-//! Where a loop can rest: every place at which the time is as wanted and a small error dies away.
+//! Fixed points of a loop: every state at which the time is on target and a small error decays.
 //!
-//! In: a plant, a contender, a target. Out: its fixed points. Feedback is led through its whole range without being closed; n = ⌊ρ⌋ makes
-//! frames slower where ε̂ grows, so there can be two. Never here: how a loop gets there.
+//! In: a plant, a contender, a target. Out: its fixed points. For feedback the open loop is swept through its whole range; n = ⌊ρ⌋ makes
+//! frames slower where ε̂ grows, so there can be two. Never here: the way to a fixed point.
 //! Theory: `docs/theory/control.md`, eq. 2, 4 and 6.
 
 use super::contender::Contender;
@@ -10,14 +10,14 @@ use super::play::{Start, Trial, play};
 use crate::control::{FrameWork, Law, PictureControl};
 use std::time::Duration;
 
-/// Where a loop comes to rest.
+/// A state in which a loop rests.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedPoint {
     /// The loop variable ε̂ there.
     pub eps_hat: f64,
     /// t/T_set there.
     pub ratio: f64,
-    /// Whether it rests on a limit of what is in view.
+    /// Whether the loop rests at an end of the range of the objects in view.
     pub clamped: bool,
 }
 
@@ -26,12 +26,12 @@ const STEPS: usize = 2000;
 const FACTOR: f64 = 1.002;
 /// Steps of the printed law at most: from 1e-9 to 1e9.
 const STEPS_MAX: usize = 20_000;
-/// α with which the printed law is led: frames a second are then far from 0 whatever the step.
+/// α used to sweep the printed law: the frame rate is then far from 0 whatever the step.
 const LEADING: f64 = 1e-2;
-/// Seconds until a policy that predicts is taken to rest.
+/// Time after which a predicting policy counts as settled, seconds.
 const REST_S: f64 = 5.0;
 
-/// The places at which `contender` can rest on `plant` at `target_hz`, by rising ε̂.
+/// The fixed points of `contender` on `plant` at `target_hz`, by rising ε̂.
 #[must_use]
 pub fn fixed_points(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<FixedPoint> {
     let set_s = contender.set_share() / target_hz;
@@ -56,7 +56,7 @@ fn along_the_range(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<(
     (0..=STEPS).map(place).collect()
 }
 
-/// (ε̂, seconds) along the line ρ − β ε̂ = constant on which the printed law moves from where it begins, finest first.
+/// (ε̂, seconds) along the line ρ − β ε̂ = constant on which the printed law moves from its start, finest first.
 fn along_the_line(plant: &Plant, contender: Contender, target_hz: f64, beta: f64) -> Vec<(f64, f64)> {
     let mut control = contender.control(plant, target_hz);
     control.plan(plant.views(0));
@@ -82,7 +82,7 @@ fn lead(control: &mut PictureControl, target_hz: f64, by: f64) {
     control.observe(FrameWork { work, draw: work, skip: false });
 }
 
-/// Where the time falls through `set_s` as ε̂ rises, and ends of the range past which a law would go.
+/// The points at which the time falls through `set_s` as ε̂ rises, and ends of the range that a law would pass.
 fn rests(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
     let (Some(&finest), Some(&coarsest)) = (places.first(), places.last()) else { return Vec::new() };
     let end = |(eps_hat, seconds): (f64, f64)| FixedPoint { eps_hat, ratio: seconds / set_s, clamped: true };
@@ -98,7 +98,7 @@ fn rests(places: &[(f64, f64)], set_s: f64) -> Vec<FixedPoint> {
     first.into_iter().chain(within).chain(last).collect()
 }
 
-/// What is predicted is what is budgeted: one place, to which it comes by itself.
+/// The single fixed point of a predicting policy, which budgets by its prediction: the end of a calm trial.
 fn where_it_ends(plant: &Plant, contender: Contender, target_hz: f64) -> Vec<FixedPoint> {
     let trial = Trial { start: Start::Target, seconds: REST_S, ..Trial::calm(contender, target_hz) };
     let last = play(plant, &trial).last().map(|beat| FixedPoint {
@@ -118,7 +118,7 @@ mod tests {
     const FIXED_S: f64 = 5e-3;
     const POLYGON_S: f64 = 1e-6;
 
-    /// t = fixed + c · 480 · 2ⁿ/ε̂ on a tube whose ε and n reach so far (control.md, eq. 6).
+    /// t = fixed + c · 480 · 2ⁿ/ε̂ on a tube with this range of n (control.md, eq. 6).
     fn plant(n: (u8, u8)) -> Plant {
         let mut view: ObjectView = tube_alone();
         view.range.n = n;
@@ -130,7 +130,7 @@ mod tests {
         let points = fixed_points(&plant((0, 5)), Law::CORRECTED.into(), 30.0);
         let expected = 480.0 * POLYGON_S / (0.9 / 30.0 - FIXED_S);
         assert_eq!(points.len(), 1, "{points:?}");
-        assert!((points[0].eps_hat / expected - 1.0).abs() < 0.04, "{points:?} and {expected}"); // cut anew every 3 %
+        assert!((points[0].eps_hat / expected - 1.0).abs() < 0.04, "{points:?} and {expected}"); // recut every 3 %
         assert!(!points[0].clamped);
     }
 

@@ -1,7 +1,7 @@
-//! The gains that do best: a coarse grid, then Nelder and Mead's simplex from the best of it (NM65).
+//! Search for the best gains: a coarse grid, then Nelder and Mead's simplex from the best grid point (NM65).
 //!
-//! In: a plant, a target, how much to play. Out: the best verdict so far, whenever it is stopped. Deterministic.
-//! Never here: what good is ([`super::judge`] says).
+//! In: a plant, a target, the extent of the trials. Out: the best verdict so far, whenever it is stopped. Deterministic. Never here: the
+//! objective ([`super::judge`] has it).
 
 use super::contender::Contender;
 use super::plant::Plant;
@@ -13,20 +13,20 @@ use std::cell::RefCell;
 
 /// A search.
 pub struct Search<'a> {
-    /// What is to be held.
+    /// The plant to be controlled.
     pub plant: &'a Plant,
     /// Frames a second, > 0.
     pub target_hz: f64,
-    /// How much is played for each candidate.
+    /// The extent of the trials for each candidate.
     pub extent: Extent,
-    /// Told of every candidate: the share that is done, and the best so far; answers whether to go on.
+    /// Called after every candidate with the fraction done and the best so far; returns whether to continue.
     pub go_on: &'a mut dyn FnMut(f64, &Verdict) -> bool,
 }
 
-/// What a search came to.
+/// The result of a search.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// The best.
+    /// The best verdict.
     pub best: Verdict,
     /// Every candidate with its objective, in the order they were tried.
     pub tried: Vec<(Contender, f64)>,
@@ -34,12 +34,12 @@ pub struct Found {
     pub interrupted: bool,
 }
 
-/// A family of contenders, by a few numbers of any size.
+/// A family of contenders, parametrised by a few numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Family {
     /// The corrected law: κ and margin.
     Corrected,
-    /// The same with a part on the error's change: κ, margin and λ.
+    /// The same with a proportional part: κ, margin and λ.
     Pi,
     /// The printed law: α and β.
     Printed,
@@ -47,7 +47,7 @@ pub enum Family {
     Adaptive,
 }
 
-/// About so many candidates a simplex iteration tries.
+/// Average number of candidates per simplex iteration.
 const TRIES: f64 = 2.0;
 /// Spread of the first simplex.
 const SPREAD: f64 = 0.35;
@@ -56,7 +56,7 @@ impl Family {
     /// Every family.
     pub const ALL: [Self; 4] = [Self::Corrected, Self::Pi, Self::Printed, Self::Adaptive];
 
-    /// Who is meant by the logarithms of its gains.
+    /// The contender with the gains whose logarithms are `at`.
     fn contender(self, at: &[f64]) -> Contender {
         let gain = |k: usize, (low, high): (f64, f64)| libm::exp(at[k]).clamp(low, high);
         let margin = (0.005, 0.5);
@@ -89,7 +89,7 @@ impl Family {
         }
     }
 
-    /// Where the grid's candidates lie: every combination.
+    /// The grid's candidates: every combination.
     fn candidates(self) -> Vec<Vec<f64>> {
         self.grid().iter().fold(vec![Vec::new()], |all, gains| {
             let with = |held: &Vec<f64>| {
@@ -101,7 +101,7 @@ impl Family {
     }
 }
 
-/// The state of a search that the solver's cost function shares.
+/// The state of a search, shared with the solver's cost function.
 struct Judging<'a, 'b> {
     search: &'b mut Search<'a>,
     family: Family,
@@ -131,7 +131,7 @@ impl Judging<'_, '_> {
     }
 }
 
-/// Looks for the gains of `family` that do best; `None` where not one candidate was judged.
+/// Searches for the best gains of `family`; `None` if no candidate was judged.
 #[must_use]
 pub fn search(search: &mut Search<'_>, family: Family) -> Option<Found> {
     let grid = family.candidates();
@@ -147,7 +147,7 @@ pub fn search(search: &mut Search<'_>, family: Family) -> Option<Found> {
     let (corner, _) = corner?;
     let judging = RefCell::new(judging);
     if !judging.borrow().interrupted {
-        // a search that is stopped ends as an error of its cost function; the best so far is kept here
+        // a search that is stopped ends as an error of its cost function; the best so far is stored in `judging`
         let _ = polish(&judging, corner);
     }
     let Judging { best, tried, interrupted, .. } = judging.into_inner();
@@ -168,7 +168,7 @@ fn polish(judging: &RefCell<Judging<'_, '_>>, corner: Vec<f64>) -> Result<(), Er
     Ok(())
 }
 
-/// The cost function as the solver wants it.
+/// The cost function as the solver needs it.
 struct Cost<'a, 'b, 'c>(&'c RefCell<Judging<'a, 'b>>);
 
 impl CostFunction for Cost<'_, '_, '_> {
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn no_margin_is_left_that_nothing_asks_for() {
-        // times scatter by 1 % at most here: a few hundredths of the frame are all that keeps frames on time
+        // times scatter by 1 % at most here: a few hundredths of the frame suffice to keep frames on time
         let Contender::Feedback(Law::Corrected { margin, .. }) = found(Family::Corrected, usize::MAX).best.contender
         else {
             panic!("the corrected law was looked at")

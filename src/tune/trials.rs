@@ -1,7 +1,7 @@
-//! A law judged: all that may upset it, on machines of several speeds, with several seeds.
+//! Judges a law: all disturbances, on machines of several speeds, with several seeds.
 //!
-//! In: a plant, a contender, a target. Out: a [`Verdict`] with one number to be made small. Trials are dealt to all cores; the verdict does
-//! not depend on who plays which. Never here: which gains to try.
+//! In: a plant, a contender, a target. Out: a [`Verdict`] with one number to minimise. Trials are distributed over all cores; the verdict
+//! does not depend on the distribution. Never here: the choice of gains to try.
 
 use super::contender::Contender;
 use super::disturb::Disturbance;
@@ -13,14 +13,14 @@ use std::num::NonZero;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread;
 
-/// How much is played.
+/// The extent of the trials.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Extent {
-    /// Seeds a disturbance, ≥ 1.
+    /// Seeds per disturbance, ≥ 1.
     pub seeds: u64,
-    /// Wall seconds of a trial are this many thousandths.
+    /// Duration of a trial, thousandths of wall seconds.
     pub millis: u64,
-    /// Threads that play, ≥ 1; `None`: as many as there are cores.
+    /// Number of threads, ≥ 1; `None`: as many as there are cores.
     pub threads: Option<NonZero<usize>>,
 }
 
@@ -31,62 +31,61 @@ impl Extent {
     pub const QUICK: Self = Self { seeds: 2, millis: 2000, threads: None };
 }
 
-/// What a law came to.
+/// The result of judging a law.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Verdict {
-    /// Who was judged.
+    /// The contender judged.
     pub contender: Contender,
-    /// The worse of the settling times from 0.4 and from 2.5 times the wanted rate, wall seconds; `None` where one does not settle.
+    /// The worse of the settling times from 0.4 and from 2.5 times the target rate, wall seconds; `None` if one does not settle.
     pub settle_s: Option<f64>,
     /// The worse overshoot of the two.
     pub overshoot: f64,
-    /// Share of frames that took 5 % too long, over all disturbances.
+    /// Fraction of frames that took 5 % too long, over all disturbances.
     pub miss_share: f64,
-    /// Turns back within three frames, a frame, over all disturbances.
+    /// Reversals within three frames, per frame, over all disturbances.
     pub reversals: f64,
-    /// Mean share of the polygons that the whole time of a frame would have paid for.
+    /// Mean fraction of the polygons that the whole time of a frame would have allowed.
     pub quality: f64,
-    /// How far it is from swinging for ever, at the worst of the speeds that were asked; `None` where its set point is out of reach at all
-    /// of them.
+    /// Stability margins at the worst of the speeds tested; `None` if the set point is out of reach at all of them.
     pub margins: Option<Margins>,
-    /// Speeds of the machine, in parts of the plant's own, at which it settles within a second and does not swing.
+    /// Speeds of the machine, relative to the plant's own, at which the law settles within a second and does not oscillate.
     pub robust_to: Vec<f64>,
-    /// Speeds that were asked: those at which the picture can be made to take the time of a frame.
+    /// Speeds tested: those at which the picture can be made to take the time of a frame.
     pub asked: Vec<f64>,
-    /// Of them the one nearest to the machine's own, at which all else was measured; 1 where none was asked.
+    /// The speed among them nearest to the machine's own, at which all else was measured; 1 if none was tested.
     pub at_speed: f64,
-    /// The number to be made small: see [`Verdict::objective`].
+    /// The number to minimise: see [`Verdict::objective`].
     pub objective: f64,
 }
 
-/// How far a law is from swinging for ever.
+/// Stability margins of a law.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Margins {
-    /// The factor on the gains at which it begins to.
+    /// The factor on the gains at which the loop becomes unstable.
     pub gain: f64,
-    /// How many frames later a change may show.
+    /// The number of additional frames of delay that the loop tolerates.
     pub delay: usize,
 }
 
-/// Speeds of the machine that a law must bear.
+/// Speeds of the machine that a law must tolerate.
 const SPEEDS: [f64; 5] = [0.25, 0.5, 1.0, 2.0, 4.0];
-/// Starts from which it must settle.
+/// Starts from which a law must settle, as fractions of the target rate.
 const STARTS: [f64; 2] = [0.4, 2.5];
-/// A scatter of frame times below this part, a five-hundredth of what counts as settled, is no reason to play a trial again.
+/// If frame times scatter by less than this, a five-hundredth of the settling band, a trial is not repeated with other seeds.
 const NOISE_LEAST: f64 = 1e-4;
-/// It must settle within a second.
+/// A law must settle within this time, seconds.
 const SETTLE_MAX_S: f64 = 1.0;
 /// Least margins: a factor on the gain, and frames of delay.
 const GAIN_MARGIN: f64 = 2.0;
 const DELAY_MARGIN: usize = 2;
 
-/// What a late frame, a reversal, a lost part of quality, a second of settling and a missing margin count beside an error of one.
+/// Weights of a late frame, a reversal, a lost part of quality, a second of settling and a missing margin relative to an error of one.
 const WEIGHTS: [f64; 5] = [2.0, 0.1, 1.0, 0.1, 1.0];
 
-/// Speeds of the machine, in parts of the plant's own and in rising order, at which what is in view can be made to take the time of a frame.
+/// Speeds of the machine, relative to the plant's own and ascending, at which the objects in view can be made to take the time of a frame.
 #[must_use]
 pub fn speeds_in_reach(plant: &Plant, target_hz: f64) -> Vec<f64> {
-    // by T, not by a law's own set point: a law must not choose which speeds it is asked for
+    // by T, not by a law's own set point: a law must not influence the speeds it is tested at
     SPEEDS.into_iter().filter(|&speed| plant.reach(speed).holds(1.0 / target_hz)).collect()
 }
 
@@ -141,7 +140,7 @@ impl Verdict {
             + margin * missing
     }
 
-    /// Whether it keeps the margins that are asked of gains: a factor of two, and two frames.
+    /// Whether the law keeps the required margins: a factor of two, and two frames.
     #[must_use]
     pub fn is_safe(&self) -> bool {
         self.margins.is_some_and(|margins| margins.gain >= GAIN_MARGIN && margins.delay >= DELAY_MARGIN)
@@ -158,7 +157,7 @@ impl Margins {
     }
 }
 
-/// Trials with every disturbance and every seed; one of those that no seed changes.
+/// Trials with every disturbance and every seed; one of each that the seed does not change.
 fn disturbed(calm: &Trial, noise: f64, extent: Extent) -> Vec<Trial> {
     let of = |disturbance: Disturbance| {
         let by_chance = disturbance.is_by_chance() || noise > NOISE_LEAST;
@@ -178,7 +177,7 @@ fn mean(trials: &[Trial], measured: &[Measures], value: fn(&Measures) -> f64) ->
     Disturbance::ALL.iter().map(of).sum::<f64>() / Disturbance::ALL.len() as f64
 }
 
-/// Plays every trial on so many threads; `None`: as many as there are cores.
+/// Simulates every trial on `threads` threads; `None`: as many as there are cores.
 #[must_use]
 pub fn measure(plant: &Plant, trials: &[Trial], threads: Option<NonZero<usize>>) -> Vec<Measures> {
     let threads = threads.or_else(|| thread::available_parallelism().ok()).map_or(1, NonZero::get);
@@ -197,7 +196,7 @@ pub fn measure(plant: &Plant, trials: &[Trial], threads: Option<NonZero<usize>>)
     let mut all: Vec<(usize, Measures)> = thread::scope(|scope| {
         let hands: Vec<_> = (1..threads).map(|_| scope.spawn(work)).collect();
         let mut all = work();
-        // a panic in a trial is a bug of ours: it is printed already, and its trials are missing
+        // a panic in a trial is our own bug: it is printed already, and its trials are missing
         hands.into_iter().for_each(|hand| all.extend(hand.join().unwrap_or_default()));
         all
     });
@@ -219,7 +218,7 @@ mod tests {
 
     #[test]
     fn a_margin_costs_the_polygons_that_it_leaves_out() {
-        // of T = 33.3 ms, 7 ms are fixed: a margin m leaves (1 − m − 0.21)/(1 − 0.21) of the polygons, to what disturbances take
+        // of T = 33.3 ms, 7 ms are fixed: a margin m leaves (1 − m − 0.21)/(1 − 0.21) of the polygons, apart from disturbances
         let (thin, wide) = (judged(0.05), judged(0.5));
         let expected = (0.5 - 0.21) / (0.95 - 0.21);
         assert!((wide.quality / thin.quality / expected - 1.0).abs() < 0.1, "{} and {}", wide.quality, thin.quality);
@@ -231,7 +230,7 @@ mod tests {
     fn margins_are_those_of_the_worst_speed() {
         let plant = Plant::identify(&observed(7e-3, 0.22e-6, 0)).unwrap();
         let verdict = judged(0.1);
-        // the larger the share of the time that goes with polygons, the larger the loop's gain: the fastest machine is the worst
+        // the larger the share of the time that scales with polygons, the larger the loop's gain: the fastest machine is the worst
         let fastest = verdict.asked.iter().copied().filter(|s| plant.reach(*s).holds(0.03)).fold(0.0, f64::max);
         let share = plant.share(0.03, fastest);
         assert!((verdict.margins.unwrap().gain - 2.0 / (0.5 * share)).abs() < 0.01, "{verdict:?}");

@@ -1,43 +1,43 @@
-//! One number that says how much slower the machine is than its table: a Kalman filter with a sense for outliers.
+//! How much slower the machine is than its cost table, as one number: a Kalman filter with outlier rejection.
 //!
 //! In: the time predicted by the table, and the time measured. Out: κ = measured / predicted, and how far it can be trusted.
 //! Never here: clocks, or which frame a measurement belongs to ([`super::Adaptive`] knows). Theory: `docs/theory/budget.md`, eq. 34 … 36.
 
 use crate::within;
 
-/// Least and greatest growth of the variance of κ from one lesson to the next: it may wander by 1.4 to 14 % a frame.
+/// Least and greatest process noise: growth of the variance of κ between measurements. κ may drift by 1.4 to 14 % a frame.
 const WANDER: (f64, f64) = (2e-4, 2e-2);
-/// That growth at first, 4.5 % a frame: a machine that nobody knows is believed until it is seen to tremble.
+/// Initial process noise, 4.5 % a frame: on an unknown machine measurements count much until they turn out to be noisy.
 const WANDER_START: f64 = 2e-3;
-/// How fast that growth follows what errors have in common with those before them, and the correlation that is taken for chance: with
-/// none taken, the growth would wander with it.
+/// Rate at which the process noise follows the correlation of consecutive errors, and the correlation that counts as chance: with 0, the
+/// process noise itself would drift.
 const HASTE: f64 = 0.1;
 const CHANCE: f64 = 0.1;
-/// Variance of κ at first: the table may be 14 % wrong before a surprise is an outlier.
+/// Initial variance of κ: the table may be 14 % wrong before an error counts as an outlier.
 const P_START: f64 = 0.02;
-/// Variance of κ after a change of regime: the next lesson is believed whole.
+/// Variance of κ after a change of regime: the next measurement is taken in full.
 const P_REGIME: f64 = 0.2;
-/// Least standard deviation of a measurement, as a part of the frame's time.
+/// Least standard deviation of a measurement, as a fraction of the frame's time.
 const SIGMA_LEAST: f64 = 0.01;
-/// Memory of σ²: each lesson counts 3 %.
+/// Memory of σ²: each measurement counts 3 %.
 const FORGET: f64 = 0.97;
 /// An error past this many σ is an outlier …
 const OUTLIER: f64 = 4.0;
-/// … unless so many in a row err on the same side: then it is the machine that changed.
+/// … unless this many in a row err on the same side: then the machine has changed.
 const IN_A_ROW: i8 = 3;
-/// Where κ is kept whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
+/// Range of κ whatever is measured: a table wrong by a factor of a thousand is a mistake elsewhere.
 const KAPPA_RANGE: (f64, f64) = (1e-3, 1e3);
 
-/// What came of a measurement.
+/// The effect of a measurement.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Lesson {
-    /// κ has moved towards it.
+    /// κ has moved towards the measurement.
     Learned,
-    /// It was too far away to be believed, unless more follow on its side.
+    /// The measurement was too far off and is ignored, unless more follow on its side.
     Outlier,
-    /// It was the third too far away on the same side: κ has jumped.
+    /// The measurement was the third outlier on the same side: κ has jumped.
     NewRegime,
-    /// It was no measurement: a number that is none, or nothing was predicted.
+    /// Not a usable measurement: not a valid number, or nothing was predicted.
     Refused,
 }
 
@@ -47,12 +47,12 @@ pub struct Gauge {
     kappa: f64,
     variance: f64,
     sigma2: f64,
-    /// Q: growth of the variance from one lesson to the next.
+    /// Q: growth of the variance between measurements.
     wander: f64,
-    /// The last error that was learned from, and the mean product of neighbouring ones.
+    /// The last error used, and the mean product of consecutive errors.
     before: f64,
     common: f64,
-    /// Outliers in a row, counted up where too slow and down where too fast.
+    /// Consecutive outliers: counts up for too slow, down for too fast.
     strange: i8,
 }
 
@@ -71,19 +71,19 @@ impl Default for Gauge {
 }
 
 impl Gauge {
-    /// How many ticks one tick of the table takes, 0.001 … 1000.
+    /// Measured ticks per tick of the table, 0.001 … 1000.
     #[must_use]
     pub fn kappa(&self) -> f64 {
         self.kappa
     }
 
-    /// σ̂: standard deviation of the error of a prediction, as a part of the frame's time.
+    /// σ̂: standard deviation of the error of a prediction, as a fraction of the frame's time.
     #[must_use]
     pub fn sigma(&self) -> f64 {
         libm::sqrt(self.sigma2)
     }
 
-    /// Learns that `took` was measured where the table, without κ, had predicted `table`; both as parts of the frame's time T.
+    /// Updates κ: `took` was measured where the table, without κ, predicted `table`; both as fractions of the frame's time T.
     pub fn observe(&mut self, table: f64, took: f64) -> Lesson {
         if !(table.is_finite() && table > 0.0 && took.is_finite() && took >= 0.0) {
             return Lesson::Refused;
@@ -110,7 +110,7 @@ impl Gauge {
         lesson
     }
 
-    /// Errors that resemble those before them say that κ is followed too slowly; those that do not, fast enough (Meh70, eq. 35a).
+    /// Consecutive errors that correlate show that κ follows too slowly; uncorrelated errors, that it follows fast enough (Meh70, eq. 35a).
     fn follow(&mut self, error: f64) {
         self.common = FORGET * self.common + (1.0 - FORGET) * error * self.before;
         self.before = error;
@@ -134,7 +134,7 @@ impl Gauge {
 mod tests {
     use super::*;
 
-    /// What the filter plans past κ in the last half of 4000 lessons of tables that are 1: the rms of its error.
+    /// Root-mean-square error of κ as the filter predicts it, over the last half of 4000 measurements with a table of 1.
     fn error_rms(mut next: impl FnMut(usize) -> f64) -> (f64, Gauge) {
         let mut gauge = Gauge::default();
         let mut square = 0.0;
@@ -146,7 +146,7 @@ mod tests {
         (libm::sqrt(square / 2000.0), gauge)
     }
 
-    /// Numbers of deviation 1, nearly: four uniform ones of a congruential generator.
+    /// Random numbers of deviation about 1: sums of four uniform ones of a congruential generator.
     fn dice() -> impl FnMut() -> f64 {
         let mut state = 7_u64;
         move || {
@@ -170,7 +170,7 @@ mod tests {
     #[test]
     fn a_machine_that_wanders_is_followed_as_fast_as_it_does() {
         let (mut dice, mut wandered) = (dice(), 0.0);
-        // a walk of 5 % a lesson, held together, and 2 % of tremble: the filter that knows both errs by 0.057
+        // random walk of 5 % a measurement, mean-reverting, and 2 % of noise: the filter that knows both errs by 0.057
         let (rms, gauge) = error_rms(|_| {
             wandered = 0.98 * wandered + 0.05 * dice();
             1.0 + wandered + 0.02 * dice()

@@ -1,26 +1,26 @@
-//! Simulation and drawing under one budget: what a rate is worth on the screen, and how two purses share the cores.
+//! Simulation and drawing under one budget: the benefit of a step rate on the screen, and how two budgets share the cores.
 //!
-//! In: motion on the screen, rates, levels. Out: offers that [`super::Adaptive`] chooses among; a split where there are two purses, at
-//! once or found while frames go by ([`Market`]). Never here: a step of anything. Theory: `docs/theory/budget.md`, eq. 54 … 59.
+//! In: motion on the screen, rates, levels. Out: offers that [`super::Adaptive`] chooses among; for two budgets a split, computed directly
+//! or found over several frames ([`Market`]). Never here: stepping. Theory: `docs/theory/budget.md`, eq. 54 … 59.
 
 use alloc::vec::Vec;
 
 use super::menu::Offer;
 
-/// What is shown between two steps.
+/// The state shown between two steps.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Between {
     /// The newest state, held.
     Hold,
-    /// The line between the last two states.
+    /// Linear interpolation between the last two states.
     Interpolate,
-    /// The newest state, carried on.
+    /// The newest state, extrapolated.
     Extrapolate,
 }
 
 /// Mean error on the screen of an object simulated at `rate_hz`, pixels (eq. 54).
 ///
-/// `speed_px` a second and `acceleration_px` a second², on the screen. Infinite at a rate that is not above 0.
+/// `speed_px` per second and `acceleration_px` per second², on the screen. Infinite at a rate that is not above 0.
 #[must_use]
 pub fn temporal_error_px(between: Between, speed_px: f64, acceleration_px: f64, rate_hz: f64) -> f64 {
     if rate_hz.is_nan() || rate_hz <= 0.0 {
@@ -33,7 +33,7 @@ pub fn temporal_error_px(between: Between, speed_px: f64, acceleration_px: f64, 
     }
 }
 
-/// One rate or one level of an object: what it costs in a frame, ticks, and its error as a part of the worst, 0 … 1.
+/// One rate or one level of an object: its cost in a frame, ticks, and its error as a fraction of the worst, 0 … 1.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Choice {
     /// Ticks in a frame.
@@ -42,9 +42,10 @@ pub struct Choice {
     pub error: f64,
 }
 
-/// Rates and levels of an object whose worth is their product, as one ladder of pairs (eq. 55): the offers, and the (rate, level) of each.
+/// Rates and levels of an object whose benefit is their product, as one ladder of pairs (eq. 55): the offers, and the (rate, level) of
+/// each.
 ///
-/// Both cost from the same purse. At most 25 pairs matter: five of each are as many as anybody tells apart.
+/// Both are paid from the same budget. At most 25 pairs matter: more than five of each are not perceptibly different.
 #[must_use]
 pub fn pairs(rates: &[Choice], levels: &[Choice]) -> (Vec<Offer>, Vec<(u32, u32)>) {
     let left = |error: f64| {
@@ -66,13 +67,13 @@ pub fn pairs(rates: &[Choice], levels: &[Choice]) -> (Vec<Offer>, Vec<(u32, u32)
     (0..).zip(rates).flat_map(both).unzip()
 }
 
-/// Halvings of the split: past these the ticks of a second are told apart.
+/// Halvings of the split: enough to resolve the ticks of a second.
 const HALVINGS: u32 = 40;
 
-/// Where two purses share cores: the part of `total` for the first at which one more tick is worth the same in both (eq. 57).
+/// For two budgets that share cores: the part of `total` for the first at which one more tick gains the same in both (eq. 57).
 ///
-/// `prices` gives λ of both for a split (first, second); each falls as its purse grows, in steps. The answer is where the first becomes
-/// the lower.
+/// `prices` gives λ of both for a split (first, second); each falls stepwise as its budget grows. The result is where the first becomes the
+/// lower.
 pub fn even_split(total: f64, mut prices: impl FnMut(f64, f64) -> (f64, f64)) -> f64 {
     let (mut low, mut high) = (0.0, total);
     for _ in 0..HALVINGS {
@@ -87,19 +88,19 @@ pub fn even_split(total: f64, mut prices: impl FnMut(f64, f64) -> (f64, f64)) ->
     0.5 * (low + high)
 }
 
-/// What steps on the processor that draws, as the market sees it.
+/// An agent that steps on the processor that draws, as the market sees it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Worker {
-    /// Ticks of a frame's time that it takes at its finest, > 0.
+    /// Ticks of a frame's time that the agent takes at its finest, > 0.
     pub full: f64,
-    /// The least part of that, 0 … 1: it cannot do with less.
+    /// The least fraction of that, 0 … 1, that the agent needs.
     pub least: f64,
-    /// Weighted gain that its error costs at its finest, ≥ 0; half the work doubles the error.
+    /// Weighted gain lost to the agent's error at its finest, ≥ 0; half the work doubles the error.
     pub loss: f64,
 }
 
 impl Worker {
-    /// The part of its full work at which one more tick gains `lambda` (eq. 58): all where ticks are free.
+    /// The fraction of the full work at which one more tick gains `lambda` (eq. 58): all of it where ticks are free.
     #[must_use]
     pub fn part(&self, lambda: f64) -> f64 {
         let part = libm::sqrt(self.loss / (lambda * self.full));
@@ -112,14 +113,14 @@ impl Worker {
     }
 }
 
-/// What `workers` take at a price, ticks.
+/// Ticks that `workers` take at price `lambda`.
 #[must_use]
 pub fn taken(workers: &[Worker], lambda: f64) -> f64 {
     workers.iter().map(|worker| worker.taken(lambda)).sum()
 }
 
-/// The least and the greatest price that makes a difference to `workers`: below the one all of them do all, past the other none does
-/// more than its least.
+/// The range of prices that makes a difference to `workers`: below it every worker does its full work, above it no worker does more than
+/// its least.
 fn prices(workers: &[Worker]) -> (f64, f64) {
     let sound = workers.iter().filter(|worker| worker.full > 0.0 && worker.loss > 0.0);
     let of = |worker: &Worker, part: f64| worker.loss / (worker.full * part * part);
@@ -129,8 +130,8 @@ fn prices(workers: &[Worker]) -> (f64, f64) {
     })
 }
 
-/// The price at which `workers` take no more than `ticks`; 0 where they do for nothing, the greatest that makes a difference where they
-/// never do.
+/// The price at which `workers` take no more than `ticks`; 0 if they do so at no price, the greatest that makes a difference if they never
+/// do.
 #[must_use]
 pub fn price(workers: &[Worker], ticks: f64) -> f64 {
     if taken(workers, 0.0) <= ticks {
@@ -149,43 +150,44 @@ pub fn price(workers: &[Worker], ticks: f64) -> f64 {
     libm::exp(high)
 }
 
-/// Nobody can do with less than this part of its work, as far as prices are concerned.
+/// Least fraction of its work that any worker is assumed to need when prices are computed.
 const LEAST: f64 = 1e-3;
-/// The part of the way to the drawing's price that one frame goes: agents answer within a quarter of a second, and must be waited for.
+/// Fraction of the distance to the drawing's price that one frame covers: agents respond within a quarter of a second, and the price must
+/// not outrun them.
 const PACE: f64 = 0.05;
-/// The most of that way that is looked at, |Δ ln λ|: prices are steps.
+/// Limit of that distance, |Δ ln λ|, in one frame: prices are step functions.
 const FAR: f64 = 1.0;
-/// Where drawing has all that it wants the price falls by this much a frame, in proportion.
+/// Relative fall of the price per frame while drawing has all the time it requests.
 const FALL: f64 = 0.02;
 
-/// How drawing stands in the market.
+/// The state of drawing in the market.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drawing {
-    /// Ticks that a frame would take if nothing else wanted any.
+    /// Ticks that a frame would take if nothing else needed any.
     pub wants: f64,
-    /// λ: gain of one more tick for the picture; 0 where it has all.
+    /// λ: gain of one more tick for the picture; 0 where drawing has all it requests.
     pub lambda: f64,
 }
 
-/// One price for simulation and drawing on shared cores, found while frames go by (eq. 59).
+/// One price for simulation and drawing on shared cores, found over several frames (eq. 59).
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Market {
     lambda: Option<f64>,
 }
 
 impl Market {
-    /// The price of a tick in the next frame, and the ticks that drawing may take; `None` where `capacity` ticks are enough for all:
-    /// then nobody gives way.
+    /// The price of a tick in the next frame, and the ticks that drawing may take; `None` where `capacity` ticks are enough for all, so
+    /// that no agent reduces its work.
     pub fn settle(&mut self, workers: &[Worker], capacity: f64, drawing: Drawing) -> Option<(f64, f64)> {
         let full = taken(workers, 0.0);
-        // who takes nothing has nothing to give
+        // workers that take nothing have nothing to give up
         let short = full > 0.0 && full + drawing.wants > capacity;
         if !short {
             self.lambda = None;
             return None;
         }
         let lambda = match self.lambda {
-            // drawing has what it wants, but for half of all at most
+            // drawing gets what it requests, but at most half of the capacity
             None => price(workers, (capacity - drawing.wants).max(0.5 * capacity)),
             Some(held) if drawing.lambda > 0.0 => {
                 held * libm::exp(PACE * crate::within(libm::log(drawing.lambda / held), (-FAR, FAR)))

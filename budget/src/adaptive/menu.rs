@@ -1,4 +1,4 @@
-//! What there is to choose among: objects by id, each with its concave hull, made once.
+//! The options to choose among: objects by id, each with its concave hull, computed once.
 //!
 //! In: levels with cost and gain, weights that change every frame. Out: hull steps, in the order of ids.
 //! Never here: a choice ([`super::pick`]). Theory: `docs/theory/budget.md`, eq. 32.
@@ -8,32 +8,32 @@ use core::ops::Range;
 
 use super::{ROUNDING, STAGES};
 
-/// One level of an object as it is offered.
+/// One level of an object as offered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Offer {
-    /// What the table says it takes, ticks, 2³² at most; NaN, infinite or negative: twice the dearest sound cost of the same object.
+    /// Ticks by the table, 2³² at most; NaN, infinite or negative: twice the most expensive valid cost of the same object.
     pub cost: f64,
-    /// What it gives at weight 1, 0 or more; what is NaN or negative counts as 0.
+    /// Gain at weight 1, ≥ 0; NaN and negative values count as 0.
     pub gain: f64,
 }
 
-/// One step along an object's hull: all that the choice looks at for each of them, so that it stays near.
+/// One step along an object's hull: only the fields that the choice reads for every step, so that they stay in the cache.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Step {
     /// Gain per tick at weight 1; > 0, finite.
     pub slope: f64,
-    /// Ticks that it adds; 32 bits because they become doubles in one instruction.
+    /// Ticks that the step adds; 32 bits because they become doubles in one instruction.
     pub cost: u32,
 }
 
-/// What an object costs and gives after a step.
+/// Cost and gain of an object after a step.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Vertex {
     /// Ticks by the table.
     pub cost: u64,
     /// Gain at weight 1.
     pub gain: f64,
-    /// The level it then has; none where it is left out.
+    /// The level after the step; `None` where the object is left out.
     pub level: Option<u32>,
 }
 
@@ -43,24 +43,24 @@ pub(crate) struct Object {
     pub id: u64,
     /// Which gauge its costs belong to, below [`super::STAGES`].
     pub stage: u8,
-    /// What all its gains are multiplied by; finite, ≥ 0.
+    /// Factor of all the object's gains; finite, ≥ 0.
     pub weight: f64,
-    /// What it is before the first step.
+    /// The object's state before the first step.
     pub base: Vertex,
-    /// What all its steps cost together, ticks by the table.
+    /// Cost of all steps together, ticks by the table.
     pub span: u64,
     first: u32,
     pub steps: u16,
     /// Steps taken in the last choice.
     pub taken: u16,
-    /// It is slow to turn back while this is above 1; one less every frame.
+    /// The object is reluctant to reverse its last change while this is above 1; counts down every frame.
     pub dwell: u8,
-    /// Whether its last change was a rise.
+    /// Whether the last change was to a finer level.
     pub rose: bool,
 }
 
 impl Object {
-    /// Has `taken` steps from now on, and is slow to turn back for `dwell` frames after a change.
+    /// Sets the number of steps taken; after a change the object is reluctant to reverse it for `dwell` frames.
     pub(crate) fn settle(&mut self, taken: u16, dwell: u8) {
         if taken == self.taken {
             self.dwell = self.dwell.saturating_sub(1);
@@ -70,12 +70,12 @@ impl Object {
         self.taken = taken;
     }
 
-    /// Whether it fell so lately that it may not rise.
+    /// Whether the object fell so recently that it may not rise.
     pub(crate) fn just_fell(&self) -> bool {
         self.dwell > 1 && !self.rose
     }
 
-    /// Whether it rose so lately that others fall before it.
+    /// Whether the object rose so recently that others fall before it.
     pub(crate) fn just_rose(&self) -> bool {
         self.dwell > 1 && self.rose
     }
@@ -88,13 +88,13 @@ pub(crate) struct Menu {
     steps: Vec<Step>,
     /// Where each step leads.
     vertices: Vec<Vertex>,
-    /// Steps of objects that went or changed, still in `steps`.
+    /// Steps of removed or changed objects, still in `steps`.
     unused: usize,
-    /// What the least of everything takes by the table, ticks of each stage.
+    /// Ticks by the table of every object at its least, for each stage.
     pub least: [u64; STAGES],
     /// How many objects may be left out.
     pub droppable: usize,
-    /// Counts what could change the choice: objects, hulls, weights.
+    /// Counts changes that could affect the choice: objects, hulls, weights.
     pub changes: u64,
     points: Vec<Vertex>,
 }
@@ -108,7 +108,7 @@ impl Menu {
         &mut self.objects
     }
 
-    /// How many places all steps take, those no longer used with them.
+    /// Number of places that all steps take, unused ones included.
     pub(crate) fn room(&self) -> usize {
         self.steps.len()
     }
@@ -117,7 +117,7 @@ impl Menu {
         &self.steps[range(object)]
     }
 
-    /// What an object is after `taken` steps.
+    /// Cost, gain and level of an object after `taken` steps.
     pub(crate) fn vertex(&self, object: &Object, taken: u16) -> Vertex {
         match taken.checked_sub(1) {
             Some(at) => self.vertices[object.first as usize + usize::from(at)],
@@ -125,9 +125,9 @@ impl Menu {
         }
     }
 
-    /// What an object gives after `taken` steps, at weight 1.
+    /// Gain of an object after `taken` steps, at weight 1.
     pub(crate) fn gain(&self, object: &Object, taken: u16) -> f64 {
-        // both are read, and then one is chosen: which one cannot be foreseen
+        // reads both and then selects: a branch here would be unpredictable
         let last = (object.first as usize + usize::from(taken)).wrapping_sub(1);
         let after = self.vertices.get(last).map_or(0.0, |v| v.gain);
         if taken > 0 { after } else { object.base.gain }
@@ -137,7 +137,7 @@ impl Menu {
         self.objects.binary_search_by_key(&id, |o| o.id).ok().map(|at| &self.objects[at])
     }
 
-    /// Puts an object on the menu, or gives it other levels. What it had taken stays as near as the new hull allows.
+    /// Adds an object, or replaces its levels. The number of steps taken stays, limited to the new hull's.
     pub(crate) fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
         let (base, kept) = self.hull(droppable, levels);
         let (first, steps) = (self.steps.len() as u32, kept.min(usize::from(u16::MAX)) as u16);
@@ -182,19 +182,19 @@ impl Menu {
         self.compact();
     }
 
-    /// Takes an object out of the sums.
+    /// Removes an object from the sums.
     fn forget(&mut self, old: &Object) {
         self.unused += usize::from(old.steps);
         self.least[usize::from(old.stage)] -= old.base.cost;
         self.droppable -= usize::from(old.base.level.is_none());
     }
 
-    /// Changes what an object's gains are multiplied by; `false` where there is no such object.
+    /// Sets the factor of an object's gains; `false` where there is no such object.
     pub(crate) fn weigh(&mut self, id: u64, weight: f64) -> bool {
         let Ok(at) = self.objects.binary_search_by_key(&id, |o| o.id) else { return false };
         let sound = if weight > 0.0 { weight.min(f64::MAX) } else { 0.0 };
         let held = &mut self.objects[at].weight;
-        // what rounding makes of a camera that stands still is no change
+        // rounding errors of a camera at rest are no change
         if (sound - *held).abs() > ROUNDING * *held {
             *held = sound;
             self.changes += 1;
@@ -202,7 +202,7 @@ impl Menu {
         true
     }
 
-    /// Takes an object off the menu; `false` where there is no such object.
+    /// Removes an object; `false` where there is no such object.
     pub(crate) fn remove(&mut self, id: u64) -> bool {
         let Ok(at) = self.objects.binary_search_by_key(&id, |o| o.id) else { return false };
         let old = self.objects.remove(at);
@@ -212,7 +212,7 @@ impl Menu {
         true
     }
 
-    /// The base of an object's hull, and how many vertices above it now lie in `points`.
+    /// The base of an object's hull, and how many vertices above it are now in `points`.
     fn hull(&mut self, droppable: bool, levels: &[Offer]) -> (Vertex, usize) {
         let is_sound = |c: f64| c.is_finite() && c >= 0.0;
         let dearest = levels.iter().map(|l| l.cost).filter(|c| is_sound(*c)).fold(0.0, f64::max);
@@ -225,7 +225,7 @@ impl Menu {
         self.points
             .sort_unstable_by(|a, b| a.cost.cmp(&b.cost).then(b.gain.total_cmp(&a.gain)).then(a.level.cmp(&b.level)));
         let nothing = Vertex { cost: 0, gain: 0.0, level: None };
-        // what is free is taken in any case, so no step is
+        // a free level with a gain is the base, so no step costs 0
         let drawn = |v: &Vertex| !droppable || (v.cost == 0 && v.gain > 0.0);
         let base = self.points.first().copied().filter(drawn).unwrap_or(nothing);
         let mut kept: usize = 0;
@@ -247,7 +247,7 @@ impl Menu {
         (base, kept)
     }
 
-    /// Closes the gaps once they are as large as what is used: constant time a change, in the long run.
+    /// Removes unused steps once they outnumber the used ones: amortised constant time per change.
     fn compact(&mut self) {
         if self.unused <= self.steps.len() / 2 {
             return;

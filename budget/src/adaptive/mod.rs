@@ -1,7 +1,7 @@
-//! The default: every frame's time goes where it gains most, by a cost table that learns while it runs.
+//! The default policy: spends every frame's time where it gains most, by a cost table that is corrected by measurements.
 //!
-//! In: objects with levels, weights, measured times. Out: a level for every object in [`Plan`]s that say what they promise.
-//! Never here: clocks, threads, what an object is; allocation once the buffers have grown. Theory: `docs/theory/budget.md`, §7.
+//! In: objects with levels, weights, measured times. Out: a level for every object, and [`Plan`]s that state the predicted time and value.
+//! Never here: clocks, threads, the nature of an object; allocation once the buffers have grown. Theory: `docs/theory/budget.md`, §7.
 //!
 //! ```
 //! use metachron_budget::adaptive::{Adaptive, Offer, Settings, Time};
@@ -35,27 +35,27 @@ use pick::{Picker, Terms};
 
 /// Stages with a κ of their own: drawing, culling, classes of simulation.
 pub const STAGES: usize = 4;
-/// Frames whose measurement may still come: what is later teaches nothing.
+/// Frames whose measurement may still arrive: later measurements are ignored.
 const IN_FLIGHT: usize = 8;
-/// Frames after a start or a disturbance that teach nothing.
+/// Frames after a start or a disturbance whose measurements are ignored.
 const UNSETTLED: u8 = 3;
-/// What moved by no more than this part of itself has not moved: positions and times are rounded.
+/// A relative change up to this counts as none: positions and times are rounded.
 const ROUNDING: f64 = 1e-9;
-/// The most by which κ falls in the plans of one frame to the next: late is mended at once, time to spare is taken up slowly.
+/// Greatest fall of the planned κ from one frame to the next: lateness is corrected immediately, spare time is used slowly.
 const EASING: f64 = 0.95;
 
-/// What can be set.
+/// The settings of [`Adaptive`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
-    /// The least margin, as a part of T; 0 … 0.5. Below what the machine's noise is, every other frame is late.
+    /// The least margin, as a fraction of T; 0 … 0.5. If it is below the machine's noise, every other frame is late.
     pub margin: f64,
-    /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. Where the machine errs by 5 %, 0.5 is
-    /// late by 5 % once in 400 frames and leaves 2 % of the time; 1.5 not once in 1250, and leaves 4 %.
+    /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. On a machine that errs by 5 %, 0.5 is late
+    /// by 5 % once in 400 frames and leaves 2 % of the time; 1.5 less than once in 1250, and leaves 4 %.
     pub sigmas: f64,
-    /// h: what a step that was taken counts more; 0 … 2. 0 changes more levels than the eye likes; above 1 little is gained.
+    /// h: additional weight of a step that was taken in the last choice; 0 … 2. At 0 levels change visibly often; above 1 little is gained.
     pub hysteresis: f64,
-    /// Frames after a change for which an object is slow to turn back: one that fell may not rise, one that rose falls after others;
-    /// 0 … 255. Below 4 what comes and goes within three frames is seen.
+    /// Frames after a change for which an object is reluctant to reverse it: one that fell may not rise, one that rose falls after others;
+    /// 0 … 255. Below 4, levels that come and go within three frames are visible.
     pub dwell: u8,
     /// Whether [`Trim`] corrects the budget as well.
     pub trim: bool,
@@ -79,38 +79,38 @@ impl Settings {
 pub struct Time {
     /// T, > 0.
     pub target: f64,
-    /// What is taken before anything is chosen, ≥ 0.
+    /// Ticks spent before anything is chosen, ≥ 0.
     pub fixed: f64,
 }
 
-/// What was chosen, and what it promises.
+/// A choice, with its predicted time and value.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Plan {
-    /// Whether it fits; if not, everything is in its lowest form and that is too much.
+    /// Whether the choice fits; if not, everything is in its lowest form and still exceeds the budget.
     pub feasible: bool,
-    /// Whether it is the last choice, kept because nothing has moved.
+    /// Whether this is the last choice, kept because nothing has moved.
     pub held: bool,
-    /// What may be spent on what is chosen, ticks.
+    /// Ticks that may be spent on the choice.
     pub budget: f64,
-    /// What the frame is expected to take, the fixed part with it, ticks.
+    /// The expected time of the frame including the fixed part, ticks.
     pub predicted: f64,
     /// Weighted gain of the choice.
     pub value: f64,
     /// The certificate: no choice within the budget has more; 0 where there is none.
     pub upper: f64,
-    /// λ: gain of one more tick; 0 where everything is at its most.
+    /// λ: gain of one more tick; 0 where everything is at its finest.
     pub lambda: f64,
 }
 
 impl Plan {
-    /// How far below the best this can be, as a part of the best.
+    /// Upper bound of the relative loss against the best choice.
     #[must_use]
     pub fn gap(&self) -> f64 {
         if self.upper > 0.0 { (1.0 - self.value / self.upper).max(0.0) } else { 0.0 }
     }
 }
 
-/// What a frame was predicted from, until it is measured.
+/// The prediction for a frame, stored until the frame is measured.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 struct Sent {
     frame: u64,
@@ -119,14 +119,14 @@ struct Sent {
     teaches: bool,
 }
 
-/// Objects, what is known of the machine, and the last choice.
+/// Objects, the estimates of the machine, and the last choice.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Adaptive {
     settings: Settings,
     menu: Menu,
     picker: Picker,
     gauges: [Gauge; STAGES],
-    /// κ as planned with: follows the gauges up at once and down slowly.
+    /// κ used in plans: follows the gauges up immediately and down slowly.
     kappa: [f64; STAGES],
     ladder: Ladder,
     hold: Hold,
@@ -135,12 +135,12 @@ pub struct Adaptive {
     unsettled: u8,
     plan: Plan,
     table: [u64; STAGES],
-    /// The menu's changes and the time at the last choice.
+    /// The menu's change counter and the time at the last choice.
     chosen_for: Option<(u64, Time)>,
 }
 
 impl Adaptive {
-    /// A controller that knows nothing yet.
+    /// A controller without measurements.
     #[must_use]
     pub fn new(settings: Settings) -> Self {
         Self {
@@ -160,20 +160,20 @@ impl Adaptive {
         }
     }
 
-    /// Puts an object on the menu, or gives it other levels (coarsest first; cost by the table of `stage`, `0..STAGES`, else the last).
+    /// Adds an object, or replaces its levels (coarsest first; cost by the table of `stage`, `0..STAGES`, else the last).
     ///
     /// A new object starts at its lowest form with weight 1. `droppable` objects may be left out altogether.
     pub fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
         self.menu.set(id, stage.min(STAGES - 1), droppable, levels);
     }
 
-    /// What an object's gains are multiplied by from the next choice on; NaN and what is below 0 are 0, and 0 is the lowest form.
-    /// `false` where there is no such object.
+    /// Sets the factor of an object's gains from the next choice on; NaN and negative values are 0, and 0 gives the lowest form. `false`
+    /// where there is no such object.
     pub fn weigh(&mut self, id: u64, weight: f64) -> bool {
         self.menu.weigh(id, weight)
     }
 
-    /// Takes an object off the menu; `false` where there is no such object.
+    /// Removes an object; `false` where there is no such object.
     pub fn remove(&mut self, id: u64) -> bool {
         self.menu.remove(id)
     }
@@ -184,11 +184,11 @@ impl Adaptive {
         self.chosen_for = None;
     }
 
-    /// Chooses for a frame; the answer is read with [`Self::level`]. Frames have numbers that never come twice.
+    /// Chooses for a frame; the result is read with [`Self::level`]. Frame numbers must be unique.
     pub fn choose(&mut self, frame: u64, time: Time) -> Plan {
         let (mut target, mut fixed) = (time.target, time.fixed);
         if !(target.is_finite() && target > 0.0) {
-            (target, fixed) = (1.0, 1.0); // no time at all: the lowest of everything, said to be infeasible
+            (target, fixed) = (1.0, 1.0); // no time at all: everything at its lowest, reported as infeasible
         }
         fixed = if fixed > 0.0 { fixed } else { 0.0 };
         for (planned, gauge) in self.kappa.iter_mut().zip(&self.gauges) {
@@ -211,7 +211,7 @@ impl Adaptive {
         self.plan
     }
 
-    /// Learns what a stage of a frame took, ticks, without what is fixed. Measurements may come late, and in any order.
+    /// Reports the time that a stage of a frame took, ticks, without the fixed part. Measurements may come late, and in any order.
     pub fn observe(&mut self, frame: u64, stage: usize, took: f64) -> Lesson {
         match self.sent[frame as usize % IN_FLIGHT] {
             Some(sent) if sent.frame == frame && sent.teaches && stage < STAGES => {
@@ -221,7 +221,7 @@ impl Adaptive {
         }
     }
 
-    /// Learns what a whole frame took, ticks: for the miss ladder and the trim.
+    /// Reports the time that a whole frame took, ticks: for the miss ladder and the trim.
     pub fn finished(&mut self, frame: u64, took: f64) {
         match self.sent[frame as usize % IN_FLIGHT] {
             Some(sent) if sent.frame == frame && sent.teaches && took.is_finite() => {
@@ -233,38 +233,38 @@ impl Adaptive {
         }
     }
 
-    /// Something outside made frames unlike others (a resize, a shader compiled, a hidden window): the next few teach nothing.
+    /// Reports an outside disturbance (a resize, a shader compiled, a hidden window): measurements of the next few frames are ignored.
     pub fn disturb(&mut self) {
         self.unsettled = UNSETTLED;
         self.sent = [None; IN_FLIGHT];
     }
 
-    /// The level an object was given; `None` where it is left out, is unknown, or has no levels.
+    /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
     #[must_use]
     pub fn level(&self, id: u64) -> Level {
         let object = self.menu.find(id)?;
         self.menu.vertex(object, object.taken).level
     }
 
-    /// The lowest form of an object, for what is left when [`is_late`] says so.
+    /// The lowest form of an object, for the rest of a frame when [`is_late`] is true.
     #[must_use]
     pub fn lowest(&self, id: u64) -> Level {
         self.menu.find(id)?.base.level
     }
 
-    /// What is known of a stage; the last where there is no such stage.
+    /// The gauge of a stage; of the last where there is no such stage.
     #[must_use]
     pub fn gauge(&self, stage: usize) -> &Gauge {
         &self.gauges[stage.min(STAGES - 1)]
     }
 
-    /// κ of a stage as the last plan was made with: it follows the gauge up at once, and down by 5 % a frame at most.
+    /// κ of a stage in the last plan: follows the gauge up immediately, and down by 5 % a frame at most.
     #[must_use]
     pub fn planned_kappa(&self, stage: usize) -> f64 {
         self.kappa[stage.min(STAGES - 1)]
     }
 
-    /// The margin now, as a part of T.
+    /// The present margin, as a fraction of T.
     #[must_use]
     pub fn margin(&self) -> f64 {
         let used = self.gauges.iter().zip(&self.table).filter(|(_, table)| **table > 0);

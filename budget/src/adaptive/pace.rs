@@ -1,21 +1,21 @@
-//! When a frame may teach and when a choice may change: the miss ladder, the deadline, the hold of a still picture.
+//! When a choice may change: the miss ladder, the deadline, and the hysteresis of a still picture.
 //!
-//! In: times of frames. Out: a margin, a verdict. Never here: a clock; whoever measures has that.
+//! In: times of frames. Out: a margin, a verdict. Never here: a clock; the caller measures.
 //! Theory: `docs/theory/budget.md`, eq. 37 … 40.
 
-/// A frame later than this part of T past it is a miss that the ladder counts.
+/// A frame that exceeds T by more than this fraction is a miss that the ladder counts.
 const MISS: f64 = 0.10;
-/// So many in a row raise the margin …
+/// This many in a row raise the margin …
 const MISSES: u8 = 2;
-/// … for so many frames.
+/// … for this many frames.
 const WARY: u8 = 30;
-/// A still picture rises where this part of T was to spare …
+/// A still picture is refined where this fraction of T was to spare …
 const SPARE: f64 = 0.05;
-/// … so often in a row: at first about as long as it takes to see that a machine has calmed down, twice as often after each time that it
-/// had to fall, up to the most, some ten seconds.
+/// … this often in a row: initially about as long as it takes to see that a machine has calmed down; doubled after each time that the
+/// picture had to be coarsened, up to the greatest, some ten seconds.
 const SPARE_IN_A_ROW: (u16, u16) = (8, 512);
 
-/// Two misses in a row make the budget wary for half a second or so.
+/// Raises the margin for about half a second after two misses in a row.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Ladder {
     misses: u8,
@@ -23,7 +23,7 @@ pub struct Ladder {
 }
 
 impl Ladder {
-    /// Learns that a frame took `part` of its time.
+    /// Reports that a frame took `part` of its time.
     pub fn observe(&mut self, part: f64) {
         self.wary = self.wary.saturating_sub(1);
         self.misses = if part > 1.0 + MISS { self.misses.saturating_add(1) } else { 0 };
@@ -32,16 +32,16 @@ impl Ladder {
         }
     }
 
-    /// What is added to the number of σ in the margin: 1 while wary.
+    /// Number added to the σ in the margin: 1 while the margin is raised.
     #[must_use]
     pub fn extra_sigmas(&self) -> f64 {
         if self.wary > 0 { 1.0 } else { 0.0 }
     }
 }
 
-/// Whether what is left of a frame must be drawn in its lowest forms: `elapsed` of `target` is past 85 %.
+/// Whether the rest of a frame must be drawn in its lowest forms: `elapsed` is past 85 % of `target`.
 ///
-/// A time that is none is late: that errs on the side of the frame.
+/// An invalid time counts as late, which keeps the frame short.
 #[must_use]
 pub fn is_late(elapsed: f64, target: f64) -> bool {
     let in_time = elapsed <= 0.85 * target;
@@ -51,7 +51,7 @@ pub fn is_late(elapsed: f64, target: f64) -> bool {
 /// Whether the choice for a picture in which nothing moves still holds.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct Hold {
-    /// Frames in a row in which time was to spare, and how many it takes to rise.
+    /// Consecutive frames with time to spare, and how many it takes to refine.
     spare: u16,
     patience: u16,
 }
@@ -63,8 +63,8 @@ impl Default for Hold {
 }
 
 impl Hold {
-    /// Whether the last choice may stay: `predicted` is what it would take now, `goal` the budget, both as parts of T; `can_rise`
-    /// where not everything is at its most.
+    /// Whether the last choice may stay: `predicted` is what it would take now, `goal` the budget, both as fractions of T; `can_rise` where
+    /// not everything is at its finest.
     pub(crate) fn keeps(&mut self, predicted: f64, goal: f64, can_rise: bool) -> bool {
         self.spare = if can_rise && goal - predicted > SPARE { self.spare.saturating_add(1) } else { 0 };
         let (late, rises) = (predicted > 1.0, self.spare >= self.patience);
@@ -78,14 +78,14 @@ impl Hold {
     }
 }
 
-/// A slow correction of the budget by what frames lacked or left over; off by default, since κ does the same sooner.
+/// A slow correction of the budget by the time that frames lacked or left over; off by default, since κ does the same sooner.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Trim {
     part: f64,
 }
 
 impl Trim {
-    /// Learns what was left over of a frame, as a part of T; nothing where all was at its most and time was left, for there was
+    /// Reports the time left over of a frame, as a fraction of T; ignored where all was at its finest and time was left, for there was
     /// nothing to spend it on (eq. 40).
     pub fn observe(&mut self, left_over: f64, all_at_most: bool) {
         if left_over.is_finite() && !(all_at_most && left_over > 0.0) {
@@ -93,7 +93,7 @@ impl Trim {
         }
     }
 
-    /// What is added to the budget, as a part of T: −0.10 … 0.05.
+    /// Correction of the budget, as a fraction of T: −0.10 … 0.05.
     #[must_use]
     pub fn part(&self) -> f64 {
         self.part

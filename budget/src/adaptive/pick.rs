@@ -1,12 +1,12 @@
 //! The choice of a frame: hull steps in falling gain per time, in linear time.
 //!
-//! In: a menu, κ of every stage, a budget. Out: steps taken of every object, λ, and a bound.
+//! In: a menu, κ of every stage, a budget. Out: steps taken for every object, λ, and a bound.
 //! Never here: where the budget comes from. Theory: `docs/theory/budget.md`, eq. 32 and 33.
 //!
 //! Steps whose gain per time is far above the last price are taken, steps far below it are not; those near it fall into buckets by the
-//! leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the steps of the one bucket that does
-//! not fit whole are sorted, and those that fit are taken. Where the price is not near the last one, all steps are near. So the answer is the one of a full sort,
-//! without its time.
+//! leading bits of their gain per time. Whole buckets are taken from the top while they fit; only the steps of the one bucket that does not
+//! fit whole are sorted, and those that fit are taken. If the price is not near the last one, all steps count as near. So the result equals
+//! that of a full sort, in linear time.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -16,28 +16,29 @@ use super::menu::{Menu, Object, Step};
 
 /// Buckets to an octave: the top bits of the mantissa. A bucket spans 9 %.
 const BITS: u32 = 3;
-/// Octaves that are told apart, about 1; what is above or below falls into the outermost bucket.
+/// Octaves that are resolved, centred at 1; values above or below fall into the outermost bucket.
 const OCTAVES: u64 = 192;
 const BUCKETS: usize = (OCTAVES << BITS) as usize;
 
-/// Fewer objects than this go on below the bucket in which the budget ends: with few, large steps much would stay unspent.
+/// With fewer objects than this the choice continues below the bucket in which the budget ends: with few, large steps much would stay
+/// unspent.
 const FEW: usize = 32;
 
-/// What the steps count of an object that has just risen: where accuracy is 1 − ½/polygons, it falls again once it is an octave too fine.
+/// Factor for the steps of an object that has just risen: where accuracy is 1 − ½/polygons, it falls again once it is an octave too fine.
 const YOUNG: f64 = 4.0;
 
-/// What a choice came to.
+/// The result of a choice.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub(crate) struct Picked {
-    /// Whether the least of everything fits.
+    /// Whether every object at its least fits.
     pub feasible: bool,
-    /// What each stage takes by the table, ticks.
+    /// Ticks of each stage by the table.
     pub table: [u64; STAGES],
     /// Weighted gain.
     pub value: f64,
-    /// No choice within the budget is worth more.
+    /// No choice within the budget has a greater value.
     pub upper: f64,
-    /// Gain of one more tick; 0 where everything is at its most.
+    /// Gain of one more tick; 0 where everything is at its finest.
     pub lambda: f64,
 }
 
@@ -54,23 +55,23 @@ impl Picked {
     }
 }
 
-/// What a choice depends on besides the menu.
+/// Inputs of a choice in addition to the menu.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Terms {
-    /// What may be spent, measured ticks.
+    /// Measured ticks that may be spent.
     pub budget: f64,
-    /// Measured ticks to one of the table, for each stage; > 0.
+    /// Measured ticks per tick of the table, for each stage; > 0.
     pub kappa: [f64; STAGES],
-    /// What a step that was taken last time counts: 1 + h.
+    /// Factor for a step that was taken last time: 1 + h.
     pub loyalty: f64,
-    /// 1/κ of each stage: a division an object would take longer than all else.
+    /// 1/κ of each stage: a division per object would dominate the time.
     pub per_kappa: [f64; STAGES],
-    /// What one object can take at most above its least, by the table of each stage: what is dearer can never fit.
+    /// Most ticks that one object can take above its least, by the table of each stage: a more expensive object can never fit.
     pub reach: [u64; STAGES],
 }
 
 impl Terms {
-    /// Terms without a menu: what one object can take is known once there is one.
+    /// Terms without a menu: `reach` is set once there is one.
     pub(crate) fn new(budget: f64, kappa: [f64; STAGES], loyalty: f64) -> Self {
         Self { budget, kappa, loyalty, per_kappa: kappa.map(|k| 1.0 / k), reach: [0; STAGES] }
     }
@@ -79,13 +80,13 @@ impl Terms {
         table.iter().zip(&self.kappa).map(|(&t, k)| t as f64 * k).sum()
     }
 
-    /// What a gain per tick of the table is worth per measured tick, for an object's steps: others, and those it had.
+    /// Factors from gain per tick of the table to gain per measured tick, for an object's steps: new ones, and those taken last time.
     fn worth(&self, object: &Object) -> [f64; 2] {
         let worth = object.weight * self.per_kappa[usize::from(object.stage)];
         [worth, worth * if object.just_rose() { YOUNG.max(self.loyalty) } else { self.loyalty }]
     }
 
-    /// How many steps of an object are on offer: all that are worth something and can ever fit; having just fallen, those it had.
+    /// How many steps of an object are on offer: all that have a gain and can ever fit; if the object has just fallen, those it had.
     fn on_offer(&self, object: &Object, steps: &[Step]) -> usize {
         let most = match (object.weight > 0.0, object.just_fell()) {
             (false, _) => 0,
@@ -115,19 +116,20 @@ struct Edge {
     step: u16,
 }
 
-/// Gains per time that are told apart: from the first on, below the second. What is above is taken, what is below is not.
+/// The range of gains per time that is resolved: from the first on, below the second. Steps above it are taken, steps below it are not.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Near(f64, f64);
 
 impl Near {
     const ALL: Self = Self(0.0, f64::INFINITY);
 
-    /// A fifth of the last price up and down, to the bottom of a bucket; where all was had, all is taken again.
+    /// The last price divided and multiplied by 1.2, the lower end rounded down to the bottom of a bucket; if all was taken last time, all
+    /// is taken again.
     fn to(price: f64) -> Self {
         Self(bottom(bucket(price / 1.2)), 1.2 * price)
     }
 
-    /// The buckets that it reaches into.
+    /// The buckets that the range covers.
     fn buckets(self) -> Range<usize> {
         bucket(self.0)..bucket(self.1) + 1
     }
@@ -138,7 +140,7 @@ impl Near {
 pub(crate) struct Picker {
     /// The price of the last choice.
     price: f64,
-    /// What the near steps of every stage and bucket take by the table.
+    /// Cost of the near steps of every stage and bucket by the table.
     bins: Vec<[u64; BUCKETS]>,
     /// Steps whose gain per time is near the price, object after object.
     near: Vec<Edge>,
@@ -149,7 +151,7 @@ pub(crate) struct Picker {
 }
 
 impl Picker {
-    /// Chooses; the menu remembers what was taken, and what changed is slow to turn back.
+    /// Chooses; the menu stores the steps taken, and objects that changed are reluctant to reverse.
     pub(crate) fn pick(&mut self, menu: &mut Menu, mut terms: Terms, dwell: u8) -> Picked {
         let mut picked = Picked { table: menu.least, ..Picked::default() };
         let spare = terms.budget - terms.cost(&menu.least);
@@ -174,7 +176,7 @@ impl Picker {
         picked
     }
 
-    /// Takes all steps above the bucket in which the budget ends, and lays those in it aside: what is taken comes to, by the table.
+    /// Takes all steps above the bucket in which the budget ends, and collects those in it in `edge`. Gives the ticks taken by the table;
     /// `None` where that bucket is not among the near ones.
     fn find_edge(&mut self, menu: &Menu, terms: &Terms, near: Near) -> Option<[u64; STAGES]> {
         let (mut table, all) = self.take_far(menu, terms, near);
@@ -195,7 +197,7 @@ impl Picker {
         all.then_some(table)
     }
 
-    /// Takes the steps above the near ones and collects those: what is taken comes to, and whether no step is below.
+    /// Takes the steps above the near ones and collects the near ones. Gives the ticks taken, and whether no step is below.
     fn take_far(&mut self, menu: &Menu, terms: &Terms, Near(low, high): Near) -> ([u64; STAGES], bool) {
         self.near.clear();
         self.near.reserve(menu.room());
@@ -233,10 +235,10 @@ impl Picker {
         }
     }
 
-    /// Takes the near steps above a bucket, and lays those in it aside.
+    /// Takes the near steps above a bucket, and collects those in it in `edge`.
     fn take_above(&mut self, edge: usize) {
         self.edge.clear();
-        // along a hull buckets never rise: of every object those above come first
+        // along a hull buckets never rise: each object's steps above the edge come first
         for step in &self.near {
             let at = bucket(step.merit);
             self.taken[step.object as usize] += u16::from(at > edge);
@@ -246,14 +248,14 @@ impl Picker {
         }
     }
 
-    /// Best first; objects stand in the order of their ids, and that decides between equals.
+    /// Best first; ties are broken by the order of ids.
     fn sort_edge(&mut self) {
         let place = |e: &Edge| (e.object, e.step);
         self.edge.sort_unstable_by(|a, b| b.merit.total_cmp(&a.merit).then(place(a).cmp(&place(b))));
     }
 
-    /// Takes the steps on the edge that fit; the gain per tick of the first that does not. Those after it are worth nearly as much, and
-    /// one large step must not keep them all out; but of its object nothing more is taken.
+    /// Takes the steps on the edge that fit, and gives the gain per tick of the first that does not. One large step must not block those
+    /// after it, whose gains are nearly as high; but no further step of its object is taken.
     fn take_edge(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) -> f64 {
         let mut lambda = 0.0;
         for edge in &self.edge {
@@ -269,7 +271,7 @@ impl Picker {
         lambda
     }
 
-    /// Below the bucket in which the budget ends: of every object, best first, the next steps that do.
+    /// Below the bucket in which the budget ends: takes each object's next steps that fit, best first.
     fn go_on(&mut self, menu: &Menu, terms: &Terms, picked: &mut Picked) {
         self.edge.clear();
         for (i, object) in menu.objects().iter().enumerate() {
@@ -289,8 +291,8 @@ impl Picker {
         }
     }
 
-    /// Writes down what was taken, what it is worth, and the bound that the price λ gives for any choice, each object being best for
-    /// itself (eq. 33): what was taken, the price of what is left over, and what hysteresis kept from being best.
+    /// Stores the steps taken, their value, and the bound that the price λ gives for any choice, with each object optimised on its own (eq.
+    /// 33): the value taken, the price of the time left over, and the loss caused by hysteresis.
     fn settle(&self, menu: &mut Menu, terms: &Terms, picked: &mut Picked, dwell: u8) {
         let mut astray = 0.0;
         for (i, &taken) in self.taken.iter().enumerate() {
@@ -308,7 +310,7 @@ impl Picker {
     }
 }
 
-/// The exponent and the top bits of the mantissa of what falls into the lowest bucket but for what is below that.
+/// Exponent and top bits of the mantissa at the bottom of the lowest bucket; smaller values fall into it too.
 const LOWEST: u64 = (1023 - OCTAVES / 2) << BITS;
 
 /// The least merit that falls into a bucket.
@@ -316,7 +318,7 @@ fn bottom(bucket: usize) -> f64 {
     if bucket > 0 { f64::from_bits((LOWEST + bucket as u64) << (52 - BITS)) } else { 0.0 }
 }
 
-/// Where a merit falls: by its exponent and the top bits of its mantissa. It is not NaN, and not below 0.
+/// The bucket of a merit: by its exponent and the top bits of its mantissa. The merit is not NaN, and not below 0.
 fn bucket(merit: f64) -> usize {
     let top = merit.to_bits() >> (52 - BITS);
     top.saturating_sub(LOWEST).min(BUCKETS as u64 - 1) as usize

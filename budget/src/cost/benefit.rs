@@ -1,31 +1,32 @@
-//! What a level is worth to who looks (FS93, §5): size, accuracy, importance, focus, motion, hysteresis.
+//! The perceptual benefit of a level (FS93, §5): size, accuracy, importance, focus, motion, hysteresis.
 //!
-//! In: what is seen of an object. Out: a benefit. Never here: perception; it is a heuristic with sliders, as its authors say.
+//! In: an object's appearance on the screen. Out: a benefit. Never here: perception; the benefit is a heuristic with sliders, as its
+//! authors say.
 //! Theory: `docs/theory/budget.md`, eq. 46 … 48.
 
-/// How a surface is shaded, which decides what counts as a sample.
+/// How a surface is shaded; this decides what counts as a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Shading {
-    /// One colour a polygon: samples are polygons, m = 1.
+    /// One colour per polygon: samples are polygons, m = 1.
     Flat,
-    /// Colours of vertices, interpolated: samples are vertices, m = 2.
+    /// Colours at vertices, interpolated: samples are vertices, m = 2.
     Gouraud,
-    /// Light worked out at every pixel: samples are pixels, m = 1.
+    /// Lighting computed at every pixel: samples are pixels, m = 1.
     PerPixel,
 }
 
-/// What is seen of an object, and how.
+/// An object's appearance on the screen.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct View {
-    /// Pixels it covers; ≥ 0.
+    /// Pixels covered; ≥ 0.
     pub pixels: f64,
     /// Inherent importance, 0 … 1.
     pub importance: f64,
-    /// Distance of its centre from the middle of the screen, as a part of half the diagonal; ≥ 0.
+    /// Distance of the object's centre from the middle of the screen, as a fraction of half the diagonal; ≥ 0.
     pub off_centre: f64,
-    /// How far it moves on the screen in a frame, pixels; ≥ 0.
+    /// Motion on the screen in a frame, pixels; ≥ 0.
     pub motion_px: f64,
-    /// The level of the frame before, if it had one.
+    /// The level of the frame before, if there was one.
     pub last: Option<u32>,
     /// How many levels the object has.
     pub levels: u32,
@@ -44,12 +45,12 @@ pub struct Picture {
     pub shading: Shading,
 }
 
-/// How much each factor may take from a benefit, 0 (nothing) … 1 (all of it): the sliders.
+/// Sliders: how much each factor may take from a benefit, 0 (nothing) … 1 (all of it).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sliders {
-    /// Size: the exponent of the pixels; at 0 all objects in view are worth the same, at 1 each as much as it covers.
+    /// Size: the exponent of the pixels; at 0 all objects in view count the same, at 1 in proportion to the pixels covered.
     pub size: f64,
-    /// Accuracy; at 0 all levels of an object are worth the same.
+    /// Accuracy; at 0 all levels of an object have the same benefit.
     pub accuracy: f64,
     /// Importance.
     pub importance: f64,
@@ -62,7 +63,7 @@ pub struct Sliders {
 }
 
 impl Default for Sliders {
-    /// Size and accuracy alone: what the timed test of (FS93, §7) must have meant.
+    /// Size and accuracy alone: presumably the setting of the timed test of (FS93, §7).
     fn default() -> Self {
         Self { size: 1.0, accuracy: 1.0, importance: 0.0, focus: 0.0, motion: 0.0, hysteresis: 0.0 }
     }
@@ -79,12 +80,12 @@ pub fn accuracy(pixels: f64, picture: &Picture) -> f64 {
         Shading::Gouraud => (picture.vertices, 2.0),
         Shading::PerPixel => (pixels, 1.0),
     };
-    // max and min pass over a NaN
+    // max and min ignore a NaN
     let samples = samples.min(pixels).max(1.0);
     (1.0 - BASE_ERROR / libm::pow(samples, m)).clamp(0.0, 1.0)
 }
 
-/// The benefit of a level (eq. 46), in pixels; ≥ 0. A number that is none takes its whole factor: 0 pixels, no importance.
+/// The benefit of a level (eq. 46), in pixels; ≥ 0. An invalid number takes its whole factor: 0 pixels, no importance.
 #[must_use]
 pub fn benefit(view: &View, picture: &Picture, sliders: &Sliders) -> f64 {
     let size = if view.pixels > 0.0 { view.pixels.min(f64::MAX) } else { 0.0 };
@@ -103,18 +104,18 @@ pub fn benefit(view: &View, picture: &Picture, sliders: &Sliders) -> f64 {
         * size_worth(size, sliders.size)
 }
 
-/// What so many pixels are worth, ≥ 0: pixels^slider, slider 0 … 1 (eq. 48a); of less than one pixel no more than there is of it.
+/// The benefit of a number of pixels, ≥ 0: pixels^slider, slider 0 … 1 (eq. 48a); below one pixel the number itself.
 #[must_use]
 pub fn size_worth(pixels: f64, slider: f64) -> f64 {
     if pixels > 1.0 { libm::pow(pixels, part(slider)) } else { pixels.max(0.0) }
 }
 
-/// A factor of which a slider lets only a part through: 1 − slider (1 − factor) (eq. 48).
+/// A factor attenuated by its slider: 1 − slider (1 − factor) (eq. 48).
 fn weighed(factor: f64, slider: f64) -> f64 {
     1.0 - part(slider) * (1.0 - part(factor))
 }
 
-/// A number inside 0 … 1; 0 for what is none.
+/// A number clamped to 0 … 1; 0 if invalid.
 fn part(x: f64) -> f64 {
     if x > 0.0 { x.min(1.0) } else { 0.0 }
 }

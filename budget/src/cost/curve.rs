@@ -1,22 +1,22 @@
 //! A measured curve between its points: the time of a primitive by its area, the time of logic by what is visible (RH05, §4).
 //!
-//! In: measured points, as they come. Out: a time for any abscissa. Never here: a law; the curves are not straight.
+//! In: measured points, in any order. Out: a time for any abscissa. Never here: a law; the curves are not straight.
 //! Theory: `docs/theory/budget.md`, eq. 44 and 45.
 
 use alloc::vec::Vec;
 
 use super::fit::quantile;
 
-/// Straight lines between the medians of what was measured at each abscissa.
+/// Linear interpolation between the medians measured at each abscissa.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Curve {
     points: Vec<(f64, f64)>,
 }
 
 impl Curve {
-    /// The curve through points (abscissa, time), each ≥ 0, in any order; several at one abscissa count by their median.
+    /// The curve through points (abscissa, time), each ≥ 0, in any order; several at one abscissa are replaced by their median.
     ///
-    /// `None` where no point is a number. Times never fall along it: more area or more objects take no less time, whatever noise says.
+    /// `None` where no point is valid. Times never fall along the curve: more area or more objects take no less time, whatever the noise.
     #[must_use]
     pub fn through(points: &[(f64, f64)]) -> Option<Self> {
         let number = |x: f64| x.is_finite() && x >= 0.0;
@@ -30,21 +30,21 @@ impl Curve {
         (!points.is_empty()).then_some(Self { points })
     }
 
-    /// The time at `x`: between the points by a straight line, before the first as there, past the last by the last line's slope.
+    /// The time at `x`: linear between points, constant before the first, extrapolated with the last segment's slope past the last.
     #[must_use]
     pub fn at(&self, x: f64) -> f64 {
         between(&self.points, x)
     }
 
-    /// The points, in rising abscissa.
+    /// The points, in ascending abscissa.
     #[must_use]
     pub fn points(&self) -> &[(f64, f64)] {
         &self.points
     }
 }
 
-/// The time at `x` on straight lines through points in rising abscissa: before the first as there, past the last by the last line's slope.
-/// 0 without a point.
+/// The time at `x` on straight lines through points in ascending abscissa: constant before the first, extrapolated with the last segment's
+/// slope past the last. 0 without a point.
 #[must_use]
 pub fn between(points: &[(f64, f64)], x: f64) -> f64 {
     let after = points.partition_point(|p| p.0 <= x);
@@ -60,7 +60,7 @@ pub fn between(points: &[(f64, f64)], x: f64) -> f64 {
     a.1 + (b.1 - a.1) / (b.0 - a.0) * (x - a.0)
 }
 
-/// The time of an instance of `primitives` equal primitives that cover `area` together, by the curve of one of them (eq. 44).
+/// The time of an instance of `primitives` equal primitives that cover `area` together, by the curve of one primitive (eq. 44).
 #[must_use]
 pub fn instance(curve: &Curve, primitives: u32, area: f64) -> f64 {
     let count = f64::from(primitives);

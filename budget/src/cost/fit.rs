@@ -1,4 +1,4 @@
-//! Coefficients of a machine from a benchmark, by fits that a few wild measurements do not move (FS93, §4).
+//! Coefficients of a machine from a benchmark, by fits that are robust against outliers (FS93, §4).
 //!
 //! In: samples of work and time. Out: [`Stages`], and how well they predict. Never here: a measurement.
 //! Theory: `docs/theory/budget.md`, eq. 42 and 43.
@@ -10,34 +10,35 @@ use super::stages::{Stages, Work};
 /// One measured draw.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
-    /// What was drawn.
+    /// The work drawn.
     pub work: Work,
     /// The time it took, > 0.
     pub time: f64,
 }
 
-/// Coefficients, and what they are worth.
+/// Coefficients and the quality of the fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Fit {
     /// The coefficients.
     pub stages: Stages,
-    /// 19 of 20 samples are predicted to within this part of their time.
+    /// 95 % of the samples are predicted to within this fraction of their time.
     pub error95: f64,
-    /// Samples that were used: those that are numbers.
+    /// Number of samples used: the valid ones.
     pub samples: usize,
 }
 
-/// Rounds in which samples find their stage and their weight; both come to rest well before.
+/// Rounds in which samples find their stage and their weight; both converge well before.
 const ROUNDS: usize = 30;
-/// An error past this many median errors counts less, in proportion (Huber's weight: 95 % as good as least squares where nothing is wild).
+/// An error past this many median errors is down-weighted in proportion (Huber's weight: 95 % as efficient as least squares without
+/// outliers).
 const WILD: f64 = 1.345 * 1.4826;
-/// Fewer samples than this fix nothing.
+/// Least number of samples for a fit.
 const LEAST: usize = 8;
 
-/// Fits setup + max(c₁ polygons + c₂ vertices, c₃ pixels) to samples of both stages; `None` with fewer than eight sound ones.
+/// Fits setup + max(c₁ polygons + c₂ vertices, c₃ pixels) to samples of both stages; `None` with fewer than eight valid ones.
 ///
-/// The samples should span polygons where pixels are few, and pixels where polygons are few. Where vertices go with polygons in one
-/// ratio throughout, they cannot be told apart: then c₂ is 0 and c₁ stands for both.
+/// The samples should span polygons where pixels are few, and pixels where polygons are few. If the ratio of vertices to polygons is
+/// constant throughout, the two cannot be separated: then c₂ is 0 and c₁ covers both.
 #[must_use]
 pub fn fit(samples: &[Sample]) -> Option<Fit> {
     let number = |x: f64| x.is_finite() && x >= 0.0;
@@ -62,7 +63,8 @@ pub fn fit(samples: &[Sample]) -> Option<Fit> {
     Some(Fit { stages: best.1, error95, samples: samples.len() })
 }
 
-/// Both stages as if each were alone: the median time of a polygon and of a pixel, no setup.
+/// Initial guess: both stages as if each were alone, from low quantiles of the time per polygon and per pixel, half the least time as
+/// setup.
 fn start(samples: &[Sample]) -> Stages {
     let least = quantile(samples.iter().map(|s| s.time), 0.0);
     let per = |count: fn(&Work) -> f64| {
@@ -72,7 +74,7 @@ fn start(samples: &[Sample]) -> Stages {
     Stages { setup: 0.5 * least, polygon: per(|w| w.polygons), vertex: 0.0, pixel: per(|w| w.pixels) }
 }
 
-/// One least-squares fit of the relative error, each sample in the stage that is the slower by the fit before (eq. 42).
+/// One least-squares fit of the relative error, each sample in the stage that was slower by the previous fit (eq. 42).
 fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> Stages {
     let row = |s: &Sample| {
         let w = s.work;
@@ -88,7 +90,7 @@ fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> St
         }
     }
     let [setup, polygon, vertex, pixel] = solve_from_zero(sums);
-    // a stage in which no sample was keeps what it had
+    // a stage without samples keeps its coefficients
     let (geometry, fill) = (sums[1][1] > 0.0, sums[3][3] > 0.0);
     Stages {
         setup,
@@ -98,7 +100,7 @@ fn round(samples: &[Sample], errors: &[f64], typical: f64, before: Stages) -> St
     }
 }
 
-/// Four unknowns that are not negative: what comes out below 0 is set to 0 and the rest solved again, vertices first.
+/// Four non-negative unknowns: a negative result is set to 0 and the rest solved again, vertices first.
 fn solve_from_zero(sums: [[f64; 5]; 4]) -> [f64; 4] {
     let mut free = [true; 4];
     loop {
@@ -111,7 +113,7 @@ fn solve_from_zero(sums: [[f64; 5]; 4]) -> [f64; 4] {
     }
 }
 
-/// Gaussian elimination with pivots from the diagonal; an unknown that the others determine already is 0.
+/// Gaussian elimination with pivots from the diagonal; an unknown that is linearly dependent on the others is 0.
 fn solve(mut a: [[f64; 5]; 4], free: [bool; 4]) -> [f64; 4] {
     const DETERMINED: f64 = 1e-9;
     let diagonal = [a[0][0], a[1][1], a[2][2], a[3][3]];
@@ -130,7 +132,7 @@ fn solve(mut a: [[f64; 5]; 4], free: [bool; 4]) -> [f64; 4] {
     core::array::from_fn(|i| if used[i] { a[i][4] / a[i][i] } else { 0.0 })
 }
 
-/// The value below which this part lies; 0 of nothing.
+/// The quantile `part` of the values; 0 of an empty set.
 pub(crate) fn quantile(values: impl Iterator<Item = f64>, part: f64) -> f64 {
     let mut values: Vec<_> = values.collect();
     values.sort_unstable_by(f64::total_cmp);

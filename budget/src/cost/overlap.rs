@@ -1,20 +1,20 @@
-//! How much of a frame is left for drawing when logic runs beside it (RH05, §5.3).
+//! How much of a frame is left for drawing when logic runs in parallel (RH05, §5.3).
 //!
-//! In: the time of the frame and of its logic. Out: the time that may be drawn for. Never here: who measures the logic.
+//! In: the time of the frame and of its logic. Out: the time available for drawing. Never here: the measurement of the logic.
 //! Theory: `docs/theory/budget.md`, eq. 50 … 52.
 
-/// How times of logic and drawing add up to the time of a frame.
+/// How the times of logic and drawing combine into the time of a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Overlap {
     /// ℓ = (t_l/t_f)², ρ = 1 − ℓ, t_r = ρ² t_f/C (RH05, eq. 5 … 7), with this C, > 0. With C = 1 a balanced frame takes 0.953 of
     /// the sum of both, not the ⅔ that the text says.
     Printed(f64),
-    /// t_f = max(t_l, t_r) + κ min(t_l, t_r), with this κ, 0 (side by side) … 1 (one after the other): ours.
+    /// t_f = max(t_l, t_r) + κ min(t_l, t_r), with this κ, 0 (fully parallel) … 1 (one after the other): ours.
     Fitted(f64),
 }
 
 impl Overlap {
-    /// The time for drawing in a frame of `frame` whose logic takes `logic`; 0 where the logic takes it all or a number is none.
+    /// The time for drawing in a frame of `frame` whose logic takes `logic`; 0 if the logic takes it all or a number is invalid.
     #[must_use]
     pub fn drawing(self, frame: f64, logic: f64) -> f64 {
         let sound = frame.is_finite() && frame > 0.0 && logic < frame;
@@ -31,7 +31,7 @@ impl Overlap {
             Self::Fitted(kappa) => {
                 let kappa = crate::within(kappa, (0.0, 1.0));
                 let longer = frame - kappa * logic;
-                // where drawing would be the shorter of the two, it is what stretches the logic
+                // if drawing were the shorter of the two, it would be what lengthens the logic
                 if longer >= logic { longer } else { ((frame - logic) / kappa).min(logic) }
             }
         }

@@ -1,26 +1,26 @@
-//! What to believe of a cost that is no number: twice what such costs are as a rule.
+//! A substitute for a cost that is not a valid number: twice the typical cost of its class.
 //!
-//! In: costs of one class as they come. Out: costs that can be compared, and how many had to be made up.
+//! In: costs of one class as they come. Out: costs that can be compared, and how many were substituted.
 //! Never here: a fit. Theory: `docs/theory/budget.md`, eq. 2.
 
-/// What levels of one class cost as a rule.
+/// The typical cost of levels of one class.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
     typical: f64,
     made_up: u64,
 }
 
-/// How much each sound cost moves what is typical.
+/// Weight of each valid cost in the running mean.
 const MEMORY: f64 = 0.05;
 
 impl Prior {
-    /// A class of which `typical` is known beforehand; 0 where that is none.
+    /// A class with a known `typical` cost; 0 if that is invalid.
     #[must_use]
     pub fn new(typical: f64) -> Self {
         Self { typical: if typical.is_finite() && typical > 0.0 { typical } else { 0.0 }, made_up: 0 }
     }
 
-    /// A cost that can be compared: itself where it is finite and ≥ 0, and then it teaches what is typical; else twice that.
+    /// A cost that can be compared: if finite and ≥ 0 the cost itself, which also updates the typical cost; else twice the typical cost.
     pub fn sound(&mut self, cost: f64) -> f64 {
         if cost.is_finite() && cost >= 0.0 {
             self.typical = if self.typical > 0.0 { self.typical + MEMORY * (cost - self.typical) } else { cost };
@@ -30,13 +30,13 @@ impl Prior {
         2.0 * self.typical
     }
 
-    /// What such levels cost as a rule: the last good value, smoothed.
+    /// The typical cost of such levels: the valid costs, smoothed.
     #[must_use]
     pub fn typical(&self) -> f64 {
         self.typical
     }
 
-    /// How many costs had to be made up.
+    /// How many costs were substituted.
     #[must_use]
     pub fn made_up(&self) -> u64 {
         self.made_up

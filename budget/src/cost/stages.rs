@@ -1,9 +1,9 @@
-//! The cost of drawing as two stages in parallel, of which the slower counts (FS93, §4).
+//! The cost of drawing as two parallel stages, of which the slower counts (FS93, §4).
 //!
 //! In: polygons, vertices, pixels. Out: a time. Never here: where the coefficients come from ([`super::fit`]).
 //! Theory: `docs/theory/budget.md`, eq. 41.
 
-/// What is drawn.
+/// The work drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Work {
     /// Polygons.
@@ -17,7 +17,7 @@ pub struct Work {
 /// Coefficients of one rendering algorithm on one machine; all in the same unit of time, ≥ 0.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Stages {
-    /// Time of an object, however small.
+    /// Fixed time of an object.
     pub setup: f64,
     /// c₁: time of a polygon.
     pub polygon: f64,
@@ -34,13 +34,13 @@ impl Stages {
         self.setup + self.geometry(work).max(self.pixel * work.pixels)
     }
 
-    /// The stage that every polygon passes.
+    /// Time of the stage that every polygon passes.
     #[must_use]
     pub fn geometry(&self, work: Work) -> f64 {
         self.polygon * work.polygons + self.vertex * work.vertices
     }
 
-    /// Whether the pixels are what takes the time: then fewer polygons save none.
+    /// Whether the pixel stage is the slower: then fewer polygons save no time.
     #[must_use]
     pub fn is_filling(&self, work: Work) -> bool {
         self.pixel * work.pixels > self.geometry(work)

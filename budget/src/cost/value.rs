@@ -1,4 +1,4 @@
-//! What an instance is worth to Robin Hood (RH05, §5.4): area over depth, in four strengths.
+//! The value of an instance in Robin Hood (RH05, §5.4): area over depth, in four strengths.
 //!
 //! In: unprojected area, depth, distance, importance. Out: a value. Never here: levels; every form of an instance has one value.
 //! Theory: `docs/theory/budget.md`, eq. 49.
@@ -6,11 +6,11 @@
 /// How fast value falls with depth.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Value {
-    /// a/√z (RH05, eq. 8): far things keep much; little time stays unspent.
+    /// a/√z (RH05, eq. 8): distant objects keep much; little time stays unspent.
     Gentle,
     /// a/z (RH05, eq. 9).
     Plain,
-    /// a/z² (RH05, eq. 10): near things take nearly all; much time stays unspent.
+    /// a/z² (RH05, eq. 10): near objects take nearly all; much time stays unspent.
     Steep,
     /// √(a/d²) by the distance from the focus (RH05, eq. 11, one reading).
     Focus,
@@ -18,13 +18,13 @@ pub enum Value {
     FocusSteep,
 }
 
-/// The least depth and distance that count, in the scene's unit: what is nearer is as near as this.
+/// The least depth and distance, in the scene's unit: anything nearer counts as this near.
 const NEAREST: f64 = 1e-3;
 
 impl Value {
-    /// The value of an instance of unprojected area `a` at depth `z`, `d` away from what is looked at, times its importance.
+    /// The value of an instance of unprojected area `a` at depth `z`, at distance `d` from the focus, times its importance.
     ///
-    /// 0 where a number is none, the area or the importance is not above 0, or it lies behind the eye.
+    /// 0 if a number is invalid, the area or the importance is not above 0, or the instance is behind the eye.
     #[must_use]
     pub fn of(self, a: f64, z: f64, d: f64, importance: f64) -> f64 {
         let (z_near, d_near) = (z.max(NEAREST), d.max(NEAREST));

@@ -1,27 +1,27 @@
-//! Meshes of any resolution by interior point, as (GB99) solves them: a logarithmic barrier that can be cut off at any time.
+//! Meshes of continuous resolution by interior point, as in (GB99): a logarithmic barrier method that can be stopped at any time.
 //!
 //! In: the meshes of [`super::gobbetti`] and a number of Newton steps. Out: resolutions within the time, and a bound.
-//! Never here: a clock; a time limit is given as a number of steps, so that equal inputs give equal bits.
+//! Never here: a clock; a time limit is given as a number of steps, so that equal inputs give bit-identical results.
 //! Theory: `docs/theory/budget.md`, eq. 29 … 31.
 //!
-//! The unknown is r, not √r as in the paper: then the wall of the time is flat. Along a curved wall Newton's steps shrink with the
-//! barrier, and 500 meshes took more than a hundred of them; they take 10 to 25 here.
+//! The unknown is r, not √r as in the paper: then the time constraint is linear. Along a curved constraint Newton's steps shrink with the
+//! barrier, and 500 meshes took more than a hundred steps; here they take 10 to 25.
 
 use alloc::vec::Vec;
 
 use super::gobbetti::{Mesh, Resolutions, value};
 
-/// How far to go.
+/// Stopping criteria.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Newton steps, each linear in the number of meshes: the time limit.
     pub steps: u32,
-    /// Ends where the bound is nearer than this part of the value; > 0.
+    /// Stops when the bound is within this fraction of the value; > 0.
     pub tolerance: f64,
 }
 
 impl Default for Limits {
-    /// A hundredth, in at most 60 steps: twice of what thousands of meshes need.
+    /// A hundredth, in at most 60 steps: twice the number that thousands of meshes need.
     fn default() -> Self {
         Self { steps: 60, tolerance: 0.01 }
     }
@@ -30,15 +30,15 @@ impl Default for Limits {
 /// Factor by which the barrier is lowered once a centre is found.
 const LOWER: f64 = 0.1;
 
-/// A centre is good enough where the Newton decrement², in units of ε, is below this: full steps converge quadratically there.
+/// A point counts as centred when the Newton decrement², in units of ε, is below this: full steps converge quadratically there.
 const CENTRED: f64 = 0.25;
 
-/// Part of the way to the nearest wall that a step may go.
+/// Fraction of the distance to the nearest constraint that a step may go.
 const TO_WALL: f64 = 0.95;
 
 /// Maximises Σ w √r under `fixed` + Σ a r ≤ `time` from `last`, the resolutions of the frame before (empty for a cold start).
 ///
-/// The answer is within the time whenever one is, however few the steps. Meshes as [`Mesh::sound`] gives them.
+/// The result is within the time whenever a feasible one exists, however few the steps. Meshes as [`Mesh::sound`] gives them.
 #[must_use]
 pub fn interior_point(time: f64, fixed: f64, meshes: &[Mesh], last: &[f64], limits: Limits) -> Resolutions {
     let budget = time - fixed;
@@ -71,9 +71,9 @@ type Terms = (f64, f64, f64);
 struct Path<'a> {
     meshes: &'a [Mesh],
     free: Vec<Free>,
-    /// What the free ones may take.
+    /// Time available to the free meshes.
     budget: f64,
-    /// What the others give.
+    /// Value of the other meshes.
     settled: f64,
     epsilon: f64,
     upper: f64,
@@ -110,7 +110,7 @@ impl<'a> Path<'a> {
         self.budget - self.free.iter().map(|f| f.mesh.time * f.r).sum::<f64>()
     }
 
-    /// Takes the worst benefit per cost down to its least, one after the other, until the start is within the time (GB99).
+    /// Sets meshes to their least resolution, worst benefit per cost first, until the start is within the time (GB99).
     fn make_feasible(&mut self) {
         let mut slack = self.slack();
         let merit = |f: &Free| f.mesh.weight / (f.mesh.time * libm::sqrt(f.r.max(f64::MIN_POSITIVE)));
@@ -126,7 +126,8 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Away from every wall: a little towards the middle, then all in one ratio towards the least until a quarter of the budget is free.
+    /// Moves the start away from every constraint: slightly towards the middle, then all in one ratio towards the least until a quarter of
+    /// the budget is free.
     fn move_inside(&mut self) {
         for f in &mut self.free {
             let margin = 0.1 * (f.mesh.most - f.mesh.least);
@@ -165,7 +166,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// Goes the whole way where that stays inside, else most of the way to the nearest wall.
+    /// Takes the full step if that stays inside, else most of the distance to the nearest constraint.
     fn advance(&mut self, slack: f64, moves: &[f64]) {
         let to_wall = |(f, dr): (&Free, &f64)| match *dr {
             dr if dr > 0.0 => (f.mesh.most - f.r) / dr,
@@ -181,7 +182,7 @@ impl<'a> Path<'a> {
         }
     }
 
-    /// A bound that holds at any point (eq. 31): λ = ε/slack prices the time, and each mesh is best for itself.
+    /// An upper bound valid at any point (eq. 31): λ = ε/slack prices the time, and each mesh is optimised on its own.
     fn certify(&mut self) {
         let slack = self.slack();
         let lambda = if slack > 0.0 { self.epsilon / slack } else { 0.0 };
@@ -207,12 +208,12 @@ impl<'a> Path<'a> {
     }
 }
 
-/// Whether there is something to weigh.
+/// Whether the mesh has a trade-off between time and benefit.
 fn is_free(m: &Mesh) -> bool {
     m.most > m.least && m.time > 0.0 && m.weight > 0.0
 }
 
-/// The resolution of a mesh with nothing to weigh: the most of what is free, else the least.
+/// The resolution of a mesh without a trade-off: the most if it costs nothing and has a weight, or the least.
 fn at_rest(m: &Mesh) -> f64 {
     if m.time > 0.0 || m.weight == 0.0 { m.least } else { m.most }
 }

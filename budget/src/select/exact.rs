@@ -1,34 +1,34 @@
-//! The optimum of the multiple-choice knapsack, by the list of answers that no other answer beats.
+//! The optimum of the multiple-choice knapsack, by a list of non-dominated partial answers.
 //!
-//! In: a [`Problem`]. Out: the best [`Selection`], or word that it is too hard.
-//! Never here: a time limit; this is for tests and for use beside the picture. Theory: `docs/theory/budget.md`, eq. 9, after (KPP04).
+//! In: a [`Problem`]. Out: the best [`Selection`], or an error if the problem is too hard. Never here: a time limit; this is for tests and
+//! offline use. Theory: `docs/theory/budget.md`, eq. 9, after (KPP04).
 
 use alloc::vec::Vec;
 
 use super::marginal::{Fit, marginal};
 use super::problem::{Entry, Level, Problem, Selection};
 
-/// The list of answers to choose among grew past what was allowed.
+/// The list of partial answers grew past the allowed size.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct TooHard {
-    /// Answers that would have had to be kept.
+    /// Number of partial answers at which the search stopped.
     pub states: usize,
 }
 
-/// The first objects in the order of ids, at one cost and value.
+/// A choice for the first objects in the order of ids, with its cost and value.
 #[derive(Clone, Copy)]
 struct State {
     cost: u64,
     value: u64,
-    /// The state of one object fewer, and the level of the last.
+    /// Index of the predecessor state (one object fewer), and the level of the last object.
     from: u32,
     level: Level,
 }
 
-/// The best answer there is. `states_max` bounds the memory: 24 bytes for each answer kept, over all objects together.
+/// The optimum. `states_max` bounds the memory: 24 bytes for each partial answer stored, over all objects together.
 ///
 /// # Errors
-/// [`TooHard`] where more answers than that could each still be part of the best.
+/// [`TooHard`] if more partial answers than that could each still be part of the optimum.
 pub fn exact(problem: &Problem, states_max: usize) -> Result<Selection, TooHard> {
     if let Some(infeasible) = problem.infeasible() {
         return Ok(infeasible);
@@ -50,10 +50,10 @@ pub fn exact(problem: &Problem, states_max: usize) -> Result<Selection, TooHard>
     Ok(problem.certified(levels, value as f64))
 }
 
-/// What the objects still to come can add at most, and what is reached already.
+/// Upper bounds for the objects still to come, and a value that is known to be reachable.
 struct Bounds {
     budget: u64,
-    /// Known to be reachable: a state that cannot pass this is only kept if it equals it.
+    /// Known to be reachable: a state that cannot reach this is dropped.
     reached: u64,
     /// For each number of objects done: least cost of the rest, and steps of its relaxation as running sums of (cost, value).
     rest: Vec<Vec<(u64, u64)>>,
@@ -66,7 +66,7 @@ impl Bounds {
         Self { budget: problem.budget(), reached, rest }
     }
 
-    /// Whether nothing that starts so can reach what is known to be reachable.
+    /// Whether no completion of this partial answer can reach the known value.
     fn hopeless(&self, done: usize, cost: u64, value: u64) -> bool {
         let sums = &self.rest[done];
         let Some(spare) = self.budget.checked_sub(cost + sums[0].0) else { return true };
@@ -92,14 +92,14 @@ fn relaxation(problem: &Problem, objects: &[usize]) -> Vec<(u64, u64)> {
         let last = sums[sums.len() - 1];
         let next = (last.0 + step.gain.cost, last.1 + step.gain.benefit);
         if step.gain.cost == 0 {
-            sums.pop(); // what is free is there from the start
+            sums.pop(); // a free step is included from the start
         }
         sums.push(next);
     }
     sums
 }
 
-/// Every state with every level of one more object, without those that another beats.
+/// Every state combined with every level of one more object, without dominated ones.
 fn extend(problem: &Problem, object: usize, states: &[State], hopeless: impl Fn(u64, u64) -> bool) -> Vec<State> {
     let choices = choices(problem, object);
     let mut next = Vec::new();
@@ -127,7 +127,7 @@ fn choices(problem: &Problem, object: usize) -> Vec<(Level, Entry)> {
     none.into_iter().chain((0..).map(Some).zip(levels.iter().copied())).collect()
 }
 
-/// The levels of the last, and so the best, state.
+/// The levels of the last state, which is the best.
 fn trace(layers: &[Vec<State>], order: &[usize]) -> Vec<Level> {
     let mut levels = alloc::vec![None; order.len()];
     let mut at = layers[order.len()].len().saturating_sub(1);

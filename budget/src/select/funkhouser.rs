@@ -1,7 +1,7 @@
 //! The greedy choice of Funkhouser and Séquin (FS93, §6): whole levels in falling benefit per cost.
 //!
 //! In: a [`Problem`]. Out: a [`Selection`]. Never here: the incremental form ([`super::incremental`]).
-//! Theory: `docs/theory/budget.md`, eq. 10 and 11: half of the best is promised by the paper and is false; a third is true with
+//! Theory: `docs/theory/budget.md`, eq. 10 and 11: the paper promises half of the optimum, which is false; a third is guaranteed with
 //! [`repaired`].
 
 use alloc::vec::Vec;
@@ -10,16 +10,16 @@ use super::marginal::best_single;
 use super::problem::{Problem, Selection};
 use super::ratio::{Rank, Ratio};
 
-/// What happens at a level that does not fit.
+/// The rule at a level that does not fit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Scan {
     /// The scan ends, "until the maximum cost is completely claimed" (FS93): one large object can block everything.
     Stop,
-    /// The level is passed over and the scan goes on.
+    /// The level is skipped and the scan goes on.
     Skip,
 }
 
-/// Scans all levels in falling benefit per cost; a level takes the place of another of its object where it is worth more.
+/// Scans all levels in falling benefit per cost; a level replaces another of its object if its benefit is greater.
 #[must_use]
 pub fn greedy(problem: &Problem, scan: Scan) -> Selection {
     if let Some(infeasible) = problem.infeasible() {
@@ -43,8 +43,8 @@ pub fn greedy(problem: &Problem, scan: Scan) -> Selection {
     problem.judge(levels)
 }
 
-/// The better of [`greedy`] with [`Scan::Skip`] and the best single change: never below a third of the best where objects may be
-/// left out (eq. 11).
+/// The better of [`greedy`] with [`Scan::Skip`] and the best single change: never below a third of the optimum if objects may be left out
+/// (eq. 11).
 #[must_use]
 pub fn repaired(problem: &Problem) -> Selection {
     greedy(problem, Scan::Skip).or_better(best_single(problem))

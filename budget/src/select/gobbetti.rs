@@ -1,7 +1,7 @@
-//! Meshes of any resolution under a time limit (GB99): the exact optimum in closed form.
+//! Meshes of continuous resolution under a time limit (GB99): the exact optimum in closed form.
 //!
 //! In: weight, time and limits of every mesh. Out: resolutions r that maximise Σ w √r, and λ.
-//! Never here: triangles; the authors' own way of solving it is [`super::barrier`]. Theory: `docs/theory/budget.md`, eq. 22 … 24.
+//! Never here: triangles; the authors' own method is [`super::barrier`]. Theory: `docs/theory/budget.md`, eq. 22 … 24.
 
 use alloc::vec::Vec;
 
@@ -10,9 +10,9 @@ use super::water::{Tap, level};
 /// A mesh whose triangle count is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Mesh {
-    /// w: what it is worth at full resolution; ≥ 0, else it counts as 0.
+    /// w: benefit at full resolution; ≥ 0, else it counts as 0.
     pub weight: f64,
-    /// a: what full resolution takes, in the unit of the budget; finite and ≥ 0, else see [`Mesh::sound`].
+    /// a: time at full resolution, in the unit of the budget; finite and ≥ 0, else see [`Mesh::sound`].
     pub time: f64,
     /// Least r, `0..=1`: below it fewer triangles save no time.
     pub least: f64,
@@ -21,7 +21,7 @@ pub struct Mesh {
 }
 
 impl Mesh {
-    /// The mesh with every number that is none replaced: weight 0, twice the time `prior`, limits inside 0 … 1 and in order.
+    /// The mesh with every invalid number replaced: weight 0, twice the time `prior`, limits inside 0 … 1 and in order.
     #[must_use]
     pub fn sound(self, prior: f64) -> Self {
         let part = |x: f64| if x > 0.0 { x.min(1.0) } else { 0.0 };
@@ -41,20 +41,20 @@ impl Mesh {
     }
 }
 
-/// Resolutions of all meshes, and how good they are.
+/// Resolutions of all meshes, and the quality of the result.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Resolutions {
     /// r of every mesh, in the order given.
     pub r: Vec<f64>,
     /// Σ w √r.
     pub value: f64,
-    /// λ: gain of one more unit of time; 0 where everything is at its most.
+    /// λ: gain of one more unit of time; 0 where every mesh is at its most.
     pub lambda: f64,
     /// Whether the least of every mesh is within the time; if not, `r` is the least.
     pub feasible: bool,
-    /// No resolutions within the time are worth more; 0 where there are none.
+    /// No resolutions within the time have a greater value; 0 where there are none.
     pub upper: f64,
-    /// Newton steps that were taken: 0 for the closed form.
+    /// Newton steps taken: 0 for the closed form.
     pub steps: u32,
 }
 

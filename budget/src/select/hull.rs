@@ -1,6 +1,6 @@
 //! The concave hull of every object's levels, as steps in falling gain per cost.
 //!
-//! In: a [`Problem`]. Out: where every object starts, and the steps that are worth taking, best first.
+//! In: a [`Problem`]. Out: the start of every object, and the steps on its hull, best first.
 //! Never here: how many steps are taken. Theory: `docs/theory/budget.md`, eq. 4 and 5, after (SZ79).
 
 use alloc::vec::Vec;
@@ -13,13 +13,13 @@ use super::ratio::{Rank, Ratio};
 pub struct Step {
     /// Which object, in the order in which they were pushed.
     pub object: u32,
-    /// The level it has after the step.
+    /// The object's level after the step.
     pub level: u32,
-    /// What the step adds: benefit and cost, ticks.
+    /// Benefit and cost that the step adds; cost in ticks.
     pub gain: Ratio,
 }
 
-/// Where every object starts, and all steps of all hulls, best first.
+/// The start of every object, and all steps of all hulls, best first.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Hulls {
     /// The cheapest set.
@@ -29,7 +29,7 @@ pub struct Hulls {
 }
 
 impl Hulls {
-    /// The hulls of a problem whose cheapest set fits; levels that can never fit are left out (without that, no bound holds).
+    /// The hulls of a problem whose cheapest set fits; levels that can never fit are left out (otherwise no bound holds).
     #[must_use]
     pub fn of(problem: &Problem) -> Self {
         let bases = problem.cheapest();
@@ -52,7 +52,7 @@ impl Hulls {
     }
 }
 
-/// The vertices of the concave hull above `least`, in rising cost; levels dearer than `reach` are not there.
+/// The vertices of the concave hull above `least`, in rising cost; levels that cost more than `reach` are excluded.
 pub(crate) fn concave(least: Entry, levels: &[Entry], reach: u64, hull: &mut Vec<(u32, Entry)>) {
     hull.clear();
     let mut order: Vec<_> = (0..levels.len() as u32).map(|l| (l, levels[l as usize])).collect();

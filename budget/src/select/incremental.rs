@@ -1,7 +1,7 @@
-//! The incremental choice of Funkhouser and Séquin (FS93, §6): from the last frame's levels, one up, as many down as it takes.
+//! The incremental choice of Funkhouser and Séquin (FS93, §6): from the last frame's levels, one rise, then as many falls as needed.
 //!
 //! In: a [`Problem`] and the levels of the frame before. Out: a [`Selection`], and how many passes it took.
-//! Never here: a promise; it equals the greedy choice only where benefit per cost falls with every level.
+//! Never here: a guarantee; the result equals the greedy choice only if benefit per cost falls with every level.
 //! Theory: `docs/theory/budget.md`, eq. 12.
 
 use alloc::collections::BinaryHeap;
@@ -12,35 +12,35 @@ use super::linear::linear;
 use super::problem::{Level, Mode, Problem, Selection};
 use super::ratio::{Rank, Ratio};
 
-/// Which of the states on the way is the answer.
+/// Which of the visited states is the answer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Keep {
-    /// The last, as the paper says: it can be worth less than one that was passed.
+    /// The last, as in the paper: its value can be below that of an earlier one.
     Last,
     /// The best that fitted.
     Best,
 }
 
-/// What the passes came to.
+/// The result of the passes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passes {
     /// The answer.
     pub selection: Selection,
-    /// Passes of one rise and as many falls as it takes.
+    /// Passes of one rise and as many falls as needed.
     pub passes: u32,
-    /// Whether it ended by itself; otherwise the number of passes was cut off.
+    /// Whether the search converged; otherwise the limit of passes was reached.
     pub settled: bool,
 }
 
-/// Starts from `last`, the levels of the frame before (`None` for what is new; empty for a cold start), and passes until an object
-/// rises and falls in the same pass.
+/// Starts from `last`, the levels of the frame before (`None` for new objects; empty for a cold start), and passes until an object rises
+/// and falls in the same pass.
 #[must_use]
 pub fn incremental(problem: &Problem, last: &[Level], keep: Keep) -> Passes {
     if let Some(selection) = problem.infeasible() {
         return Passes { selection, passes: 0, settled: true };
     }
     let mut search = Search::from(problem, last);
-    // from anywhere, every level of every object can rise and fall once each way before the same state must come again
+    // from any start, every level of every object can rise and fall once before a state must repeat
     let most = 2 * (0..problem.len()).map(|i| problem.levels(i).len() as u32 + 1).sum::<u32>() + 8;
     let (mut passes, mut settled) = (0, false);
     while !settled && passes < most {
@@ -62,7 +62,7 @@ struct Search<'a> {
     value: u64,
     /// The best state that fitted: value and levels. The cheapest set, at first.
     best: (u64, Vec<Level>),
-    /// Levels that objects could rise to, and levels that they could leave; what has moved on is passed over.
+    /// Candidates for a rise and for a fall; outdated entries are skipped.
     rises: BinaryHeap<Reverse<Rank>>,
     falls: BinaryHeap<Rank>,
 }
@@ -84,7 +84,7 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// One pass; whether it was the last.
+    /// One pass; gives whether it was the last.
     fn pass(&mut self) -> bool {
         let risen = self.rise();
         let mut last = risen.is_none() && self.spent <= self.problem.budget();
@@ -127,7 +127,7 @@ impl<'a> Search<'a> {
         self.offer(object);
     }
 
-    /// Puts the object's next rise and next fall where they are found.
+    /// Queues the object's next rise and next fall.
     fn offer(&mut self, object: usize) {
         let levels = self.problem.levels(object);
         let rank = |level: u32| {

@@ -1,7 +1,7 @@
-//! The linear relaxation: what could be reached if the last step could be taken in part.
+//! The linear relaxation: the value that could be reached if the last step could be taken in part.
 //!
-//! In: a [`Problem`]. Out: an upper bound on every answer, and λ, the worth of one more tick.
-//! Never here: an answer that can be drawn. Theory: `docs/theory/budget.md`, eq. 6, after (SZ79).
+//! In: a [`Problem`]. Out: an upper bound on every answer, and λ, the gain of one more tick. Never here: an answer that can be drawn.
+//! Theory: `docs/theory/budget.md`, eq. 6, after (SZ79).
 
 use super::hull::{Hulls, Step};
 use super::problem::Problem;
@@ -9,13 +9,13 @@ use super::problem::Problem;
 /// The optimum of the relaxation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Linear {
-    /// No answer within the budget is worth more.
+    /// No answer within the budget has a greater value.
     pub value: f64,
     /// λ: gain per tick of the step that no longer fits whole; 0 where everything fits.
     pub lambda: f64,
 }
 
-/// The bound of a problem, levels that can never fit left out beforehand; `None` where even the cheapest set is over the budget.
+/// The bound of a problem, without levels that can never fit; `None` if even the cheapest set is over the budget.
 #[must_use]
 pub fn linear(problem: &Problem) -> Option<Linear> {
     problem.infeasible().is_none().then(|| split(problem, &Hulls::of(problem)).0)

@@ -1,7 +1,7 @@
-//! The hierarchical choice of Maciel and Shirley (MS95): always open what is most important.
+//! The hierarchical choice of Maciel and Shirley (MS95): always refines the most important node.
 //!
-//! In: a [`Tree`] and the importance of its leaves. Out: a [`Cut`]. Never here: costs or benefits of impostors as a reason to choose;
-//! that is what the others do better. Theory: `docs/theory/budget.md`, eq. 21.
+//! In: a [`Tree`] and the importance of its leaves. Out: a [`Cut`]. Never here: costs or benefits of impostors as a criterion; the other
+//! policies do that better. Theory: `docs/theory/budget.md`, eq. 21.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
@@ -12,8 +12,8 @@ use super::tree_exact::infeasible;
 
 /// Starts from the root's lowest form; the most important node that is drawn goes to its next form, until that no longer fits.
 ///
-/// `importance` has one entry a node; those of groups are not read, a group is as important as its most important part.
-/// What is NaN or missing counts as 0. Where the root's lowest form does not fit, the cheapest cut is the answer.
+/// `importance` has one entry per node; those of groups are ignored, a group is as important as its most important part. NaN or missing
+/// entries count as 0. If the root's lowest form does not fit, the result is the cheapest cut.
 #[must_use]
 pub fn choose(tree: &Tree, importance: &[f64]) -> Cut {
     if let Some(cut) = infeasible(tree) {
@@ -47,7 +47,7 @@ pub fn choose(tree: &Tree, importance: &[f64]) -> Cut {
     tree.judge(levels)
 }
 
-/// What replaces a node's impostor, and its cost; `None` at the finest.
+/// The replacement of a node's impostor, and its cost; `None` at the finest.
 fn next_form(tree: &Tree, node: usize, level: u32) -> Option<(Vec<(usize, u32)>, u64)> {
     if let Some(e) = tree.impostors(node).get(level as usize + 1) {
         return Some((alloc::vec![(node, level + 1)], e.cost));
@@ -65,11 +65,11 @@ fn next_form(tree: &Tree, node: usize, level: u32) -> Option<(Vec<(usize, u32)>,
     (!parts.is_empty()).then_some((parts, cost))
 }
 
-/// Importance as whole numbers that can be sorted: a group's is the greatest of its parts'.
+/// Importance as integers that can be sorted: a group's is the greatest of its parts'.
 fn of_groups(tree: &Tree, importance: &[f64]) -> Vec<u64> {
     let mut of = alloc::vec![0; tree.len()];
     for &node in tree.order().iter().rev() {
-        // the bits of doubles that are not negative are in the order of the doubles
+        // the bits of non-negative doubles sort like the doubles
         let own = importance.get(node).map_or(0, |x| if *x > 0.0 { x.to_bits() } else { 0 });
         let parts = tree.children(node).iter().map(|&c| of[c]).max();
         of[node] = parts.unwrap_or(own);

@@ -1,7 +1,7 @@
 //! Steps of concave hulls in falling gain per cost, until the budget is spent.
 //!
-//! In: a [`Problem`]. Out: a [`Selection`] within λ · (what is left over) of the best.
-//! Never here: a time; the form for every frame is [`crate::adaptive`]. Theory: `docs/theory/budget.md`, eq. 7 and 8, after (SZ79).
+//! In: a [`Problem`]. Out: a [`Selection`] within λ · (budget left over) of the optimum.
+//! Never here: a time; the per-frame version is [`crate::adaptive`]. Theory: `docs/theory/budget.md`, eq. 7 and 8, after (SZ79).
 
 use alloc::vec::Vec;
 
@@ -9,12 +9,12 @@ use super::hull::Hulls;
 use super::linear::split;
 use super::problem::{Level, Problem, Selection};
 
-/// What happens at a step that no longer fits.
+/// The rule at a step that no longer fits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Fit {
-    /// Nothing more is taken: small moves of the view change few levels, and λ · (what is left over) certifies the answer.
+    /// Nothing more is taken: small moves of the view change few levels, and λ · (budget left over) certifies the answer.
     Stop,
-    /// That object is closed and the others go on; then whatever level still fits is taken, largest gain first.
+    /// That object is closed and the others continue; then any level that still fits is taken, largest gain first.
     Fill,
 }
 
@@ -37,14 +37,14 @@ pub fn marginal(problem: &Problem, fit: Fit) -> Selection {
     problem.certified(levels, bound.value)
 }
 
-/// The better of [`Fit::Stop`] and the best answer with a single step above the cheapest set: never below half of what the best gains
-/// over the cheapest set (eq. 8), and so never below half of the best.
+/// The better of [`Fit::Stop`] and the best answer with a single step above the cheapest set: never below half of the optimum's gain over
+/// the cheapest set (eq. 8), and so never below half of the optimum.
 #[must_use]
 pub fn repaired(problem: &Problem) -> Selection {
     marginal(problem, Fit::Stop).or_better(best_single(problem))
 }
 
-/// The cheapest set with the one change that gains most: the other half of every bound by halves.
+/// The cheapest set with the single change that gains most: needed for every bound of one half.
 #[must_use]
 pub fn best_single(problem: &Problem) -> Selection {
     if let Some(infeasible) = problem.infeasible() {
@@ -57,7 +57,7 @@ pub fn best_single(problem: &Problem) -> Selection {
     problem.judge(levels)
 }
 
-/// After the first step that does not fit: its object is closed, the others go on.
+/// After the first step that does not fit: its object is closed, the others continue.
 fn go_on(problem: &Problem, hulls: &Hulls, taken: usize, levels: &mut [Level]) {
     let mut spent = problem.cost(levels);
     let mut closed: Vec<bool> = alloc::vec![false; levels.len()];
@@ -84,7 +84,7 @@ fn fill(problem: &Problem, levels: &mut [Level]) {
     }
 }
 
-/// The change of one object that gains most and fits; the lower id, then the lower level, between equals.
+/// The change of one object that gains most and fits; ties go to the lower id, then the lower level.
 fn best_change(problem: &Problem, levels: &[Level], spent: u64) -> Option<(usize, u32)> {
     let mut best = None;
     for (object, &level) in levels.iter().enumerate() {

@@ -1,7 +1,7 @@
-//! The incremental hierarchical choice of Mason and Blake (MB97, §4): one rise in the tree, as many falls as it takes.
+//! The incremental hierarchical choice of Mason and Blake (MB97, §4): one rise in the tree, then as many falls as needed.
 //!
 //! In: a [`Tree`] and the cut of the frame before. Out: a [`Cut`] that covers every leaf, always.
-//! Never here: a promise; it stops at the first rise that does not fit. Theory: `docs/theory/budget.md`, eq. 17 and 18.
+//! Never here: a guarantee; the search stops at the first rise that does not fit. Theory: `docs/theory/budget.md`, eq. 17 and 18.
 
 use alloc::collections::BinaryHeap;
 use alloc::vec::Vec;
@@ -13,19 +13,19 @@ use super::ratio::Rank;
 use super::tree::{Cut, Tree};
 use super::tree_exact::infeasible;
 
-/// What the passes came to.
+/// The result of the passes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Passes {
     /// The answer.
     pub cut: Cut,
-    /// Passes of one rise and as many falls as it takes.
+    /// Passes of one rise and as many falls as needed.
     pub passes: u32,
-    /// Whether it ended by itself; otherwise the number of passes was cut off.
+    /// Whether the search converged; otherwise the limit of passes was reached.
     pub settled: bool,
 }
 
-/// Starts from `last`, the cut of the frame before (the root's lowest form where that is no cut of this tree), and passes until a
-/// node rises and falls in the same pass.
+/// Starts from `last`, the cut of the frame before (the root's lowest form if that is no cut of this tree), and passes until a node rises
+/// and falls in the same pass.
 #[must_use]
 pub fn incremental(tree: &Tree, last: &[Level], keep: Keep) -> Passes {
     if let Some(cut) = infeasible(tree) {
@@ -41,7 +41,7 @@ pub fn incremental(tree: &Tree, last: &[Level], keep: Keep) -> Passes {
     let cut = match (keep, search.best) {
         (Keep::Best, Some((_, levels))) => tree.judge(levels),
         (Keep::Last, Some((_, levels))) if search.spent > tree.budget() => tree.judge(levels),
-        // started over the budget and never came below it: what is cheapest is the honest answer
+        // started over the budget and never came below it: the answer is the cheapest cut
         (_, None) => tree.judge(super::tree_exact::cheapest(tree)),
         _ => tree.judge(search.levels),
     };
@@ -97,7 +97,7 @@ impl<'a> Search<'a> {
         search
     }
 
-    /// One pass; whether it was the last.
+    /// One pass; gives whether it was the last.
     fn pass(&mut self) -> bool {
         let risen = self.rise();
         let mut last = risen.is_none() && self.spent <= self.tree.budget();
@@ -144,7 +144,7 @@ impl<'a> Search<'a> {
         None
     }
 
-    /// Puts the lowest forms of a node's children in its place.
+    /// Replaces a node by the lowest forms of its children.
     fn open(&mut self, node: usize) {
         for i in 0..self.tree.children(node).len() {
             let child = self.tree.children(node)[i];
@@ -167,7 +167,7 @@ impl<'a> Search<'a> {
         }
     }
 
-    /// Changes one node, keeps the sums, and puts what it can do next where it is found.
+    /// Sets one node's level, updates the sums, and queues its next rise and fall.
     fn set(&mut self, node: usize, level: Level) {
         let was_lowest = self.at_lowest(node);
         let entry = |l: Level| l.map(|l| self.tree.impostors(node)[l as usize]).unwrap_or_default();
@@ -198,7 +198,7 @@ impl<'a> Search<'a> {
         self.levels[node].is_none() && !self.tree.impostors(node).is_empty() && parts > 0 && self.low[node] == parts
     }
 
-    /// Counts, upwards, whose children are all at their lowest.
+    /// Updates upwards how many children of each parent are at their lowest.
     fn tell_parent(&mut self, node: usize, was_lowest: bool) {
         let (mut node, mut was) = (node, was_lowest);
         while let Some(parent) = self.tree.parent(node) {

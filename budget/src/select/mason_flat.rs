@@ -1,7 +1,7 @@
-//! The flat reading of Mason and Blake (MB97, §6): impostors of groups as items that several leaves share.
+//! The flat reading of Mason and Blake (MB97, §6): impostors of groups as items shared by several leaves.
 //!
-//! In: a [`Tree`]. Out: a [`Cut`] that covers every leaf. Never here: the incremental form ([`super::mason`]); the two are not
-//! equal, whatever the paper says. Theory: `docs/theory/budget.md`, eq. 18.
+//! In: a [`Tree`]. Out: a [`Cut`] that covers every leaf. Never here: the incremental form ([`super::mason`]); the two are not equal,
+//! contrary to the paper. Theory: `docs/theory/budget.md`, eq. 18.
 
 use alloc::vec::Vec;
 use core::ops::Range;
@@ -11,8 +11,8 @@ use super::ratio::Rank;
 use super::tree::{Cut, Tree};
 use super::tree_exact::{cheapest, infeasible};
 
-/// Scans all impostors in falling benefit per cost; one that meets another in the sack takes its place together with the best
-/// remaining ones that cover the rest of its leaves, where they fit and are worth more; else it is passed over.
+/// Scans all impostors in falling benefit per cost; one that overlaps others in the knapsack replaces them together with the best remaining
+/// ones that cover the rest of their leaves, if they fit and have a greater benefit; else it is skipped.
 #[must_use]
 pub fn flat(tree: &Tree) -> Cut {
     if let Some(cut) = infeasible(tree) {
@@ -24,7 +24,7 @@ pub fn flat(tree: &Tree) -> Cut {
     }
     match sack.levels() {
         Some(levels) => tree.judge(levels),
-        // no set that covers all came to fit in the order of the scan
+        // no covering set fitted in the order of the scan
         None => tree.judge(cheapest(tree)),
     }
 }
@@ -35,7 +35,7 @@ struct Sack<'a> {
     items: Vec<(Rank, usize, u32)>,
     /// For each node: its leaves, numbered from left to right.
     leaves: Vec<Range<usize>>,
-    /// For each leaf: the item that covers it; at first one for all, without cost and benefit.
+    /// For each leaf: the item that covers it; initially one virtual item for all, without cost and benefit.
     held: Vec<Option<usize>>,
     spent: u64,
 }
@@ -53,7 +53,7 @@ impl<'a> Sack<'a> {
     fn consider(&mut self, at: usize) {
         let own = self.leaves[self.items[at].1].clone();
         let met = self.met(&own);
-        // what is replaced covers its own leaves too, where it belongs to a group above
+        // a replaced item of a group above covers other leaves too
         let all = met.iter().fold(own, |all, &item| {
             let theirs = self.covers(item);
             all.start.min(theirs.start)..all.end.max(theirs.end)
@@ -86,7 +86,7 @@ impl<'a> Sack<'a> {
         item.map_or(0..self.held.len(), |item| self.leaves[self.items[item].1].clone())
     }
 
-    /// Item `at` and the best remaining ones that cover the rest of `all`; `None` where they cannot.
+    /// Item `at` and the best remaining ones that cover the rest of `all`; `None` if they cannot.
     fn replacement(&self, at: usize, all: &Range<usize>) -> Option<Vec<usize>> {
         let own = &self.leaves[self.items[at].1];
         let mut open: Vec<_> = all.clone().map(|leaf| !own.contains(&leaf)).collect();
@@ -110,7 +110,7 @@ impl<'a> Sack<'a> {
         (missing == 0).then_some(set)
     }
 
-    /// The cut, where everything is covered.
+    /// The cut, if every leaf is covered.
     fn levels(&self) -> Option<Vec<Level>> {
         let mut levels = alloc::vec![None; self.tree.len()];
         for item in &self.held {

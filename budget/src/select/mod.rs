@@ -1,11 +1,11 @@
-//! Which level every object gets: the policies of the papers, the exact answers, and what bounds them.
+//! Selection of a level for every object: the policies of the papers, the exact optima, and upper bounds.
 //!
 //! In: levels with a cost in ticks and a benefit, and a budget. Out: a level for every object, its certificate, and whether it fits.
-//! Never here: clocks, what a tick is, where a benefit comes from ([`crate::cost`]), allocation-free steady state
-//! ([`crate::adaptive`] has that). Theory: `docs/theory/budget.md`, eq. 1 … 31.
+//! Never here: clocks, the meaning of a tick, the origin of a benefit ([`crate::cost`]), allocation-free steady state ([`crate::adaptive`]
+//! has that). Theory: `docs/theory/budget.md`, eq. 1 … 31.
 //!
-//! Every order is total: by exact ratio, then cost, then the object's id, then its level. So no answer depends on the order in
-//! which objects were pushed, and equal inputs give equal bits.
+//! Every order is total: by exact ratio, then cost, then the object's id, then its level. So no answer depends on the order in which
+//! objects were pushed, and equal inputs give bit-identical results.
 
 pub mod barrier;
 mod exact;

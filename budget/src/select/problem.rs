@@ -1,4 +1,4 @@
-//! The question: objects with levels, a budget, and whether an object may be left out.
+//! The problem statement: objects with levels, a budget, and whether an object may be left out.
 //!
 //! In: costs in whole ticks and benefits. Out: a [`Problem`] that every policy answers with a [`Selection`].
 //! Never here: how a level is chosen. Theory: `docs/theory/budget.md`, eq. 1 and 2.
@@ -10,34 +10,34 @@ use super::linear;
 /// The level an object gets; `None` where it is left out.
 pub type Level = Option<u32>;
 
-/// The most that one cost or benefit counts: sums over half a million objects stay exact.
+/// Upper limit of one cost or benefit: sums over half a million objects stay exact.
 const MOST: u64 = 1 << 44;
 
-/// What a level costs and what it gives.
+/// Cost and benefit of a level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Entry {
     /// Time, in whole ticks (nanoseconds or microseconds), `0..=2^44`.
     pub cost: u64,
-    /// What it is worth, in a unit that all objects share, `0..=2^44`.
+    /// Benefit, in a unit that all objects share, `0..=2^44`.
     pub benefit: u64,
 }
 
 impl Entry {
-    /// A level that costs `cost` ticks and is worth `benefit`; both are brought below 2^44.
+    /// A level that costs `cost` ticks and has this `benefit`; both are clamped to 2^44.
     #[must_use]
     pub fn new(cost: u64, benefit: u64) -> Self {
         Self { cost: cost.min(MOST), benefit: benefit.min(MOST) }
     }
 
-    /// A level out of measured numbers, and whether its cost was one.
+    /// A level from measured numbers, and whether its cost was valid.
     ///
-    /// The cost is rounded up, so that what fits in ticks fits in time; a cost that is NaN, infinite or negative counts as twice
-    /// `prior` (what levels of this kind cost as a rule, finite, ≥ 0). A benefit that is NaN or negative is 0; it is rounded down.
+    /// The cost is rounded up, so that a choice that fits in ticks fits in time; a cost that is NaN, infinite or negative counts as twice
+    /// `prior` (the typical cost of levels of this kind, finite, ≥ 0). A benefit that is NaN or negative is 0; it is rounded down.
     #[must_use]
     pub fn measured(cost_ticks: f64, benefit: f64, prior_ticks: f64) -> (Self, bool) {
         let sound = cost_ticks.is_finite() && cost_ticks >= 0.0;
         let cost = if sound { cost_ticks } else { 2.0 * prior_ticks };
-        // a cast of floats saturates, and takes NaN and what is below 0 to 0
+        // a cast of floats saturates, and maps NaN and negative values to 0
         (Self::new(libm::ceil(cost) as u64, benefit as u64), sound)
     }
 }
@@ -47,7 +47,7 @@ impl Entry {
 pub enum Mode {
     /// An object may be left out at no cost (F&S).
     AtMostOne,
-    /// Every object has one level; the cheapest set may then be over the budget, and is the answer that says so.
+    /// Every object has one level; the cheapest set may then be over the budget, and is returned as infeasible.
     ExactlyOne,
 }
 
@@ -62,13 +62,13 @@ pub struct Problem {
 }
 
 impl Problem {
-    /// A problem without objects. `budget` in ticks; what is negative is 0.
+    /// A problem without objects. `budget` in ticks; a negative one is 0.
     #[must_use]
     pub fn new(mode: Mode, budget: i64) -> Self {
         Self { mode, budget: budget.max(0) as u64, ids: Vec::new(), starts: alloc::vec![0], entries: Vec::new() }
     }
 
-    /// Adds an object with its levels, coarsest first. `id` decides between equals, so it must not change between frames.
+    /// Adds an object with its levels, coarsest first. `id` breaks ties, so it must not change between frames.
     ///
     /// An object without levels is never drawn, in either mode.
     pub fn push(&mut self, id: u64, levels: &[Entry]) {
@@ -119,7 +119,7 @@ impl Problem {
         level.map_or(Entry::default(), |l| self.levels(object)[l as usize])
     }
 
-    /// The least that an object can be: left out where that is allowed, else its cheapest level.
+    /// The cheapest state of an object: left out if that is allowed, else its cheapest level.
     #[must_use]
     pub fn least(&self, object: usize) -> Level {
         let cheapest =
@@ -130,32 +130,32 @@ impl Problem {
         }
     }
 
-    /// The least of every object: the cheapest answer.
+    /// The cheapest state of every object: the cheapest answer.
     #[must_use]
     pub fn cheapest(&self) -> Vec<Level> {
         (0..self.len()).map(|i| self.least(i)).collect()
     }
 
-    /// What a choice costs, ticks.
+    /// Cost of a choice, ticks.
     #[must_use]
     pub fn cost(&self, levels: &[Level]) -> u64 {
         levels.iter().enumerate().map(|(i, &l)| self.entry(i, l).cost).sum()
     }
 
-    /// What a choice is worth.
+    /// Benefit of a choice.
     #[must_use]
     pub fn value(&self, levels: &[Level]) -> u64 {
         levels.iter().enumerate().map(|(i, &l)| self.entry(i, l).benefit).sum()
     }
 
-    /// A choice with its cost, value and certificate. `levels` has one entry an object, each an existing level.
+    /// A choice with its cost, value and certificate. `levels` has one entry per object, each an existing level.
     #[must_use]
     pub fn judge(&self, levels: Vec<Level>) -> Selection {
         let upper = linear::linear(self).map_or(0.0, |l| l.value);
         self.certified(levels, upper)
     }
 
-    /// The answer where even the cheapest set is over the budget, and none where it fits.
+    /// The cheapest set as the answer if even that is over the budget; `None` if it fits.
     pub(crate) fn infeasible(&self) -> Option<Selection> {
         let cheapest = self.cheapest();
         (self.cost(&cheapest) > self.budget).then(|| self.certified(cheapest, 0.0))
@@ -175,29 +175,29 @@ impl Problem {
     }
 }
 
-/// A level for every object, and how good that can be said to be.
+/// A level for every object, and its certificate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Selection {
-    /// One entry an object, in the order in which they were pushed.
+    /// One entry per object, in the order in which they were pushed.
     pub levels: Vec<Level>,
     /// Sum of the benefits.
     pub value: u64,
     /// Sum of the costs, ticks.
     pub cost: u64,
-    /// Whether the cost is within the budget. A policy that heeds the budget gives `false` only where even the cheapest set is over it.
+    /// Whether the cost is within the budget. A policy that obeys the budget gives `false` only if even the cheapest set is over it.
     pub feasible: bool,
-    /// The certificate: no choice within the budget is worth more than this. 0 where there is no such choice.
+    /// The certificate: no choice within the budget has a greater value. 0 where there is no such choice.
     pub upper: f64,
 }
 
 impl Selection {
-    /// How far below the best this can be, as a part of the best: 0 is proven optimal. 0 where there is nothing to gain or to compare.
+    /// Upper bound of the relative loss against the optimum: 0 is proven optimal. 0 if there is nothing to gain or to compare.
     #[must_use]
     pub fn gap(&self) -> f64 {
         if self.upper > 0.0 { (1.0 - self.value as f64 / self.upper).max(0.0) } else { 0.0 }
     }
 
-    /// The better of two answers: what fits, then what is worth more, then what is cheaper; `self` between equals.
+    /// The better of two answers: feasible first, then greater value, then lower cost; `self` in a tie.
     #[must_use]
     pub fn or_better(self, other: Self) -> Self {
         let rank = |s: &Self| (s.feasible, s.value, u64::MAX - s.cost);

@@ -1,7 +1,7 @@
-//! Rates of simulation under one load: the least Σ w/f with Σ c f within it.
+//! Simulation rates under one load: minimises Σ w/f with Σ c f within the load.
 //!
 //! In: weight, time of a step and limits of every agent. Out: rates f, and λ.
-//! Never here: what a step does. Theory: `docs/theory/budget.md`, eq. 25.
+//! Never here: the content of a step. Theory: `docs/theory/budget.md`, eq. 25.
 
 use alloc::vec::Vec;
 
@@ -10,7 +10,7 @@ use super::water::{Tap, level};
 /// An agent whose rate is free.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Agent {
-    /// w: its error at one step a second; ≥ 0.
+    /// w: the agent's error at one step a second; ≥ 0.
     pub weight: f64,
     /// c: time of one step, seconds; ≥ 0.
     pub step_s: f64,
@@ -25,9 +25,9 @@ pub struct Agent {
 pub struct Rates {
     /// f of every agent, steps a second, in the order given.
     pub f_hz: Vec<f64>,
-    /// Σ w/f over the agents that weigh anything.
+    /// Σ w/f over the agents with a positive weight.
     pub error: f64,
-    /// λ: how much one more unit of load takes from the error; 0 where every agent is at its most.
+    /// λ: decrease of the error per additional unit of load; 0 where every agent is at its most.
     pub lambda: f64,
     /// Whether the least rate of every agent is within the load; if not, `f_hz` is the least.
     pub feasible: bool,

@@ -8,9 +8,9 @@ use core::cmp::{Ordering, Reverse};
 /// Benefit per tick. A free gain is above every other ratio, no gain below every other: 0/0 is 0.
 #[derive(Debug, Clone, Copy)]
 pub struct Ratio {
-    /// What is gained.
+    /// The gain.
     pub benefit: u64,
-    /// What it costs, ticks.
+    /// The cost, ticks.
     pub cost: u64,
 }
 
@@ -54,9 +54,9 @@ impl PartialEq for Ratio {
 
 impl Eq for Ratio {}
 
-/// A place in the order in which choices are tried: what is less comes first.
+/// A position in the order in which choices are tried: lesser ranks come first.
 ///
-/// Greater ratio, then lower cost, then lower id, then lower level; `object` only tells equal ids apart.
+/// Greater ratio, then lower cost, then lower id, then lower level; `object` only distinguishes equal ids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct Rank {
     ratio: Reverse<Ratio>,

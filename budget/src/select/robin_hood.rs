@@ -1,30 +1,30 @@
-//! The distribution of time of Robin Hood (RH05): every instance gets its part by value, and gives back what it does not need.
+//! The distribution of time of Robin Hood (RH05): every instance gets its share by value, and returns the part it does not need.
 //!
 //! In: a time, and instances with a value and the times of their forms. Out: a form for each. One pass, no bound.
-//! Never here: what an instance is worth ([`crate::cost::value`]) or how much of a frame is left for drawing
-//! ([`crate::cost::overlap`]). Theory: `docs/theory/budget.md`, eq. 26 … 28.
+//! Never here: the value of an instance ([`crate::cost::value`]) or the time of a frame left for drawing ([`crate::cost::overlap`]).
+//! Theory: `docs/theory/budget.md`, eq. 26 … 28.
 
 use alloc::vec::Vec;
 
 /// A visible instance.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Instance {
-    /// Decides between instances of the same complexity.
+    /// Breaks ties between instances of the same complexity.
     pub id: u64,
-    /// Time of the best form of its type at one fixed area: the order of the visit.
+    /// Time of the best form of the instance's type at one fixed area: the order of the visit.
     pub complexity: f64,
-    /// What it is worth; NaN and what is below 0 count as 0.
+    /// Value of the instance; NaN and negative values count as 0.
     pub value: f64,
-    /// Times of its forms, best first; one that is not finite or below 0 is never chosen.
+    /// Times of the forms, best first; one that is not finite or below 0 is never chosen.
     pub forms: Vec<f64>,
 }
 
-/// What an instance gets whose time does not pay for its cheapest form.
+/// The rule for an instance whose time does not pay for its cheapest form.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TooLittle {
-    /// It is not drawn (RH05, §1).
+    /// The instance is not drawn (RH05, §1).
     Nothing,
-    /// As much of its cheapest form as its time pays for (RH05, §7.2).
+    /// The part of the cheapest form that the time pays for (RH05, §7.2).
     Part,
 }
 
@@ -33,18 +33,18 @@ pub enum TooLittle {
 pub struct Distribution {
     /// The instances in the order in which they were visited.
     pub order: Vec<usize>,
-    /// The time each was offered.
+    /// The time that each was offered.
     pub offered: Vec<f64>,
     /// The form of each; `None` where it is not drawn.
     pub form: Vec<Option<u32>>,
     /// How much of its form is drawn, `0..=1`.
     pub part: Vec<f64>,
-    /// The time that nobody took, ≥ 0.
+    /// The time that no instance took, ≥ 0.
     pub leftover: f64,
 }
 
-/// Shares `time` out: visited in rising complexity, each is offered t = v · (time left)/(value left) and takes its dearest form
-/// that costs no more (RH05, eq. 1 … 4).
+/// Distributes `time`: visited in rising complexity, each instance is offered t = v · (time left)/(value left) and takes its most expensive
+/// form that costs no more (RH05, eq. 1 … 4).
 #[must_use]
 pub fn distribute(time: f64, instances: &[Instance], rule: TooLittle) -> Distribution {
     let mut order: Vec<_> = (0..instances.len()).collect();
@@ -58,7 +58,7 @@ pub fn distribute(time: f64, instances: &[Instance], rule: TooLittle) -> Distrib
     let (mut offered, mut form, mut part) = (alloc::vec![0.0; n], alloc::vec![None; n], alloc::vec![0.0; n]);
     for &i in &order {
         let value = sound(instances[i].value);
-        // by rounding the value left can come to 0 before the last instance
+        // by rounding the value left can reach 0 before the last instance
         let offer = match (value > 0.0, value_left > 0.0) {
             (false, _) => 0.0,
             (true, true) => (value * left / value_left).min(left),

@@ -1,7 +1,7 @@
-//! Groups of objects that can be drawn as one: a tree whose cut is what is drawn (MB97, §3).
+//! Groups of objects that can be drawn as one: a tree, of which a cut is drawn (MB97, §3).
 //!
 //! In: nodes with impostors. Out: a [`Tree`] that the hierarchical policies answer with a [`Cut`].
-//! Never here: which cut. Theory: `docs/theory/budget.md`, eq. 17 and 18.
+//! Never here: the choice of a cut. Theory: `docs/theory/budget.md`, eq. 17 and 18.
 
 use alloc::vec::Vec;
 
@@ -14,17 +14,17 @@ use super::tree_exact;
 pub struct Node {
     /// The node above it; `None` for the first, which is the root, and for no other.
     pub parent: Option<usize>,
-    /// Its own pictures, coarsest first; a leaf has at least one.
+    /// The node's own impostors, coarsest first; a leaf has at least one.
     pub impostors: Vec<Entry>,
 }
 
-/// Why nodes are no tree. Nothing is kept.
+/// Why nodes do not form a tree. No tree is built.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum TreeError {
-    /// This node hangs from nothing: no such parent, itself, a circle, or it is a second root.
+    /// This node is not connected to the root: no such parent, its own parent, a cycle, or a second root.
     Loose(usize),
-    /// This leaf has no impostor, so that no cut could cover it.
+    /// This leaf has no impostor, so no cut could cover it.
     BareLeaf(usize),
 }
 
@@ -51,10 +51,10 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// A tree of nodes, the first of which is the root; `budget` in ticks, what is negative is 0. No nodes are an empty scene.
+    /// A tree of nodes, the first of which is the root; `budget` in ticks, a negative one is 0. No nodes are an empty scene.
     ///
     /// # Errors
-    /// [`TreeError`] names the first node that is in no tree, or the first leaf that could not be drawn.
+    /// [`TreeError`] names the first node that is not in the tree, or the first leaf that could not be drawn.
     pub fn new(budget: i64, nodes: &[Node]) -> Result<Self, TreeError> {
         let mut children = alloc::vec![Vec::new(); nodes.len()];
         for (i, node) in nodes.iter().enumerate() {
@@ -100,7 +100,7 @@ impl Tree {
         self.budget
     }
 
-    /// A node's own pictures, coarsest first.
+    /// A node's own impostors, coarsest first.
     #[must_use]
     pub fn impostors(&self, node: usize) -> &[Entry] {
         &self.impostors[node]
@@ -133,13 +133,13 @@ impl Tree {
         }
     }
 
-    /// Where an impostor comes in the order of falling benefit per cost.
+    /// The position of an impostor in the order of falling benefit per cost.
     pub(crate) fn rank(&self, node: usize, level: u32) -> Rank {
         let e = self.impostors[node][level as usize];
         Rank::new(Ratio { benefit: e.benefit, cost: e.cost }, node as u64, node, level)
     }
 
-    /// Whether the impostors named cover every leaf exactly once.
+    /// Whether the impostors given cover every leaf exactly once.
     #[must_use]
     pub fn is_cut(&self, levels: &[Level]) -> bool {
         if levels.len() != self.len() {
@@ -159,7 +159,7 @@ impl Tree {
         true
     }
 
-    /// A cut with its cost, value and certificate. `levels` has one entry a node, each an existing impostor.
+    /// A cut with its cost, value and certificate. `levels` has one entry per node, each an existing impostor.
     #[must_use]
     pub fn judge(&self, levels: Vec<Level>) -> Cut {
         self.certified(levels, tree_exact::upper(self))
@@ -172,23 +172,23 @@ impl Tree {
     }
 }
 
-/// What is drawn of a tree, and how good that can be said to be.
+/// A cut of a tree, and its certificate.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Cut {
-    /// One entry a node: the impostor that is drawn in its place, `None` where its parts or a group above it are.
+    /// One entry per node: the impostor drawn for it, `None` where its parts or a group above it are drawn.
     pub levels: Vec<Level>,
     /// Sum of the benefits.
     pub value: u64,
     /// Sum of the costs, ticks.
     pub cost: u64,
-    /// Whether the cost is within the budget; `false` with the cheapest cut where none is.
+    /// Whether the cost is within the budget; `false` for the cheapest cut if no cut fits.
     pub feasible: bool,
-    /// The certificate: no cut within the budget is worth more. 0 where there is no such cut.
+    /// The certificate: no cut within the budget has a greater value. 0 where there is no such cut.
     pub upper: f64,
 }
 
 impl Cut {
-    /// How far below the best this can be, as a part of the best.
+    /// Upper bound of the relative loss against the optimum.
     #[must_use]
     pub fn gap(&self) -> f64 {
         if self.upper > 0.0 { (1.0 - self.value as f64 / self.upper).max(0.0) } else { 0.0 }

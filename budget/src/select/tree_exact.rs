@@ -11,7 +11,7 @@ use super::problem::{Entry, Level};
 use super::ratio::Ratio;
 use super::tree::{Cut, Tree};
 
-/// The cheapest cut, said to be infeasible, where no cut is within the budget.
+/// The cheapest cut, marked infeasible, if no cut is within the budget.
 pub(crate) fn infeasible(tree: &Tree) -> Option<Cut> {
     let hulls = Hulls::of(tree);
     let cheapest = hulls.root().map_or(0, |h| h.vertices[0].entry.cost);
@@ -23,12 +23,12 @@ pub(crate) fn cheapest(tree: &Tree) -> Vec<Level> {
     Hulls::of(tree).cut(tree, 0)
 }
 
-/// No cut within the budget is worth more than this (eq. 20); 0 where there is none.
+/// No cut within the budget has a greater value than this (eq. 20); 0 where there is none.
 pub(crate) fn upper(tree: &Tree) -> f64 {
     Hulls::of(tree).split(tree.budget()).map_or(0.0, |s| s.upper)
 }
 
-/// The best vertex of the hull of all cuts that fits: what one price λ for all nodes gives.
+/// The best vertex of the hull of all cuts that fits: the result of one price λ for all nodes.
 #[must_use]
 pub fn lagrange(tree: &Tree) -> Cut {
     let hulls = Hulls::of(tree);
@@ -49,7 +49,7 @@ struct Vertex {
 enum Made {
     /// One of the node's own impostors.
     Impostor(u32),
-    /// Its children's hulls, after this many of their steps.
+    /// The children's hulls, after this many of their steps.
     Steps(u32),
 }
 
@@ -57,7 +57,7 @@ enum Made {
 struct Hull {
     /// In rising cost, and falling gain per cost.
     vertices: Vec<Vertex>,
-    /// Steps of all children, best first: whose.
+    /// Steps of all children, best first: the child of each.
     steps: Vec<u32>,
 }
 
@@ -112,7 +112,7 @@ impl Hulls {
         steps
     }
 
-    /// Where the budget cuts the root's hull; `None` where even its first vertex does not fit.
+    /// The point where the budget cuts the root's hull; `None` if even its first vertex does not fit.
     fn split(&self, budget: u64) -> Option<Split> {
         let Some(root) = self.root() else { return Some(Split { vertex: 0, upper: 0.0 }) };
         let fitting = root.vertices.partition_point(|v| v.entry.cost <= budget);
@@ -162,7 +162,7 @@ fn less(a: Entry, b: Entry) -> Entry {
     Entry { cost: a.cost - b.cost, benefit: a.benefit - b.benefit }
 }
 
-/// A part of a cut that no other part of the same leaves beats.
+/// A part of a cut that is not dominated by another part with the same leaves.
 #[derive(Clone, Copy)]
 struct State {
     entry: Entry,
@@ -176,10 +176,10 @@ enum From {
     Both(u32, u32),
 }
 
-/// The best cut there is (eq. 19). `states_max` bounds the memory: 40 bytes for each part of a cut kept, over all nodes together.
+/// The optimal cut (eq. 19). `states_max` bounds the memory: 40 bytes for each part of a cut stored, over all nodes together.
 ///
 /// # Errors
-/// [`TooHard`] where more parts than that could each still belong to the best.
+/// [`TooHard`] if more parts than that could each still belong to the optimum.
 pub fn exact(tree: &Tree, states_max: usize) -> Result<Cut, TooHard> {
     if let Some(infeasible) = infeasible(tree) {
         return Ok(infeasible);
@@ -208,7 +208,7 @@ pub fn exact(tree: &Tree, states_max: usize) -> Result<Cut, TooHard> {
     Ok(Cut { upper: cut.value as f64, ..cut })
 }
 
-/// Every part of one list with every part of another.
+/// Combines every part of one list with every part of another.
 fn product(arena: &mut Vec<State>, a: &[u32], b: &[u32], budget: u64) -> Vec<u32> {
     let pair = |&(i, j): &(u32, u32)| State {
         entry: add(arena[i as usize].entry, arena[j as usize].entry),
@@ -218,7 +218,7 @@ fn product(arena: &mut Vec<State>, a: &[u32], b: &[u32], budget: u64) -> Vec<u32
     keep(arena, states, budget)
 }
 
-/// Puts what fits and is not beaten into the arena.
+/// Adds the parts that fit and are not dominated to the arena.
 fn keep(arena: &mut Vec<State>, mut states: Vec<State>, budget: u64) -> Vec<u32> {
     states.retain(|s| s.entry.cost <= budget);
     states.sort_by_key(|s| (s.entry.cost, u64::MAX - s.entry.benefit));
@@ -235,7 +235,7 @@ fn keep(arena: &mut Vec<State>, mut states: Vec<State>, budget: u64) -> Vec<u32>
     list
 }
 
-/// Of parts in the arena, those that are not beaten.
+/// The parts in the arena that are not dominated.
 fn best(arena: &[State], mut list: Vec<u32>) -> Vec<u32> {
     list.sort_by_key(|&i| (arena[i as usize].entry.cost, u64::MAX - arena[i as usize].entry.benefit));
     let mut most = None;

@@ -1,6 +1,6 @@
-//! One level for all: x = k μ inside its limits, and Σ a x equal to the budget, exactly and in linear time.
+//! Water filling: one level μ for all, x = k μ inside its limits, Σ a x equal to the budget, exactly and in linear time.
 //!
-//! In: [`Tap`]s and a budget. Out: μ. Never here: what x is ([`super::gobbetti`], [`super::rates`]), or iteration to a tolerance
+//! In: [`Tap`]s and a budget. Out: μ. Never here: the meaning of x ([`super::gobbetti`], [`super::rates`]), or iteration to a tolerance
 //! ([`crate::share`] does that from a good guess). Theory: `docs/theory/budget.md`, eq. 22 and 23.
 
 use alloc::vec::Vec;
@@ -10,7 +10,7 @@ use alloc::vec::Vec;
 pub struct Tap {
     /// k: growth of x with μ; finite, ≥ 0.
     pub growth: f64,
-    /// a: what one unit of x takes of the budget; finite, ≥ 0.
+    /// a: budget per unit of x; finite, ≥ 0.
     pub price: f64,
     /// The least x, finite, ≥ 0.
     pub least: f64,
@@ -19,7 +19,7 @@ pub struct Tap {
 }
 
 impl Tap {
-    /// x at level `mu`: k μ inside its limits. What costs nothing is at its most; what does not grow, at its least.
+    /// x at level `mu`: k μ inside its limits. With a price of 0, x is at its most; with a growth of 0, at its least.
     #[must_use]
     pub fn at(&self, mu: f64) -> f64 {
         if self.price == 0.0 && self.growth > 0.0 {
@@ -33,10 +33,10 @@ impl Tap {
     }
 }
 
-/// μ at which Σ a x(μ) is the budget; infinite where the budget pays for every most; `None` where it does not pay for every least.
+/// μ at which Σ a x(μ) is the budget; infinite if the budget pays for every most; `None` if it does not pay for every least.
 ///
-/// The spent sum is piecewise linear and rising with two breaks a tap. Half of the breaks that are left are ruled out at a time, and
-/// the taps that lie wholly on one side with them: linear time in all.
+/// The sum spent is piecewise linear and rising, with two breaks per tap. Each pass rules out half of the remaining breaks, and with them
+/// the taps that are wholly on one side: linear time in all.
 #[must_use]
 pub fn level(budget: f64, taps: &[Tap]) -> Option<f64> {
     let total = |x: fn(&Tap) -> f64| taps.iter().map(|t| t.price * x(t)).sum::<f64>();
@@ -47,7 +47,7 @@ pub fn level(budget: f64, taps: &[Tap]) -> Option<f64> {
         return Some(f64::INFINITY);
     }
     let mut left: Vec<Tap> = taps.iter().copied().filter(|t| t.price > 0.0 && t.growth > 0.0).collect();
-    // spent = settled + slope μ + what the taps left spend
+    // spent = settled + slope μ + the sum of the taps left
     let mut settled: f64 = taps.iter().filter(|t| t.price > 0.0 && t.growth == 0.0).map(|t| t.price * t.least).sum();
     let (mut slope, mut low, mut high) = (0.0, 0.0, f64::INFINITY);
     let mut breaks: Vec<f64> = left.iter().flat_map(|t| [t.ends().0, t.ends().1]).collect();

@@ -1,6 +1,7 @@
-//! Frames that are not drawn as they were just chosen: chosen for while the frame before was drawn (GB99), or late before anything is drawn.
+//! Frames drawn differently from their choice: chosen while the frame before is drawn (GB99), or late before drawing starts.
 //!
-//! In: what is in view now, then what is in view when its turn has come. Out: the plan of that frame. Never here: who draws meanwhile.
+//! In: the objects in view now, then those in view when the frame is drawn. Out: the plan of that frame. Never here: the drawing in
+//! between.
 //! Theory: `docs/theory/control.md`, section 6.
 
 use super::super::ask::{Promise, demand};
@@ -11,19 +12,19 @@ use super::super::policy::Policy;
 use super::super::view::ObjectView;
 use super::PictureControl;
 
-/// A choice that nothing is drawn with yet.
+/// A choice that is not drawn yet.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Ahead {
     levels: Vec<LevelDemand>,
     promise: Promise,
 }
 
-/// A frame teaches nothing where what was chosen for is less than this part of what is seen when it is drawn, by the prices, or more
-/// than one over it.
+/// A frame is not used for learning if the predicted time of the choice is less than this fraction of the predicted time of the frame as
+/// drawn, by the prices, or more than its inverse.
 const LIKE: f64 = 0.5;
 
 impl PictureControl {
-    /// Chooses for the next frame while this one, which [`PictureControl::last_plan`] tells of, is drawn; frozen levels stay.
+    /// Chooses for the next frame while this one ([`PictureControl::last_plan`]) is drawn; frozen levels stay.
     pub fn plan_ahead(&mut self, objects: &[ObjectView]) {
         if self.frozen {
             return;
@@ -35,9 +36,9 @@ impl PictureControl {
         self.ahead = Some(Ahead { levels, promise });
     }
 
-    /// Makes what was chosen ahead the plan of this frame; `false` where nothing was, or for others than these objects.
+    /// Makes the choice made ahead the plan of this frame; `false` if there is none, or if it was for other objects.
     ///
-    /// What has come into view since is drawn at its coarsest, shaded as cheaply as it may be: nobody has set time aside for it.
+    /// Objects that have come into view since are drawn at their coarsest with the cheapest shading: no time is reserved for them.
     pub fn take_up(&mut self, objects: &[ObjectView]) -> bool {
         let ours = |ahead: &Ahead| {
             let alike = ahead.levels.len() == objects.len() && self.views.len() == objects.len();
@@ -63,8 +64,8 @@ impl PictureControl {
         true
     }
 
-    /// Draws all that is in view in its lowest form: most of the frame's time is gone before anything is drawn. What is frozen stays as it
-    /// is, and a group that is open stays open.
+    /// Draws everything in view in its lowest form: most of the frame's time is gone before drawing starts. Frozen levels stay, and an open
+    /// group stays open.
     pub fn hurry(&mut self) {
         if self.frozen {
             return;
@@ -84,7 +85,7 @@ impl PictureControl {
         self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
     }
 
-    /// What is drawn is not what was chosen, which was to take `chosen_s` by the prices: tells what it is to take now.
+    /// Updates the prediction after levels were changed from the choice, which was predicted to take `chosen_s` by the prices.
     fn drawn_otherwise(&mut self, chosen_s: f64) {
         let seen_s = self.drawn_s(&self.plan.levels);
         self.chosen_part = if seen_s > 0.0 { chosen_s / seen_s } else { 1.0 };
@@ -95,12 +96,12 @@ impl PictureControl {
         }
     }
 
-    /// Whether the frame that is drawn is much like the one that was chosen for.
+    /// Whether the frame as drawn resembles the one that was chosen for.
     pub(super) fn is_as_chosen(&self) -> bool {
         (LIKE..=1.0 / LIKE).contains(&self.chosen_part)
     }
 
-    /// What the objects in view take at these levels by the prices, seconds.
+    /// Time of the objects in view at these levels by the prices, seconds.
     fn drawn_s(&self, levels: &[LevelDemand]) -> f64 {
         let prices = self.policy.prices(&self.prices);
         prices.objects_s(self.views.iter().map(|(view, _)| view), levels)

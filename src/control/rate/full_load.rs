@@ -1,18 +1,18 @@
-//! What an agent would take of a core at its finest: the mean of the last windows, with the bursts among them.
+//! Load of an agent at its finest, as a fraction of a core: the mean of the last windows, bursts included.
 //!
-//! In: the load of a window, carried to the finest. Out: their mean. Never here: where on the stairs the agent is.
+//! In: the load of a window, scaled to the finest. Out: their mean. Never here: the present level of the agent.
 //! Theory: `docs/theory/control.md`, eq. 18.
 
 use std::collections::VecDeque;
 
-/// Windows that count: four seconds, after which a burst is forgotten. Bursts that come more often than that are paid for by their mean.
+/// Number of windows: four seconds, after which a burst no longer counts. More frequent bursts are covered by the mean.
 const WINDOWS: usize = 16;
-/// So much above the mean a window is dear …
+/// A window this much above the mean counts as expensive …
 const DEAR: f64 = 1.25;
-/// … and so many in a row, a second, are no burst: it is the work that has grown, and what was before says nothing any more.
+/// … and this many in a row, a second, are not a burst: the work has grown, and older windows are discarded.
 pub(super) const IN_A_ROW: usize = 4;
 
-/// The load of an agent at its finest, as a part of a core.
+/// The load of an agent at its finest, as a fraction of a core.
 #[derive(Debug, Clone, Default)]
 pub(super) struct FullLoad {
     windows: VecDeque<f64>,
@@ -20,7 +20,7 @@ pub(super) struct FullLoad {
 }
 
 impl FullLoad {
-    /// Learns the load of a window.
+    /// Adds the load of a window.
     pub fn note(&mut self, load: f64) {
         let dear = self.mean().is_some_and(|mean| load > DEAR * mean);
         self.dear = if dear { self.dear + 1 } else { 0 };
@@ -34,7 +34,7 @@ impl FullLoad {
         }
     }
 
-    /// The mean; `None` before anything was learnt.
+    /// The mean; `None` before the first window.
     pub fn mean(&self) -> Option<f64> {
         let sum: f64 = self.windows.iter().sum();
         (!self.windows.is_empty()).then(|| sum / self.windows.len() as f64)
