@@ -39,7 +39,7 @@ pub enum ShapeError {
     /// A mesh has no triangle with an area.
     #[error("none of the {triangles} triangles of the mesh has an area")]
     EmptyMesh {
-        /// How many triangles were given.
+        /// Number of triangles given.
         triangles: usize,
     },
     /// A triangle refers to a corner that does not exist.

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 /// An edge that more than two triangles share: there the surface branches, and no longer has two sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Branch {
-    /// Number of the first triangle that is one too many, from 0.
+    /// Index of the first surplus triangle, from 0.
     pub triangle: usize,
     /// Its corners at the ends of the edge.
     pub corners: [u32; 2],

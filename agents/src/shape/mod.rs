@@ -39,7 +39,7 @@ pub use texture::{Pattern, Texture, Wrap};
 pub use tom::{Cut, Tom, TomError};
 pub use tool::{ToolPart, ToolShape};
 
-/// Ways out of a solid whose cosine is below this have none in common: what starts inside would be torn apart on them.
+/// Exit normals of a solid with a cosine below this are incompatible: a body that starts inside would be torn apart along them.
 pub(crate) const PARTED: f64 = 0.5;
 
 #[cfg(test)]

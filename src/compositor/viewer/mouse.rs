@@ -23,7 +23,7 @@ const FRAME_ROOM: f64 = 1.15;
 /// State of the user's mouse control: camera and user spring.
 #[derive(Debug, Clone, Default)]
 pub struct Hand {
-    /// The free camera; `None` while the scene's camera is looked through.
+    /// The free camera; `None` while the scene's camera is in use.
     own: Option<Camera>,
     /// Follow the selected object.
     pub track: bool,

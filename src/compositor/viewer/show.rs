@@ -96,20 +96,20 @@ pub enum Action {
 /// The picture's feedback law and its gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// The law as printed (GDC04, eq. 1), on ε̂ = 40 ε/L.
+    /// The published law (GDC04, eq. 1), on ε̂ = 40 ε/L.
     Printed {
-        /// α: change of ε̂ for each frame per second that is missing, > 0.
+        /// α: change of ε̂ per missing frame per second, > 0.
         alpha: f64,
-        /// β: change of ρ for each unit of ε̂, > 0.
+        /// β: change of ρ per unit of ε̂, > 0.
         beta: f64,
     },
-    /// The law on the logarithm of the measured time, whose gain no machine changes.
+    /// The law on the logarithm of the measured time, whose gain does not depend on the machine.
     Corrected {
-        /// κ, 0.01 … 0.99: the share of an error that one frame removes.
+        /// κ, 0.01 … 0.99: the fraction of an error that one frame removes.
         kappa: f64,
-        /// λ, 0 … 0.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
+        /// λ, 0 … 0.99: the fraction of an error's change that one frame adds; above 0 it is a PI law without wind-up.
         lead: f64,
-        /// Share of the frame's time that is left free, 0 … 0.9.
+        /// Fraction of the frame's time that is left free, 0 … 0.9.
         margin: f64,
     },
 }
@@ -237,9 +237,9 @@ pub struct Status {
 /// A search for better gains.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tuning {
-    /// The share that is done, 0 … 1.
+    /// The fraction done, 0 … 1.
     pub done: f64,
-    /// What it does now, or the best so far.
+    /// The present stage, or the best gains so far.
     pub words: String,
 }
 
