@@ -1,8 +1,8 @@
 //! Benchmark of a GPU adapter: drawing times of pictures of many equal balls, by triangles, covered pixels and shading (FS93, §4; RH05,
 //! §4.1).
 //!
-//! In: an adapter. Out: measured pictures. Never here: a fit, a file. It takes one or two seconds on a software rasteriser (CPU); no
-//! picture is begun after three seconds, the rest is left for the next run.
+//! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one or two seconds on a software rasteriser
+//! (CPU); no picture is begun after three seconds, the rest is left for the next run.
 
 use super::draw::RendererOptions;
 use super::gather::{Actor, Form, Look, Material, Stage, States};

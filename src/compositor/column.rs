@@ -9,7 +9,7 @@ use glam::DVec3;
 /// Direction towards the key light: over the left shoulder of a viewer at −y.
 pub const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
 
-/// How far the shadow's depths reach towards the light and away from it, in radii of the focus: tool shafts are tall.
+/// Range of the shadow's depths towards the light and away from it, in radii of the focus: tool shafts are tall.
 pub const REACH: (f64, f64) = (2.5, 1.5);
 
 /// Fraction of its width by which the column may be moved to whole texels of any map.

@@ -43,7 +43,7 @@ pub enum Material {
     Skin,
 }
 
-/// How an object looks.
+/// Appearance of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// Colour, sRGB.

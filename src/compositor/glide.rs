@@ -68,7 +68,7 @@ impl Glide {
             () if rests && to > self.fine => (to, self.coarse, 1.0, true),
             () if rests => (self.fine, to, 0.0, false),
             () if to >= self.fine || (self.rising && to > self.coarse) => (to, self.coarse, self.share, true),
-            // still closer to the coarse end: the fine end that it morphed towards is dropped
+            // the refinement in progress is dropped: the new morph starts at its coarse end
             () if self.rising => (self.coarse, to, 0.0, false),
             () => (self.fine, to, self.share, false),
         };

@@ -27,7 +27,7 @@ pub struct Level {
     pub resolution: Resolution,
     /// Number of triangles, for forms that take any number. An actor with 0 is left out of the picture, with its shadow.
     pub triangles: u32,
-    /// How it is shaded.
+    /// Shading.
     pub shading: Shading,
     /// Fraction of its possible detail: 0 is its coarsest, 1 its finest. Shown in [`super::Colouring::Detail`] alone.
     pub detail: f32,

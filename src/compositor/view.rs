@@ -36,7 +36,7 @@ impl Size {
 /// A half line in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts, metres.
+    /// Start, metres.
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,

@@ -301,7 +301,7 @@ fn distance_to_box(node: &BvhNode, point: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length()
 }
 
-/// How far the box extends in front of a plane.
+/// Extent of the box in front of a plane.
 fn front_of_box(node: &BvhNode, point: DVec3, normal: DVec3) -> f64 {
     let (low, high) = (node.mins().as_dvec3(), node.maxs().as_dvec3());
     let farthest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);

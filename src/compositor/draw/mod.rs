@@ -57,7 +57,7 @@ impl RendererOptions {
     }
 }
 
-/// Where a picture is drawn.
+/// The target of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Target<'a> {
     /// A view of a texture in the renderer's format.

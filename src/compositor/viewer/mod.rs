@@ -86,7 +86,7 @@ impl Looks {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Layout {
-    /// How the picture is shown.
+    /// Drawing options of the picture.
     pub looks: Looks,
     /// Whether the panels are shown.
     pub panels: bool,

@@ -282,12 +282,12 @@ pub struct CouplingRow {
 /// Present activity of an agent.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum AgentState {
-    /// It steps.
+    /// Stepping.
     #[default]
     Running,
-    /// It sleeps until a wake query finds it.
+    /// Asleep until touched.
     Resting,
-    /// It was stopped, for this reason.
+    /// Stopped, for this reason.
     Parked(String),
 }
 

@@ -138,7 +138,7 @@ impl Tom {
     }
 
     /// Distance of the full mesh from the cut of `triangles`, metres: the greatest of a sample of its vertices.
-    /// It never decreases as the count decreases.
+    /// The error never decreases as the count decreases.
     #[must_use]
     pub fn error_m(&self, triangles: u32) -> f64 {
         error::at(&self.errors, triangles)
