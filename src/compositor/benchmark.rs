@@ -1,8 +1,8 @@
-//! A benchmark of an adapter: what pictures of many equal balls take, by triangles, the pixels that each covers, and shading (FS93, §4;
-//! RH05, §4.1).
+//! Benchmark of a GPU adapter: drawing times of pictures of many equal balls, by triangles, covered pixels and shading (FS93, §4; RH05,
+//! §4.1).
 //!
-//! In: an adapter. Out: measured pictures. Never here: a fit, a file. It takes one or two seconds where a processor draws, and no
-//! picture is begun after three; what is left is for the next time.
+//! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one or two seconds on a software rasteriser
+//! (CPU); no picture is begun after three seconds, the rest is left for the next run.
 
 use super::draw::RendererOptions;
 use super::gather::{Actor, Form, Look, Material, Stage, States};
@@ -23,48 +23,48 @@ pub struct Drawn {
     pub picture_px: f64,
     /// Objects in it.
     pub objects: u32,
-    /// Triangles of each.
+    /// Triangles per object.
     pub polygons: f64,
-    /// Pixels that each covers.
+    /// Pixels that each object covers.
     pub pixels: f64,
-    /// How they are shaded.
+    /// Shading of the objects.
     pub shading: Shading,
-    /// The median of a few drawings of it, seconds.
+    /// Median of a few drawing times, seconds.
     pub seconds: f64,
 }
 
-/// Pictures without an object, for what a picture and its pixels cost.
+/// Pictures without an object, to measure the cost of the picture and its pixels alone.
 const EMPTY: [Size; 3] =
     [Size { width: 320, height: 180 }, Size { width: 640, height: 360 }, Size { width: 960, height: 540 }];
 /// Pictures of balls.
 const SIZE: Size = Size { width: 640, height: 360 };
-/// Balls along the side of a square, few where they are large, and the most pixels that each may then cover beside the others.
+/// Balls along the side of a square (few where they are large), and the most pixels that each may cover without overlapping the next.
 const SQUARES: [(u32, f64); 4] = [(6, 2e3), (4, 4.4e3), (2, 17e3), (1, 60e3)];
-/// Radius of a ball, and from one to the next, metres.
+/// Radius of a ball, and the distance between centres of neighbours, metres.
 const RADIUS_M: f64 = 0.05;
 const APART_M: f64 = 0.12;
 /// Triangles of a ball.
 const TRIANGLES: [u32; 4] = [8, 32, 128, 512];
-/// Of one area a triangle, the fewest pixels that a ball covers: the numbers of triangles that are drawn begin there …
+/// Fewest pixels that a ball covers: for one area per triangle, the triangle counts that are drawn begin there …
 const LEAST_PX: f64 = 100.0;
-/// … and are so many.
+/// … and are this many.
 const NUMBERS: usize = 2;
-/// No picture is begun this long after the first: what was measured until then is given.
+/// No picture is begun later than this after the first; the pictures measured until then are returned.
 const LONGEST: Duration = Duration::from_secs(3);
-/// Drawings of each picture after the first, which makes meshes and buffers …
+/// Drawings of each picture after the first one, which makes meshes and buffers …
 const DRAWINGS: usize = 5;
-/// … or as many as fit into this time: the fiftieth part of the whole, and there are about fifty pictures.
+/// … or as many as fit into this time: a fiftieth of the whole, as there are about fifty pictures.
 const PICTURE: Duration = Duration::from_millis(60);
 const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
 
-/// What to draw: a picture of this size without an object, or balls of (shading, triangles, pixels) each.
+/// A picture to draw: of this size without an object, or balls of (shading, triangles, pixels) each.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Ask {
     Empty(Size),
     Balls(Shading, u32, f64),
 }
 
-/// All pictures, in the order in which they are drawn: balls whose triangles cover the least and the greatest area first.
+/// All pictures in drawing order: balls whose triangles cover the least and the greatest area come first.
 fn asks(areas_px: &[f64]) -> Vec<Ask> {
     let of = |area_px| {
         numbers(area_px).flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(shading, triangles, pixels)))
@@ -72,14 +72,14 @@ fn asks(areas_px: &[f64]) -> Vec<Ask> {
     EMPTY.into_iter().map(Ask::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
 }
 
-/// The part of all pictures that is left where so many are known, 0 … 1.
+/// The fraction of all pictures still to be measured when `known` are done, 0 … 1.
 #[must_use]
 pub fn benchmark_left(areas_px: &[f64], known: usize) -> f64 {
     let all = asks(areas_px).len();
     all.saturating_sub(known) as f64 / all.max(1) as f64
 }
 
-/// Draws all pictures, or as many as there is time for, without the first so many that are `known`.
+/// Draws all pictures after the first `known`, or as many as there is time for.
 ///
 /// # Errors
 /// As [`Offscreen::new`] and [`Offscreen::render`].
@@ -89,7 +89,7 @@ pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: u
     };
     let ball = Arc::new(ball);
     let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
-    // shaders are compiled where they are first drawn with: that is no part of what drawing takes
+    // shaders are compiled at their first use, which must not count as drawing time
     for shading in SHADINGS {
         measure(&mut screen, &ball, (shading, TRIANGLES[0], SQUARES[0].1))?;
     }
@@ -118,13 +118,13 @@ fn empty(screen: &mut Offscreen) -> Result<Drawn, GpuError> {
     Ok(Drawn { picture_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
 }
 
-/// The first, the last, the second, the last but one and so on: what is measured until time runs out spans the whole.
+/// The first, the last, the second, the last but one and so on: the pictures measured until time runs out span the whole range.
 fn ends_first(sorted: &[f64]) -> impl Iterator<Item = f64> {
     let last = sorted.len().saturating_sub(1);
     (0..sorted.len()).map(move |k| sorted[if k % 2 == 0 { k / 2 } else { last - k / 2 }])
 }
 
-/// Numbers of triangles that cover so many pixels each, and what balls of them cover.
+/// Triangle counts of balls whose triangles cover `area_px` each, and the pixels that such a ball covers.
 fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
     let covers = TRIANGLES.into_iter().map(move |triangles| (triangles, area_px * f64::from(triangles)));
     covers.filter(|(_, pixels)| (LEAST_PX..=SQUARES[SQUARES.len() - 1].1).contains(pixels)).take(NUMBERS)
@@ -139,7 +139,7 @@ fn measure(
     let mut stage = balls(ball, side, shading == Shading::Textured);
     let cut = ball.cut(triangles).triangles;
     let level = Level { shading, triangles: cut, ..Resolution { eps_m: 1.0, n: 0 }.into() };
-    // at a metre, and from there as the square of the distance
+    // covered pixels are measured at 1 m; from there they fall with the square of the distance
     let distance_m = (seen_pixels(&mut stage, 1.0) / (pixels / f64::from(triangles) * f64::from(cut))).sqrt();
     let seconds = median(screen, &mut stage, distance_m, &vec![level; (side * side) as usize])?;
     let pixels = seen_pixels(&mut stage, distance_m);
@@ -174,7 +174,7 @@ fn camera(distance_m: f64) -> Camera {
     Camera::looking(DVec3::new(0.0, -distance_m, 0.0), DVec3::ZERO, 0.6)
 }
 
-/// A square of balls across the view, with a pattern on them or without.
+/// A square of balls across the view, with or without a pattern on them.
 fn balls(ball: &Arc<Tom>, side: u32, painted: bool) -> Stage {
     let look = Look { colour: [200, 120, 100], material: Material::Plastic };
     let model = Model::Mesh(Arc::clone(ball));
@@ -191,7 +191,7 @@ fn balls(ball: &Arc<Tom>, side: u32, painted: bool) -> Stage {
     stage
 }
 
-/// Where a ball of the square is, metres.
+/// Position of a ball in the square, metres.
 fn place(id: u32, side: u32) -> DVec3 {
     let along = |i: u32| (f64::from(i) - 0.5 * f64::from(side - 1)) * APART_M;
     DVec3::new(along(id % side), 0.0, along(id / side))
@@ -225,7 +225,7 @@ mod tests {
             for (triangles, pixels) in all {
                 assert!((pixels / f64::from(triangles) / area_px - 1.0).abs() < 1e-12);
                 let (side, most) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap();
-                // balls are 1/1.2 of their places wide, and the places fill no more than the height of the picture
+                // a ball is 1/1.2 as wide as its cell, and the cells fill no more than the height of the picture
                 let wide_px = 2.0 * (most / std::f64::consts::PI).sqrt() * APART_M / (2.0 * RADIUS_M);
                 assert!(wide_px * f64::from(side) < 1.02 * f64::from(SIZE.height) + 0.2 * wide_px, "{side} of {most}");
             }

@@ -1,33 +1,35 @@
-//! The light, and the column of it whose depths the shadow map holds.
+//! The key light, and the column along it whose depths the shadow map holds.
 //!
-//! In: what a picture's light falls on. Out: the column, and whether something in it may throw a shadow. Never here: texels, the GPU.
+//! In: the box of a picture that the light falls on. Out: the column, and whether an object in it may throw a shadow. Never here: texels,
+//! the GPU.
 
 use super::picture::Picture;
 use glam::DVec3;
 
-/// Towards the key light: over the left shoulder of who stands at −y.
+/// Direction towards the key light: over the left shoulder of a viewer at −y.
 pub const LIGHT: DVec3 = DVec3::new(-0.36, -0.30, 0.883);
 
-/// How far the shadow's depths reach towards the light and away from it, in radii of the focus: shafts stand high.
+/// Range of the shadow's depths towards the light and away from it, in radii of the focus: tool shafts are tall.
 pub const REACH: (f64, f64) = (2.5, 1.5);
 
-/// Share of its width by which the column may be moved to whole texels of any map.
+/// Fraction of its width by which the column may be moved to whole texels of any map.
 const SNAP_SHARE: f64 = 0.01;
 
-/// A square column along the light, about all that is near what the camera looks at.
+/// A square column along the light, around everything near the camera's target.
 #[derive(Debug, Clone, Copy)]
 pub struct LightColumn {
-    /// Towards the light, and the sides.
+    /// Direction towards the light; normal to both sides.
     pub light: DVec3,
     /// One side of the square.
     pub right: DVec3,
     /// The other one.
     pub up: DVec3,
-    /// The middle in world axes: across that of what casts, along that of what the light falls on, metres.
+    /// The centre in world axes, metres: across the light that of the objects that cast, along the light that of the ball the light is
+    /// fitted to.
     pub middle: DVec3,
     /// Half its width, metres.
     pub half_m: f64,
-    /// How far it reaches from the middle towards the light and away from it, metres.
+    /// Distance from the middle to its ends towards the light and away from it, metres.
     pub reach_m: (f64, f64),
 }
 
@@ -45,13 +47,13 @@ impl LightColumn {
             right,
             up,
             middle: centre + light * (picture.focus_m - centre).dot(light),
-            // in steps of a tenth, so that shadows do not crawl with every move
+            // in steps of a tenth, so that shadow edges do not crawl with every move
             half_m: 1.1_f64.powf((half.max(1e-3).ln() / 1.1_f64.ln()).ceil()),
             reach_m: (REACH.0 * picture.focus_radius_m, REACH.1 * picture.focus_radius_m),
         }
     }
 
-    /// Whether any of a ball may stand in it: nothing else throws a shadow that is drawn.
+    /// Whether any part of a ball may be in the column: nothing outside throws a shadow that is drawn.
     pub fn holds(&self, centre_m: DVec3, radius_m: f64) -> bool {
         let from = centre_m - self.middle;
         let half = self.half_m * (1.0 + SNAP_SHARE) + radius_m;

@@ -1,7 +1,7 @@
-//! Makes the picture: every visible object at the level asked for, as flat arrays.
+//! Composes the picture: every visible object at its requested level, as flat arrays.
 //!
-//! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: which level is right, the GPU.
-//! What the camera does not see is in the picture where it stands in the light of what it sees: for its shadow.
+//! In: a posed and surveyed [`Stage`], levels, a style. Out: a [`Picture`]. Never here: the choice of levels, the GPU.
+//! An object outside the view is in the picture where it may shade a visible one: for its shadow only.
 
 use super::column::LightColumn;
 use super::gather::{Form, Look, Material, Stage, Track};
@@ -18,32 +18,32 @@ use metachron_core::{AgentId, Anchor, Body, Resolution};
 use metachron_geometry::{Primitive, Rounding, SkinFrame};
 use std::f64::consts::TAU;
 
-/// Repeats of the skin's texture around a tube; the shader has the same number.
+/// Repeats of the skin's texture around a tube; the shader uses the same number.
 const TEXTURE_AROUND: f64 = 2.0;
-/// Share of the distance to the target that the user's spring is thick.
+/// Radius of the user spring's coil, as a fraction of the distance to the camera's target.
 const SPRING_SHARE: f64 = 0.011;
-/// Turns of that spring, and intervals a turn.
+/// Turns of that spring, and intervals per turn.
 const SPRING_TURNS: (usize, usize) = (9, 8);
 /// Force that colours a grasp fully red, newtons.
 const FORCE_RED_N: f64 = 2.0;
-/// Past this multiple of the eye's distance an object no longer widens the light.
+/// Objects beyond this multiple of the camera's distance no longer widen the light.
 const FOCUS_REACH: f64 = 4.0;
 
 /// The user's spring on an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hand {
-    /// Whom it pulls.
+    /// The agent that the spring pulls.
     pub object: AgentId,
-    /// At which material point.
+    /// The material point that it pulls at.
     pub anchor: Anchor,
-    /// Where the other end is, metres.
+    /// The other end of the spring, metres.
     pub target: DVec3,
 }
 
-/// Lists that are filled anew every frame.
+/// Lists that are refilled every frame.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
-    /// The actors that the picture needs: who is seen, and who may throw a shadow on what is.
+    /// The actors that the picture needs: visible ones, and those that may throw a shadow on a visible one.
     shown: Vec<usize>,
     solids: Solids,
     tubes: Vec<(u8, usize)>,
@@ -57,7 +57,7 @@ impl Stage {
         &self.picture
     }
 
-    /// Makes the picture at `levels`, one an actor in their order (missing ones are drawn at (1 cm, 3)).
+    /// Makes the picture at `levels`, one per actor in their order (missing ones are drawn at (1 cm, 3)).
     pub fn compose(&mut self, camera: &Camera, levels: &[Level], style: Style, hand: Option<Hand>) -> &Picture {
         let mut picture = std::mem::take(&mut self.picture);
         let mut scratch = std::mem::take(&mut self.scratch);
@@ -89,14 +89,14 @@ impl Stage {
         &self.picture
     }
 
-    /// Where a material point of an agent is shown, metres.
+    /// Displayed position of a material point of an agent, metres.
     #[must_use]
     pub fn place(&self, id: AgentId, anchor: Anchor) -> Option<DVec3> {
         let track = self.tracks.iter().find(|track| track.actor.id == id)?;
         track.pose.point(anchor).map(|(position, _)| position)
     }
 
-    /// The ball that light is fitted to, and the box that shadow is: all that is near what the camera looks at.
+    /// Finds the ball that the light is fitted to and the box that the shadow map is fitted to, around everything near the camera's target.
     fn find_focus(&self, camera: &Camera, picture: &mut Picture) {
         let reach = FOCUS_REACH * camera.distance_m;
         let near = |c: DVec3, r: f64| r > 0.0 && r.is_finite() && c.distance(camera.target_m) + r < reach;
@@ -113,12 +113,12 @@ impl Stage {
         let [low, high] = ball;
         picture.focus_m = if found { 0.5 * (low + high) } else { camera.target_m };
         let radius = if found { 0.5 * low.distance(high) } else { camera.distance_m };
-        // in steps of a tenth, so that shadows do not crawl with every move
+        // in steps of a tenth, so that shadow edges do not crawl with every move
         picture.focus_radius_m = 1.1_f64.powf((radius.max(1e-3).ln() / 1.1_f64.ln()).ceil());
         picture.shadowed_m = if found { (tight[0], tight[1]) } else { around(picture.focus_m, picture.focus_radius_m) };
     }
 
-    /// Finds who is seen or stands in the light of what is.
+    /// Finds the actors that are visible or may shade a visible one.
     fn find_shown(&self, picture: &Picture, shown: &mut Vec<usize>) {
         let column = LightColumn::of(picture);
         let needed = |track: &Track| track.seen || column.holds(track.bounds.centre, track.bounds.radius_m);
@@ -126,7 +126,7 @@ impl Stage {
         shown.extend(self.tracks.iter().enumerate().filter(|(_, track)| needed(track)).map(|(number, _)| number));
     }
 
-    /// Cuts every tube into its intervals, tubes of one level side by side.
+    /// Cuts every tube into its intervals; tubes of one level are stored consecutively.
     fn add_tubes(&mut self, levels: &[Level], picture: &mut Picture, scratch: &mut Scratch) {
         scratch.tubes.clear();
         let long = |form: &Form| matches!(form, Form::Tube | Form::Rope { .. });
@@ -146,7 +146,7 @@ impl Stage {
                 (Body::Curve(curve), _) => curve,
                 (Body::Soft(soft), Form::Rope { radius_m }) => {
                     curve_of_rope(soft, *radius_m, &mut track.rope);
-                    // drawn as it is divided
+                    // a rope is drawn with its own segments
                     at.eps_m = track.rope.arc_m.last().copied().unwrap_or(1.0) / track.rope.frames.len().max(1) as f64;
                     &track.rope
                 }
@@ -172,7 +172,7 @@ impl Stage {
         }
     }
 
-    /// The skins of soft bodies, each with an instance of its own for its colour.
+    /// The skins of soft bodies, each with its own instance for its colour.
     fn add_skins(&self, levels: &[Level], picture: &mut Picture, Scratch { shown, skins: room, .. }: &mut Scratch) {
         for &number in &*shown {
             let track = &self.tracks[number];
@@ -191,7 +191,7 @@ impl Stage {
         }
     }
 
-    /// A small ball at every point that is held, from white to red by the force.
+    /// A small ball at every grasped point, from white to red by the force.
     fn add_grasps(&self, picture: &Picture, Scratch { shown, solids, .. }: &mut Scratch) {
         for track in shown.iter().map(|&number| &self.tracks[number]) {
             let (Body::Tool(tool), Form::Tool(shape)) = (&track.pose, &track.actor.form) else { continue };
@@ -227,7 +227,7 @@ impl Paint {
     }
 }
 
-/// The level asked for an actor, made safe.
+/// The level requested for an actor, clamped to its valid range.
 pub(super) fn level(levels: &[Level], number: usize) -> Level {
     let usual = Resolution { eps_m: 0.01, n: 3 };
     levels.get(number).copied().unwrap_or_else(|| usual.into()).safe()
@@ -281,7 +281,7 @@ fn add_spring(from: DVec3, to: DVec3, radius_m: f64, picture: &mut Picture) {
     let first = picture.samples.len() as u32;
     for i in 0..=count {
         let t = i as f64 / count as f64;
-        // straight at both ends, so that it leaves one point and reaches the other
+        // the radius tapers to zero at both ends, so that the coil meets both points
         let swell = (t * (1.0 - t) * 12.0).min(1.0);
         let rate = if swell < 1.0 { 12.0 * (1.0 - 2.0 * t) } else { 0.0 };
         let (sin, cos) = (TAU * t * SPRING_TURNS.0 as f64).sin_cos();

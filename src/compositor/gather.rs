@@ -1,7 +1,7 @@
-//! From published snapshots to the states a frame shows.
+//! From published snapshots to the states that a frame shows.
 //!
-//! In: the newest snapshot of each agent and the frame's time. Out: one pose an object, at a time as near the frame's as the
-//! choice of [`States`] allows, and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
+//! In: the newest snapshot of each agent and the frame's time. Out: one pose per object, at the time that the choice of [`States`] gives,
+//! and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
 
 use super::glide::Glide;
 use super::painting::Painting;
@@ -17,22 +17,22 @@ use metachron_geometry::{
 };
 use std::sync::Arc;
 
-/// Which states a frame shows.
+/// The states that a frame shows.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum States {
-    /// Between the two newest: smooth, one step of the agent late.
+    /// Interpolated between the two newest: smooth, one step of the agent late.
     #[default]
     Interpolate,
-    /// The newest carried on by its velocities to the frame's time: on time, wrong where forces act.
+    /// The newest, extrapolated by its velocities to the frame's time: on time, wrong where forces act.
     Extrapolate,
-    /// The newest as it is: on time to one step, not smooth where steps are longer than frames.
+    /// The newest, unchanged: on time to one step, not smooth where steps are longer than frames.
     Latest,
 }
 
-/// What a surface is made of.
+/// Material of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Material {
-    /// Wet tissue with a texture of its own.
+    /// Wet tissue with its own texture.
     Tissue,
     /// Brushed metal.
     Metal,
@@ -43,7 +43,7 @@ pub enum Material {
     Skin,
 }
 
-/// How an object looks.
+/// Appearance of an object.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Look {
     /// Colour, sRGB.
@@ -52,18 +52,18 @@ pub struct Look {
     pub material: Material,
 }
 
-/// What an agent's matter looks like in space.
+/// Drawn form of an agent.
 #[derive(Debug, Clone)]
 pub enum Form {
-    /// Nothing to see.
+    /// Not drawn.
     Unseen,
     /// A skin over a framed curve.
     Tube,
-    /// A solid that moves as one.
+    /// A rigid solid.
     Solid(Solid),
     /// A grasping tool.
     Tool(ToolShape),
-    /// What never moves and has no snapshots; it is drawn with as many triangles as its level says.
+    /// Static geometry without snapshots; its level gives the number of triangles.
     Scenery(Model, Placement),
     /// The skin of a sheet or soft solid.
     Skin(SurfaceForm),
@@ -74,39 +74,39 @@ pub enum Form {
     },
 }
 
-/// An agent as the picture knows it.
+/// An agent to be drawn.
 #[derive(Debug, Clone)]
 pub struct Actor {
-    /// Which agent.
+    /// The agent.
     pub id: AgentId,
-    /// What it looks like in space.
+    /// Its form.
     pub form: Form,
     /// Its colour and material.
     pub look: Look,
 }
 
-/// Something fixed that is seen. The first plane among the props is the floor.
+/// A visible static solid. The first plane among the props is the floor.
 #[derive(Debug, Clone)]
 pub struct Prop {
-    /// What and where.
+    /// Shape and pose.
     pub obstacle: Obstacle,
     /// Its colour and material.
     pub look: Look,
 }
 
-/// Everything that can be seen, and its states at the time of a frame.
+/// All objects that can be drawn, and their states at the time of a frame.
 #[derive(Debug, Default)]
 pub struct Stage {
     pub(super) tracks: Vec<Track>,
     pub(super) props: Vec<PropShape>,
     pub(super) picture: Picture,
     pub(super) scratch: super::compose::Scratch,
-    /// What the last survey found, and by whose eye.
+    /// Results of the last survey, and the camera and picture size of that survey.
     pub(super) found: Vec<Seen>,
-    /// The actors that it looked at.
+    /// The actors that the last survey updated.
     pub(super) looked: Vec<usize>,
     pub(super) eye: Option<(Camera, Size)>,
-    /// Over how many frames meshes change their cut.
+    /// Frames over which meshes change their cut.
     pub(super) glide_frames: u8,
 }
 
@@ -118,28 +118,28 @@ pub(super) struct Track {
     before: Option<Arc<Snapshot>>,
     newest: Option<Arc<Snapshot>>,
     awake: bool,
-    /// It rests, and is shown as it rests: until there is news of it nothing about it changes.
+    /// The agent is at rest and shown at rest: its pose stays unchanged until the next snapshot.
     still: bool,
-    /// Whether it was posed anew since the last survey.
+    /// Whether it was posed again since the last survey.
     pub fresh: bool,
-    /// The state that is shown.
+    /// The displayed state.
     pub pose: Body,
     pub shown: SimTime,
     pub age_s: f64,
     pub bounds: Bounds,
     pub seen: bool,
     pub skeleton: Skeleton,
-    /// At which ε the skeleton was made of the pose; `None` where it was made of another one.
+    /// ε at which the skeleton was made from the present pose; `None` where it was made from an earlier one.
     pub cut_m: Option<f64>,
-    /// The cut that a mesh is drawn at while it is seen.
+    /// The cut at which a mesh is drawn while visible.
     pub glide: Option<Glide>,
-    /// A rope as it is shown.
+    /// The displayed curve of a rope.
     pub rope: CurveState,
-    /// What is painted on scenery.
+    /// Texture of scenery.
     pub painting: Option<Painting>,
 }
 
-/// A fixed solid with what drawing needs to know of it.
+/// A static solid with its drawing data.
 #[derive(Debug)]
 pub(super) struct PropShape {
     pub solid: Solid,
@@ -149,25 +149,25 @@ pub(super) struct PropShape {
     pub body: BodyShape,
 }
 
-/// The mesh of a solid that is not made of primitives, and the size of any.
+/// The mesh of a solid that is not a primitive, and the size of any solid.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct BodyShape {
-    /// Number among the given meshes, or of scenery among the models.
+    /// Index among the given meshes, or of scenery among the models.
     pub given: Option<u32>,
-    /// Centre of a ball that holds it, from its origin in its own axes, metres.
+    /// Centre of a bounding ball, from the origin in body axes, metres.
     pub middle_m: DVec3,
     /// Radius of that ball, metres.
     pub radius_m: f64,
-    /// A quarter of its surface, m²: the mean area it covers seen from any side (Cauchy), exact for convex bodies.
+    /// A quarter of its surface, m²: the mean projected area over all view directions (Cauchy), exact for convex bodies.
     pub mean_area_m2: f64,
 }
 
-/// A ball that holds an object.
+/// A bounding ball and box.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Bounds {
     pub centre: DVec3,
     pub radius_m: f64,
-    /// Half the box along the world's axes that holds it, about the centre, metres.
+    /// Half extents of the axis-aligned bounding box about the centre, metres.
     pub half_m: DVec3,
 }
 
@@ -176,7 +176,7 @@ impl Bounds {
         Self { centre, radius_m, half_m: DVec3::splat(radius_m) }
     }
 
-    /// Around points with a skin of this thickness.
+    /// Bounds of points, with a skin of this thickness.
     fn of(points: &[DVec3], skin_m: f64) -> Self {
         let corners = points.iter().copied().reduce(DVec3::min).zip(points.iter().copied().reduce(DVec3::max));
         let Some((low, high)) = corners else { return Self::default() };
@@ -186,7 +186,7 @@ impl Bounds {
 }
 
 impl Stage {
-    /// A stage with these actors and props on it.
+    /// A stage with these actors and props.
     #[must_use]
     pub fn new(actors: Vec<Actor>, props: Vec<Prop>) -> Self {
         let (mut meshes, mut models) = (Vec::new(), Models::default());
@@ -197,10 +197,10 @@ impl Stage {
         Self { tracks, props, picture, ..Self::default() }
     }
 
-    /// Takes the newest snapshot of an agent; `awake` tells whether it goes on stepping.
-    /// One that was seen already changes nothing, one of an earlier time starts its history anew (a reset).
+    /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
+    /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
     pub fn see(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
-        // actors mostly stand in the order of their numbers
+        // the index of an actor is mostly its agent's number
         let here = |track: &Track| track.actor.id == id;
         let at = id.0 as usize;
         let at = if self.tracks.get(at).is_some_and(here) { Some(at) } else { self.tracks.iter().position(here) };
@@ -209,8 +209,8 @@ impl Stage {
         }
     }
 
-    /// Brings every object to the frame's time as `states` asks, but for those that rest and are shown so; says how many that
-    /// were.
+    /// Poses every object at the frame's time by the rule of `states`, except those that rest and are shown at rest; returns the number
+    /// posed.
     pub fn pose(&mut self, time: SimTime, states: States) -> usize {
         let mut posed = 0;
         for track in self.tracks.iter_mut().filter(|track| !track.still) {
@@ -225,7 +225,7 @@ impl Stage {
         self.tracks.iter().find(|track| track.actor.id == id).map(|track| track.age_s)
     }
 
-    /// The state of an agent that the frame shows and its time.
+    /// The state of an agent that the frame shows, and its time.
     #[must_use]
     pub fn shown(&self, id: AgentId) -> Option<(&Body, SimTime)> {
         self.tracks.iter().find(|track| track.actor.id == id).map(|track| (&track.pose, track.shown))
@@ -287,7 +287,7 @@ impl Track {
         }
     }
 
-    /// Whether there was a state to pose it by.
+    /// Whether there was a snapshot to pose it by.
     fn pose_at(&mut self, time: SimTime, states: States) -> bool {
         let Some(newest) = &self.newest else { return false };
         self.age_s = if self.awake { time.secs_after(newest.moment()).max(0.0) } else { 0.0 };
@@ -329,7 +329,7 @@ impl PropShape {
         Self { solid, look: prop.look, position, rotation, body }
     }
 
-    /// Half the box along the world's axes that holds it, about its position, metres.
+    /// Half extents of the axis-aligned bounding box about its position, metres.
     pub fn half_extents(&self) -> DVec3 {
         match self.solid {
             Solid::Box { half_extents_m: h } => {
@@ -341,7 +341,7 @@ impl PropShape {
     }
 }
 
-/// Every model once, with its extent: copies share both.
+/// Every model once, with its extent, shared by its copies.
 #[derive(Default)]
 struct Models(Vec<(Model, Extent)>);
 

@@ -1,39 +1,39 @@
-//! How a mesh changes its cut: over a few frames, so that nobody sees it jump.
+//! Geomorphs: a mesh changes its cut gradually over a few frames, so that no jump is visible.
 //!
-//! In: the triangles asked for, frame by frame. Out: the cut that is drawn, and how far it lies on its way to a coarser one
-//! (a geomorph). Never here: which count is right, the GPU. Theory: `docs/theory/multiresolution.md`.
+//! In: the triangles requested, frame by frame. Out: the cut that is drawn, and its morph fraction towards a coarser one. Never here: the
+//! choice of the count, the GPU. Theory: `docs/theory/multiresolution.md`.
 //!
-//! What gets finer is drawn at once with all the triangles asked for, and begins where the coarser cut was. What gets coarser keeps
-//! its triangles on its way, more than were asked for: as long as the frame's allowance lasts, then it jumps.
+//! A refining mesh is drawn with all requested triangles immediately, starting at the positions of the coarser cut. A coarsening mesh keeps
+//! more triangles than requested until its morph ends, as long as the frame's allowance lasts; without allowance it jumps.
 
 use super::picture::MeshKey;
 use metachron_geometry::{Cut, Tom};
 
-/// What gliding may cost in a frame.
+/// Limits on morphs in a frame.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Allowance {
-    /// The part of the way that one frame goes; 1 and more is at once.
+    /// Morph fraction per frame; 1 and more is immediate.
     pub step: f32,
-    /// Triangles that may be drawn beyond those asked for.
+    /// Triangles that may be drawn beyond those requested.
     pub triangles: f64,
 }
 
-/// A mesh at a cut, or on its way from one to another.
+/// A mesh at a cut, or morphing from one cut to another.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Glide {
-    /// The triangles last asked for.
+    /// The triangles last requested.
     asked: u32,
-    /// Both ends of the way; alike at rest.
+    /// Both ends of the morph; equal at rest.
     fine: Cut,
     coarse: Cut,
-    /// How far it lies from the fine end towards the coarse one, 0 … 1.
+    /// Morph fraction from the fine end towards the coarse one, 0 … 1.
     share: f32,
-    /// Whether it is on its way to the fine end.
+    /// Whether the morph goes towards the fine end.
     rising: bool,
 }
 
 impl Glide {
-    /// At rest at the cut for so many triangles.
+    /// At rest at the cut for `triangles`.
     pub fn at(tom: &Tom, triangles: u32) -> Self {
         Self::resting(triangles, tom.cut(triangles))
     }
@@ -42,7 +42,7 @@ impl Glide {
         Self { asked, fine: cut, coarse: cut, share: 0.0, rising: false }
     }
 
-    /// Goes one frame towards the cut for so many triangles.
+    /// Advances by one frame towards the cut for `triangles`.
     pub fn advance(&mut self, tom: &Tom, triangles: u32, allowance: &mut Allowance) {
         if triangles != self.asked {
             self.asked = triangles;
@@ -61,20 +61,20 @@ impl Glide {
         self.share += if self.rising { -allowance.step } else { allowance.step };
     }
 
-    /// Puts the ends of the way so that the wanted cut is one of them, as near as may be to what was drawn last.
+    /// Sets the ends of the morph so that the requested cut is one of them, as near as possible to the shape last drawn.
     fn aim(&mut self, to: Cut) {
         let rests = self.fine == self.coarse;
         (self.fine, self.coarse, self.share, self.rising) = match () {
             () if rests && to > self.fine => (to, self.coarse, 1.0, true),
             () if rests => (self.fine, to, 0.0, false),
             () if to >= self.fine || (self.rising && to > self.coarse) => (to, self.coarse, self.share, true),
-            // what it has not become yet it need not give up
+            // the refinement in progress is dropped: the new morph starts at its coarse end
             () if self.rising => (self.coarse, to, 0.0, false),
             () => (self.fine, to, self.share, false),
         };
     }
 
-    /// What of model number `model` is drawn, and how far it lies on the way to its coarse end.
+    /// The mesh key drawn for model number `model`, and its morph fraction towards the coarse end.
     pub fn drawn(&self, model: u32) -> (MeshKey, f32) {
         if self.share > 0.0 {
             (MeshKey::Glide(model, self.fine, self.coarse.vertices), self.share)
@@ -100,7 +100,7 @@ mod tests {
         }
     }
 
-    /// What is drawn while `asked` stays, frame by frame, with room for so many triangles a frame.
+    /// The cuts drawn frame by frame while `asked` is constant, with an allowance of `triangles` per frame.
     fn frames(glide: &mut Glide, tom: &Tom, asked: u32, triangles: f64) -> Vec<(u32, f32)> {
         let frame = |_| {
             glide.advance(tom, asked, &mut Allowance { step: 0.25, triangles });

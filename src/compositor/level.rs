@@ -1,40 +1,40 @@
-//! How finely one actor is drawn, and by which shading.
+//! The level of detail of one actor and its shading.
 //!
-//! In: what a policy asks for. Out: numbers that [`super::Stage::compose`] draws at. Never here: which level is right.
+//! In: a policy's decision. Out: numbers at which [`super::Stage::compose`] draws. Never here: the choice of the level.
 
 use metachron_core::{N_MAX, Resolution};
 
-/// How the light on a surface is worked out.
+/// Shading model of a surface.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
 pub enum Shading {
-    /// One colour a triangle.
+    /// One colour per triangle.
     Flat,
-    /// Colours at corners, interpolated between them.
+    /// Lit per vertex, colours interpolated.
     Gouraud,
-    /// Light at every pixel.
+    /// Lit per pixel.
     #[default]
     PerPixel,
-    /// The same on what is painted on it; what nothing is painted on is drawn as [`Shading::PerPixel`].
+    /// Lit per pixel with the texture; an object without a texture is drawn as [`Shading::PerPixel`].
     Textured,
-    /// Better than anybody asks for: what is painted on it, shadows with soft rims, corners darker than what the sky reaches.
+    /// Reference quality above what policies request: texture, soft-edged shadows, ambient occlusion at corners.
     Shadowed,
 }
 
-/// The level that an actor is drawn at.
+/// The level at which an actor is drawn.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Level {
-    /// Of a tube its (ε, n); of what is one mesh a level its n.
+    /// (ε, n) of a tube; only n for a single mesh with levels.
     pub resolution: Resolution,
-    /// Of what can have any number of triangles, how many. Whatever has 0 is left out of the picture, with its shadow.
+    /// Number of triangles, for forms that take any number. An actor with 0 is left out of the picture, with its shadow.
     pub triangles: u32,
-    /// How it is shaded.
+    /// Shading.
     pub shading: Shading,
-    /// How much of what it can have it is drawn with: 0 its coarsest … 1 its finest. It shows in [`super::Colouring::Detail`] alone.
+    /// Fraction of its possible detail: 0 is its coarsest, 1 its finest. Shown in [`super::Colouring::Detail`] alone.
     pub detail: f32,
 }
 
 impl Level {
-    /// The level with its n brought inside `0..=N_MAX`.
+    /// The level with n clamped to `0..=N_MAX`.
     pub(super) fn safe(self) -> Self {
         let Resolution { eps_m, n } = self.resolution;
         Self { resolution: Resolution { eps_m, n: n.min(N_MAX) }, ..self }
@@ -42,7 +42,7 @@ impl Level {
 }
 
 impl From<Resolution> for Level {
-    /// All triangles that there are, lit at every pixel.
+    /// All triangles, lit per pixel.
     fn from(resolution: Resolution) -> Self {
         Self { resolution, triangles: u32::MAX, shading: Shading::default(), detail: 1.0 }
     }

@@ -1,19 +1,19 @@
-//! How like two pictures are: structural similarity (WBSS04) and the peak signal-to-noise ratio.
+//! Similarity of two pictures: structural similarity (WBSS04) and the peak signal-to-noise ratio.
 //!
-//! In: two pictures of one size. Out: a number. Never here: what is in them.
+//! In: two pictures of one size. Out: a number. Never here: the scene.
 
 use super::offscreen::PictureFile;
 
-/// Half the side of a window, pixels, and the deviation of its weights (WBSS04, §III).
+/// Half the side of a window, pixels, its side, and the standard deviation of its weights (WBSS04, §III).
 const HALF: usize = 5;
 const SIDE: usize = 2 * HALF + 1;
 const SIGMA: f64 = 1.5;
-/// What keeps quotients of small numbers steady: (K L)², K = 0.01 and 0.03, L = 255.
+/// Constants that stabilise quotients of small numbers: (K L)², K = 0.01 and 0.03, L = 255.
 const C1: f64 = 2.55 * 2.55;
 const C2: f64 = 7.65 * 7.65;
 
-/// Mean structural similarity of the pictures' luma over all windows of 11 × 11 pixels, −1 … 1, 1 where they are alike; `None` where
-/// sizes differ or there is no whole window.
+/// Mean structural similarity of the pictures' luma over all windows of 11 × 11 pixels, −1 … 1, 1 for equal pictures; `None` where sizes
+/// differ or there is no whole window.
 #[must_use]
 pub fn ssim(a: &PictureFile, b: &PictureFile) -> Option<f64> {
     let (width, height) = (a.width() as usize, a.height() as usize);
@@ -33,8 +33,8 @@ pub fn ssim(a: &PictureFile, b: &PictureFile) -> Option<f64> {
     Some(all.sum::<f64>() / mx.len() as f64)
 }
 
-/// 10 log₁₀(255² / mean square difference of red, green and blue), dB; infinite where the pictures are alike; `None` where sizes differ
-/// or there are no pixels.
+/// 10 log₁₀(255² / mean square difference of red, green and blue), dB; infinite for equal pictures; `None` where sizes differ or there are
+/// no pixels.
 #[must_use]
 pub fn psnr_db(a: &PictureFile, b: &PictureFile) -> Option<f64> {
     if a.dimensions() != b.dimensions() || a.is_empty() {
@@ -47,7 +47,7 @@ pub fn psnr_db(a: &PictureFile, b: &PictureFile) -> Option<f64> {
     Some(10.0 * libm::log10(255.0 * 255.0 / mean))
 }
 
-/// Luma of each pixel (BT.601, as in the paper's own program), 0 … 255.
+/// Luma of each pixel (BT.601, as in the authors' implementation), 0 … 255.
 fn luma(picture: &PictureFile) -> Vec<f64> {
     picture
         .pixels()
@@ -110,13 +110,13 @@ mod tests {
 
     #[test]
     fn a_negative_has_the_opposite_structure() {
-        // ± 60 about 100 in a fine chequer, whose weighted mean in a window is the middle to 1e-3 of the swing
+        // ± 60 about 100 in a fine chequer, whose weighted mean in a window is the centre to 1e-3 of the amplitude
         let chequer = |sign: i32| picture(move |x, y| (100 + sign * if (x + y) % 2 == 0 { 60 } else { -60 }) as u8);
         let wanted = (C2 - 2.0 * 3600.0) / (C2 + 2.0 * 3600.0);
         assert!((ssim(&chequer(1), &chequer(-1)).unwrap() - wanted).abs() < 1e-3);
     }
 
-    /// The sum over 121 weights of every window, as the paper writes it.
+    /// The sum over the 121 weights of every window, as in the paper.
     fn brute(a: &PictureFile, b: &PictureFile) -> f64 {
         let (x, y, w) = (luma(a), luma(b), weights());
         let (width, height) = (a.width() as usize, a.height() as usize);

@@ -1,8 +1,8 @@
-//! Draws the newest states (wgpu) and the panels around them (egui). It reads snapshots, never the runtime.
+//! Draws the newest states (wgpu) and the panels around them (egui). Reads snapshots, never the runtime.
 //!
-//! A frame: [`Stage::see`] takes the newest snapshots, [`Stage::pose`] brings them to the frame's time,
-//! [`Stage::survey`] says what is visible and how large, [`Stage::compose`] makes the [`Picture`] at the levels asked
-//! for, [`Renderer::render`] draws it. [`Stage`] needs no GPU; [`Offscreen`] needs no window.
+//! A frame: [`Stage::see`] receives the newest snapshots, [`Stage::pose`] poses them at the frame's time, [`Stage::survey`] finds which
+//! actors are visible and how large, [`Stage::compose`] makes the [`Picture`] at the requested levels, [`Renderer::render`] draws it.
+//! [`Stage`] needs no GPU; [`Offscreen`] needs no window.
 
 mod benchmark;
 mod column;

@@ -1,7 +1,7 @@
 //! Pictures without a window: choosing an adapter, drawing into a texture, reading it back, writing a file.
 //!
-//! In: the environment (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`, as users of wgpu expect), a picture. Out: pixels, PNG files.
-//! Never here: windows, what is in the picture.
+//! In: the environment (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`, as usual in wgpu), a picture. Out: pixels, PNG files. Never here: windows, the
+//! content of the picture.
 
 use super::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
 use super::picture::Picture;
@@ -16,7 +16,7 @@ use std::time::Duration;
 pub struct Lost(Arc<OnceLock<String>>);
 
 impl Lost {
-    /// Watches a device from now on; it replaces whoever watched before.
+    /// Watches a device from now on; replaces the watcher set before.
     #[must_use]
     pub fn watch(device: &wgpu::Device) -> Self {
         let lost = Self::default();
@@ -28,14 +28,14 @@ impl Lost {
         lost
     }
 
-    /// What the driver said when the device was lost; `None` while it lives.
+    /// The driver's message when the device was lost; `None` while it works.
     #[must_use]
     pub fn reason(&self) -> Option<String> {
         self.0.get().cloned()
     }
 }
 
-/// Why there is no GPU to draw with, or no picture from it.
+/// Reasons for having no GPU to draw with, or no picture from it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum GpuError {
@@ -45,32 +45,32 @@ pub enum GpuError {
          `apt-get install mesa-vulkan-drivers`, on Fedora `dnf install mesa-vulkan-drivers` ({detail})"
     )]
     NoAdapter {
-        /// What wgpu says, in short.
+        /// The message of wgpu, shortened.
         detail: String,
     },
-    /// An adapter was found and would not open.
+    /// An adapter was found but could not be opened.
     #[error("the graphics adapter {adapter} would not open: {detail}")]
     NoDevice {
         /// The adapter's name.
         adapter: String,
-        /// What wgpu says.
+        /// The message of wgpu.
         detail: String,
     },
     /// Drawing failed.
     #[error(transparent)]
     Draw(#[from] DrawError),
-    /// The pixels could not be read back. Drawing again may do.
+    /// The pixels could not be read back. Drawing again may succeed.
     #[error("the picture could not be read back: {detail}")]
     ReadBack {
-        /// What wgpu says.
+        /// The message of wgpu.
         detail: String,
     },
     /// The file could not be written.
     #[error("the picture could not be written to {path}")]
     File {
-        /// Where it should have gone.
+        /// The intended path.
         path: PathBuf,
-        /// Why not.
+        /// The reason.
         source: image::ImageError,
     },
 }
@@ -87,11 +87,11 @@ pub struct Gpu {
 }
 
 impl Gpu {
-    /// Opens an adapter without a window: Vulkan (or the system's own), else OpenGL.
-    /// `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` choose another.
+    /// Opens an adapter without a window: Vulkan (or the system's native API), else OpenGL. `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` override
+    /// this.
     ///
     /// # Errors
-    /// [`GpuError::NoAdapter`] says what to install; [`GpuError::NoDevice`] names the adapter that would not open.
+    /// [`GpuError::NoAdapter`] states what to install; [`GpuError::NoDevice`] names the adapter that could not be opened.
     pub fn headless() -> Result<Self, GpuError> {
         let choices = match wgpu::Backends::from_env() {
             Some(chosen) => vec![chosen],
@@ -122,7 +122,7 @@ impl Gpu {
         Ok(Self { info, device, queue })
     }
 
-    /// Whether it is a processor that draws.
+    /// Whether it is a software rasteriser (CPU).
     #[must_use]
     pub fn is_processor(&self) -> bool {
         self.info.device_type == wgpu::DeviceType::Cpu
@@ -135,7 +135,7 @@ impl Gpu {
     }
 }
 
-/// What is asked of an adapter, with a window or without: its texture sizes, and time stamps where it has them.
+/// Requirements on an adapter, with or without a window: its own texture sizes, and time stamps where supported.
 pub(super) fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
     wgpu::DeviceDescriptor {
         label: Some("metachron"),
@@ -158,7 +158,7 @@ async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
     found.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) })
 }
 
-/// So much of a library's words as fits on a line or two.
+/// The first line of a library's message, shortened to 160 characters.
 fn shortened(words: &str) -> String {
     const MOST: usize = 160;
     let line = words.lines().next().unwrap_or_default();
@@ -168,10 +168,10 @@ fn shortened(words: &str) -> String {
     }
 }
 
-/// A picture in memory, to be looked at or written.
+/// A picture in memory.
 pub type PictureFile = RgbaImage;
 
-/// Draws pictures into a texture of its own.
+/// Draws pictures into its own texture.
 #[derive(Debug)]
 pub struct Offscreen {
     gpu: Gpu,
@@ -180,21 +180,21 @@ pub struct Offscreen {
     texture: Option<(wgpu::Texture, wgpu::TextureView)>,
 }
 
-/// Format of the textures that are read back: the shaders write the sRGB curve themselves, which costs a processor less than
-/// a format that does.
+/// Format of the textures that are read back: the shaders apply the sRGB curve themselves, which costs a software rasteriser less than an
+/// sRGB format.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
 impl Offscreen {
     /// A target of `size` on `gpu`; one without pixels draws nothing.
     ///
     /// # Errors
-    /// [`GpuError::Draw`] where the device cannot do it or the size is beyond its limit.
+    /// [`GpuError::Draw`] where the device lacks a feature or the size is beyond its limit.
     pub fn new(gpu: Gpu, size: Size, options: RendererOptions) -> Result<Self, GpuError> {
         let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, options)?;
         Self::with(gpu, renderer, size)
     }
 
-    /// The same with another size: what the renderer has made for its adapter stays.
+    /// The same with another size; the renderer and its caches are kept.
     ///
     /// # Errors
     /// [`GpuError::Draw`] where the size is beyond the device's limit.
@@ -242,7 +242,7 @@ impl Offscreen {
         self.size
     }
 
-    /// Draws and waits until it is drawn, so that a clock around this call measures the frame's whole work.
+    /// Draws and waits for completion, so that a clock around this call measures the frame's whole work.
     ///
     /// # Errors
     /// As [`Renderer::render`].
@@ -251,7 +251,7 @@ impl Offscreen {
         Ok(DrawTimes { gpu: self.wait()?, ..times })
     }
 
-    /// Begins to draw: [`Offscreen::wait`] waits for its end, and this thread has its time to itself until then.
+    /// Starts drawing: [`Offscreen::wait`] waits for completion, and this thread is free until then.
     ///
     /// # Errors
     /// As [`Renderer::render`].
@@ -260,7 +260,7 @@ impl Offscreen {
         Ok(self.renderer.render(picture, camera, Target { view, size: self.size })?)
     }
 
-    /// Waits until all that was submitted is drawn; the adapter's own time, where it has told of any.
+    /// Waits until all submitted work is drawn; returns the GPU time, where the adapter reports one.
     ///
     /// # Errors
     /// [`GpuError::Draw`] where the device was lost.
@@ -272,7 +272,7 @@ impl Offscreen {
     /// The pixels of the last picture, sRGB.
     ///
     /// # Errors
-    /// [`GpuError::ReadBack`] where the device would not give them.
+    /// [`GpuError::ReadBack`] where the device could not read them.
     pub fn read_back(&self) -> Result<PictureFile, GpuError> {
         match &self.texture {
             None => Ok(RgbaImage::new(0, 0)),
@@ -283,7 +283,7 @@ impl Offscreen {
     /// Writes the last picture to a PNG file.
     ///
     /// # Errors
-    /// [`GpuError::ReadBack`], or [`GpuError::File`] naming the path.
+    /// [`GpuError::ReadBack`], or [`GpuError::File`] with the path.
     pub fn save(&self, path: &Path) -> Result<(), GpuError> {
         write_png(&self.read_back()?, path)
     }
@@ -298,7 +298,7 @@ pub(super) fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
     polled.map(|_| ()).map_err(|error| GpuError::ReadBack { detail: error.to_string() })
 }
 
-/// The pixels of a texture of four bytes a pixel, after all submitted work.
+/// The pixels of a texture with four bytes per pixel, after all submitted work.
 pub(super) fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<PictureFile, GpuError> {
     let (width, height) = (texture.width(), texture.height());
     let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);

@@ -1,6 +1,6 @@
-//! What is painted on scenery: which texture, and what is seen of it where it is not drawn.
+//! Textures of scenery: which texture an actor has, and its mean colour for shadings that do not draw it.
 //!
-//! In: textures and who has them. Out: numbers of textures, colours. Never here: pixels on the GPU.
+//! In: textures and their actors. Out: texture numbers, colours. Never here: pixels on the GPU.
 
 use super::compose::Paint;
 use super::gather::Stage;
@@ -12,17 +12,17 @@ use std::sync::Arc;
 /// The texture of one actor.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Painting {
-    /// Its number among the picture's, from 1.
+    /// Its number in the picture's list, from 1.
     number: u32,
-    /// Repeats a metre where it lies on sides, else 0.
+    /// Repeats per metre where it is projected on sides, else 0.
     wrap: f32,
-    /// Its mean, sRGB.
+    /// Its mean colour, sRGB.
     mean: [u8; 3],
 }
 
 impl Stage {
-    /// Paints an actor that is scenery: from [`Shading::Textured`] on the texture times the actor's colour is drawn, by cheaper shadings its mean.
-    /// An actor that is not there is none the worse for it.
+    /// Sets the texture of an actor that is scenery: from [`Shading::Textured`] on, texture times the actor's colour is drawn; cheaper
+    /// shadings use the texture's mean. An unknown actor is ignored.
     pub fn paint(&mut self, id: AgentId, texture: &Arc<Texture>) {
         let known = &self.picture.textures;
         let number = known.iter().position(|other| Arc::ptr_eq(other, texture)).unwrap_or(known.len());
@@ -40,7 +40,7 @@ impl Stage {
 }
 
 impl Painting {
-    /// The texture's number and its repeats a metre where the shading draws it; else the paint gets its mean.
+    /// The texture's number and its repeats per metre where the shading draws it; else multiplies the paint's colour by the texture's mean.
     pub fn lies(&self, paint: &mut Paint, shading: Shading) -> Option<(u32, f32)> {
         if shading >= Shading::Textured {
             return Some((self.number, self.wrap));

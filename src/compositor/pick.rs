@@ -1,6 +1,6 @@
-//! What the pointer points at: the nearest object along a ray, as it is shown.
+//! Picking: the nearest object along a ray, in its displayed state.
 //!
-//! In: a ray. Out: an object and a material point of it. Never here: what is done with it.
+//! In: a ray. Out: an object and its material point. Never here: the action on it.
 
 use super::gather::{Form, Stage, Track};
 use super::view::Ray;
@@ -9,26 +9,26 @@ use metachron_core::{AgentId, Anchor, Body, CurveState, SoftState, ToolState};
 use metachron_geometry::SurfaceForm;
 use metachron_geometry::{Primitive, PrimitiveMesh, Rounding, Solid, ToolShape};
 
-/// What a ray hit.
+/// The hit of a ray.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Hit {
-    /// Whom.
+    /// The agent hit.
     pub object: AgentId,
-    /// Which material point.
+    /// The material point.
     pub anchor: Anchor,
-    /// Where, metres.
+    /// The point in space, metres.
     pub point_m: DVec3,
-    /// How far along the ray, metres.
+    /// Distance along the ray, metres.
     pub distance_m: f64,
 }
 
-/// Level of the meshes that rays are tested against: near enough for a pointer.
+/// Level of the meshes that rays are tested against: accurate enough for a pointer.
 const PICK_LEVEL: u8 = 3;
-/// Tools are thin: how much thicker than its shaft one feels to the pointer.
+/// Radius for picking a tool, as a multiple of its shaft's: tools are thin.
 const TOOL_GRIP: f64 = 3.0;
 
 impl Stage {
-    /// The nearest object along `ray`, if there is one. Fixed props are not picked.
+    /// The nearest object along `ray`, if there is one. Props are not picked.
     #[must_use]
     pub fn pick(&self, ray: Ray) -> Option<Hit> {
         let hits = self.tracks.iter().filter_map(|track| {
@@ -69,8 +69,8 @@ impl Stage {
     }
 }
 
-/// Distance along the ray to a capsule from `a` to `b`, with the share of the way from `a`: where the ray passes
-/// nearest to the line, moved back to the skin.
+/// Distance along the ray to a capsule from `a` to `b`, and the fraction from `a` to `b`: the ray's closest approach to the line, moved
+/// back to the skin.
 fn hit_capsule(a: DVec3, b: DVec3, radius_m: f64, ray: Ray) -> Option<(f64, f64)> {
     let (axis, from) = (b - a, a - ray.origin);
     let (aa, ad, fd) = (axis.length_squared(), axis.dot(ray.direction), from.dot(ray.direction));
@@ -93,7 +93,7 @@ fn hit_curve(curve: &CurveState, ray: Ray) -> Option<(Anchor, f64)> {
     hits.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// The nearest triangle of a skin along the ray, seen from either side, and its vertex nearest to the point.
+/// The nearest triangle of a skin along the ray, hit from either side, and its vertex nearest to the hit.
 fn hit_skin(form: &SurfaceForm, soft: &SoftState, ray: Ray) -> Option<(Anchor, f64)> {
     let hits = form.triangles.iter().filter_map(|triangle| {
         let corners = triangle.map(|vertex| soft.positions[vertex as usize]);
@@ -109,7 +109,7 @@ fn hit_skin(form: &SurfaceForm, soft: &SoftState, ray: Ray) -> Option<(Anchor, f
     hits.min_by(|a, b| a.1.total_cmp(&b.1))
 }
 
-/// A rope is thin: how much thicker than it is it feels to the pointer.
+/// Radius for picking a rope, as a multiple of its own: ropes are thin.
 const ROPE_GRIP: f64 = 2.0;
 
 fn hit_rope(soft: &SoftState, radius_m: f64, ray: Ray) -> Option<(Anchor, f64)> {
@@ -182,7 +182,7 @@ mod tests {
         let stage = stage(vec![ball(5.0), ball(2.0)]);
         let hit = stage.pick(Ray { origin: DVec3::ZERO, direction: DVec3::X }).unwrap();
         assert_eq!(hit.object, AgentId(1));
-        // a ball of level 3 lies within 8 % of a radius of the real one
+        // a ball of level 3 is within 8 % of a radius of the exact one
         assert!((hit.distance_m - 1.5).abs() < 0.04, "{}", hit.distance_m);
         assert_eq!(stage.pick(Ray { origin: DVec3::ZERO, direction: DVec3::Y }), None);
     }

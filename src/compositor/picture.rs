@@ -1,7 +1,7 @@
-//! A picture before it is drawn: flat arrays that a renderer uploads as they are.
+//! A picture before drawing: flat arrays that a renderer uploads unchanged.
 //!
-//! In: what [`super::Stage`] composes. Out: what [`super::Renderer`] draws. Never here: snapshots, the GPU.
-//! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its bits.
+//! In: the output of [`super::Stage`]. Out: the input of [`super::Renderer`]. Never here: snapshots, the GPU.
+//! Positions are `f32` metres relative to [`Picture::origin`], so that a scene far from the world's origin keeps its precision.
 
 use super::level::Shading;
 use super::skin::Skins;
@@ -11,30 +11,30 @@ use metachron_core::Resolution;
 use metachron_geometry::{Cut, Model, Primitive, PrimitiveMesh, PrimitiveVertex, Texture, patch};
 use std::sync::Arc;
 
-/// What colours mean.
+/// Meaning of the colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Colouring {
     /// The objects' own materials.
     #[default]
     Material,
-    /// The resolution (ε, n) they are drawn at: the hue is n, stripes are the intervals ε.
+    /// The resolution (ε, n) that objects are drawn at: the hue is n, stripes are the intervals ε.
     Resolution,
-    /// The age of what is shown: from blue (now) to red (0.1 s and older).
+    /// The age of the displayed state: from blue (now) to red (0.1 s and older).
     Age,
-    /// How much of its detail an object is drawn with, from nearly black (its coarsest) to white (its finest), as (FS93) shows it.
+    /// The fraction of its detail that an object is drawn with, from nearly black (its coarsest) to white (its finest), as in (FS93).
     Detail,
 }
 
-/// How a picture is drawn.
+/// Drawing options of a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Style {
-    /// What colours mean.
+    /// Meaning of the colours.
     pub colouring: Colouring,
     /// Whether every edge is drawn as a line.
     pub wireframe: bool,
 }
 
-/// One end of an interval of a tube, as the GPU reads it: 64 bytes.
+/// One end of an interval of a tube, in the GPU's layout: 64 bytes.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct SkinSample {
@@ -48,19 +48,19 @@ pub struct SkinSample {
     pub radius_slope: f32,
     /// Unit vector across the curve.
     pub normal: [f32; 3],
-    /// Angle of the matter past the normal, radians.
+    /// Angle of the material past the normal, radians.
     pub twist_rad: f32,
     /// Rest arc length, metres.
     pub arc_m: f32,
-    /// Repeats of the skin's texture a metre.
+    /// Repeats of the skin's texture per metre.
     pub texture_per_m: f32,
     /// Colour, sRGB, and material number.
     pub colour: [u8; 4],
-    /// Tint laid over everything, and how much of it.
+    /// Tint over everything (sRGB), and its opacity.
     pub tint: [u8; 4],
 }
 
-/// One solid, as the GPU reads it: 64 bytes.
+/// One solid, in the GPU's layout: 64 bytes.
 #[derive(Debug, Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub struct SolidInstance {
@@ -68,29 +68,29 @@ pub struct SolidInstance {
     pub rotation: [f32; 4],
     /// Position.
     pub position: [f32; 3],
-    /// Radius of the ball swept over the core, metres; of points how many times larger they are drawn.
+    /// Radius of the ball swept over the core, metres; for points the factor by which they are enlarged.
     pub radius_m: f32,
-    /// Half extents of the core, metres; of models their scale.
+    /// Half extents of the core, metres; for models their scale.
     pub extents: [f32; 3],
-    /// Of [`MeshKey::Glide`] how far it lies on its way, 0 … 1; else 0.
+    /// Morph fraction of a [`MeshKey::Glide`], 0 … 1; else 0.
     pub glide: f32,
     /// Colour, sRGB, and material number.
     pub colour: [u8; 4],
-    /// Tint laid over everything, and how much of it.
+    /// Tint over everything (sRGB), and its opacity.
     pub tint: [u8; 4],
-    /// Repeats a metre of a texture that lies on sides, 0 for one that lies as the corners say; and nothing.
+    /// Repeats per metre of a texture projected on sides, 0 for one with texture coordinates; the second is unused.
     pub wrap: [f32; 2],
 }
 
-/// One corner of a mesh, as the GPU reads it: 32 bytes.
+/// One corner of a mesh, in the GPU's layout: 32 bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct MeshCorner {
-    /// Place on the core.
+    /// Position on the core.
     pub core: [f32; 3],
     /// Unit normal.
     pub normal: [f32; 3],
-    /// Place on a texture.
+    /// Texture coordinates.
     pub uv: [f32; 2],
 }
 
@@ -100,20 +100,20 @@ impl From<&PrimitiveVertex> for MeshCorner {
     }
 }
 
-/// Which mesh a run of solids uses.
+/// The mesh of a run of solids.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum MeshKey {
     /// A primitive at a level n.
     Primitive(Primitive, u8),
-    /// Number of a mesh in [`Picture::meshes`].
+    /// Index of a mesh in [`Picture::meshes`].
     Given(u32),
-    /// A cut of the mesh of this number in [`Picture::models`].
+    /// A cut of the mesh with this index in [`Picture::models`].
     Cut(u32, Cut),
-    /// The same on its way to the cut of so many vertices: model, cut, vertices.
+    /// The same, morphing to a coarser cut: model, cut, vertex count of the coarser cut.
     Glide(u32, Cut, u32),
-    /// So many triangles from the start of a rung of the foliage of this number in [`Picture::models`]: model, rung, triangles.
+    /// The first triangles of a foliage level in [`Picture::models`]: model, rung, triangles.
     Part(u32, u8, u32),
-    /// A sharp box whose sides are cut into so many cells along x, y and z, each at least 1.
+    /// A sharp box whose sides are divided into this many cells along x, y and z, each at least 1.
     Slab([u8; 3]),
 }
 
@@ -122,24 +122,24 @@ pub enum MeshKey {
 pub struct TubeRun {
     /// Its first sample.
     pub first: u32,
-    /// How many intervals.
+    /// Number of intervals.
     pub intervals: u32,
     /// Level of the patch.
     pub n: u8,
-    /// Whether the skin is tissue, with a texture where it is lit at every pixel.
+    /// Whether the skin is tissue, with a texture where it is lit per pixel.
     pub tissue: bool,
-    /// How it is shaded.
+    /// Shading.
     pub shading: Shading,
-    /// Whether the camera sees it; what it does not see is drawn into the shadow only.
+    /// Whether it is visible; otherwise it is drawn into the shadow map only.
     pub shown: bool,
 }
 
-/// What solids of a run have in common: runs follow each other in this order.
+/// Properties that the solids of a run share: runs follow each other in this order.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct SolidKind {
-    /// How they are shaded.
+    /// Shading.
     pub shading: Shading,
-    /// Number of the texture that is drawn on them in [`Picture::textures`], from 1; 0 where none is.
+    /// Number of their texture in [`Picture::textures`], from 1; 0 for none.
     pub texture: u32,
     /// Their mesh.
     pub mesh: MeshKey,
@@ -148,11 +148,11 @@ pub struct SolidKind {
 /// Solids of one kind: instances `first .. first + count`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SolidRun {
-    /// What they have in common.
+    /// Shared properties.
     pub kind: SolidKind,
     /// The first instance.
     pub first: u32,
-    /// How many.
+    /// Number of instances.
     pub count: u32,
 }
 
@@ -167,18 +167,18 @@ pub struct FloorDraw {
     pub colour: [u8; 3],
 }
 
-/// Everything a renderer needs for one frame; storage is used again.
+/// All data that a renderer needs for one frame; storage is reused.
 #[derive(Debug, Clone)]
 pub struct Picture {
-    /// What positions are relative to, metres.
+    /// The point that positions are relative to, metres.
     pub origin: DVec3,
-    /// Centre of what the light falls on, metres, world axes.
+    /// Centre of the region that the light is fitted to, metres, world axes.
     pub focus_m: DVec3,
-    /// Radius of what the light falls on, metres.
+    /// Radius of that region, metres.
     pub focus_radius_m: f64,
-    /// Lower and upper corner of the box around everything that casts a shadow worth drawing, metres, world axes.
+    /// Lower and upper corner of the box around all objects whose shadows are drawn, metres, world axes.
     pub shadowed_m: (DVec3, DVec3),
-    /// How it is drawn.
+    /// Drawing options.
     pub style: Style,
     /// All tubes' samples.
     pub samples: Vec<SkinSample>,
@@ -192,11 +192,11 @@ pub struct Picture {
     pub skins: Skins,
     /// The floor, if there is one.
     pub floor: Option<FloorDraw>,
-    /// Meshes that are no primitives.
+    /// Meshes that are not primitives.
     pub meshes: Arc<[PrimitiveMesh]>,
-    /// What is drawn with any number of triangles.
+    /// Models that can be drawn with any number of triangles.
     pub models: Arc<[Model]>,
-    /// What is painted on them.
+    /// Their textures.
     pub textures: Arc<[Arc<Texture>]>,
 }
 
@@ -222,7 +222,7 @@ impl Default for Picture {
 }
 
 impl Picture {
-    /// Empties the picture, keeping its storage.
+    /// Clears the picture; storage is kept.
     pub(super) fn clear(&mut self) {
         self.samples.clear();
         self.tubes.clear();
@@ -232,7 +232,7 @@ impl Picture {
         self.floor = None;
     }
 
-    /// Triangles of the picture, without those of its shadows.
+    /// Triangles of the picture, without those of its shadow map.
     #[must_use]
     pub fn triangles(&self) -> u64 {
         let tubes =
@@ -267,11 +267,11 @@ pub fn resolution_colour(at: Resolution) -> [u8; 3] {
 /// The shade of a level: dark grey is the coarsest an object has, white its finest.
 #[must_use]
 pub fn detail_colour(detail: f32) -> [u8; 3] {
-    // a cast of floats saturates, and takes NaN to 0
+    // a cast of floats saturates, and maps NaN to 0
     [(28.0 + 227.0 * detail.clamp(0.0, 1.0)) as u8; 3]
 }
 
-/// Past this age what is shown is as red as it gets, seconds.
+/// Ages beyond this are drawn fully red, seconds.
 const AGE_RED_S: f64 = 0.1;
 
 /// The colour of an age: blue is now, red is 0.1 s and older.

@@ -1,17 +1,17 @@
-//! States between and beyond snapshots.
+//! Interpolated and extrapolated states of snapshots.
 //!
-//! In: one or two snapshots and a time. Out: a body at a time, written into storage that is used again.
-//! Never here: which snapshots an object has. Curves that were divided anew in between are matched by rest arc length.
+//! In: one or two snapshots and a time. Out: a body at a time, written into reused storage.
+//! Never here: the choice of snapshots. Curves whose division changed between snapshots are matched by rest arc length.
 
 use glam::{DQuat, DVec3};
 use metachron_core::{Body, CurveState, RigidState, SimTime, Snapshot, SoftState, ToolState};
 
-/// Past this age states are no longer carried on, seconds: an agent that stopped must not fly apart.
+/// Limit of extrapolation, seconds: the displayed state of an agent that stopped must not fly apart.
 const BEYOND_MAX_S: f64 = 0.1;
 
-/// Writes the state between two snapshots that belongs to the frame at `time`, one step of the agent earlier; its time.
+/// Writes the state between two snapshots for the frame at `time`, one step of the agent earlier; returns its time.
 ///
-/// A state one step old lies between two published ones as long as the agent keeps its rate.
+/// The state one step earlier is between two published ones as long as the agent keeps its rate.
 pub fn between(before: &Snapshot, newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
     let span = newest.moment().secs_after(before.moment());
     let step = span / newest.steps.saturating_sub(before.steps).max(1) as f64;
@@ -24,7 +24,7 @@ pub fn between(before: &Snapshot, newest: &Snapshot, time: SimTime, into: &mut B
     SimTime::from_nanos(before.moment().as_nanos() + u64::try_from(late.as_nanos()).unwrap_or(0))
 }
 
-/// Writes the newest state carried on by its velocities to the frame at `time`; its time.
+/// Writes the newest state extrapolated by its velocities to the frame at `time`; returns its time.
 pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
     let age_s = time.secs_after(newest.moment()).clamp(0.0, BEYOND_MAX_S);
     copy(&newest.body, into);
@@ -51,7 +51,7 @@ pub fn beyond(newest: &Snapshot, time: SimTime, into: &mut Body) -> SimTime {
     SimTime::from_nanos(newest.moment().as_nanos() + ahead)
 }
 
-/// Copies a body into storage that is used again.
+/// Copies a body into reused storage.
 pub fn copy(from: &Body, into: &mut Body) {
     match from {
         Body::Curve(curve) => {
@@ -71,7 +71,7 @@ pub fn copy(from: &Body, into: &mut Body) {
     }
 }
 
-/// Writes the body at the share `w` of the way from `a` to `b`; `false` where they are not of one kind.
+/// Writes the body interpolated at `w` from `a` to `b`; `false` where they differ in kind.
 fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
     match (a, b) {
         (Body::Curve(a), Body::Curve(b)) if !a.arc_m.is_empty() => blend_curves(a, b, w, into.curve_mut()),
@@ -104,7 +104,7 @@ fn blend(a: &Body, b: &Body, w: f64, into: &mut Body) -> bool {
     true
 }
 
-/// Vertices at the share `w` of the way from `a` to `b`.
+/// Vertices interpolated at `w` from `a` to `b`.
 fn blend_soft(a: &SoftState, b: &SoftState, w: f64, into: &mut SoftState) {
     let between = |from: &[DVec3], to: &[DVec3], into: &mut Vec<DVec3>| {
         into.clear();
@@ -114,12 +114,12 @@ fn blend_soft(a: &SoftState, b: &SoftState, w: f64, into: &mut SoftState) {
     between(&a.velocities, &b.velocities, &mut into.velocities);
 }
 
-/// Turns from `a` to `b` the short way round.
+/// Rotation from `a` to `b` along the shorter arc.
 fn turn(a: DQuat, b: DQuat, w: f64) -> DQuat {
     a.slerp(if a.dot(b) < 0.0 { -b } else { b }, w)
 }
 
-/// Nodes of `b`, each between where its matter was in `a` and where it is in `b`.
+/// Nodes of `b`, each interpolated from the position of its material point in `a`.
 fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
     into.arc_m.clone_from(&b.arc_m);
     into.positions.clear();
@@ -136,7 +136,7 @@ fn blend_curves(a: &CurveState, b: &CurveState, w: f64, into: &mut CurveState) {
     walk.left = 0;
     for (i, &frame) in b.frames.iter().enumerate() {
         let was = walk.frame(0.5 * (b.arc_m[i] + b.arc_m[i + 1])).unwrap_or(frame);
-        into.frames.push(was.lerp(frame, w)); // normalised, the short way: frames of one step lie close
+        into.frames.push(was.lerp(frame, w)); // normalised, along the shorter arc: frames of one step are close
     }
 }
 
@@ -203,7 +203,7 @@ mod tests {
     fn linear_motion_is_interpolated_exactly_one_step_late() {
         let (before, newest) = (at(100, 10, moving(8, 0.1)), at(140, 12, moving(8, 0.14)));
         let mut body = Body::Nothing;
-        // two steps of 20 ms in between: the frame at 150 ms shows 130 ms
+        // the snapshots are two steps of 20 ms apart: the frame at 150 ms shows 130 ms
         let shown = between(&before, &newest, SimTime::from_nanos(150_000_000), &mut body);
         assert_eq!(shown.as_nanos() / 1000, 130_000);
         assert!(heights(&body).iter().all(|z| (z - 0.26).abs() < 1e-15));
@@ -239,7 +239,7 @@ mod tests {
         let mut body = Body::Nothing;
         between(&before, &newest, SimTime::from_nanos(125_000_000), &mut body);
         let Body::Rigid(state) = body else { panic!("not rigid") };
-        assert!(state.rotation.angle_between(DQuat::from_rotation_z(0.5)) < 1e-7); // acos near 1 keeps half the digits
+        assert!(state.rotation.angle_between(DQuat::from_rotation_z(0.5)) < 1e-7); // acos near 1 loses half the digits
     }
 
     #[test]

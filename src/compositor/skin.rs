@@ -1,7 +1,7 @@
-//! Soft bodies in the picture: skins of triangles that move, and ropes as tubes.
+//! Soft bodies in the picture: moving skins of triangles, and ropes as tubes.
 //!
-//! In: vertices as a snapshot shows them, and what joins them. Out: corners with normals for one mesh of the frame, smooth but at the
-//! sharp edges of solids; a framed curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
+//! In: the displayed vertices and their connectivity. Out: corners with normals for one mesh of the frame, smooth except at the sharp edges
+//! of solids; a framed curve. Never here: levels, the GPU. Nothing is allocated once sizes settle.
 
 use super::level::Shading;
 use super::picture::MeshCorner;
@@ -9,13 +9,13 @@ use glam::{DQuat, DVec3};
 use metachron_core::{CurveState, SoftState};
 use metachron_geometry::SurfaceForm;
 
-/// Level of the patches that a rope is drawn with.
+/// Level of the patches of a rope.
 pub const ROPE_LEVEL: u8 = 2;
-/// A sheet is drawn at least this thick, as a share of its edges: thinner, its two faces would fight for the same depths.
+/// Least drawn thickness of a sheet, as a fraction of its edges: below, the depths of its two faces cannot be told apart.
 const THIN_SHARE: f64 = 0.01;
 
-/// Triangles of a solid that share a vertex are shaded as one surface where the cosine between them is at least this, 60°: the bends of
-/// a soft body are smooth, the edges of its shape are edges.
+/// Triangles of a solid that share a vertex are shaded as one surface where the cosine between them is at least this, 60°: the bends of a
+/// soft body stay smooth, the edges of its shape stay sharp.
 const SMOOTH_COS: f64 = 0.5;
 
 /// The corners and triangles of all skins of a frame.
@@ -25,37 +25,37 @@ pub struct Skins {
     pub corners: Vec<MeshCorner>,
     /// Corners of each triangle, counter-clockwise seen from outside.
     pub triangles: Vec<[u32; 3]>,
-    /// Their sides, three a triangle, where edges are drawn.
+    /// Their sides, three per triangle, where edges are drawn.
     pub sides: Vec<[u32; 2]>,
-    /// Which triangles belong to which instance of the picture.
+    /// The triangles of each instance of the picture.
     pub runs: Vec<SkinRun>,
 }
 
 /// One skin.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct SkinRun {
-    /// Its first triangle, and how many it has.
+    /// Its first triangle, and the number of triangles.
     pub triangles: (u32, u32),
-    /// The instance of [`super::Picture::instances`] that tells its colour and how thick it is.
+    /// The instance of [`super::Picture::instances`] with its colour and thickness.
     pub instance: u32,
-    /// How it is shaded.
+    /// Shading.
     pub shading: Shading,
 }
 
-/// How one skin is added.
+/// Options of adding one skin.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SkinWish {
-    /// What positions are relative to, metres.
+    /// The point that positions are relative to, metres.
     pub origin: DVec3,
-    /// The instance of its colour.
+    /// The instance with its colour.
     pub instance: u32,
-    /// How it is shaded.
+    /// Shading.
     pub shading: Shading,
     /// Whether its edges are drawn.
     pub edges: bool,
 }
 
-/// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others stand behind all vertices.
+/// The surfaces that meet at each vertex of a solid: the first has the vertex's number, others are stored after all vertices.
 #[derive(Debug, Default)]
 struct Faces {
     all: Vec<Face>,
@@ -67,25 +67,25 @@ struct Faces {
 #[derive(Debug, Clone, Copy)]
 struct Face {
     vertex: u32,
-    /// The normal of its first triangle; zero before that is known.
+    /// The normal of its first triangle; zero until that is known.
     first: DVec3,
-    /// The normals of its triangles, added by area.
+    /// The area-weighted sum of its triangles' normals.
     sum: DVec3,
     /// The next surface at this vertex.
     next: Option<u32>,
 }
 
-/// Room to work in.
+/// Reused scratch storage.
 #[derive(Debug, Default)]
 pub(super) struct SkinRoom {
     normals: Vec<DVec3>,
     faces: Faces,
-    /// How many triangles each edge of a sheet has: those with one are its rim.
+    /// The sides of a sheet's triangles; after `find_rim` only its border edges, which belong to one triangle.
     rim: Vec<[u32; 2]>,
 }
 
 impl Skins {
-    /// Empties the list, keeping its storage.
+    /// Clears the list; storage is kept.
     pub(super) fn clear(&mut self) {
         self.corners.clear();
         self.triangles.clear();
@@ -93,7 +93,7 @@ impl Skins {
         self.runs.clear();
     }
 
-    /// Adds the skin of a body that is drawn by an instance, with its sides where edges are drawn.
+    /// Adds the skin of a body that an instance draws, with its sides where edges are drawn.
     pub(super) fn add(&mut self, form: &SurfaceForm, soft: &SoftState, wish: SkinWish, room: &mut SkinRoom) {
         let SkinWish { origin, instance, shading, edges } = wish;
         let (first, from) = (self.corners.len() as u32, self.triangles.len() as u32);
@@ -144,7 +144,7 @@ impl Faces {
         }
     }
 
-    /// The surface at `vertex` that a triangle with this normal belongs to; a triangle without one, to the first.
+    /// The surface at `vertex` that a triangle with this normal belongs to; a degenerate triangle belongs to the first.
     fn face(&mut self, vertex: u32, normal: DVec3) -> u32 {
         let mut at = vertex;
         loop {
@@ -179,7 +179,7 @@ impl SkinRoom {
         self.normals.iter_mut().for_each(|normal| *normal = normal.normalize_or(DVec3::Z));
     }
 
-    /// Finds the sides of triangles that have no neighbour, each in the direction of its triangle.
+    /// Finds the sides of triangles without a neighbour, each in the direction of its triangle.
     fn find_rim(&mut self, form: &SurfaceForm) {
         self.rim.clear();
         self.rim.extend(form.triangles.iter().flat_map(|&[a, b, c]| [[a, b], [b, c], [c, a]]));
@@ -199,12 +199,12 @@ impl SkinRoom {
     }
 }
 
-/// How thick a skin is drawn about its vertices, metres.
+/// Drawn half thickness of a skin about its vertices, metres.
 pub(super) fn drawn_radius_m(form: &SurfaceForm) -> f64 {
     if form.closed { 0.0 } else { form.radius_m.max(THIN_SHARE * form.edge_m) }
 }
 
-/// A rope as a framed curve, its frames turned no more than it bends; into storage that is used again.
+/// A rope as a framed curve with frames of minimal rotation; into reused storage.
 pub(super) fn curve_of_rope(soft: &SoftState, radius_m: f64, curve: &mut CurveState) {
     curve.positions.clone_from(&soft.positions);
     curve.velocities.clone_from(&soft.velocities);
@@ -298,7 +298,7 @@ mod tests {
             let flat = (b - a).cross(c - a).normalize();
             assert!(corners.iter().all(|corner| flat.dot(corner.normal.into()) > 1.0 - 1e-6), "a side is flat");
         }
-        // the room remembers nothing of the body before
+        // no data of the previous body is left in the scratch storage
         skins.clear();
         skins.add(&form, &soft, wish, &mut room);
         assert_eq!((skins.corners.len(), skins.triangles.len()), (24, 12));

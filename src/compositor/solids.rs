@@ -1,6 +1,6 @@
 //! Solids, tools, fixed props and scenery in the picture: one instance each, in runs of a kind.
 //!
-//! In: objects as they are posed, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, which level is right.
+//! In: posed objects, levels. Out: instances of a [`Picture`]. Never here: tubes, skins, the choice of levels.
 
 use super::compose::{Paint, instance, level, tint};
 use super::gather::{Actor, Form, Material, PropShape, Stage, Track};
@@ -13,25 +13,26 @@ use metachron_geometry::{Model, Primitive, Rounding, Rung, Solid, ToolShape};
 
 /// Level at which fixed solids are drawn.
 const PROP_LEVEL: u8 = 4;
-/// Cells of a fixed box are at most this share of the light's radius long: light is close to linear across one.
+/// Cells of a fixed box are at most this fraction of the light's radius long: light is close to linear across one.
 const CELL_SHARE: f64 = 0.125;
-/// Most cells along a side of a fixed box; a larger one is lit pixel by pixel everywhere.
+/// Most cells along a side of a fixed box; a larger box is lit per pixel everywhere.
 const CELLS_MAX: f64 = 24.0;
-/// Triangles beyond those asked for with which meshes may get coarser slowly, as a part of all that were asked for.
+/// Triangles by which coarsening meshes may exceed their request in total, as a fraction of all triangles requested.
 const GLIDE_SHARE: f64 = 0.05;
 
-/// Solids by the way they are drawn, before they are put in order.
+/// Solids by kind, before sorting.
 pub(super) type Solids = Vec<(SolidKind, SolidInstance)>;
 
 impl Stage {
-    /// Lets meshes change their cut over so many frames from now on; 0 (as at the start) and 1 are at once.
+    /// Lets meshes change their cut over this many frames from now on; 0 (the initial value) and 1 are immediate.
     ///
-    /// What gets coarser is then drawn with more triangles than asked for on its way, a twentieth of the meshes' at most.
+    /// A coarsening mesh then has more triangles than requested until its morph ends; the excess is at most a twentieth of all meshes'
+    /// triangles.
     pub const fn glide_over(&mut self, frames: u8) {
         self.glide_frames = frames;
     }
 
-    /// What gliding may cost in the next picture.
+    /// Limits on morphs in the next picture.
     pub(super) fn allowance(&self, levels: &[Level], shown: &[usize]) -> Allowance {
         if self.glide_frames < 2 {
             return Allowance { step: 1.0, triangles: 0.0 };
@@ -47,13 +48,13 @@ impl Stage {
     }
 }
 
-/// What a mesh without a texture of its own is drawn as.
+/// The kind of a mesh without its own texture.
 pub(super) fn kind(shading: Shading, mesh: MeshKey) -> SolidKind {
     let shading = if shading == Shading::Textured { Shading::PerPixel } else { shading };
     SolidKind { shading, texture: 0, mesh }
 }
 
-/// The mesh and size of a solid at level `n`; `None` for one that is not drawn so.
+/// The mesh and size of a solid at level `n`; `None` for one that has neither a given mesh nor a primitive.
 fn mesh_of(solid: &Solid, given: Option<u32>, n: u8) -> Option<(MeshKey, Rounding)> {
     if let Some(number) = given {
         return Some((MeshKey::Given(number), Rounding { extents: Vec3::ONE, radius_m: 0.0 }));
@@ -82,7 +83,7 @@ pub(super) fn add_solid(
     }
 }
 
-/// Scenery that is seen: as much of its mesh as its level says.
+/// Adds visible scenery with the triangles that its level gives.
 fn add_scenery(
     track: &mut Track,
     level: Level,
@@ -101,7 +102,7 @@ fn add_scenery(
         }
         Model::Foliage(foliage) => {
             let prefix = foliage.cut(level.triangles);
-            // a mesh is not swept: only strokes grow
+            // growth applies to strokes only: a mesh is not swept
             let is_mesh = matches!(foliage.rungs().get(usize::from(prefix.rung)), Some(Rung::Mesh(_)));
             (MeshKey::Part(number, prefix.rung, prefix.triangles), if is_mesh { 0.0 } else { prefix.growth }, 0.0)
         }
@@ -138,8 +139,8 @@ pub(super) fn add_prop(prop: &PropShape, picture: &mut Picture, solids: &mut Sol
     solids.push((kind(Shading::PerPixel, mesh), instance(prop.position - picture.origin, prop.rotation, size, paint)));
 }
 
-/// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and cut into cells small enough to be lit at their
-/// corners. Brushed metal is not, nor is what is far larger than the light.
+/// A fixed box as a slab: sharp, since boxes are joined to trays and tables, and divided into cells small enough to be lit per vertex.
+/// Excluded are brushed metal, and boxes far larger than the light's region.
 fn slab_of(prop: &PropShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)> {
     let Solid::Box { half_extents_m } = prop.solid else { return None };
     let cells = (2.0 * half_extents_m / (CELL_SHARE * light_radius_m)).ceil().max(DVec3::ONE);
@@ -150,7 +151,7 @@ fn slab_of(prop: &PropShape, light_radius_m: f64) -> Option<(MeshKey, Rounding)>
 
 /// Sorts solids by shading and mesh and cuts them into runs.
 pub(super) fn sort_solids(solids: &mut Solids, picture: &mut Picture) {
-    // the order among equals does not show, so the sort need not allocate to keep it
+    // the order among equal keys does not show, so an unstable sort, which does not allocate, suffices
     solids.sort_unstable_by_key(|(key, _)| *key);
     for (kind, solid) in solids.iter() {
         let first = picture.instances.len() as u32;

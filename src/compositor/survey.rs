@@ -1,40 +1,40 @@
-//! What of the stage is seen, how large and how fast on the screen: what a policy needs to share out a budget.
+//! Visibility, screen size and screen speed of every actor: the input of a policy that divides a budget.
 //!
-//! In: posed objects and a camera. Out: one [`Seen`] an actor. Never here: levels.
+//! In: posed objects and a camera. Out: one [`Seen`] per actor. Never here: levels.
 
 use super::gather::{Form, Stage, Track};
 use super::view::{Camera, Frustum, Size};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState};
 
-/// An actor as the camera sees it.
+/// The view of an actor by the camera.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Seen {
-    /// Which agent.
+    /// The agent.
     pub id: AgentId,
-    /// Whether any of it may be in the picture.
+    /// Whether any part of it may be in the picture.
     pub visible: bool,
-    /// Area it covers, pixels, ≥ 0, hidden parts included; at most the picture's.
+    /// Covered area, pixels, ≥ 0, hidden parts included; at most the picture's.
     pub pixels: f64,
     /// Distance of its centre from the eye, metres.
     pub distance_m: f64,
-    /// How fast it moves across the picture, pixels a second of simulated time: the root mean square over its points.
+    /// Speed across the picture, pixels per second of simulated time: the root mean square over its points.
     pub speed_px_s: f64,
     /// Rest length and mean radius of a tube, metres.
     pub tube_m: Option<(f64, f64)>,
-    /// Distance of its centre from the middle of the picture, as a part of half the diagonal.
+    /// Distance of its centre from the middle of the picture, as a fraction of half the diagonal.
     pub off_centre: f64,
-    /// Distance of its centre from the point that the camera looks at, metres.
+    /// Distance of its centre from the camera's target, metres.
     pub from_focus_m: f64,
-    /// Centre of a ball that holds it, metres.
+    /// Centre of a bounding ball, metres.
     pub centre_m: DVec3,
     /// Radius of that ball, metres.
     pub radius_m: f64,
 }
 
 impl Stage {
-    /// Finds what the camera sees ([`Stage::seen`]). What stays as it is before a camera that stays where it is is not looked at
-    /// again ([`Stage::looked`] says what was). Keeps for [`Stage::compose`] who is visible.
+    /// Updates [`Stage::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`Stage::looked`] lists
+    /// the updated ones). Stores the visibility for [`Stage::compose`].
     pub fn survey(&mut self, camera: &Camera, size: Size) {
         let eye = Some((*camera, size));
         let moved = self.eye != eye;
@@ -55,19 +55,19 @@ impl Stage {
         }
     }
 
-    /// The numbers of the actors that the last [`Stage::survey`] looked at, rising.
+    /// The indices of the actors that the last [`Stage::survey`] updated, ascending.
     #[must_use]
     pub fn looked(&self) -> &[usize] {
         &self.looked
     }
 
-    /// What the last [`Stage::survey`] found, one entry an actor in their order.
+    /// Results of the last [`Stage::survey`], one entry per actor in their order.
     #[must_use]
     pub fn seen(&self) -> &[Seen] {
         &self.found
     }
 
-    /// Centre and radius in metres of a ball that holds one actor, or all of them; `None` where there is nothing to see.
+    /// Centre and radius in metres of a bounding ball of one actor, or of all; `None` where nothing is drawn.
     #[must_use]
     pub fn bounds(&self, of: Option<AgentId>) -> Option<(DVec3, f64)> {
         let wanted = |track: &&Track| of.is_none_or(|id| track.actor.id == id) && track.bounds.radius_m > 0.0;
@@ -96,7 +96,7 @@ fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Se
         Body::Soft(soft) => {
             let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
             let half = bounds.half_m;
-            // the mean side of its box: a sheet covers less, a ball about as much
+            // the mean side of its bounding box: more than a sheet covers, about what a ball covers
             let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
             (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
         }
@@ -121,10 +121,10 @@ fn half_diagonal_px(size: Size) -> f64 {
     (0.5 * f64::from(size.width).hypot(f64::from(size.height))).max(1.0)
 }
 
-/// Area of a tube on the screen: of each segment its projected length times its projected width.
+/// Area of a tube on the screen: the sum over segments of projected length times projected width.
 fn curve_pixels(curve: &CurveState, camera: &Camera, (size, frustum): (Size, &Frustum)) -> f64 {
     let (eye, forward, near_m) = (camera.eye(), camera.forward(), camera.near_m());
-    // pixels that a metre takes across the view at a depth of a metre
+    // pixels per metre across the view at a depth of one metre
     let pixels_m = camera.pixels_per_metre(1.0, size);
     let segment = |i: usize| {
         let (a, b) = (curve.positions[i], curve.positions[i + 1]);
@@ -185,7 +185,7 @@ mod tests {
         let mut plain = Stage::new((0..1010).map(actor).collect(), vec![]);
         (0..1010).for_each(|id| plain.see(AgentId(id), &state(id, 0), true));
         plain.pose(SimTime::ZERO, States::Latest);
-        // ten move on, a thousand have come to rest
+        // ten keep moving, a thousand have come to rest
         let mut frame = |ms: u64, news: &[u32], x: f64| {
             (0..10).for_each(|id| stage.see(AgentId(id), &state(id, ms), true));
             news.iter().for_each(|id| stage.see(AgentId(*id), &state(*id, ms), false));
@@ -203,7 +203,7 @@ mod tests {
         assert_eq!(frame(20, &[], 0.0), (10, 10, 0.0));
         assert_eq!(frame(30, &[], 500.0), (10, 1010, 0.0), "another camera");
         assert_eq!(frame(40, &[], 500.0), (10, 10, 0.0));
-        // five steps of 10 ms have led there, and a frame shows a step less
+        // speed after five steps of 10 ms; a frame shows one step less
         assert_eq!(frame(50, &[700], 500.0), (11, 11, 40.0));
         assert_eq!(frame(60, &[], 500.0), (11, 11, 50.0));
         assert_eq!(frame(70, &[], 500.0), (10, 10, 50.0));

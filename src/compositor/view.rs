@@ -1,7 +1,7 @@
 //! The camera: an orbit about a target with z up, its projection, rays and frustum.
 //!
 //! In: drags and keys as numbers. Out: matrices, rays, pixels. Never here: the GPU, input devices, scenes.
-//! Depth is reversed and without a far plane: near things get the bits.
+//! Depth is reversed and without a far plane, which spreads the floating-point precision evenly over depth.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Mat4};
 use std::f64::consts::TAU;
@@ -16,7 +16,7 @@ pub struct Size {
 }
 
 impl Size {
-    /// Whether there is nothing to draw on.
+    /// Whether it has no pixels.
     #[must_use]
     pub fn is_empty(self) -> bool {
         self.width == 0 || self.height == 0
@@ -36,39 +36,39 @@ impl Size {
 /// A half line in space.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Where it starts, metres.
+    /// Start, metres.
     pub origin: DVec3,
     /// Unit direction.
     pub direction: DVec3,
 }
 
-/// An eye on a sphere about what it looks at; z is up.
+/// A camera on a sphere about its target; z is up.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
-    /// What the eye looks at, metres.
+    /// The target, metres.
     pub target_m: DVec3,
-    /// Distance of the eye from it, metres; kept within 1 cm … 10 km.
+    /// Distance of the eye from the target, metres; clamped to 1 cm … 10 km.
     pub distance_m: f64,
     /// Direction of the eye from the target, about z from x, radians.
     pub yaw_rad: f64,
-    /// Height of the eye above the horizon, radians; kept within ± a right angle less a degree.
+    /// Elevation of the eye above the horizon, radians; clamped to ± a right angle less a degree.
     pub pitch_rad: f64,
     /// Vertical field of view, radians, 0.01 … 3.
     pub fov_y_rad: f64,
 }
 
-/// How near and how far the eye may be from its target, metres.
+/// Least and greatest distance of the eye from its target, metres.
 pub const DISTANCE_M: (f64, f64) = (0.01, 1e4);
-/// A camera that turned by more than this between two frames has jumped: an eighth of a turn, radians.
+/// A turn by more than this between two frames counts as a jump: an eighth of a turn, radians.
 const JUMP_RAD: f64 = TAU / 8.0;
-/// The steepest view: straight up or down has no horizon to keep level.
+/// The steepest view: a view straight up or down has no horizon to keep level.
 pub const PITCH_MAX_RAD: f64 = 1.553;
-/// The nearest thing drawn, as a share of the distance to the target.
+/// Distance of the near plane, as a fraction of the distance to the target.
 const NEAR_SHARE: f64 = 0.01;
 
 impl Camera {
     /// A camera at `eye_m` that looks at `target_m`; `fov_y_rad` is the vertical field of view.
-    /// An eye at its target looks at it from 1 m along x.
+    /// An eye at its target is moved 1 m along x.
     #[must_use]
     pub fn looking(eye_m: DVec3, target_m: DVec3, fov_y_rad: f64) -> Self {
         let arm = eye_m - target_m;
@@ -83,8 +83,8 @@ impl Camera {
         }
     }
 
-    /// The camera after it has gone on as it went from `before` to here, by `times` that way: turning as it turned, about what it looks at.
-    /// One that jumped (by more than half its distance, or an eighth of a turn) stays.
+    /// Extrapolates the motion from `before` to this camera by `times` that change, turning about its target as it did.
+    /// A camera that jumped (by more than half its distance, or an eighth of a turn) is returned unchanged.
     #[must_use]
     pub fn carried_on(&self, before: &Self, times: f64) -> Self {
         let way = self.target_m - before.target_m;
@@ -111,7 +111,7 @@ impl Camera {
         DVec3::new(cos * self.yaw_rad.cos(), cos * self.yaw_rad.sin(), sin)
     }
 
-    /// Where the eye is, metres.
+    /// Position of the eye, metres.
     #[must_use]
     pub fn eye(&self) -> DVec3 {
         self.target_m + self.arm() * self.distance_m
@@ -135,26 +135,26 @@ impl Camera {
         self.right().cross(self.forward())
     }
 
-    /// Distance of the nearest thing drawn, metres.
+    /// Distance of the near plane, metres.
     #[must_use]
     pub fn near_m(&self) -> f64 {
         (self.distance_m * NEAR_SHARE).min(0.1)
     }
 
-    /// Turns the eye about the target as a drag by `pixels` over a picture of `size` asks: its height is half a turn.
+    /// Turns the eye about the target for a drag by `pixels` over a picture of `size`: the full height is half a turn.
     pub fn orbit(&mut self, pixels: DVec2, size: Size) {
         let turn = std::f64::consts::PI / f64::from(size.height.max(1));
         self.yaw_rad = (self.yaw_rad - pixels.x * turn).rem_euclid(std::f64::consts::TAU);
         self.pitch_rad = (self.pitch_rad + pixels.y * turn).clamp(-PITCH_MAX_RAD, PITCH_MAX_RAD);
     }
 
-    /// Moves eye and target so that the point under the pointer stays under it, at the target's distance.
+    /// Moves eye and target so that the point under the pointer, at the target's distance, stays under it.
     pub fn pan(&mut self, pixels: DVec2, size: Size) {
         let scale = 1.0 / self.pixels_per_metre(self.distance_m, size);
         self.target_m += (self.up() * pixels.y - self.right() * pixels.x) * scale;
     }
 
-    /// Brings the eye nearer (`factor` < 1) or takes it away (> 1). A factor that is not above zero is ignored.
+    /// Moves the eye nearer (`factor` < 1) or away (> 1). A factor that is not above zero is ignored.
     pub fn zoom(&mut self, factor: f64) {
         if factor > 0.0 && factor.is_finite() {
             self.distance_m = (self.distance_m * factor).clamp(DISTANCE_M.0, DISTANCE_M.1);
@@ -166,7 +166,7 @@ impl Camera {
         self.target_m += self.right() * step_m.x + self.forward() * step_m.y + self.up() * step_m.z;
     }
 
-    /// Looks at a ball of `radius_m` about `centre_m` so that it fills the picture.
+    /// Targets a ball of `radius_m` about `centre_m` so that it fills the picture.
     pub fn show(&mut self, centre_m: DVec3, radius_m: f64, size: Size) {
         let half = 0.5 * self.fov_y_rad;
         let half = half.min((half.tan() * size.aspect()).atan());
@@ -174,7 +174,7 @@ impl Camera {
         self.distance_m = (radius_m / half.sin()).clamp(DISTANCE_M.0, DISTANCE_M.1);
     }
 
-    /// Pixels that a metre across the view takes at `depth_m` in front of the eye.
+    /// Pixels per metre across the view at `depth_m` in front of the eye.
     #[must_use]
     pub fn pixels_per_metre(&self, depth_m: f64, size: Size) -> f64 {
         f64::from(size.height) / (2.0 * (0.5 * self.fov_y_rad).tan() * depth_m.max(self.near_m()))
@@ -193,7 +193,7 @@ impl Camera {
             * view
     }
 
-    /// The pixel where a point is seen, from the picture's upper left corner, and its depth in metres; `None` behind the eye.
+    /// The pixel of a point, from the picture's upper left corner, and its depth in metres; `None` if nearer than the near plane or behind.
     #[must_use]
     pub fn project(&self, point_m: DVec3, size: Size) -> Option<(DVec2, f64)> {
         let depth = (point_m - self.eye()).dot(self.forward());
@@ -216,7 +216,7 @@ impl Camera {
         Ray { origin: self.eye(), direction }
     }
 
-    /// What of space is in a picture of this size.
+    /// The view volume of a picture of this size.
     #[must_use]
     pub fn frustum(&self, size: Size) -> Frustum {
         let tan_y = (0.5 * self.fov_y_rad).tan();
@@ -227,18 +227,18 @@ impl Camera {
     }
 }
 
-/// The part of space that a camera has in its picture.
+/// The view volume of a camera.
 #[derive(Debug, Clone, Copy)]
 pub struct Frustum {
     eye: DVec3,
     forward: DVec3,
     near_m: f64,
-    /// Right and up: the direction, the tangent of half the angle of view that way, and one over its cosine.
+    /// Right and up: the direction, the tangent of half the angle of view in it, and one over that angle's cosine.
     sides: [(DVec3, f64, f64); 2],
 }
 
 impl Frustum {
-    /// Whether a ball may be seen: it is not wholly outside any side of the view.
+    /// Whether a ball may be visible: it is not wholly outside any side of the view.
     #[must_use]
     pub fn sees(&self, centre_m: DVec3, radius_m: f64) -> bool {
         let from_eye = centre_m - self.eye;
@@ -279,7 +279,7 @@ mod tests {
 
     #[test]
     fn a_camera_that_goes_on_as_it_went_is_carried_on_to_where_it_will_be() {
-        // once around in 7 s while it comes nearer and what it looks at drifts
+        // once around in 7 s while the distance shrinks and the target drifts
         let at = |s: f64| Camera {
             target_m: DVec3::new(0.1 * s, 0.0, 1.0),
             distance_m: 3.0 - 0.2 * s,

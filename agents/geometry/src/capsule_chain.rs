@@ -1,17 +1,17 @@
-//! Strands: balls along a line, joined by spans, and where two of them face each other.
+//! Strands: balls along a polyline, joined by spans, and the facing points of two of them.
 //!
-//! In: nodes with radii. Out: feet of nodes, facing points, gaps. Never here: which pairs are worth a look, motion.
+//! In: nodes with radii. Out: feet of nodes, facing points, gaps. Never here: the choice of pairs, motion.
 //! Theory: `docs/theory/contact.md`, eq. 18.
 
 use super::signed_distance::{Ball, Touch};
 use glam::DVec3;
 
-/// Axes nearer than this cross: no way leads from one to the other, metres.
+/// Axes closer than this cross: the direction between them is undefined, metres.
 const CROSSING_M: f64 = 1e-9;
 
-/// The share of `segment` at which `point` has its foot on a chain of nodes, at least two. Each foot is told by one segment: at
-/// a joint that sticks out by the later one, past an end of the chain by the last one there. A segment without length has it at
-/// its start.
+/// The fraction of `segment` at which `point` has its foot on a chain of at least two nodes; `None` where another segment has it. Each foot
+/// belongs to exactly one segment: at a convex joint to the later one, past an end of the chain to the last one there. A segment without
+/// length has it at its start.
 pub fn foot(point: DVec3, chain: &[DVec3], segment: usize) -> Option<f64> {
     let share = |k: usize| {
         let way = chain[k + 1] - chain[k];
@@ -26,13 +26,12 @@ pub fn foot(point: DVec3, chain: &[DVec3], segment: usize) -> Option<f64> {
     ours.then_some(here.max(0.0))
 }
 
-/// How two points of two spans face each other: the normal from the second to the first and the distance of the surfaces, and
-/// the radii there.
+/// The facing of two points of two spans: the normal from the second to the first, the distance of the surfaces, and the radii there.
 pub fn facing(first: [Ball; 2], second: [Ball; 2], shares: [f64; 2]) -> (Touch, [f64; 2]) {
     let (a, b) = (first[0].toward(first[1], shares[0]), second[0].toward(second[1], shares[1]));
     let way = a.centre - b.centre;
     let distance = way.length();
-    // axes that cross have no way between them: across both is as good as any
+    // crossing axes have no direction between them: the normal of both axes is used
     let across = || {
         let [u, v] = [first, second].map(|ends| ends[1].centre - ends[0].centre);
         let along = if u == DVec3::ZERO { v } else { u };

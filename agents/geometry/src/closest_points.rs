@@ -2,14 +2,14 @@
 
 use glam::DVec3;
 
-/// Below this sine squared two segments count as parallel: 1e-4 of a radian, where the crossing moves by a whole length
-/// for a change of 1e-4 lengths.
+/// Below this sine squared two segments count as parallel: 1e-4 of a radian, where an angle change of 1e-4 moves the crossing by a whole
+/// length.
 const PARALLEL_SINE2: f64 = 1e-8;
 
-/// The shares (s, t) of two segments at which they are nearest.
+/// The fractions (s, t) of two segments at which they are nearest.
 ///
-/// Where parallel segments run beside each other every pair of points is as near: the middle of the common stretch is taken,
-/// so that the answer does not jump from end to end.
+/// Where parallel segments overlap lengthwise, every pair of points is equally near: the middle of the overlap is taken, so that the result
+/// does not jump from end to end.
 pub fn near_segments([a0, a1]: [DVec3; 2], [b0, b1]: [DVec3; 2]) -> (f64, f64) {
     let (u, v, w) = (a1 - a0, b1 - b0, a0 - b0);
     let (uu, vv, uv) = (u.length_squared(), v.length_squared(), u.dot(v));
@@ -28,7 +28,7 @@ pub fn near_segments([a0, a1]: [DVec3; 2], [b0, b1]: [DVec3; 2]) -> (f64, f64) {
     (s, on_b(s))
 }
 
-/// The share `top / bottom` of a segment, kept on it; 0 for a segment without length.
+/// The fraction `top / bottom` of a segment, clamped to it; 0 for a segment without length.
 fn share(top: f64, bottom: f64) -> f64 {
     if bottom > 0.0 { (top / bottom).clamp(0.0, 1.0) } else { 0.0 }
 }

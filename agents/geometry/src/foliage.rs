@@ -1,35 +1,35 @@
-//! Many small pieces that can be drawn any number at a time: the trunk and the leaves of a tree (RH05, §6).
+//! Many small pieces that can be drawn in any number: the trunk and the leaves of a tree (RH05, §6).
 //!
-//! In: a seed and sizes. Out: rungs from points and lines up to meshes, and which prefix of which rung a count of triangles buys.
-//! Never here: which count is right, the GPU. Pieces that count most come first, so every prefix is the best of its length.
+//! In: a seed and sizes. Out: rungs (levels) from points and lines up to meshes, and the prefix of a rung for a number of triangles.
+//! Never here: the choice of the number, the GPU. The most important pieces come first, so every prefix is the best of its length.
 
 use super::{PrimitiveMesh, PrimitiveVertex};
 use glam::{DVec3, Vec3};
 use std::f64::consts::TAU;
 
-/// A line or a point that faces whoever looks: a bough or a leaf from afar.
+/// A line or a point that faces the camera: a bough or a leaf from afar.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Stroke {
-    /// Where it begins, or is, metres.
+    /// Start of a line, or position of a point, metres.
     pub from: Vec3,
-    /// Of a line the way to its end, metres; of a point its unit normal.
+    /// Vector to the end of a line, metres; unit normal of a point.
     pub way: Vec3,
-    /// Half the width of a line; of a point the distance of its three corners, metres.
+    /// Half the width of a line; distance of a point's three corners from it, metres.
     pub radius_m: f32,
 }
 
-/// One way to draw all pieces.
+/// One representation of all pieces.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Rung {
-    /// One triangle a piece, turned to the eye; fewer of them are drawn larger, so that as much is covered.
+    /// One triangle per piece, turned to the camera; fewer of them are drawn larger, so that the covered area stays the same.
     Points(Vec<Stroke>),
-    /// Two triangles a piece, turned to the eye.
+    /// Two triangles per piece, turned to the camera.
     Lines(Vec<Stroke>),
     /// Triangles, piece by piece.
     Mesh(PrimitiveMesh),
 }
 
-/// Pieces in rungs that need more and more triangles.
+/// Pieces in rungs with increasing numbers of triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Foliage {
     rungs: Vec<Rung>,
@@ -38,30 +38,30 @@ pub struct Foliage {
 /// The first pieces of one rung.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prefix {
-    /// Number of the rung.
+    /// Index of the rung.
     pub rung: u8,
-    /// How many triangles of it.
+    /// Number of its triangles.
     pub triangles: u32,
-    /// How many times larger than it is each point is drawn.
+    /// Enlargement of each point.
     pub growth: f32,
 }
 
-/// What grows.
+/// Parameters of a tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeSpec {
     /// Seed of its shape.
     pub seed: u64,
     /// Height, metres, > 0.
     pub height_m: f64,
-    /// Boughs, each a stretch of trunk or branch, ≥ 1.
+    /// Boughs, each a segment of trunk or branch, ≥ 1.
     pub branches: u32,
     /// Leaves, ≥ 1.
     pub leaves: u32,
-    /// Whether it has one rung only, whose longest affordable prefix is drawn.
+    /// Whether it has only the finest rung, of which a prefix is drawn.
     pub prefix: bool,
 }
 
-/// Sides of a bough in the rungs of a trunk that are meshes: the last is what it looks like from near.
+/// Sides of a bough in the mesh rungs of a trunk: the last is the one seen from near.
 const SIDES: [u32; 3] = [3, 4, 5];
 
 impl Rung {
@@ -77,20 +77,20 @@ impl Rung {
 }
 
 impl Foliage {
-    /// The rungs, from the cheapest on.
+    /// The rungs, cheapest first.
     #[must_use]
     pub fn rungs(&self) -> &[Rung] {
         &self.rungs
     }
 
-    /// The fewest triangles worth drawing, and all of the finest rung.
+    /// The fewest triangles that can be drawn, and the number of the finest rung.
     #[must_use]
     pub fn range(&self) -> (u32, u32) {
         let least = if matches!(self.rungs.first(), Some(Rung::Lines(_))) { 2 } else { 1 };
         (least, self.rungs.last().map_or(0, Rung::triangles))
     }
 
-    /// What so many triangles buy: the finest rung that they pay for whole, else the beginning of the first.
+    /// The prefix for `triangles`: the finest rung that fits whole, else the beginning of the first.
     #[must_use]
     pub fn cut(&self, triangles: u32) -> Prefix {
         let whole = self.rungs.iter().rposition(|rung| rung.triangles() <= triangles);
@@ -106,7 +106,7 @@ impl Foliage {
     }
 }
 
-/// The trunk with its boughs, thick ones first, and the leaves, in no order.
+/// The trunk with its boughs, thick ones first, and the leaves, in random order.
 #[must_use]
 pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
     let mut chance = Chance(spec.seed);
@@ -119,7 +119,7 @@ pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
     let trunk = std::iter::once(Rung::Lines(lines.collect()));
     let trunk = trunk.chain(SIDES.map(|sides| Rung::Mesh(bough_mesh(&grown.boughs, sides))));
     let leaves = leaves(spec, &grown, &mut chance);
-    // a triangle turned to the eye covers what a leaf that hangs any way covers on the mean: half its area
+    // a triangle turned to the camera covers as much as a randomly oriented leaf does on average: half its area
     let side = LEAF_SIDE * spec.height_m / libm::sqrt(f64::from(spec.leaves.max(1)));
     let radius_m = libm::sqrt(2.0 * side * side / (3.0 * libm::sqrt(3.0))) as f32;
     let points = leaves.iter().map(|l| Stroke { from: l.at.as_vec3(), way: l.normal.as_vec3(), radius_m });
@@ -128,14 +128,14 @@ pub fn tree(spec: &TreeSpec) -> [Foliage; 2] {
     [Foliage { rungs: keep(trunk.collect()) }, Foliage { rungs: keep(vec![Rung::Points(points.collect()), hanging]) }]
 }
 
-/// Side of a leaf as a share of the height over the square root of their number: together they cover the crown about once.
+/// Side of a leaf as a fraction of the height over the square root of their number: together they cover the crown about once.
 const LEAF_SIDE: f64 = 0.55;
-/// Length of the first bough as a share of the height, and of each next one of the one before.
+/// Length of the first bough as a fraction of the height, and of each next one as a fraction of the one before.
 const BOUGH: (f64, f64) = (0.22, 0.86);
-/// Radius of the trunk as a share of the height, and of each next bough of the one before: along and to the side.
+/// Radius of the trunk as a fraction of the height, and of each next bough as a fraction of the one before: along and to the side.
 const GIRTH: (f64, f64, f64) = (0.028, 0.84, 0.62);
 
-/// A stretch of trunk or branch.
+/// A segment of trunk or branch.
 #[derive(Clone, Copy)]
 struct Bough {
     from: DVec3,
@@ -149,7 +149,7 @@ struct Leaf {
     normal: DVec3,
 }
 
-/// What is still to grow.
+/// The end of a bough that can grow.
 #[derive(Clone, Copy)]
 struct Bud {
     at: DVec3,
@@ -163,7 +163,7 @@ struct Grown {
     buds: Vec<Bud>,
 }
 
-/// Always the thickest bud grows next: it becomes a bough with two buds at its end.
+/// Repeatedly grows the thickest bud: it becomes a bough with two buds at its end.
 fn grow(spec: &TreeSpec, chance: &mut Chance) -> Grown {
     let height = spec.height_m;
     let first = Bud { at: DVec3::ZERO, way: DVec3::Z, radius_m: GIRTH.0 * height, length_m: BOUGH.0 * height };
@@ -185,7 +185,7 @@ fn grow(spec: &TreeSpec, chance: &mut Chance) -> Grown {
     grown
 }
 
-/// Leaves around what would have grown next, facing away from the trunk's middle, more or less.
+/// Leaves around the remaining buds, facing roughly away from the buds' centre.
 fn leaves(spec: &TreeSpec, grown: &Grown, chance: &mut Chance) -> Vec<Leaf> {
     let middle = grown.buds.iter().map(|b| b.at).sum::<DVec3>() / grown.buds.len().max(1) as f64;
     let leaf = |_| {
@@ -237,7 +237,7 @@ fn leaf_mesh(leaves: &[Leaf], side: f64) -> PrimitiveMesh {
     mesh
 }
 
-/// Numbers from a seed: splitmix.
+/// Pseudo-random numbers from a seed: splitmix.
 struct Chance(u64);
 
 impl Chance {
@@ -249,7 +249,7 @@ impl Chance {
         z ^ (z >> 31)
     }
 
-    /// 0 … 1.
+    /// Uniform in 0 … 1.
     fn share(&mut self) -> f64 {
         (self.next() >> 11) as f64 / (1_u64 << 53) as f64
     }

@@ -1,12 +1,12 @@
-//! Furniture as boxes: what rooms of experiments are filled with.
+//! Furniture as boxes, for the rooms of experiments.
 //!
-//! In: nothing. Out: centres, half extents, and how round edges are, metres. Never here: triangles.
-//! No two boxes share a corner: meshes weld what is at one place.
+//! In: nothing. Out: centres, half extents, and edge roundness, metres. Never here: triangles.
+//! No two boxes share a corner: meshes weld coincident points.
 
-/// Centre, half extents, and how round its edges are: 0 a box, 1 halfway to a ball.
+/// Centre, half extents, and edge roundness: 0 a box, 1 halfway to a ball.
 pub(super) type Part = ([f64; 3], [f64; 3], f64);
 
-/// Cushion, back, two arms and a foot.
+/// Seat, back, two arms and a foot.
 pub(super) const SEAT: [Part; 5] = [
     ([0.0, 0.02, 0.42], [0.24, 0.24, 0.07], 0.6),
     ([0.0, -0.26, 0.72], [0.24, 0.06, 0.28], 0.6),
@@ -42,7 +42,7 @@ pub(super) const DOOR: [Part; 5] = [
     ([0.0, 0.0, 0.01], [0.419, 0.078, 0.009], 0.0),
 ];
 
-/// Five of them, thick and thin, high and low.
+/// Five books, thick and thin, high and low.
 pub(super) const BOOKS: [Part; 5] = [
     ([-0.12, 0.0, 0.14], [0.028, 0.1, 0.14], 0.1),
     ([-0.06, 0.01, 0.125], [0.022, 0.09, 0.125], 0.1),

@@ -1,6 +1,6 @@
-//! Meshes from a formula and a seed, so that scenes for experiments need no files.
+//! Procedural meshes from a formula and a seed, so that scenes for experiments need no files.
 //!
-//! In: what kind, a seed, how many triangles. Out: a mesh of a size of about one metre. Never here: levels, files.
+//! In: a kind, a seed, a number of triangles. Out: a mesh about one metre in size. Never here: levels, files.
 
 use super::PrimitiveMesh;
 use super::furniture;
@@ -8,18 +8,18 @@ use super::furniture::Part;
 use super::mesh::creased_mesh;
 use glam::{DVec2, DVec3};
 
-/// What a generated mesh looks like.
+/// Shape of a generated mesh.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Generator {
     /// A ball of radius 1.
     Sphere,
-    /// A ring about z of radius 1, as thick as a third of it.
+    /// A ring about z of radius 1; the tube's radius is a third of it.
     Torus,
     /// A ball whose radius varies by a fifth: smooth bumps.
     Blob,
     /// Hills on a square of side 2 about the origin, a quarter high; open at its border.
     Terrain,
-    /// A theatre seat that faces +y: cushion, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
+    /// A theatre seat that faces +y: seat, back, two arms and a foot, 0.55 wide and 1 high, standing on z = 0.
     Seat,
     /// A rod along z from −1 to 1, of radius a twentieth.
     Strut,
@@ -36,7 +36,7 @@ pub enum Generator {
 }
 
 impl Generator {
-    /// All of them, in the order of their names' list.
+    /// All of them, in the order of the list of names.
     pub const ALL: [Self; 11] = [
         Self::Sphere,
         Self::Torus,
@@ -51,7 +51,7 @@ impl Generator {
         Self::Books,
     ];
 
-    /// The name as scenes write it.
+    /// The name in scene files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -70,8 +70,8 @@ impl Generator {
     }
 }
 
-/// A mesh of at least `triangles` triangles, and as few more as the grids it is made of allow.
-/// Equal arguments give equal bits.
+/// A mesh of at least `triangles` triangles, with as few more as its grids allow.
+/// Equal arguments give bit-identical results.
 #[must_use]
 pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
     let mut sheet = Sheet::default();
@@ -91,7 +91,7 @@ pub fn generate(kind: Generator, seed: u64, triangles: u32) -> PrimitiveMesh {
     creased_mesh(&sheet.points, &sheet.triangles)
 }
 
-/// Cells along a grid so that `per` triangles a squared cell make at least `triangles`.
+/// Cells along a grid so that `per` triangles per squared cell count make at least `triangles`.
 fn side(triangles: u32, per: u32) -> u32 {
     (f64::from(triangles) / f64::from(per)).sqrt().ceil().max(1.0) as u32
 }
@@ -103,7 +103,7 @@ struct Sheet {
 }
 
 impl Sheet {
-    /// A grid of `columns` × `rows` cells, whose corners are where `place` says for (0 … columns, 0 … rows).
+    /// A grid of `columns` × `rows` cells, whose corners `place` gives for (0 … columns, 0 … rows).
     fn grid(&mut self, (columns, rows): (u32, u32), place: impl Fn(u32, u32) -> DVec3) {
         let first = self.points.len() as u32;
         self.points.extend((0..=rows).flat_map(|r| (0..=columns).map(move |c| (c, r))).map(|(c, r)| place(c, r)));
@@ -114,12 +114,12 @@ impl Sheet {
         }
     }
 
-    /// Six faces of a cube of `cells`² each, put where `place` says for the unit way to each corner.
+    /// Six faces of a cube of `cells`² each; `place` maps the unit direction of each corner to its position.
     fn ball(&mut self, cells: u32, place: impl Fn(DVec3) -> DVec3) {
         let first = self.points.len();
         self.cube(cells);
         for point in &mut self.points[first..] {
-            // an equal angle a cell: nearly equal triangles
+            // equal angles per cell: nearly equal triangles
             let lean =
                 point.to_array().map(|x| if x.abs() == 1.0 { x } else { libm::tan(x * std::f64::consts::FRAC_PI_4) });
             *point = place(DVec3::from(lean).normalize());
@@ -154,7 +154,7 @@ impl Sheet {
         self.weld(0);
     }
 
-    /// A wall of quads and a fan at each end.
+    /// A wall of quads and a triangle fan at each end.
     fn rod(&mut self, triangles: u32, radius: f64) {
         let around = (libm::sqrt(0.5 * f64::from(triangles)) as u32).clamp(4, 96);
         let rows = (triangles.saturating_sub(2 * around)).div_ceil(2 * around).max(1);
@@ -181,7 +181,7 @@ impl Sheet {
         });
     }
 
-    /// Boxes with edges more or less round, each of as many cells.
+    /// Boxes with rounded edges, all with the same number of cells.
     fn boxes(&mut self, triangles: u32, parts: &[Part]) {
         let cells = side(triangles, 12 * parts.len() as u32);
         for (centre, half, round) in parts {
@@ -195,7 +195,7 @@ impl Sheet {
         }
     }
 
-    /// Makes one of all points after `first` that are at the same place: the faces of a cube become one surface.
+    /// Merges all coincident points after `first`: the faces of a cube become one surface.
     fn weld(&mut self, first: usize) {
         let key = |p: DVec3| (p + DVec3::ZERO).to_array().map(f64::to_bits);
         let mut known = std::collections::BTreeMap::new();
@@ -216,14 +216,14 @@ impl Sheet {
     }
 }
 
-/// Smooth noise of about −1 … 1: `octaves` layers, each half as high and wide as the one before.
+/// Smooth noise of about −1 … 1: `octaves` layers, each with half the amplitude and period of the one before.
 fn layers(seed: u64, at: DVec3, octaves: u32) -> f64 {
     (0..octaves)
         .map(|o| noise(seed.wrapping_add(u64::from(o)), at * f64::from(1_u32 << o)) / f64::from(1_u32 << o))
         .sum()
 }
 
-/// Values at whole coordinates, smoothly between.
+/// Random values at integer coordinates, smoothly interpolated.
 fn noise(seed: u64, at: DVec3) -> f64 {
     let cell = at.floor();
     let ease = |t: f64| t * t * (3.0 - 2.0 * t);
@@ -239,7 +239,7 @@ fn noise(seed: u64, at: DVec3) -> f64 {
     sum
 }
 
-/// A number in −1 … 1 for whole coordinates: splitmix's finaliser.
+/// A number in −1 … 1 for integer coordinates, by the finaliser of splitmix.
 fn value(seed: u64, at: DVec3) -> f64 {
     let mut h = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
     for x in at.to_array() {
@@ -259,7 +259,7 @@ mod tests {
         for kind in Generator::ALL {
             for wanted in [2000, 20_000] {
                 let count = generate(kind, 7, wanted).triangles.len() as f64;
-                // grids are square: one more row of 6 cells a face is a third more, less the half that chance gives
+                // grids are square: one more row with 6 cells per face is a third more, less half of it on average
                 let more = count / f64::from(wanted) - 1.0;
                 assert!((0.0..0.2).contains(&more), "{kind:?}: {count} of {wanted}");
             }
@@ -276,7 +276,7 @@ mod tests {
             assert!(face.dot(a) > 0.0);
             area += 0.5 * face.length();
         }
-        // chords of a grid of 20 cells a quarter turn: a thousandth below the sphere's
+        // chords of a grid with 20 cells per quarter turn: a thousandth below the sphere's
         assert!((area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 2e-3, "{area}");
     }
 

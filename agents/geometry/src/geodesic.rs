@@ -1,15 +1,15 @@
-//! The edges of a ball of triangles, along which a dome's struts lie (MB97, §8).
+//! The edges of a geodesic ball, used for the struts of a dome (MB97, §8).
 //!
-//! In: nothing. Out: 120 pairs of points on the unit ball. Never here: what stands along them.
+//! In: nothing. Out: 120 pairs of points on the unit ball. Never here: the struts themselves.
 
 use glam::DVec3;
 
-/// Longer than an edge of the ball (0.547 and 0.618), shorter than any other distance of its corners.
+/// Above the edges of the ball (0.547 and 0.618), below any other distance of its corners.
 const EDGE_MAX: f64 = 0.65;
-/// Longer than an edge of the icosahedron in the unit ball (1.051), shorter than any other distance of its corners.
+/// Above the edge of the icosahedron in the unit ball (1.051), below any other distance of its corners.
 const LONG_EDGE_MAX: f64 = 1.1;
 
-/// The edges of an icosahedron's faces cut in four each, its corners brought to the unit ball: 120, 60 of each of two lengths.
+/// The edges of an icosahedron with each face divided into four and its corners projected to the unit ball: 120, 60 of each of two lengths.
 #[must_use]
 pub fn geodesic_edges() -> Vec<[DVec3; 2]> {
     let golden = 0.5 * (1.0 + libm::sqrt(5.0));
@@ -22,7 +22,7 @@ pub fn geodesic_edges() -> Vec<[DVec3; 2]> {
     pairs(&corners, EDGE_MAX)
 }
 
-/// Pairs of points nearer to each other than `longest`.
+/// Pairs of points closer to each other than `longest`.
 fn pairs(points: &[DVec3], longest: f64) -> Vec<[DVec3; 2]> {
     let of = |i: usize| points[i + 1..].iter().map(move |b| [points[i], *b]);
     (0..points.len()).flat_map(of).filter(|[a, b]| a.distance(*b) < longest).collect()
@@ -37,7 +37,7 @@ mod tests {
         let edges = geodesic_edges();
         let lengths: Vec<f64> = edges.iter().map(|[a, b]| a.distance(*b)).collect();
         assert_eq!(edges.len(), 120);
-        // chords of half of 63.43° and of 36° (a midpoint to its neighbour's)
+        // chords of half of 63.43° and of 36° (between neighbouring midpoints)
         let near = |x: f64| lengths.iter().filter(|l| (**l - x).abs() < 1e-9).count();
         let half = 2.0 * (0.25 * 63.434_948_822_922_f64.to_radians()).sin();
         let mid = 2.0 * 18_f64.to_radians().sin();

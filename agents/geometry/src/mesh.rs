@@ -1,7 +1,7 @@
-//! Meshes as they are given: normals for triangle meshes and convex hulls.
+//! Normals for given triangle meshes and convex hulls.
 //!
-//! In: points and triangles, places on a texture. Out: a [`PrimitiveMesh`] whose core is in metres (extents 1, radius 0).
-//! Never here: levels; a mesh is drawn as it is.
+//! In: points and triangles, texture coordinates. Out: a [`PrimitiveMesh`] whose core is in metres (extents 1, radius 0).
+//! Never here: levels; a mesh is drawn unchanged.
 
 use super::topology::places;
 use super::{PrimitiveMesh, PrimitiveVertex};
@@ -12,22 +12,22 @@ use std::sync::Arc;
 
 /// Edges that turn by more than this stay sharp: the cosine of 40°.
 const CREASE_COS: f64 = 0.766;
-/// Where more faces than this meet in a point, those that look nearly one way are smoothed as one.
+/// Where more faces than this meet at a point, faces of nearly equal normals are merged for smoothing.
 const FACES_MAX: usize = 64;
-/// Ways that are told apart there: a sixth of a radian, 10°, is one.
+/// Resolution of normals in that merge: 1/6 of a radian, 10°.
 const WAYS: f64 = 6.0;
 
 /// Normals for a triangle mesh: smooth over gentle edges, sharp at creases past 40°.
 ///
-/// Triangles that name a missing point or have no area are left out.
+/// Triangles that refer to a missing point or have no area are left out.
 #[must_use]
 pub fn creased_mesh(points_m: &[DVec3], triangles: &[[u32; 3]]) -> PrimitiveMesh {
     painted_mesh(points_m, &[], triangles)
 }
 
-/// The same with the place of each point on a texture; missing ones are 0, and so are those that are no number.
+/// The same with texture coordinates for each point; missing ones are 0, and so are those that are not finite.
 ///
-/// Points at one place are one for the normals: what is painted has seams, its light has none.
+/// Coincident points count as one for the normals: the texture has seams, the shading has none.
 #[must_use]
 pub fn painted_mesh(points_m: &[DVec3], uvs: &[Vec2], triangles: &[[u32; 3]]) -> PrimitiveMesh {
     let corner = |i: u32| points_m.get(i as usize).copied();
@@ -62,7 +62,7 @@ pub fn painted_mesh(points_m: &[DVec3], uvs: &[Vec2], triangles: &[[u32; 3]]) ->
     mesh
 }
 
-/// Faces at a point that look one way.
+/// Faces at a point with one normal.
 #[derive(Debug, Clone, Copy)]
 struct Facing {
     /// Twice their area, along their normal.
@@ -71,7 +71,7 @@ struct Facing {
     way: DVec3,
 }
 
-/// Faces that look nearly one way as one: the time that the normals of a fan take stays in proportion to its faces.
+/// Merges faces of nearly equal normals: the time for the normals of a fan stays proportional to its faces.
 fn gathered(facing: &[Facing]) -> Vec<Facing> {
     let mut sums: BTreeMap<[i8; 3], DVec3> = BTreeMap::new();
     for face in facing {
@@ -103,7 +103,7 @@ mod tests {
         let mesh = hull_mesh(&cube()).unwrap();
         assert_eq!(mesh.triangles.len(), 12);
         for v in &mesh.vertices {
-            // on every face of a cube the normal is an axis
+            // normals on every face of a cube are along an axis
             assert!((v.normal.abs().max_element() - 1.0).abs() < 1e-6, "{}", v.normal);
         }
     }
@@ -122,7 +122,7 @@ mod tests {
     }
     #[test]
     fn a_seam_of_doubled_points_is_not_seen_in_the_light() {
-        // a roof of 20°, its ridge along y once shared and once doubled
+        // a roof of 20° with its ridge along y, once shared and once doubled
         let height = 0.5 * libm::tan(20.0_f64.to_radians() / 2.0);
         let ridge = [DVec3::new(0.5, 0.0, height), DVec3::new(0.5, 1.0, height)];
         let mut points = vec![DVec3::ZERO, ridge[0], ridge[1], DVec3::Y, DVec3::X, DVec3::new(1.0, 1.0, 0.0)];
@@ -142,7 +142,7 @@ mod tests {
             let fan: Vec<[u32; 3]> = (0..sides).map(|i| [0, 1 + i, 1 + (i + 1) % sides]).collect();
             creased_mesh(&points, &fan)
         };
-        // faces within 40° of one's own are smoothed: of 64 all are looked at one by one, of 20,000 by ways 10° apart
+        // faces within 40° are smoothed: with 64 faces each is treated individually, with 20,000 they are merged by directions 10° apart
         for (few, many) in [(0, 0), (16, 5000), (40, 12_500)] {
             let [a, b] = [(64, few), (20_000, many)].map(|(sides, face)| cone(sides).vertices[3 * face].normal);
             assert!(a.dot(b) > 0.99, "{a} {b}");

@@ -1,8 +1,8 @@
-//! Distances from a triangle mesh: the walls that a ball touches, and the edges that poke into a span.
+//! Distances from a triangle mesh: the walls that a ball touches, and the convex edges that a span touches.
 //!
-//! A place counts beside a nearer one only if it lies in front of the nearer one's tangent plane (eq. 13): a flat floor of many
-//! triangles gives one contact, a corner gives one a wall, and the far side of a thin plate none.
-//! The side a point is on is told by the normals; a mesh is felt from behind too, as deep as the search reaches.
+//! A surface point counts in addition to a nearer one only if it is in front of the nearer one's tangent plane (eq. 13): a flat floor of
+//! many triangles gives one contact, a corner gives one per wall, and the far side of a thin plate none.
+//! The normals decide on which side a point is; a mesh is also detected from behind, as deep as the search reaches.
 
 use super::closest_points::{near_segments, near_triangle};
 use super::parry_shapes::Triangles;
@@ -26,37 +26,38 @@ pub struct MeshField {
 struct Face {
     corners: [DVec3; 3],
     normal: DVec3,
-    /// Whether the edge from corner i to corner i + 1 has no triangle on its other side.
+    /// Whether the edge from corner i to corner i + 1 is a border: no triangle on its other side.
     rim: [bool; 3],
 }
 
-/// An edge that stands out: convex, or the rim of an open mesh.
+/// A convex edge, or the border of an open mesh.
 #[derive(Debug, Clone)]
 struct Edge {
     ends: [DVec3; 2],
     normals: [DVec3; 2],
 }
 
-/// The nearest place of one triangle.
+/// The nearest point of one triangle.
 #[derive(Debug, Clone, Copy)]
 struct Place {
     point: DVec3,
     distance: f64,
-    /// Sine of the angle between the way to the point and the triangle's plane; below zero behind it.
+    /// Sine of the angle between the direction to the query point and the triangle's plane; negative behind it.
     side: f64,
     normal: DVec3,
 }
 
-/// How far in front of an accepted tangent plane another place must lie, as a share of the reach: below the steps between
-/// the triangles of a smooth hollow.
+/// Least distance of a further surface point in front of an accepted tangent plane, as a fraction of the reach: larger than the steps
+/// between the triangles of a smooth hollow.
 const FRONT_SHARE: f64 = 1e-3;
-/// Distances are the same below this share: the triangles around an edge share their nearest point.
+/// Relative difference below which distances count as equal: the triangles around an edge share their nearest point.
 const SAME_SHARE: f64 = 1e-9;
-/// Seen more squarely than this sine, a point is over the inside of a triangle (the angle is below 1e-3 of a radian).
+/// Above this sine the direction counts as normal: the query point is above the inside of a triangle (angle to the normal below 1e-3 of a
+/// radian).
 const SQUARE: f64 = 1.0 - 1e-6;
-/// The sine of the angle above which a convex edge stands out: 1°.
+/// Sine of the angle above which a convex edge counts: 1°.
 const SHARP_SINE: f64 = 0.017;
-/// Boxes of the trees are single precision: this share of their coordinates covers the rounding.
+/// Boxes of the trees are single precision: this fraction of their coordinates covers the rounding.
 const BOX_MARGIN: f32 = 1e-6;
 
 impl MeshField {
@@ -75,7 +76,7 @@ impl MeshField {
         Self { faces, face_tree, edges, edge_tree, bounds }
     }
 
-    /// How far `point` is from the box around all triangles, metres; 0 inside.
+    /// Distance of `point` from the bounding box of all triangles, metres; 0 inside.
     pub fn distance_from_bounds(&self, point: DVec3) -> f64 {
         let (low, high) = self.bounds;
         (low - point).max(point - high).max(DVec3::ZERO).length()
@@ -94,7 +95,7 @@ impl MeshField {
         }
     }
 
-    /// The nearest place in front of all `planes`.
+    /// The nearest surface point in front of all `planes`.
     fn nearest(&self, centre: DVec3, reach_m: f64, planes: &[(DVec3, DVec3)]) -> Option<Place> {
         let front_m = FRONT_SHARE * reach_m;
         let mut best: Option<Place> = None;
@@ -120,7 +121,7 @@ impl MeshField {
         best
     }
 
-    /// The standing edge that comes nearest to the inside of a span, and where on the span.
+    /// The convex or border edge nearest to the inside of a span, and the fraction of the span at which it is.
     pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
         let [a, b] = ends.map(|e| e.centre);
         let widest = ends[0].radius_m.max(ends[1].radius_m) + reach_m;
@@ -143,7 +144,7 @@ impl MeshField {
         best.map(|(_, share, touch)| (share, touch))
     }
 
-    /// How far the surface is from a segment, and the way out from the surface; 0 where the segment goes through it.
+    /// Distance of the surface from a segment, and the normal out of the surface; 0 where the segment intersects it.
     pub fn nearest_to_span(&self, span: [DVec3; 2], reach_m: f64) -> Option<Touch> {
         let [a, b] = span;
         let (middle, half) = ((a + b) * 0.5, (b - a).abs() * 0.5);
@@ -208,13 +209,13 @@ impl Face {
 }
 
 impl Place {
-    /// Whether this place speaks for the surface before `other`: nearer, or as near and seen more squarely.
+    /// Whether this surface point takes precedence over `other`: nearer, or equally near with a direction closer to the normal.
     fn before(&self, other: &Self) -> bool {
         let same = (self.distance - other.distance).abs() <= SAME_SHARE * other.distance;
         if same { self.side.abs() > other.side.abs() } else { self.distance < other.distance }
     }
 
-    /// Whether the point is past the rim of a sheet and behind it: nothing is there.
+    /// Whether the query point is beyond the border of an open mesh and behind it: no contact there.
     fn behind_rim(&self, face: &Face) -> bool {
         if self.side >= 0.0 || self.side < -SQUARE {
             return false;
@@ -229,7 +230,7 @@ impl Place {
     fn touch(&self, centre: DVec3) -> Touch {
         let sign = if self.side < 0.0 { -1.0 } else { 1.0 };
         let way = (centre - self.point) * sign;
-        // at the surface the way has no direction of its own
+        // at the surface the direction to the query point is undefined
         let square = self.side.abs() > SQUARE || self.distance < 1e-9;
         let normal = if square { self.normal } else { way / self.distance };
         Touch { normal, distance_m: self.distance * sign }
@@ -237,7 +238,7 @@ impl Place {
 }
 
 impl Edge {
-    /// Where the inside of a span is nearest to this edge, from outside.
+    /// The fraction of the span at which it is nearest to this edge, and the contact, if outside the surface.
     fn touch(&self, span: [DVec3; 2]) -> Option<(f64, Touch)> {
         let (share, along) = near_segments(span, self.ends);
         let point = self.ends[0].lerp(self.ends[1], along);
@@ -252,12 +253,12 @@ fn face_normal([a, b, c]: [DVec3; 3]) -> DVec3 {
     (b - a).cross(c - a).normalize_or(DVec3::Z)
 }
 
-/// The place of a corner as a key: corners at the same place are one, whatever their numbers.
+/// The position of a corner as a key: coincident corners are one, whatever their indices.
 fn key(p: DVec3) -> [u64; 3] {
     (p + DVec3::ZERO).to_array().map(f64::to_bits)
 }
 
-/// Marks the rims of `faces` and lists the edges that stand out.
+/// Marks the borders of `faces` and lists the convex and border edges.
 fn standing_edges(faces: &mut [Face]) -> Vec<Edge> {
     let mut sides: BTreeMap<[[u64; 3]; 2], Vec<(usize, usize)>> = BTreeMap::new();
     for (f, face) in faces.iter().enumerate() {
@@ -272,7 +273,7 @@ fn standing_edges(faces: &mut [Face]) -> Vec<Edge> {
         let (f, i) = users[0];
         let (a, b) = (faces[f].corners[i], faces[f].corners[(i + 1) % 3]);
         let other = users.get(1).map_or(faces[f].normal, |&(g, _)| faces[g].normal);
-        // the turn from one face to the next, seen along the edge: positive where the edge sticks out
+        // the turn from one face to the next about the edge: positive where the edge is convex
         let turn = faces[f].normal.cross(other).dot((b - a).normalize_or_zero());
         if users.len() == 1 {
             faces[f].rim[i] = true;
@@ -300,7 +301,7 @@ fn distance_to_box(node: &BvhNode, point: DVec3) -> f64 {
     (low - point).max(point - high).max(DVec3::ZERO).length()
 }
 
-/// How far the box reaches in front of a plane.
+/// Extent of the box in front of a plane.
 fn front_of_box(node: &BvhNode, point: DVec3, normal: DVec3) -> f64 {
     let (low, high) = (node.mins().as_dvec3(), node.maxs().as_dvec3());
     let farthest = DVec3::select(normal.cmpgt(DVec3::ZERO), high, low);

@@ -1,32 +1,33 @@
-//! What can be drawn with any number of triangles and where it stands; and one mesh for many of them (a proxy).
+//! Models that can be drawn with any number of triangles, their placement, and one mesh for many of them (a proxy).
 //!
-//! In: meshes and foliage with their places. Out: counts, a ball around each, a coarse mesh of all. Never here: looks, the GPU.
+//! In: meshes and foliage with their placements. Out: counts, a bounding ball of each, a coarse mesh of all. Never here: appearance, the
+//! GPU.
 
 use super::{Foliage, PrimitiveMesh, PrimitiveVertex, Rung, Tom, TomError, hull_mesh};
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// What is drawn with any number of triangles; copies share it.
+/// Geometry drawn with any number of triangles; copies share it.
 #[derive(Debug, Clone)]
 pub enum Model {
     /// A mesh of any number of triangles.
     Mesh(Arc<Tom>),
-    /// Pieces in rungs.
+    /// Foliage: pieces in rungs.
     Foliage(Arc<Foliage>),
 }
 
-/// Where a model stands.
+/// Pose and scale of a model.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Placement {
-    /// Where its axes start, metres.
+    /// Origin of its axes, metres.
     pub position: DVec3,
-    /// How it is turned.
+    /// Rotation from its axes to the world's.
     pub rotation: DQuat,
-    /// What its coordinates are multiplied by to be metres, > 0.
+    /// Factor from its coordinates to metres, > 0.
     pub scale: f64,
 }
 
-/// A ball that holds a model, and the model's surface, in its own coordinates.
+/// A bounding ball of a model and the model's surface area, in its own coordinates.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Extent {
     /// Centre of the ball.
@@ -38,7 +39,7 @@ pub struct Extent {
 }
 
 impl Placement {
-    /// A point of the model in the world, metres.
+    /// The position of a point of the model in the world, metres.
     #[must_use]
     pub fn place(&self, point: DVec3) -> DVec3 {
         self.position + self.rotation * (point * self.scale)
@@ -46,7 +47,7 @@ impl Placement {
 }
 
 impl Model {
-    /// The fewest triangles that are drawn of it, and all.
+    /// The fewest triangles that can be drawn of it, and all.
     #[must_use]
     pub fn range(&self) -> (u32, u32) {
         match self {
@@ -65,7 +66,7 @@ impl Model {
         }
     }
 
-    /// How large it is at its finest.
+    /// Its size at its finest.
     #[must_use]
     pub fn extent(&self) -> Extent {
         let mesh = self.mesh(u32::MAX);
@@ -81,7 +82,7 @@ impl Model {
         Extent { centre, radius: places().map(|p| p.distance(centre)).fold(0.0, f64::max), area: area.sum() }
     }
 
-    /// Its mesh of at most so many triangles (its fewest where that is more); pieces as a prefix of their mesh.
+    /// Its mesh of at most `triangles` (its fewest where that is more); foliage as a prefix of its mesh.
     fn mesh(&self, triangles: u32) -> PrimitiveMesh {
         match self {
             Self::Mesh(tom) => {
@@ -98,7 +99,7 @@ impl Model {
         }
     }
 
-    /// Its part of a proxy: of pieces the hull around them.
+    /// Its part of a proxy: for foliage the convex hull of the pieces.
     fn coarse(&self, triangles: u32) -> PrimitiveMesh {
         match self {
             Self::Mesh(_) => self.mesh(triangles),
@@ -110,7 +111,7 @@ impl Model {
     }
 }
 
-/// How many times the proxy's triangles its members bring along before they are thinned together.
+/// Triangles of all members together before they are simplified as one, as a multiple of the proxy's.
 const RICHER: u32 = 8;
 
 /// One mesh of at most `triangles` triangles for all `parts`, made of coarse meshes of each, in coordinates about `origin`.
@@ -145,7 +146,7 @@ mod tests {
     #[test]
     fn extent_of_a_sphere_is_the_spheres() {
         let extent = ball().extent();
-        // chords of a grid of 7 cells a quarter turn
+        // chords of a grid with 7 cells per quarter turn
         assert!(extent.centre.length() < 1e-6 && (extent.radius - 1.0).abs() < 1e-6, "{extent:?}");
         assert!((extent.area / (4.0 * std::f64::consts::PI) - 1.0).abs() < 0.02, "{extent:?}");
     }

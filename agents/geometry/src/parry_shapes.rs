@@ -1,6 +1,6 @@
-//! Solids as parry shapes: what rapier3d and the contact queries of a mesh or a hull work on.
+//! Solids as parry shapes, for rapier3d and the contact queries of a mesh or a hull.
 //!
-//! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: where the solid is, what it weighs.
+//! In: a [`Solid`]. Out: a `SharedShape` in the same axes, single precision. Never here: the pose or the mass of the solid.
 
 use super::Solid;
 use super::topology::is_closed;
@@ -10,14 +10,14 @@ use rapier3d::parry::shape::{SharedShape, TriMeshFlags};
 use rapier3d::parry::transformation::try_convex_hull;
 use std::f32::consts::FRAC_PI_2;
 
-/// Why a solid is no shape.
+/// Reasons why a solid is not a valid shape.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum ShapeError {
-    /// A length that must be above zero is not, or is not finite.
+    /// A length that must be above zero is zero or negative, or is not finite.
     #[error("{what} is {value_m} m; it must be finite and above zero")]
     BadLength {
-        /// Which length.
+        /// The length's name.
         what: &'static str,
         /// The value given, metres.
         value_m: f64,
@@ -25,58 +25,58 @@ pub enum ShapeError {
     /// A corner of a hull or mesh is not finite.
     #[error("point {index} is not finite")]
     BadPoint {
-        /// Number of the point, from 0.
+        /// Index of the point, from 0.
         index: usize,
     },
     /// The points of a hull enclose no volume.
     #[error("the hull of {points} points encloses no volume: {why}")]
     FlatHull {
-        /// How many points there are.
+        /// Number of points.
         points: usize,
-        /// What was found.
+        /// The finding.
         why: String,
     },
     /// A mesh has no triangle with an area.
     #[error("none of the {triangles} triangles of the mesh has an area")]
     EmptyMesh {
-        /// How many triangles were given.
+        /// Number of triangles given.
         triangles: usize,
     },
-    /// A triangle names a corner that does not exist.
+    /// A triangle refers to a corner that does not exist.
     #[error("triangle {triangle} names corner {corner}, but there are only {points}")]
     BadCorner {
-        /// Number of the triangle, from 0.
+        /// Index of the triangle, from 0.
         triangle: usize,
-        /// The corner it names.
+        /// The corner it refers to.
         corner: u32,
-        /// How many corners there are.
+        /// Number of corners.
         points: usize,
     },
 }
 
-/// Triangles over points: counter-clockwise seen from outside.
+/// Triangles over points, counter-clockwise seen from outside.
 #[derive(Debug, Clone)]
 pub struct Triangles {
     /// Corners, metres.
     pub points: Vec<DVec3>,
-    /// Corner numbers of each triangle; none is degenerate.
+    /// Corner indices of each triangle; none is degenerate.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// Below this share of its longest edge's square a triangle's area is nothing (single precision holds 1e-7).
+/// Below this fraction of its longest edge's square a triangle's area counts as zero (single precision resolves 1e-7).
 const AREA_SHARE_MIN: f64 = 1e-9;
-/// Below this share of its size cubed a hull's volume is nothing.
+/// Below this fraction of its size cubed a hull's volume counts as zero.
 const VOLUME_SHARE_MIN: f64 = 1e-6;
 
 impl Solid {
     /// The same solid as a parry shape, in the solid's own axes (single precision).
     ///
-    /// A plane is a half space with its normal along +z; a cylinder is a compound of one turned part, because parry's lies
-    /// along y. A closed mesh is oriented (it has an inside), an open one is a sheet.
+    /// A plane is a half space with its normal along +z; a cylinder is a compound of one rotated part, because parry's axis is y. A closed
+    /// mesh is oriented (it has an inside), an open one is a sheet.
     ///
     /// # Errors
-    /// [`ShapeError`] for a length that is not above zero, a point that is not finite, a hull without volume, a mesh without
-    /// area and a triangle that names a corner that is not there.
+    /// [`ShapeError`] for a length that is not above zero, a point that is not finite, a hull without volume, a mesh without area and a
+    /// triangle that refers to a missing corner.
     pub fn to_shared_shape(&self) -> Result<SharedShape, ShapeError> {
         self.check()?;
         Ok(match self {
@@ -106,7 +106,7 @@ impl Solid {
         })
     }
 
-    /// Whether every length of the solid is finite and above zero, and every point finite.
+    /// Checks that every length of the solid is finite and above zero, and every point finite.
     pub fn check(&self) -> Result<(), ShapeError> {
         let length = |what, value_m: f64| {
             let good = value_m.is_finite() && value_m > 0.0;
@@ -123,7 +123,7 @@ impl Solid {
             }
             Self::Plane => Ok(()),
             Self::Hull { points_m } | Self::Mesh { points_m, .. } => {
-                // single precision must hold them too
+                // single precision must represent them too
                 let bad = points_m.iter().position(|p| !p.as_vec3().is_finite());
                 bad.map_or(Ok(()), |index| Err(ShapeError::BadPoint { index }))
             }
@@ -154,7 +154,7 @@ pub fn hull_triangles(points: &[DVec3]) -> Result<Triangles, ShapeError> {
     }
 }
 
-/// The triangles of a mesh that have an area.
+/// The triangles of a mesh with a non-zero area.
 pub fn mesh_triangles(points: &[DVec3], triangles: &[[u32; 3]]) -> Result<Triangles, ShapeError> {
     let mut kept = Vec::with_capacity(triangles.len());
     for (triangle, &corners) in triangles.iter().enumerate() {

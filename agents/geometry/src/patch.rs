@@ -9,11 +9,11 @@
 pub struct PatchVertex {
     /// Along the interval, 0 … 1.
     pub u: f32,
-    /// Around the tube, 0 … 1; the seam has both ends.
+    /// Around the tube, 0 … 1; the seam's vertices are doubled, at 0 and 1.
     pub turn: f32,
-    /// Cosine of the angle; exactly alike at both ends of the seam.
+    /// Cosine of the angle; exactly equal on both sides of the seam.
     pub cos: f32,
-    /// Sine of the angle; exactly alike at both ends of the seam.
+    /// Sine of the angle; exactly equal on both sides of the seam.
     pub sin: f32,
 }
 
@@ -35,7 +35,7 @@ pub const fn triangles(n: u8) -> u32 {
     2 * sides(n) * rings(n)
 }
 
-/// Vertices of one patch; the seam is there twice.
+/// Vertices of one patch; those of the seam are doubled.
 #[must_use]
 pub const fn vertices(n: u8) -> u32 {
     (sides(n) + 1) * (rings(n) + 1)
@@ -89,7 +89,7 @@ mod tests {
     fn patch_is_closed_around_and_open_at_its_ends() {
         for n in 0..=5 {
             let stride = sides(n) + 1;
-            // the two columns of the seam are one place
+            // the two columns of the seam coincide
             let place = |v: u16| (u32::from(v) / stride, u32::from(v) % stride % sides(n));
             let mut edges: HashMap<_, i32> = HashMap::new();
             for [a, b, c] in patch_triangles(n) {
@@ -99,7 +99,7 @@ mod tests {
                 }
             }
             for ((p, q), sum) in edges {
-                // an inner edge is walked once each way; the ends' rims once only
+                // an inner edge is traversed once in each direction; the rims at the ends only once
                 let rim = p.0 == q.0 && (p.0 == 0 || p.0 == rings(n));
                 assert_eq!(sum != 0, rim, "level {n}: {p:?} {q:?}");
             }

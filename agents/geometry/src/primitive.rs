@@ -1,27 +1,27 @@
-//! Meshes of solids at every level n: ball, box, capsule, cylinder, jaw, and hulls and meshes as they are.
+//! Meshes of solids at every level n: ball, box, capsule, cylinder, jaw; hulls and meshes unchanged.
 //!
 //! In: a primitive and its level. Out: vertices with normals, triangles, counts for cost models.
-//! Never here: where the solid is, or the GPU. The idea: a ball, box, capsule and cylinder are one shape, a core swept
-//! by a ball (`position = core · extents + normal · radius`), so one mesh of a level serves every size of that primitive.
+//! Never here: the solid's pose, the GPU. Ball, box, capsule and cylinder are one shape, a core swept by a ball (`position = core · extents
+//! + normal · radius`), so one mesh per level serves every size of that primitive.
 
 use super::Solid;
 use super::patch::sides;
 use glam::{Vec2, Vec3};
 use std::f64::consts::FRAC_PI_4;
 
-/// A corner of a primitive before it has a size.
+/// A corner of a primitive, independent of its size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PrimitiveVertex {
-    /// Where the corner is on the core, to be multiplied by [`Rounding::extents`].
+    /// Position on the core, to be multiplied by [`Rounding::extents`].
     pub core: Vec3,
     /// Unit normal outward; the corner is [`Rounding::radius_m`] along it from the core.
     pub normal: Vec3,
-    /// Where it is on a texture: 0 … 1 across and down, repeating; 0 where there is none.
+    /// Texture coordinates: 0 … 1 across and down, repeating; 0 where there are none.
     pub uv: Vec2,
 }
 
 impl PrimitiveVertex {
-    /// A corner that is nowhere on a texture.
+    /// A corner without texture coordinates.
     #[must_use]
     pub const fn bare(core: Vec3, normal: Vec3) -> Self {
         Self { core, normal, uv: Vec2::ZERO }
@@ -33,7 +33,7 @@ impl PrimitiveVertex {
 pub struct PrimitiveMesh {
     /// Corners.
     pub vertices: Vec<PrimitiveVertex>,
-    /// Corner numbers of each triangle.
+    /// Corner indices of each triangle.
     pub triangles: Vec<[u32; 3]>,
 }
 
@@ -46,22 +46,22 @@ pub struct Rounding {
     pub radius_m: f32,
 }
 
-/// A family of meshes, one a level.
+/// A family of meshes, one per level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Primitive {
     /// A ball; its core is a point.
     Ball,
-    /// A box; from level 1 its edges are a little rounded, as real ones are, and catch the light.
+    /// A box; from level 1 on its edges are slightly rounded, as real ones are, and catch the light.
     Box,
     /// A capsule along z; its core is a line.
     Capsule,
-    /// A cylinder along z; from level 1 its rims are a little rounded.
+    /// A cylinder along z; from level 1 on its rims are slightly rounded.
     Cylinder,
     /// One jaw of a grasper, from its hinge along +z, closing towards −x; 1 long.
     Jaw,
 }
 
-/// Share of its smallest half extent by which a box or cylinder is rounded.
+/// Rounding of a box or cylinder, as a fraction of its smallest half extent.
 const BEVEL: f64 = 0.08;
 
 /// Quads along a quarter-turn pair (a face of the ball) at level n, close to 2·2^(n/2).
@@ -150,14 +150,14 @@ impl Primitive {
     }
 }
 
-/// One line of a face's grid: the side of the core it lies on (−1, 0, 1), and the tangent of the normal's angle.
+/// One line of a face's grid: the side of the core it belongs to (−1, 0, 1), and the tangent of the normal's angle.
 #[derive(Clone, Copy)]
 struct Knot {
     side: f32,
     lean: f64,
 }
 
-/// Lines across a face of a ball: an eighth of a turn to either side of its middle.
+/// Lines across a face of a ball: an eighth of a turn to either side of its centre.
 fn round_knots(divisions: u32) -> Vec<Knot> {
     let lean = |i: u32| lean_at(2.0 * f64::from(i) / f64::from(divisions) - 1.0);
     (0..=divisions).map(|i| Knot { side: 0.0, lean: lean(i) }).collect()
@@ -175,7 +175,7 @@ fn lean_at(share: f64) -> f64 {
     if share.abs() == 1.0 { share } else { libm::tan(share * FRAC_PI_4) }
 }
 
-/// Six faces of a cube, each a grid, blown up to the normals the knots ask for.
+/// Six faces of a cube, each a grid, with the normals of the knots.
 fn swept_box(knots: &[&[Knot]; 3]) -> PrimitiveMesh {
     let mut mesh = PrimitiveMesh::default();
     for axis in 0..3 {
@@ -223,7 +223,7 @@ fn cylinder(sides: u32, bevel: u32) -> PrimitiveMesh {
         first
     };
     let tilt = |i: u32| if bevel == 0 { 0.0 } else { 2.0 * FRAC_PI_4 * f64::from(i) / f64::from(bevel) };
-    // from the bottom's rim up to the top's: rings that are joined, then the two caps with their own flat normals
+    // rings from the bottom's rim up to the top's, joined; then the two caps with their own flat normals
     let mut rings = Vec::new();
     rings.extend((0..=bevel).rev().map(|i| ring(&mut mesh, -1.0, -tilt(i))));
     rings.extend((0..=bevel).map(|i| ring(&mut mesh, 1.0, tilt(i))));
@@ -292,7 +292,7 @@ mod tests {
         for solid in solids() {
             for n in 0..=4 {
                 let (places, mesh) = corners(&solid, n);
-                // corners are alike when they are one place to a millionth of the size (f32 rounding of two sums)
+                // corners count as equal if they coincide to a millionth of the size (f32 rounding of two sums)
                 let key = |i: u32| (places[i as usize] * 1e5).round().as_ivec3().to_array();
                 let mut edges: HashMap<_, i32> = HashMap::new();
                 for [a, b, c] in &mesh.triangles {
@@ -318,7 +318,7 @@ mod tests {
         for (solid, (area, volume)) in solids().iter().zip(closed) {
             let (places, mesh) = corners(solid, 8);
             let (a, v) = measure(&places, &mesh);
-            // a bevel of 8 % of the smallest half extent takes less than 2 % off; tessellation of level 8 less than 0.1 %
+            // a bevel of 8 % of the smallest half extent removes less than 2 %; tessellation of level 8 less than 0.1 %
             assert!((a / area - 1.0).abs() < 0.02, "{solid:?}: area {a} of {area}");
             assert!((v / volume - 1.0).abs() < 0.02, "{solid:?}: volume {v} of {volume}");
         }
@@ -334,7 +334,7 @@ mod tests {
                     let [a, b, c] = t.map(|i| places[i as usize]);
                     let face = (b - a).cross(c - a);
                     let mean: Vec3 = t.iter().map(|&i| mesh.vertices[i as usize].normal).sum();
-                    // slivers without area have no side
+                    // slivers without area have no orientation
                     assert!(face.length() < 1e-9 || face.dot(mean) > 0.0, "{solid:?} level {n}");
                 }
             }

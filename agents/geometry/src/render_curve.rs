@@ -1,31 +1,31 @@
 //! The skeleton of a tube's picture: a C¹ curve through its nodes, cut into intervals ε with rotation-minimising frames.
 //!
-//! In: a [`CurveState`] and the interval ε. Out: one [`SkinFrame`] at each end of an interval, ready to bend a
-//! cylinder patch ([`super::patch`]) between. Never here: triangles, the GPU, allocation once the sizes settle.
-//! Between nodes the curve is the cubic of Hermite with the tangents of the parabola through three nodes, so it is C¹
-//! and reproduces parabolas; frames follow by double reflection (WJZL08, §4), whose error is O(ε⁴).
+//! In: a [`CurveState`] and the interval ε. Out: one [`SkinFrame`] at each end of an interval, between which a cylinder patch
+//! ([`super::patch`]) is bent. Never here: triangles, the GPU, allocation once the sizes settle.
+//! Between nodes the curve is the cubic of Hermite with the tangents of the parabola through three nodes, so it is C¹ and reproduces
+//! parabolas; frames follow by double reflection (WJZL08, §4), whose error is O(ε⁴).
 
 use glam::{DQuat, DVec3};
 use metachron_core::CurveState;
 
-/// The most intervals a skeleton is cut into: past it one tube alone outgrows any frame.
+/// Most intervals of a skeleton: beyond, a single tube exceeds the budget of any frame.
 pub const INTERVALS_MAX: usize = 1 << 16;
 
-/// How much denser than on a straight stretch the sharpest bend may be sampled.
+/// Highest sampling density in a bend, relative to a straight stretch.
 const SPREAD_MAX: f64 = 3.0;
 
 /// The curve at one end of an interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SkinFrame {
-    /// Rest arc length of this point of the matter, metres.
+    /// Rest arc length of this material point, metres.
     pub arc_m: f64,
-    /// Where it is, metres.
+    /// Position, metres.
     pub position: DVec3,
     /// Derivative of the position by rest arc length: the tangent times the stretch.
     pub slope: DVec3,
-    /// Unit vector across the curve that turns about it as little as possible.
+    /// Unit vector across the curve, rotation-minimising along it.
     pub normal: DVec3,
-    /// Angle from `normal` to the matter's own x director about the tangent, radians; without jumps along the curve.
+    /// Angle about the tangent from `normal` to the section's own x director, radians; without jumps along the curve.
     pub twist_rad: f64,
     /// Outer radius, metres.
     pub radius_m: f64,
@@ -33,7 +33,7 @@ pub struct SkinFrame {
     pub radius_slope: f64,
 }
 
-/// Cuts curves into intervals; its storage is used again.
+/// Cuts curves into intervals; its storage is reused.
 #[derive(Debug, Clone, Default)]
 pub struct Skeleton {
     slopes: Vec<DVec3>,
@@ -43,11 +43,11 @@ pub struct Skeleton {
     frames: Vec<SkinFrame>,
 }
 
-/// How many intervals ε = `eps_m` makes of a curve of `length_m`: ⌈L/ε⌉, at least one, at most [`INTERVALS_MAX`].
+/// The number of intervals of ε = `eps_m` on a curve of `length_m`: ⌈L/ε⌉, at least one, at most [`INTERVALS_MAX`].
 #[must_use]
 pub fn intervals(length_m: f64, eps_m: f64) -> usize {
     let wanted = libm::ceil(length_m / eps_m);
-    // a ratio that is no number fails both comparisons and gives one interval
+    // a NaN ratio fails both comparisons and gives one interval
     if wanted >= INTERVALS_MAX as f64 {
         INTERVALS_MAX
     } else if wanted > 1.0 {
@@ -64,7 +64,7 @@ impl Skeleton {
         &self.frames
     }
 
-    /// Cuts `curve` into ⌈L/ε⌉ intervals, denser where it bends, and gives the frames between them.
+    /// Cuts `curve` into ⌈L/ε⌉ intervals, denser where it bends, and returns the frames between them.
     pub fn rebuild(&mut self, curve: &CurveState, eps_m: f64) -> &[SkinFrame] {
         self.frames.clear();
         let nodes = curve.positions.len();
@@ -87,8 +87,8 @@ impl Skeleton {
 
     /// Integrates the sampling density 1 + √(κ/(κ̄ + 1/L)) along the nodes, κ̄ the mean curvature.
     ///
-    /// A chord across an arc misses it by κ ε²/8, so equal errors ask for a density of √κ; the 1 keeps straight
-    /// stretches sampled, and 1/L keeps the noise of an almost straight curve from steering the samples.
+    /// A chord deviates from an arc by κ ε²/8, so equal errors require a density of √κ; the 1 keeps straight stretches sampled, and 1/L
+    /// keeps the noise of an almost straight curve from dominating the density.
     fn find_spread(&mut self, curve: &CurveState) {
         let last = curve.arc_m.len() - 1;
         let bend = |i: usize| {
@@ -108,7 +108,7 @@ impl Skeleton {
         }
     }
 
-    /// Puts `count + 1` frames at equal shares of the integrated density; normals and twist come later.
+    /// Puts `count + 1` frames at equal fractions of the integrated density; normals and twist are set later.
     fn place(&mut self, curve: &CurveState, count: usize) {
         let last = curve.arc_m.len() - 1;
         let total = self.spread[last];
@@ -124,7 +124,7 @@ impl Skeleton {
         }
     }
 
-    /// The cubic between nodes `left` and `left + 1` at the share `w` of the way.
+    /// The cubic between nodes `left` and `left + 1` at the fraction `w`.
     fn evaluate(&self, curve: &CurveState, left: usize, w: f64) -> SkinFrame {
         let right = left + 1;
         let h = curve.arc_m[right] - curve.arc_m[left];
@@ -200,8 +200,8 @@ fn across(v: DVec3, t: DVec3) -> DVec3 {
     (v - t * v.dot(t)).try_normalize().unwrap_or_else(|| t.any_orthonormal_vector())
 }
 
-/// Carries `normal` along the frames by double reflection (WJZL08, §4): once at the chord's bisecting plane, once more so that
-/// the reflected tangent becomes the tangent there.
+/// Transports `normal` along the frames by double reflection (WJZL08, §4): first at the chord's bisecting plane, then so that the reflected
+/// tangent becomes the next frame's tangent.
 fn turn_least(frames: &mut [SkinFrame], normal: DVec3) {
     let tangent = |f: &SkinFrame| f.slope.try_normalize();
     let mut t = frames.iter().find_map(tangent).unwrap_or(DVec3::Z);
@@ -226,7 +226,7 @@ fn turn_least(frames: &mut [SkinFrame], normal: DVec3) {
     }
 }
 
-/// Measures how far the matter's x director has turned past each frame's normal, without jumps of 2π.
+/// Computes the angle of the section's x director from each frame's normal, without jumps of 2π.
 fn follow_twist(frames: &mut [SkinFrame], curve: &CurveState) {
     if curve.frames.len() + 1 != curve.arc_m.len() {
         return;
@@ -244,7 +244,7 @@ fn follow_twist(frames: &mut [SkinFrame], curve: &CurveState) {
     }
 }
 
-/// The section's rotation at `arc_m`, between the rotations at the middles of two segments. `segment` only rises.
+/// The section's rotation at `arc_m`, interpolated between the middles of two segments. `segment` only increases.
 fn section_at(curve: &CurveState, arc_m: f64, segment: &mut usize) -> DQuat {
     let middle = |i: usize| 0.5 * (curve.arc_m[i] + curve.arc_m[i + 1]);
     let last = curve.frames.len() - 1;
@@ -282,7 +282,7 @@ mod tests {
         skeleton.rebuild(&curve, 0.1);
         for node in 1..11 {
             let (before, after) = (skeleton.evaluate(&curve, node - 1, 1.0), skeleton.evaluate(&curve, node, 0.0));
-            // the same polynomial ends, summed in another order: a few ulp of 1
+            // both are values of the same cubics at a shared end, summed in another order: a few ulp of 1
             assert!((before.position - after.position).length() < 1e-14);
             assert!((before.slope - after.slope).length() < 1e-13);
             assert!((before.position - curve.positions[node]).length() < 1e-14);
@@ -291,7 +291,7 @@ mod tests {
 
     #[test]
     fn a_parabola_is_reproduced() {
-        // unevenly spaced nodes on (s, s²): the tangents are of parabolas, so nothing is lost
+        // unevenly spaced nodes on (s, s²): the tangents are those of parabolas, so the result is exact
         let arc_m = vec![0.0, 0.1, 0.35, 0.4, 1.0];
         let positions: Vec<_> = arc_m.iter().map(|&s| DVec3::new(s, s * s, 0.0)).collect();
         let curve = CurveState {
@@ -309,11 +309,11 @@ mod tests {
 
     #[test]
     fn frames_do_not_twist_on_a_plane_curve() {
-        // a clothoid-like plane curve: the normal that starts out of the plane must stay there
+        // a clothoid-like plane curve: a normal that starts out of the plane must stay perpendicular to it
         let mut curve = helix(40, 1.2, 0.0);
         curve.frames = vec![DQuat::from_rotation_arc(DVec3::X, DVec3::Z); 39];
         for f in Skeleton::default().rebuild(&curve, 0.2) {
-            assert!((f.normal - DVec3::Z).length() < 1e-13, "{}", f.normal); // exact by symmetry but for rounding
+            assert!((f.normal - DVec3::Z).length() < 1e-13, "{}", f.normal); // exact by symmetry except for rounding
         }
     }
 
@@ -345,7 +345,7 @@ mod tests {
     fn twist_of_the_matter_is_followed_over_many_turns() {
         let n = 200;
         let arc_m: Vec<f64> = (0..=n).map(|i| i as f64 / n as f64).collect();
-        let rate = 40.0; // radians a metre: more than six turns
+        let rate = 40.0; // radians per metre: more than six turns
         let curve = CurveState {
             positions: arc_m.iter().map(|&s| DVec3::new(0.0, 0.0, s)).collect(),
             velocities: vec![DVec3::ZERO; n + 1],

@@ -1,6 +1,6 @@
-//! How far a point is from a fixed solid, and along which normal: the geometry of contact with obstacles.
+//! Signed distance and normal of a static solid: the geometry of contact with obstacles.
 //!
-//! In: an [`Obstacle`], balls and spans between balls. Out: the places where they touch it, or nearly do.
+//! In: an [`Obstacle`], balls and spans between balls. Out: the points where they touch it, or nearly do.
 //! Never here: velocities, forces. Theory: `docs/theory/contact.md`, eq. 12–14.
 
 use super::mesh_distance::MeshField;
@@ -8,18 +8,18 @@ use super::parry_shapes::{hull_triangles, mesh_triangles};
 use super::{Obstacle, ShapeError, Solid};
 use glam::{DQuat, DVec2, DVec3};
 
-/// A place of an obstacle's surface near a point.
+/// A point of an obstacle's surface near a query point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Touch {
-    /// Unit normal of the surface there, out of the obstacle.
+    /// Unit normal of the surface, out of the obstacle.
     pub normal: DVec3,
-    /// Distance of the point from the surface, metres; negative inside.
+    /// Distance of the query point from the surface, metres; negative inside.
     pub distance_m: f64,
 }
 
 impl Touch {
-    /// Whether the place at which the `ball` inside a span touches lies behind this one, which the span's `end` touches already
-    /// (eq. 13).
+    /// Whether the surface point touched by the inner `ball` of a span is behind the tangent plane of this one, which the span's `end`
+    /// already touches (eq. 13).
     pub fn hides(self, end: Ball, ball: Ball, touch: Self) -> bool {
         let wall = end.centre - self.normal * self.distance_m;
         let place = ball.centre - touch.normal * touch.distance_m;
@@ -29,20 +29,20 @@ impl Touch {
     }
 }
 
-/// The most places at which one ball touches one obstacle: a corner of a room has three.
+/// Most contact points of one ball with one obstacle: a corner of a room has three.
 pub const TOUCHES_MAX: usize = 4;
 
-/// Up to [`TOUCHES_MAX`] places, nearest first.
+/// Up to [`TOUCHES_MAX`] contact points, nearest first.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct Touches {
     places: [Option<Touch>; TOUCHES_MAX],
     count: usize,
-    /// No surface is nearer than this, metres, whatever the reach was.
+    /// Lower bound of the distance to any surface, metres, independent of the reach.
     pub clear_m: f64,
 }
 
 impl Touches {
-    /// Adds a place; a full list stays as it is.
+    /// Adds a contact point; a full list stays unchanged.
     pub fn push(&mut self, touch: Touch) {
         if self.count < TOUCHES_MAX {
             self.places[self.count] = Some(touch);
@@ -50,12 +50,12 @@ impl Touches {
         }
     }
 
-    /// Whether no more fit.
+    /// Whether the list is full.
     pub fn is_full(&self) -> bool {
         self.count == TOUCHES_MAX
     }
 
-    /// The places, nearest first.
+    /// The contact points, nearest first.
     pub fn iter(&self) -> impl Iterator<Item = Touch> + '_ {
         self.places.iter().flatten().copied()
     }
@@ -71,7 +71,7 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// The ball at the share `s` of the way to `other`.
+    /// The ball interpolated at `s` towards `other`.
     pub fn toward(self, other: Self, s: f64) -> Self {
         Self {
             centre: self.centre.lerp(other.centre, s),
@@ -80,7 +80,7 @@ impl Ball {
     }
 }
 
-/// A solid as a field of distances, where it stands.
+/// A solid as a field of distances, at its pose.
 #[derive(Debug, Clone)]
 pub struct Field {
     kind: Kind,
@@ -95,7 +95,7 @@ enum Kind {
     Capsule(f64, f64),
     Cylinder(f64, f64),
     Plane,
-    /// Triangles, in world axes already: an obstacle never moves.
+    /// Triangles, already in world axes: an obstacle never moves.
     Mesh(std::boxed::Box<MeshField>),
 }
 
@@ -103,26 +103,26 @@ enum Kind {
 struct Lowest {
     share: f64,
     touch: Touch,
-    /// Where the tangents meet: the gap is nowhere below it, metres.
+    /// Height of the intersection of the tangents: a lower bound of the gap, metres.
     floor_m: f64,
 }
 
-/// Normals whose cosine is above this tell of the same wall: 0.8°.
+/// Normals whose cosine is above this belong to the same wall: 0.8°.
 const FLAT: f64 = 0.9999;
-/// Halvings of the search for the lowest point of a span: tangents meet much faster on smooth shapes.
+/// Iterations of the search for the lowest point of a span: tangents converge much faster on smooth shapes.
 const SPAN_TRIES: usize = 16;
-/// How near the floor under the tangents the lowest point must come, as a share of the span.
+/// Tolerance between the lowest point and the lower bound of the tangents, as a fraction of the span.
 const LOWEST_SHARE: f64 = 1e-6;
-/// A cylinder that leans less than this stands on its rim: no point of that is the nearest.
+/// Below this tilt a cylinder rests on its whole rim: no point of the rim is the nearest.
 const UPRIGHT: f64 = 1e-3;
-/// How close to an end of a span its lowest point belongs to that end's own ball, as a share of the span.
+/// A lowest point closer to an end than this, as a fraction of the span, belongs to that end's own ball.
 const SPAN_END_SHARE: f64 = 0.02;
 
 impl Field {
     /// The field of an obstacle.
     ///
     /// # Errors
-    /// [`ShapeError`] where [`Solid::to_shared_shape`] would give one.
+    /// [`ShapeError`] in the cases of [`Solid::to_shared_shape`].
     pub fn new(obstacle: &Obstacle) -> Result<Self, ShapeError> {
         Self::placed(&obstacle.solid, obstacle.position, obstacle.rotation.normalize())
     }
@@ -158,10 +158,10 @@ impl Field {
         Ok(Self { kind, position, rotation })
     }
 
-    /// Where `point` is within `reach_m` of the surface, nearest place first.
+    /// Contact points of `point` within `reach_m` of the surface, nearest first.
     ///
-    /// A convex primitive has one place, at any depth. A mesh or hull has one for each wall of a corner, and is felt only
-    /// to the depth `reach_m` behind its surface.
+    /// A convex primitive has one, at any depth. A mesh or hull has one for each wall of a corner, and is detected only to the depth
+    /// `reach_m` behind its surface.
     pub fn touches(&self, point: DVec3, reach_m: f64) -> Touches {
         let mut found = Touches::default();
         if let Kind::Mesh(mesh) = &self.kind {
@@ -181,24 +181,25 @@ impl Field {
         found
     }
 
-    /// Takes back of the `way` on which a ball of `radius_m` has just come to `centre` what led it into this solid, or deeper.
+    /// Removes from the displacement `way`, by which a ball of `radius_m` arrived at `centre`, the part that moved it into this solid, or
+    /// deeper.
     pub fn hold_back(&self, centre: &mut DVec3, way: DVec3, radius_m: f64) {
         let came_to = *centre;
         for touch in self.touches(came_to, radius_m).iter() {
             let gap_m = touch.distance_m - radius_m;
             let before_m = gap_m - way.dot(touch.normal);
-            // what one place has taken back another of the same way out does not again
+            // a correction at one contact point counts for others with the same normal
             let now_m = gap_m + (*centre - came_to).dot(touch.normal);
             *centre += touch.normal * (before_m.min(0.0) - now_m).max(0.0);
         }
     }
 
-    /// Whether the inside of a span can come nearer than both of its ends: never to a flat floor without end.
+    /// Whether the inside of a span can come nearer than both of its ends: never with an infinite plane.
     pub fn feels_spans(&self) -> bool {
         !matches!(self.kind, Kind::Plane)
     }
 
-    /// Whether `ball` moved by `way` stays farther than `slack_m` from this solid. A mesh says no.
+    /// Whether `ball` displaced by `way` stays farther than `slack_m` from this solid. Always false for a mesh.
     pub fn is_missed(&self, ball: Ball, way: DVec3, slack_m: f64) -> bool {
         if matches!(self.kind, Kind::Mesh(_)) {
             return false;
@@ -208,13 +209,13 @@ impl Field {
         clear(end) && self.lowest([ball, end], slack_m).is_none()
     }
 
-    /// The place where the inside of a span comes nearer than its ends, and its share of the span; `None` where the ends say
-    /// it all, or the span stays farther than `reach_m` beyond its own radius.
+    /// The contact point where the inside of a span comes nearer than its ends, and its fraction of the span; `None` where the contact
+    /// points of the ends suffice, or the span stays farther than `reach_m` beyond its own radius.
     pub fn touches_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
         self.lowest_of_span(ends, reach_m).filter(|(share, _)| (SPAN_END_SHARE..=1.0 - SPAN_END_SHARE).contains(share))
     }
 
-    /// The same, however near to an end of the span it is.
+    /// The same, however close to an end of the span.
     pub fn lowest_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<(f64, Touch)> {
         match &self.kind {
             Kind::Mesh(mesh) => mesh.touches_span(ends, reach_m),
@@ -222,8 +223,8 @@ impl Field {
         }
     }
 
-    /// The corners that a flat face may come nearest to whose normal towards the solid is `way`: all of a box; of each rim of a
-    /// cylinder the nearest point and three at right angles. `None` for what has none or is a mesh.
+    /// The corners at which a flat face with the normal `way` towards the solid may be nearest: all of a box; of each rim of a cylinder the
+    /// nearest point and three at right angles. `None` for solids without corners and meshes.
     pub fn corners(&self, way: DVec3) -> Option<[DVec3; 8]> {
         let sign = |i: usize, bit: usize| if i >> bit & 1 == 1 { 1.0 } else { -1.0 };
         match &self.kind {
@@ -238,10 +239,10 @@ impl Field {
         }
     }
 
-    /// A lower bound of the gap to a whole span, with the normal of the place that comes nearest; `None` beyond `reach_m`.
+    /// A lower bound of the gap to a whole span, with the normal of the nearest surface point; `None` beyond `reach_m`.
     ///
-    /// Exact to a millionth of the span's length for a convex primitive. To a mesh the whole span has its widest radius, and
-    /// where it overlaps the bound is up to half a span deeper than need be.
+    /// Exact to a millionth of the span's length for a convex primitive. For a mesh the whole span has its greatest radius, and where it
+    /// overlaps the bound is up to half a span deeper than necessary.
     pub fn gap_of_span(&self, ends: [Ball; 2], reach_m: f64) -> Option<Touch> {
         let at_end = |ball: Ball| {
             let near = self.touches(ball.centre, ball.radius_m + reach_m).iter().next()?;
@@ -257,14 +258,14 @@ impl Field {
         let length_m = ends[0].centre.distance(ends[1].centre);
         let near = [at_end(ends[0]), at_end(ends[1]), inside].into_iter().flatten();
         let least = near.min_by(|a, b| a.distance_m.total_cmp(&b.distance_m))?;
-        // inside a mesh a place between the ends may be deeper than both
+        // inside a mesh a point between the ends may be deeper than both
         let narrow_m = ends[0].radius_m.min(ends[1].radius_m);
         let is_deep = matches!(self.kind, Kind::Mesh(_)) && least.distance_m <= -narrow_m;
         let slack_m = if is_deep { 0.5 * length_m } else { LOWEST_SHARE * length_m };
         Some(Touch { distance_m: least.distance_m - slack_m, ..least })
     }
 
-    /// The lowest point of the convex function gap(s) inside a span, where tangents meet (eq. 14).
+    /// The lowest point of the convex function gap(s) inside a span, at the intersection of tangents (eq. 14).
     fn lowest(&self, ends: [Ball; 2], reach_m: f64) -> Option<Lowest> {
         let along = ends[1].centre - ends[0].centre;
         let at = |s: f64| {
@@ -286,7 +287,7 @@ impl Field {
                 return None;
             }
             let middle = at(meet.clamp(left.0, right.0));
-            // where the slope is nothing the tangents of the ends say nothing any more
+            // where the slope is zero the tangents of the ends give no better bound
             let floor = if middle.2.abs() <= tolerance { middle.1 } else { floor };
             let here = Lowest { share: middle.0, touch: middle.3, floor_m: floor };
             best = Some(here).filter(|_| middle.1 <= reach_m);
@@ -298,7 +299,7 @@ impl Field {
         best
     }
 
-    /// The nearest surface of a convex primitive, from outside or inside (eq. 12).
+    /// The nearest surface point of a convex primitive, from outside or inside (eq. 12).
     fn nearest(&self, point: DVec3) -> Touch {
         let local = self.rotation.conjugate() * (point - self.position);
         let (distance_m, normal) = match self.kind {

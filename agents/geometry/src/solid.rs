@@ -1,9 +1,9 @@
-//! Solid shapes: what a rigid body or a fixed obstacle is made of.
+//! Solid shapes of rigid bodies and static obstacles.
 
 use glam::{DQuat, DVec3};
 use std::sync::Arc;
 
-/// A solid in its own axes, metres, centred where its primitive is centred.
+/// A solid in its own axes, metres, with its primitive's centre at the origin.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Solid {
     /// A ball.
@@ -30,7 +30,7 @@ pub enum Solid {
         /// Half the length, > 0.
         half_height_m: f64,
     },
-    /// The half space below z = 0; only as a fixed obstacle.
+    /// The half space below z = 0; only as a static obstacle.
     Plane,
     /// The convex hull of points.
     Hull {
@@ -41,19 +41,19 @@ pub enum Solid {
     Mesh {
         /// Corners.
         points_m: Arc<[DVec3]>,
-        /// Corner numbers of each triangle, counter-clockwise seen from outside.
+        /// Corner indices of each triangle, counter-clockwise seen from outside.
         triangles: Arc<[[u32; 3]]>,
     },
 }
 
-/// A solid that never moves: every agent may touch it, none owns it.
+/// A static solid: every agent may touch it, no agent owns it.
 #[derive(Debug, Clone)]
 pub struct Obstacle {
     /// The object's name in the scene.
     pub name: String,
     /// Its shape.
     pub solid: Solid,
-    /// Where its axes' origin is, metres.
+    /// Position of its axes' origin, metres.
     pub position: DVec3,
     /// Rotation from its axes to the world's.
     pub rotation: DQuat,

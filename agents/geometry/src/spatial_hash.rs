@@ -1,6 +1,6 @@
 //! Points in a uniform hash grid: all pairs within one cell's size of each other, in O(N).
 //!
-//! In: points and the size of a cell. Out: pairs of point numbers, each once. Nothing is allocated once the sizes settle.
+//! In: points and the size of a cell. Out: pairs of point indices, each once. Nothing is allocated once the sizes settle.
 
 use glam::{DVec3, IVec3};
 
@@ -8,12 +8,12 @@ use glam::{DVec3, IVec3};
 #[derive(Debug, Clone, Default)]
 pub struct Grid {
     cells: Vec<IVec3>,
-    /// Where each bucket starts in `sorted`; one entry more than buckets.
+    /// Start of each bucket in `sorted`; one entry more than buckets.
     starts: Vec<u32>,
     sorted: Vec<u32>,
 }
 
-/// Half of the 26 neighbours of a cell: the other half sees the pair from its own side.
+/// Half of the 26 neighbours of a cell: pairs with the other half are visited from the neighbour's side.
 const HALF: [IVec3; 13] = [
     IVec3::new(1, 0, 0),
     IVec3::new(-1, 1, 0),
@@ -46,7 +46,7 @@ impl Grid {
         }
         self.sorted.clear();
         self.sorted.resize(self.cells.len(), 0);
-        // backwards, so that each bucket ends up by rising numbers and `starts` at its own starts again
+        // filled backwards, so that each bucket is sorted in ascending order and its entry in `starts` ends at its start
         for (i, cell) in self.cells.iter().enumerate().rev() {
             let end = &mut self.starts[bucket(*cell, buckets) + 1];
             *end -= 1;
@@ -74,7 +74,7 @@ impl Grid {
 }
 
 fn bucket(cell: IVec3, buckets: usize) -> usize {
-    // large primes, as (TEA03) suggests for grids
+    // large primes, as suggested for grids in (TEA03)
     let mixed = cell.x.wrapping_mul(73_856_093) ^ cell.y.wrapping_mul(19_349_663) ^ cell.z.wrapping_mul(83_492_791);
     (mixed as u32 ^ (mixed as u32 >> 15)) as usize & (buckets - 1)
 }

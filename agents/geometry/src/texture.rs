@@ -1,13 +1,13 @@
-//! What is painted on a mesh: pixels, and how they lie on it.
+//! Textures: pixels and their mapping onto a mesh.
 //!
 //! In: pixels, or the name of a pattern. Out: a [`Texture`]. Never here: files, light, the GPU.
 
-/// How a texture lies on a mesh.
+/// Mapping of a texture onto a mesh.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wrap {
     /// Where the mesh's corners say ([`crate::PrimitiveVertex::uv`]).
     Corners,
-    /// Straight onto each side, along the axis nearest to the normal: one repeat every so many metres, finite, > 0.
+    /// Projected onto each side along the axis nearest to the normal: one repeat per this many metres, finite, > 0.
     Sides(f32),
 }
 
@@ -16,7 +16,7 @@ pub enum Wrap {
 pub struct Texture {
     width: u32,
     height: u32,
-    /// Row by row from the top: red, green, blue (sRGB), and nothing that is looked at.
+    /// Row by row from the top: red, green, blue (sRGB), and an unused byte.
     texels: Vec<[u8; 4]>,
     wrap: Wrap,
 }
@@ -24,12 +24,12 @@ pub struct Texture {
 /// Width and height of a pattern, pixels.
 const PATTERN: u32 = 256;
 
-/// A pattern from a formula: it repeats without a seam.
+/// A procedural pattern that repeats without a seam.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Pattern {
     /// Four by four squares, light and dark.
     Checker,
-    /// Boards side by side, each of its own shade, with a grain.
+    /// Boards next to each other, each in its own shade, with a grain.
     Planks,
     /// Four shelves of books.
     Books,
@@ -39,7 +39,7 @@ impl Pattern {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::Checker, Self::Planks, Self::Books];
 
-    /// The name as scenes write it.
+    /// The name in scene files.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
@@ -67,7 +67,7 @@ impl Pattern {
 }
 
 impl Texture {
-    /// So many pixels across and down; `None` where that is none, or not as many as there are.
+    /// A texture of width × height pixels; `None` where that is zero or differs from the number of texels.
     #[must_use]
     pub fn new((width, height): (u32, u32), texels: Vec<[u8; 4]>, wrap: Wrap) -> Option<Self> {
         let count = u64::from(width) * u64::from(height);
@@ -86,13 +86,13 @@ impl Texture {
         &self.texels
     }
 
-    /// How it lies on a mesh.
+    /// Its mapping onto a mesh.
     #[must_use]
     pub fn wrap(&self) -> Wrap {
         self.wrap
     }
 
-    /// What it looks like from so far that it is one colour, sRGB: the mean of its light.
+    /// Its mean colour, sRGB, averaged in linear light.
     #[must_use]
     pub fn mean(&self) -> [u8; 3] {
         let mut sums = [0.0; 3];
@@ -102,7 +102,7 @@ impl Texture {
         sums.map(|sum| value(sum / self.texels.len() as f64))
     }
 
-    /// The same at half its size, at least 1: each pixel the mean light of those it stands for.
+    /// The same at half its size, at least 1: each pixel is the mean linear light of the four it replaces.
     #[must_use]
     pub fn halved(&self) -> Self {
         let (width, height) = ((self.width / 2).max(1), (self.height / 2).max(1));
@@ -120,13 +120,13 @@ impl Texture {
     }
 }
 
-/// The light of an sRGB value, 0 … 1.
+/// The linear light of an sRGB value, 0 … 1.
 fn light(value: u8) -> f64 {
     let c = f64::from(value) / 255.0;
     if c <= 0.04045 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
 }
 
-/// The sRGB value of a light.
+/// The sRGB value of a linear light.
 fn value(light: f64) -> u8 {
     let c = if light <= 0.003_130_8 { 12.92 * light } else { 1.055 * libm::pow(light, 1.0 / 2.4) - 0.055 };
     // a cast of floats saturates
@@ -143,7 +143,7 @@ fn planks(x: u32, y: u32) -> [u8; 3] {
         return [58, 38, 24];
     }
     let shade = 0.82 + 0.18 * chance(board, 7);
-    // a grain of long streaks: the same for eight pixels along
+    // a grain of long streaks: constant over eight pixels along the board
     let grain = 0.92 + 0.08 * chance(y, x / 8);
     [172.0, 122.0, 78.0].map(|c: f64| (c * shade * grain) as u8)
 }
@@ -163,7 +163,7 @@ fn books(x: u32, y: u32) -> [u8; 3] {
     }
 }
 
-/// A number in 0 … 1 from two: splitmix's finaliser.
+/// A number in 0 … 1 from two integers, by the finaliser of splitmix.
 fn chance(a: u32, b: u32) -> f64 {
     let mut h = (u64::from(a) << 32 | u64::from(b)).wrapping_add(0x9e37_79b9_7f4a_7c15);
     h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,16 +1,16 @@
 //! The shape of a grasping tool: jaws, hinge, clevis and shaft as sized primitives in the tool's own axes.
 //!
-//! In: how far the jaws are open and how thick the shaft is. Out: parts to draw. Never here: how the tool moves or grasps.
+//! In: the opening of the jaws and the size of the shaft. Out: parts to draw. Never here: motion or grasping.
 //! The point between the jaws is the origin, jaws point along +z, the shaft runs along −z.
 
 use super::mesh::creased_mesh;
 use super::{Primitive, PrimitiveMesh, Rounding};
 use glam::{DQuat, DVec3, Vec3};
 
-/// The measures of a tool.
+/// Dimensions of a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolShape {
-    /// Radius of the shaft, metres, > 0. Everything near the tip is in proportion.
+    /// Radius of the shaft, metres, > 0. Everything near the tip is proportional to it.
     pub shaft_radius_m: f64,
     /// Length of the shaft, metres, > 0.
     pub shaft_length_m: f64,
@@ -26,21 +26,21 @@ impl Default for ToolShape {
 /// One part of a tool.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ToolPart {
-    /// What to draw.
+    /// The shape.
     pub primitive: Primitive,
-    /// How large.
+    /// The size.
     pub size: Rounding,
-    /// Where, in the tool's axes, metres.
+    /// Position in the tool's axes, metres.
     pub position: DVec3,
-    /// How turned, from the part's axes to the tool's.
+    /// Rotation from the part's axes to the tool's.
     pub rotation: DQuat,
 }
 
-/// How far each jaw swings from shut to wide open, radians.
+/// Swing of each jaw from shut to wide open, radians.
 const JAW_SWING_RAD: f64 = 0.52;
 /// Length of the jaws in shaft radii.
 const JAW_LENGTH: f64 = 8.0;
-/// The share of the jaws that lies behind the point between them.
+/// Fraction of the jaws' length behind the point between them.
 const JAW_BEHIND: f64 = 0.75;
 
 impl ToolShape {
@@ -105,7 +105,7 @@ pub(super) const fn jaw_triangles(n: u8) -> u32 {
     2 * corners * (sections - 1) + 2 * (corners - 2)
 }
 
-/// A jaw 1 long along z: a half round that tapers to the tip, flat with teeth on the side that bites (−x).
+/// A jaw 1 long along z: a half round that tapers to the tip, flat with teeth on the biting side (−x).
 pub(super) fn jaw(n: u8) -> PrimitiveMesh {
     let (corners, sections) = (jaw_corners(n), jaw_sections(n));
     let mut points = Vec::new();
@@ -113,7 +113,7 @@ pub(super) fn jaw(n: u8) -> PrimitiveMesh {
         let z = f64::from(section) / f64::from(sections - 1);
         let width = 0.115 * (1.0 - 0.55 * z * z) * if section + 1 == sections { 0.55 } else { 1.0 };
         let thickness = 0.10 * (1.0 - 0.6 * z) * if section + 1 == sections { 0.6 } else { 1.0 };
-        // teeth: every other section's bite stands back
+        // teeth: the bite of every other section is recessed
         let bite = if section % 2 == 1 && section + 1 < sections { 0.014 } else { 0.0 };
         for corner in 0..corners {
             let angle = std::f64::consts::PI * f64::from(corner) / f64::from(corners - 1);
@@ -153,7 +153,7 @@ mod tests {
         // each jaw swings by 0.52 rad over 20 mm
         let gap = 2.0 * 8.0 * shape.shaft_radius_m * 0.52_f64.sin();
         assert!((tip(1.0, 0).distance(tip(1.0, 1)) - gap).abs() < 1e-6);
-        // and away from its own back: the first jaw is the one on +x
+        // the first jaw opens towards +x
         assert!(tip(1.0, 0).x > 0.0);
     }
 

@@ -1,21 +1,21 @@
-//! The edges of a triangle mesh: whether all of them close, and where more than two triangles meet in one.
+//! The edges of a triangle mesh: whether the mesh is closed, and where more than two triangles share an edge.
 //!
-//! In: points and triangles. Out: a verdict. Never here: what follows from it.
-//! Points at one place are one: a seam of doubled points (for places on a texture, for normals) neither opens a surface nor hides
-//! that it branches. Triangles without an area have no say.
+//! In: points and triangles. Out: the finding. Never here: its consequences.
+//! Coincident points count as one: a seam of doubled points (for texture coordinates, for normals) neither opens a surface nor hides a
+//! branch. Triangles without an area are ignored.
 
 use super::Triangles;
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// An edge that more than two triangles share: there the surface branches, and has no two sides any more.
+/// An edge that more than two triangles share: there the surface branches, and no longer has two sides.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Branch {
-    /// Number of the first triangle that is one too many, from 0.
+    /// Index of the first surplus triangle, from 0.
     pub triangle: usize,
     /// Its corners at the ends of the edge.
     pub corners: [u32; 2],
-    /// How many triangles share the edge.
+    /// Number of triangles that share the edge.
     pub sharing: usize,
 }
 
@@ -23,18 +23,17 @@ pub struct Branch {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 struct Side {
     object: u32,
-    /// The places that the edge joins, the lesser first.
+    /// The ends of the edge, by index among distinct points, the lesser first.
     edge: [u32; 2],
     triangle: u32,
-    /// Whether the triangle runs along it from the lesser to the greater.
+    /// Whether the triangle traverses it from the lesser to the greater.
     forward: bool,
 }
 
-/// The first edge, in the order of the triangles, that more than two of one object share. Triangles name points that are there.
+/// The first edge, in the order of the triangles, that more than two triangles of one object share. All corner indices must exist.
 ///
-/// `object_of` says of which object a triangle is: objects that touch each other along an edge are no branch.
-/// Every triangle counts, also one that is there twice: a sheet whose faces are there once for each side branches along every edge
-/// inside it.
+/// `object_of` returns the object of a triangle: objects that touch each other along an edge do not branch.
+/// Every triangle counts, duplicates too: a sheet with one copy of its faces for each side branches along every inner edge.
 #[must_use]
 pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Option<Branch> {
     let place = places(points);
@@ -47,7 +46,7 @@ pub fn branch(points: &[DVec3], triangles: &[[u32; 3]], object_of: impl Fn(usize
     Some(Branch { triangle: triangle as usize, corners: edge.map(at), sharing: first.len() })
 }
 
-/// Whether every edge has a triangle on both sides, running opposite ways.
+/// Whether every edge has equally many triangles in either direction.
 pub fn is_closed(mesh: &Triangles) -> bool {
     let sides = sides((&mesh.points, &places(&mesh.points)), &mesh.triangles, |_| 0);
     let balanced = |sharing: &[Side]| 2 * sharing.iter().filter(|side| side.forward).count() == sharing.len();
@@ -58,15 +57,15 @@ fn same_edge(a: &Side, b: &Side) -> bool {
     (a.object, a.edge) == (b.object, b.edge)
 }
 
-/// For each point the first one at its place.
+/// For each point the index of the first coincident one.
 pub(super) fn places(points: &[DVec3]) -> Vec<u32> {
     let mut first_at = HashMap::with_capacity(points.len());
-    // adding zero makes -0.0 the same place as 0.0
+    // adding zero makes -0.0 equal to 0.0
     let bits = |p: &DVec3| (*p + DVec3::ZERO).to_array().map(f64::to_bits);
     (0..).zip(points).map(|(i, p)| *first_at.entry(bits(p)).or_insert(i)).collect()
 }
 
-/// The sides of all triangles with an area, those of one edge of an object side by side in the order of their triangles.
+/// The sides of all triangles with an area, sorted by object and edge, then by triangle.
 fn sides((points, place): (&[DVec3], &[u32]), triangles: &[[u32; 3]], object_of: impl Fn(usize) -> u32) -> Vec<Side> {
     let mut sides = Vec::with_capacity(3 * triangles.len());
     for (number, t) in triangles.iter().enumerate() {
@@ -88,7 +87,7 @@ mod tests {
     use super::*;
     use crate::{Generator, generate, hull_triangles};
 
-    /// The branch of triangles that are all of one object.
+    /// The branch of triangles that all belong to one object.
     fn branch(points: &[DVec3], triangles: &[[u32; 3]]) -> Option<Branch> {
         super::branch(points, triangles, |_| 0)
     }
@@ -114,13 +113,13 @@ mod tests {
         let fan = [[0, 1, 2], [1, 0, 3], [0, 1, 4], [4, 1, 0]];
         assert_eq!(branch(&points, &fan[..2]), None);
         assert_eq!(branch(&points, &fan), Some(Branch { triangle: 2, corners: [0, 1], sharing: 4 }));
-        // a face that is there three times shares its edges with itself
+        // a face that occurs three times shares its edges with itself
         let again = [[0, 1, 2], [1, 2, 0], [0, 2, 1]];
         assert_eq!(branch(&points, &again).unwrap().sharing, 3);
-        // two objects that touch along an edge have one each
+        // two objects that touch along an edge: two triangles each, no branch
         let touching = super::branch(&points, &fan, |t| u32::from(t > 1));
         assert_eq!(touching, None);
-        // what has no area has no say
+        // triangles without an area are ignored
         assert_eq!(branch(&points, &[[0, 1, 2], [1, 0, 3], [0, 1, 1], [1, 0, 0]]), None);
     }
 

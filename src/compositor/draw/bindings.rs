@@ -1,6 +1,6 @@
-//! What shaders are bound to: layouts, the frame's numbers, the shadow map, the tissue texture.
+//! Resources that shaders are bound to: layouts, the frame's uniforms, the shadow map, the tissue texture.
 //!
-//! In: a device. Out: everything bound that does not change from frame to frame. Never here: a frame, pipelines.
+//! In: a device. Out: all bindings that do not change from frame to frame. Never here: a frame, pipelines.
 
 use super::globals::Globals;
 use super::tissue;
@@ -10,7 +10,7 @@ use wgpu::{BindGroupLayout, Device, TextureFormat};
 /// Format of depths.
 pub const DEPTH: TextureFormat = TextureFormat::Depth32Float;
 
-/// What passes may read: the light's pass the numbers only, the picture's pass the light's depths too, and what is painted on a mesh.
+/// Bind group layouts: the light's pass reads the uniforms only, the picture's pass the shadow map too, and painted meshes a texture.
 #[derive(Debug)]
 pub struct Layouts {
     pub(super) light: BindGroupLayout,
@@ -68,16 +68,16 @@ impl Layouts {
     }
 }
 
-/// The things bound, and the views that passes draw into.
+/// The bind groups, and the views that passes draw into.
 #[derive(Debug)]
 pub struct Bindings {
-    /// The frame's numbers.
+    /// The frame's uniforms.
     pub globals: wgpu::Buffer,
-    /// Bound while the light's depths are drawn.
+    /// Bound while the shadow map is drawn.
     pub light: wgpu::BindGroup,
     /// Bound while the picture is drawn.
     pub picture: wgpu::BindGroup,
-    /// The light's depths.
+    /// The shadow map.
     pub shadow: wgpu::TextureView,
 }
 

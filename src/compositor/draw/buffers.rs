@@ -1,10 +1,10 @@
-//! Buffers that grow and the textures that belong to a target's size.
+//! Growing buffers, and the textures that depend on a target's size.
 //!
-//! In: bytes, sizes. Out: buffers and views. Never here: what they mean.
+//! In: bytes, sizes. Out: buffers and views. Never here: their contents' meaning.
 
 use super::super::view::Size;
 
-/// A buffer of vertices or indices that is written anew every frame and only ever grows.
+/// A buffer of vertices or indices that is rewritten every frame and only ever grows.
 #[derive(Debug)]
 pub struct Growing {
     label: &'static str,
@@ -18,7 +18,7 @@ impl Growing {
         Self { label, stride, buffer: None }
     }
 
-    /// Uploads `bytes`, into a larger buffer if need be.
+    /// Uploads `bytes`, into a larger buffer if needed.
     pub fn write(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, bytes: &[u8]) {
         if bytes.is_empty() {
             return;
@@ -43,14 +43,14 @@ impl Growing {
     }
 }
 
-/// What a target needs beside itself.
+/// Attachments of a target in addition to its own view.
 #[derive(Debug)]
 pub struct Targets {
     /// The size it is for.
     pub size: Size,
     /// Depths, reversed.
     pub depth: wgpu::TextureView,
-    /// Where samples are drawn before they are averaged; `None` with one sample a pixel.
+    /// Multisampled colour before it is resolved; `None` with one sample per pixel.
     samples: Option<wgpu::TextureView>,
 }
 

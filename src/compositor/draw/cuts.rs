@@ -1,8 +1,8 @@
 //! Cuts of multiresolution meshes on the GPU: the vertices of each mesh once, the triangles of each cut in use.
 //!
-//! In: the cuts that a picture uses. Out: draws. Never here: which cut is right.
-//! Triangles of cuts stand one after another in one buffer, and so do the ends of ways from one cut to another. A new one is found and
-//! appended; when the buffer is full, what the picture does not use is forgotten, and the rest is written anew.
+//! In: the cuts that a picture uses. Out: draws. Never here: the choice of a cut.
+//! Triangles of cuts are stored one after another in one buffer, and so are the end vertices of geomorphs from one cut to a coarser one. A
+//! new item is appended; when the buffer is full, all items are dropped and those that the picture uses are written anew.
 
 use super::super::picture::{MeshCorner, MeshKey, Picture};
 use metachron_geometry::{Cut, Model, Tom};
@@ -15,14 +15,14 @@ use wgpu::util::DeviceExt;
 /// Least size of a buffer, items.
 const ROOM_MIN: u64 = 1 << 14;
 
-/// What was made of the models of a picture.
+/// GPU data made from the models of a picture.
 #[derive(Debug, Default)]
 pub struct Cuts {
     models: Option<Arc<[Model]>>,
     vertices: HashMap<u32, wgpu::Buffer>,
     triangles: Store<CutKey>,
     edges: Store<CutKey>,
-    /// Where the vertices of a cut are at the coarser end of their way.
+    /// Vertices of a cut at the coarser end of its geomorph.
     ways: Store<WayKey>,
     corners: Vec<[u32; 3]>,
     sides: Vec<[u32; 2]>,
@@ -32,10 +32,10 @@ pub struct Cuts {
 /// A model and its cut.
 type CutKey = (u32, Cut);
 
-/// A model, vertices of the finer cut, vertices of the coarser one.
+/// A model, vertex count of the finer cut, vertex count of the coarser one.
 type WayKey = (u32, u32, u32);
 
-/// One buffer of items and who has which of them.
+/// One buffer of items and the range of each key in it.
 #[derive(Debug)]
 struct Store<K> {
     buffer: Option<wgpu::Buffer>,
@@ -49,7 +49,7 @@ impl<K> Default for Store<K> {
     }
 }
 
-/// What a store holds.
+/// The items of a store.
 #[derive(Debug, Clone, Copy)]
 struct Item {
     label: &'static str,
@@ -61,7 +61,7 @@ const INDEX: Item = Item { label: "cuts", bytes: 4, usage: wgpu::BufferUsages::I
 const END: Item = Item { label: "ways", bytes: size_of::<MeshCorner>() as u64, usage: wgpu::BufferUsages::VERTEX };
 
 impl Cuts {
-    /// Makes what `picture` needs and is not there yet.
+    /// Uploads the items that `picture` needs and that are missing.
     pub fn prepare(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) {
         if self.models.as_ref().is_none_or(|models| !Arc::ptr_eq(models, &picture.models)) {
             *self = Self { models: Some(Arc::clone(&picture.models)), ..Self::default() };
@@ -117,7 +117,8 @@ impl Cuts {
         }
     }
 
-    /// Draws `count` instances of a cut, on its way to one of so many vertices if to any, as triangles or as edges; the number of draws.
+    /// Draws `count` instances of a cut as triangles or as edges, morphing to a cut of `coarser` vertices if given; returns the number of
+    /// draws.
     pub fn draw(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
@@ -145,7 +146,7 @@ impl Cuts {
 }
 
 impl<K: Copy + Eq + Hash> Store<K> {
-    /// Sees to it that everything in `used` fits, each with its number of items; forgets all where it must.
+    /// Ensures that everything in `used`, each with its number of items, fits; drops all items where it does not.
     fn make_room(&mut self, device: &wgpu::Device, item: Item, used: impl Iterator<Item = (K, u32)> + Clone) {
         let sum = |some: &mut dyn Iterator<Item = (K, u32)>| some.map(|(_, items)| u64::from(items)).sum::<u64>();
         let wanted = sum(&mut used.clone().filter(|(key, _)| !self.slots.contains_key(key)));
@@ -155,7 +156,7 @@ impl<K: Copy + Eq + Hash> Store<K> {
         }
         self.slots.clear();
         self.used = 0;
-        // twice what one picture needs, so that not every picture of a moving eye begins anew
+        // twice the need of one picture, so that a moving camera does not force a rewrite with every picture
         let all = 2 * sum(&mut used.clone());
         if all > room {
             self.buffer = Some(device.create_buffer(&wgpu::BufferDescriptor {
@@ -175,7 +176,7 @@ impl<K: Copy + Eq + Hash> Store<K> {
         self.used = end;
     }
 
-    /// The part of the buffer that a key has.
+    /// The part of the buffer that belongs to a key.
     fn part(&self, item: Item, key: &K) -> Option<wgpu::BufferSlice<'_>> {
         let slot = self.slots.get(key)?;
         let [from, to] = [slot.start, slot.end].map(|at| u64::from(at) * item.bytes);
@@ -183,7 +184,7 @@ impl<K: Copy + Eq + Hash> Store<K> {
     }
 }
 
-/// Every cut of a picture with its mesh; runs of one cut in two shadings name it twice.
+/// Every cut of a picture with its mesh; a cut drawn in two shadings occurs twice.
 fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
     picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Cut(model, cut) | MeshKey::Glide(model, cut, _) => Some((model, tom(picture, model)?, cut)),
@@ -191,7 +192,7 @@ fn cuts(picture: &Picture) -> impl Iterator<Item = (u32, &Tom, Cut)> + Clone {
     })
 }
 
-/// Every way of a picture with its mesh.
+/// Every geomorph of a picture with its mesh.
 fn ways(picture: &Picture) -> impl Iterator<Item = (WayKey, &Tom)> + Clone {
     picture.solids.iter().filter_map(|run| match run.kind.mesh {
         MeshKey::Glide(model, cut, coarser) => Some(((model, cut.vertices, coarser), tom(picture, model)?)),

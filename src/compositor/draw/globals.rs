@@ -1,4 +1,4 @@
-//! The numbers every shader of a frame shares, and the light.
+//! The uniforms that every shader of a frame shares, and the light.
 //!
 //! In: a picture and a camera. Out: one uniform block. Never here: the GPU.
 
@@ -27,11 +27,11 @@ pub struct Globals {
     materials: [[f32; 4]; 8],
 }
 
-/// Direction of the lamp's long side, roughly.
+/// Approximate direction of the lamp's long side.
 const LAMP_SIDE: DVec3 = DVec3::new(0.79, 0.61, 0.0);
 
-/// Two rows a material, in the order of `Material`: wrap, reflectance, width and gain of the sharp lobe; width and gain of the
-/// broad lobe, mirror, metal. Widths are squares of the roughness.
+/// Two rows per material, in the order of `Material`: wrap, reflectance, width and gain of the sharp lobe; width and gain of the broad
+/// lobe, mirror, metal. Widths are squares of the roughness.
 const MATERIALS: [[f32; 4]; 8] = [
     [0.38, 0.055, 0.0025, 34.0],
     [0.0500, 3.0, 1.25, 0.0],
@@ -43,7 +43,7 @@ const MATERIALS: [[f32; 4]; 8] = [
     [0.1800, 1.6, 0.20, 0.0],
 ];
 
-/// What of the light never changes, as the shaders' source.
+/// The constants of the light, as shader source.
 pub fn light_source() -> String {
     let light = LIGHT.normalize();
     let lamp_x = (LAMP_SIDE - light * LAMP_SIDE.dot(light)).normalize();
@@ -83,18 +83,18 @@ impl Globals {
 }
 
 impl FloorDraw {
-    /// The point of the floor nearest to another.
+    /// The point of the floor nearest to `point`.
     fn below(&self, point: DVec3) -> DVec3 {
         point - self.normal * (point - self.point).dot(self.normal)
     }
 }
 
-/// Past this many radii of the focus the floor is as dark as the room behind it; the shaders have the same number.
+/// Beyond this many radii of the focus the floor is as dark as the room behind it; the shaders use the same number.
 const FLOOR_REACH: f64 = 2.8;
 
-/// Whether every pixel that nothing else covers shows the floor, before it has faded into the room.
+/// Whether every pixel that nothing else covers shows the floor before it has faded into the room.
 ///
-/// What a picture shows of a plane is convex if all four corners show it, and so is the disc that has not faded.
+/// The visible part of a plane is convex if all four corners show it, and so is the disc that has not faded.
 pub fn floor_fills(picture: &Picture, camera: &Camera, size: Size) -> bool {
     let Some(floor) = &picture.floor else { return false };
     let centre = floor.below(picture.focus_m - picture.origin);
@@ -107,13 +107,13 @@ pub fn floor_fills(picture: &Picture, camera: &Camera, size: Size) -> bool {
     })
 }
 
-/// The column of light as a map of so many texels holds it.
+/// The column of light, aligned to the texels of a shadow map.
 struct LightFrame {
     column: LightColumn,
-    /// The middle of the map in world axes: across in whole texels, so that shadows do not crawl.
+    /// The centre of the map in world axes: across the light in whole texels, so that shadow edges do not crawl.
     middle: DVec3,
     texel_m: f64,
-    /// What the depths span, metres.
+    /// Range of the depths, metres.
     range_m: f64,
 }
 
@@ -141,7 +141,7 @@ impl LightFrame {
         .transpose()
     }
 
-    /// What the column cuts out of the floor; a floor that light only grazes is not followed into the distance.
+    /// The column's section with the floor; at grazing light it is taken along the floor's normal instead, as it would grow without bound.
     fn patch(&self, floor: &FloorDraw, origin: DVec3) -> Patch {
         let LightColumn { light, right, up, half_m, .. } = self.column;
         let slope = light.dot(floor.normal);
@@ -156,7 +156,7 @@ impl LightFrame {
     }
 }
 
-/// Cosine of the angle between light and a floor's normal under which light grazes it.
+/// Cosine of the angle between light and a floor's normal below which light counts as grazing.
 const GRAZING: f64 = 0.15;
 
 /// The part of the floor that shadows can fall on: a parallelogram by its centre and sides, metres.
@@ -168,7 +168,7 @@ struct Patch {
 }
 
 impl Patch {
-    /// How many times larger it must be to hold all of the floor that has not faded, at least 1.
+    /// The factor by which it must grow to hold all of the floor that has not faded, at least 1.
     fn reach(&self, floor_centre: DVec3, radius_m: f64) -> f64 {
         let inscribed = 0.5 * self.x.cross(self.y).length() / self.x.length().max(self.y.length());
         let wanted = FLOOR_REACH * radius_m + self.centre.distance(floor_centre);
@@ -200,7 +200,7 @@ mod tests {
         let frame = LightFrame::new(&picture, 1024);
         let projection = frame.projection(picture.origin);
         let at = projection.transform_point3(picture.focus_m - picture.origin);
-        // snapped to whole texels: at most half a texel off
+        // snapped to whole texels: off by at most half a texel
         assert!((at.x - 0.5).abs() <= 0.5 / 1024.0 + 1e-12 && (at.y - 0.5).abs() <= 0.5 / 1024.0 + 1e-12, "{at}");
         assert!((at.z - REACH.0 / (REACH.0 + REACH.1)).abs() < 1e-12, "{at}");
         let nearer = projection.transform_point3(picture.focus_m - picture.origin + frame.column.light * 0.7);
@@ -235,6 +235,6 @@ mod tests {
         let from = |eye: DVec3| Camera::looking(picture.focus_m + eye, picture.focus_m, 0.6);
         assert!(floor_fills(&picture, &from(DVec3::new(0.1, -0.5, 1.0)), size));
         assert!(!floor_fills(&picture, &from(DVec3::new(0.0, -1.5, 0.1)), size)); // the horizon is in view
-        assert!(!floor_fills(&picture, &from(DVec3::new(0.0, -0.5, 20.0)), size)); // so is the floor's end
+        assert!(!floor_fills(&picture, &from(DVec3::new(0.0, -0.5, 20.0)), size)); // the floor's end is in view too
     }
 }

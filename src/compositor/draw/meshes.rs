@@ -1,4 +1,4 @@
-//! Meshes on the GPU, made when a level is first drawn and kept.
+//! Meshes on the GPU, made when a level is first drawn and cached.
 //!
 //! In: levels that a picture uses. Out: vertex and index buffers. Never here: instances.
 
@@ -35,17 +35,17 @@ impl Mesh {
         }
     }
 
-    /// Its corners.
+    /// The vertex buffer.
     pub fn vertices(&self) -> wgpu::BufferSlice<'_> {
         self.vertices.slice(..)
     }
 
-    /// Draws `count` instances, as triangles or as edges; the number of draws.
+    /// Draws `count` instances, as triangles or as edges; returns the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, edges: bool, count: u32) -> u32 {
         self.draw_first(pass, (edges, u32::MAX), count)
     }
 
-    /// Draws its first `triangles` (all edges, where edges are wanted) for `count` instances; the number of draws.
+    /// Draws its first `triangles` (all edges, if edges are requested) for `count` instances; returns the number of draws.
     pub fn draw_first(&self, pass: &mut wgpu::RenderPass<'_>, (edges, triangles): (bool, u32), count: u32) -> u32 {
         let first = self.corners.min(triangles.saturating_mul(3));
         let (indices, corners) = if edges { (&self.edges, self.ends) } else { (&self.triangles, first) };
@@ -59,7 +59,7 @@ impl Mesh {
     }
 }
 
-/// Every edge of some triangles once.
+/// Every edge of the triangles once.
 fn edges_of(triangles: &[[u32; 3]]) -> Vec<[u32; 2]> {
     let sides = triangles.iter().flat_map(|&[a, b, c]| [(a, b), (b, c), (c, a)]);
     let once: BTreeSet<_> = sides.map(|(a, b)| [a.min(b), a.max(b)]).collect();
@@ -72,13 +72,13 @@ pub struct Meshes {
     patches: [Option<Mesh>; N_MAX as usize + 1],
     solids: HashMap<MeshKey, Mesh>,
     given: Option<Arc<[PrimitiveMesh]>>,
-    /// Rungs of foliage by model and rung, and whether they are strokes.
+    /// Foliage levels by model and level index, and whether they are strokes.
     parts: HashMap<(u32, u8), (Mesh, bool)>,
     models: Option<Arc<[Model]>>,
 }
 
 impl Meshes {
-    /// Makes what `picture` needs and is not there yet.
+    /// Makes the meshes that `picture` needs and that are missing.
     pub fn prepare(&mut self, device: &wgpu::Device, picture: &Picture) {
         if self.given.as_ref().is_none_or(|given| !Arc::ptr_eq(given, &picture.meshes)) {
             self.solids.retain(|key, _| !matches!(key, MeshKey::Given(_)));
@@ -116,12 +116,12 @@ impl Meshes {
         });
     }
 
-    /// A rung of foliage.
+    /// The mesh of a foliage level.
     pub fn part(&self, model: u32, rung: u8) -> Option<&Mesh> {
         self.parts.get(&(model, rung)).map(|(mesh, _)| mesh)
     }
 
-    /// Whether a mesh is of points or lines that turn to the eye.
+    /// Whether a mesh consists of points or lines that turn to the camera.
     pub fn is_strokes(&self, key: MeshKey) -> bool {
         matches!(key, MeshKey::Part(model, rung, _) if self.parts.get(&(model, rung)).is_some_and(|(_, strokes)| *strokes))
     }
@@ -131,7 +131,7 @@ impl Meshes {
         self.patches.get(usize::from(n))?.as_ref()
     }
 
-    /// The mesh of solids.
+    /// The mesh of a kind of solid.
     pub fn solid(&self, key: MeshKey) -> Option<&Mesh> {
         self.solids.get(&key)
     }
@@ -163,7 +163,7 @@ fn solid_mesh(device: &wgpu::Device, key: MeshKey, given: &[PrimitiveMesh]) -> M
     primitive_mesh(device, mesh)
 }
 
-/// The corners of a point and of a line, by the numbers that the shader knows them by, and their triangles.
+/// The corners of a point and of a line, by the shader's numbers, and their triangles.
 const POINT: (&[u8], &[[u32; 3]]) = (&[0, 1, 2], &[[0, 1, 2]]);
 const LINE: (&[u8], &[[u32; 3]]) = (&[4, 5, 6, 7], &[[0, 1, 2], [0, 2, 3]]);
 
@@ -232,7 +232,7 @@ mod tests {
                 assert!(out.dot(a.normal) > 0.0, "{cells:?}");
                 six_volumes += a.core.dot(b.core.cross(c.core));
             }
-            // a closed surface of a cube of side 2 holds 8; a few hundred sums of f32
+            // a cube of side 2 has a volume of 8; tolerance for a few hundred sums of f32
             assert!((six_volumes / 6.0 - 8.0).abs() < 1e-4, "{cells:?}: {six_volumes}");
         }
     }

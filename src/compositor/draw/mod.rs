@@ -1,7 +1,7 @@
-//! Draws a [`Picture`] with wgpu: tubes skinned on the GPU, solids by instances, one shadow map, one pass of light.
+//! Draws a [`Picture`] with wgpu: tubes skinned on the GPU, solids by instances, one shadow map, one lighting pass.
 //!
-//! In: a picture, a camera, a target. Out: pixels and what they took. Never here: snapshots, levels, windows.
-//! A renderer can be dropped and made anew with another device at any time; it holds nothing that a picture does not give.
+//! In: a picture, a camera, a target. Out: pixels and the time they took. Never here: snapshots, levels, windows.
+//! A renderer can be dropped and made anew with another device at any time; all its content comes from the picture.
 
 mod bindings;
 mod buffers;
@@ -29,25 +29,25 @@ use std::time::{Duration, Instant};
 use textures::Textures;
 use timing::Timing;
 
-/// How a renderer spends.
+/// Quality settings of a renderer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RendererOptions {
-    /// Samples a pixel: 1 or 4. Four smooth every edge and cost about twice the pixels' time.
+    /// Samples per pixel: 1 or 4. Four smooth every edge and cost about twice the pixels' time.
     pub samples: u32,
     /// Width and height of the shadow map, 64 … 8192.
     pub shadow_px: u32,
-    /// Filtered comparisons with it a pixel: 1 or 4. Four soften its rims and cost a processor that draws a fifth more.
+    /// Filtered shadow-map comparisons per pixel: 1 or 4. Four soften shadow edges and cost a software rasteriser a fifth more.
     pub shadow_taps: u32,
-    /// Whether light is worked out at corners wherever that hardly shows: on fixed boxes and the floor all but the shadow, on
-    /// tubes what does not depend on the folds of the skin. A processor that draws then needs half the time.
+    /// Whether light is computed per vertex wherever that hardly shows: on fixed boxes and the floor all but the shadow, on tubes all that
+    /// does not depend on the folds of the skin. A software rasteriser then needs half the time.
     pub lean: bool,
 }
 
 impl RendererOptions {
-    /// For pictures that may take their time.
+    /// For still pictures, which need not be drawn in real time.
     pub const STILL: Self = Self { samples: 4, shadow_px: 2048, shadow_taps: 4, lean: false };
 
-    /// What suits an adapter that draws in real time: a processor gets one sample a pixel, a smaller shadow map and lean light.
+    /// Real-time settings for an adapter: a software rasteriser gets one sample per pixel, a smaller shadow map and lean light.
     #[must_use]
     pub fn for_adapter(info: &wgpu::AdapterInfo) -> Self {
         match info.device_type {
@@ -57,7 +57,7 @@ impl RendererOptions {
     }
 }
 
-/// Where a picture is drawn.
+/// The target of a picture.
 #[derive(Debug, Clone, Copy)]
 pub struct Target<'a> {
     /// A view of a texture in the renderer's format.
@@ -66,12 +66,12 @@ pub struct Target<'a> {
     pub size: Size,
 }
 
-/// What drawing a picture took.
+/// Cost of drawing a picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct DrawTimes {
-    /// Time of this thread: uploading, encoding, submitting.
+    /// CPU time of this thread: uploading, encoding, submitting.
     pub cpu: Duration,
-    /// Time of the GPU on the newest frame whose time stamps are back; `None` where the adapter has none.
+    /// GPU time of the newest frame whose time stamps are back; `None` where the adapter has none.
     pub gpu: Option<Duration>,
     /// Triangles drawn, without those of the shadow map.
     pub triangles: u64,
@@ -83,7 +83,7 @@ pub struct DrawTimes {
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum DrawError {
-    /// The target is larger than the device's textures. Nothing was drawn; a smaller one will do.
+    /// The target is larger than the device's textures allow. Nothing was drawn; a smaller target works.
     #[error("a picture of {width} × {height} pixels is too large for this adapter; its limit is {max}")]
     TooLarge {
         /// Pixels across.
@@ -96,13 +96,13 @@ pub enum DrawError {
     /// The device is gone. Make a new device and a new renderer; pictures stay valid.
     #[error("the graphics device was lost: {reason}")]
     DeviceLost {
-        /// What the driver says.
+        /// The driver's message.
         reason: String,
     },
-    /// wgpu refused what was asked: a bug of ours, or a device out of memory. The picture is undefined.
+    /// wgpu rejected a call: a bug of this crate, or a device out of memory. The picture is undefined.
     #[error("the graphics device refused: {message}")]
     Refused {
-        /// What wgpu says.
+        /// The message of wgpu.
         message: String,
     },
 }
@@ -131,7 +131,7 @@ impl Renderer {
     /// A renderer for targets of `format`. Sets the device's callback for its loss ([`Renderer::lost`]).
     ///
     /// # Errors
-    /// [`DrawError::Refused`] where the device cannot do what the shaders need.
+    /// [`DrawError::Refused`] where the device lacks a feature that the shaders need.
     pub fn new(
         device: &wgpu::Device,
         queue: &wgpu::Queue,
@@ -182,9 +182,9 @@ impl Renderer {
         self.options
     }
 
-    /// Draws `picture` as `camera` sees it and submits the work; it does not wait for the GPU.
+    /// Draws `picture` as seen by `camera` and submits the work; it does not wait for the GPU.
     ///
-    /// A target without pixels is left alone.
+    /// A target without pixels is left unchanged.
     ///
     /// # Errors
     /// See [`DrawError`]; the renderer stays usable unless the device was lost.
@@ -218,9 +218,9 @@ impl Renderer {
         self.timing.as_mut().and_then(Timing::newest)
     }
 
-    /// The error of a lost device; the news of a loss comes with a poll.
+    /// The error of a lost device; a loss is reported during a poll.
     fn loss(&self) -> Option<DrawError> {
-        // a device that is gone refuses the poll; that it is gone is what the callback tells
+        // the poll of a lost device returns an error; the loss itself is reported by the callback
         let _ = self.device.poll(wgpu::PollType::Poll);
         self.lost.reason().map(|reason| DrawError::DeviceLost { reason })
     }
@@ -251,7 +251,7 @@ impl Renderer {
     }
 }
 
-/// What wgpu refused while `scope` was open.
+/// The error that wgpu reported while `scope` was open.
 fn refusal(scope: wgpu::ErrorScopeGuard) -> Result<(), DrawError> {
     match pollster::block_on(scope.pop()) {
         None => Ok(()),

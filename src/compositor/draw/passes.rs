@@ -1,6 +1,6 @@
-//! The passes of a frame: the light's depths, then the picture.
+//! The passes of a frame: the shadow map, then the picture.
 //!
-//! In: a picture whose meshes and numbers are uploaded. Out: draws. Never here: uploads, pipelines, submission.
+//! In: a picture whose meshes and uniforms are uploaded. Out: draws. Never here: uploads, pipelines, submission.
 
 use super::super::level::Shading;
 use super::super::picture::{MeshKey, Picture, SkinSample, SolidInstance, SolidRun, TubeRun};
@@ -8,11 +8,11 @@ use super::meshes::Mesh;
 use super::timing::Timing;
 use super::{Renderer, Target};
 
-/// Shadows need no finer patches than this: the shadow map's texels are coarser.
+/// Finest patch level in the shadow map: its texels are coarser than finer patches.
 pub(super) const SHADOW_LEVEL: u8 = 2;
 
 impl Renderer {
-    /// The depths of everything as the light sees it; the number of draws.
+    /// Draws the shadow map; returns the number of draws.
     pub(super) fn draw_shadows(&self, encoder: &mut wgpu::CommandEncoder, picture: &Picture) -> u32 {
         let mut pass = encoder.begin_render_pass(&wgpu::RenderPassDescriptor {
             label: Some("shadow"),
@@ -21,7 +21,7 @@ impl Renderer {
             ..Default::default()
         });
         pass.set_bind_group(0, &self.bindings.light, &[]);
-        // the outermost texels stay empty: past the map there is light
+        // the outermost texels stay empty: everything past the map is lit
         let inner = self.options.shadow_px - 2;
         pass.set_scissor_rect(1, 1, inner, inner);
         let mut draws = 0;
@@ -39,7 +39,7 @@ impl Renderer {
         draws + self.draw_skins(&mut pass, picture, (|_| &self.pipelines.solid_shadow, false))
     }
 
-    /// The picture itself, nearest kinds first so that hidden pixels are not lit; the number of draws.
+    /// Draws the picture, nearest kinds first so that hidden pixels are not lit; returns the number of draws.
     pub(super) fn draw_picture(
         &self,
         encoder: &mut wgpu::CommandEncoder,
@@ -103,7 +103,7 @@ impl Renderer {
         draws + self.draw_skins(pass, picture, (|_| &self.pipelines.solid_edges, true))
     }
 
-    /// The skins of soft bodies, each a mesh that is drawn once by the pipeline that its shading asks for.
+    /// The skins of soft bodies, each a mesh drawn once with the pipeline of its shading.
     fn draw_skins<'a>(
         &self,
         pass: &mut wgpu::RenderPass<'_>,
@@ -121,7 +121,7 @@ impl Renderer {
         drawn.sum()
     }
 
-    /// What a run of solids is drawn with: points, lines and slabs are lit at their corners.
+    /// The pipeline of a run of solids: points, lines and slabs are lit per vertex.
     fn pipeline_of(&self, run: &SolidRun) -> &wgpu::RenderPipeline {
         match (run.kind.mesh, run.kind.shading) {
             (MeshKey::Slab(_), _) => &self.pipelines.slab,
@@ -130,7 +130,7 @@ impl Renderer {
         }
     }
 
-    /// One tube: the patch once an interval, between each sample and the next of the one buffer of all tubes.
+    /// One tube: the patch instanced once per interval, between consecutive samples of the buffer shared by all tubes.
     fn draw_tube(&self, pass: &mut wgpu::RenderPass<'_>, tube: &TubeRun, mesh: Option<&Mesh>, edges: bool) -> u32 {
         let (Some(mesh), Some(samples)) = (mesh, self.samples.buffer()) else { return 0 };
         let stride = size_of::<SkinSample>() as u64;
@@ -156,7 +156,7 @@ impl Renderer {
     }
 }
 
-/// A mesh that is on no way to another: both ends of it are itself.
+/// Draws a mesh that is not morphing: both ends of its geomorph are the mesh itself.
 fn draw_still(pass: &mut wgpu::RenderPass<'_>, mesh: &Mesh, (edges, triangles): (bool, u32), count: u32) -> u32 {
     pass.set_vertex_buffer(2, mesh.vertices());
     mesh.draw_first(pass, (edges, triangles), count)

@@ -1,6 +1,6 @@
-//! Pipelines: which shaders draw what, and how.
+//! Render pipelines: shaders, vertex layouts and states of everything that is drawn.
 //!
-//! In: a device and a format. Out: everything that is drawn with. Never here: a frame, what shaders are bound to.
+//! In: a device and a format. Out: pipelines. Never here: a frame, bind groups.
 
 use super::super::level::Shading;
 use super::RendererOptions;
@@ -21,43 +21,43 @@ pub struct Pipelines {
     pub tissue: RenderPipeline,
     /// Other tubes.
     pub skin: RenderPipeline,
-    /// Tubes of one colour a triangle.
+    /// Tubes, flat shaded.
     pub skin_flat: RenderPipeline,
-    /// Tubes lit at the corners of their triangles.
+    /// Tubes, lit per vertex.
     pub skin_gouraud: RenderPipeline,
     /// Solids.
     pub solid: RenderPipeline,
-    /// Solids of one colour a triangle.
+    /// Solids, flat shaded.
     pub solid_flat: RenderPipeline,
-    /// Solids lit at their corners.
+    /// Solids, lit per vertex.
     pub solid_gouraud: RenderPipeline,
-    /// Solids with what is painted on them.
+    /// Textured solids.
     pub painted: RenderPipeline,
-    /// Tubes in soft shadow: of anything else, of tissue.
+    /// Tubes in soft shadow: of any other material, of tissue.
     pub skins_shadowed: [RenderPipeline; 2],
-    /// Solids in soft shadow: plain, and with what is painted on them.
+    /// Solids in soft shadow: plain, textured.
     pub solids_shadowed: [RenderPipeline; 2],
-    /// Points and lines that turn to the eye.
+    /// Points and lines that turn to the camera.
     pub stroke: RenderPipeline,
-    /// Points and lines as the light sees them.
+    /// Points and lines in the shadow map.
     pub stroke_shadow: RenderPipeline,
     /// Boxes in cells.
     pub slab: RenderPipeline,
     /// The floor in its parts, and how many vertices each has.
     pub floor: Vec<(RenderPipeline, u32)>,
-    /// What lies behind everything.
+    /// The background.
     pub room: RenderPipeline,
     /// Tubes as lines.
     pub skin_edges: RenderPipeline,
     /// Solids as lines.
     pub solid_edges: RenderPipeline,
-    /// Tubes as the light sees them.
+    /// Tubes in the shadow map.
     pub skin_shadow: RenderPipeline,
-    /// Solids as the light sees them.
+    /// Solids in the shadow map.
     pub solid_shadow: RenderPipeline,
 }
 
-/// What distinguishes one pipeline from another.
+/// The settings in which pipelines differ.
 struct Recipe<'a> {
     label: &'a str,
     vertex: &'a str,
@@ -68,11 +68,11 @@ struct Recipe<'a> {
     module: &'a ShaderModule,
 }
 
-/// What pipelines of a renderer have in common.
+/// The settings that the pipelines of a renderer share.
 struct Kitchen<'a> {
     device: &'a Device,
     layouts: [wgpu::PipelineLayout; 2],
-    /// The picture's, and a texture beside it.
+    /// Layout of the picture's bind group and a texture's.
     with_texture: wgpu::PipelineLayout,
     format: TextureFormat,
     samples: u32,
@@ -82,7 +82,7 @@ struct Kitchen<'a> {
 const SAMPLE_STRIDE: u64 = 64;
 const CORNER_STRIDE: u64 = 32;
 
-/// Cells along a side of the floor's shadowed patch, and rings around it; the shader has the same numbers.
+/// Cells along a side of the floor's shadowed patch, and rings around it; the shader uses the same numbers.
 const FLOOR_CELLS: u32 = 8;
 const FLOOR_RINGS: u32 = 8;
 const FLOOR_PATCH_CORNERS: u32 = 6 * FLOOR_CELLS * FLOOR_CELLS;
@@ -95,7 +95,7 @@ const END: [wgpu::VertexAttribute; 4] =
     wgpu::vertex_attr_array![7 => Float32x4, 8 => Float32x4, 9 => Float32x4, 10 => Float32x2];
 /// A mesh's corner.
 const CORNER: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![0 => Float32x3, 1 => Float32x3, 9 => Float32x2];
-/// Where that is at the end of its way.
+/// The corner at the end of its geomorph.
 const CORNER_TO: [wgpu::VertexAttribute; 3] = wgpu::vertex_attr_array![7 => Float32x3, 8 => Float32x3, 11 => Float32x2];
 /// A solid's instance.
 const BODY: [wgpu::VertexAttribute; 6] = wgpu::vertex_attr_array![2 => Float32x4, 3 => Float32x4, 4 => Float32x4, 5 => Unorm8x4, 6 => Unorm8x4, 10 => Float32x2];
@@ -174,7 +174,7 @@ impl Pipelines {
 }
 
 impl Pipelines {
-    /// What tubes of a shading are drawn with.
+    /// The pipeline for tubes of a shading.
     pub fn skin_of(&self, tissue: bool, shading: Shading) -> &RenderPipeline {
         match shading {
             Shading::Flat => &self.skin_flat,
@@ -185,7 +185,7 @@ impl Pipelines {
         }
     }
 
-    /// What solids and meshes of a shading are drawn with, with a texture or without.
+    /// The pipeline for solids and meshes of a shading, textured or not.
     pub fn solid_of(&self, shading: Shading, texture: bool) -> &RenderPipeline {
         match shading {
             Shading::Flat => &self.solid_flat,
@@ -224,7 +224,7 @@ impl<'a> Kitchen<'a> {
         ]
     }
 
-    /// What needs no buffers.
+    /// A pipeline without buffers.
     fn plain(
         &self,
         module: &ShaderModule,
@@ -234,7 +234,7 @@ impl<'a> Kitchen<'a> {
         self.cook(&Recipe { label: vertex, vertex, fragment: Some(fragment), buffers: &[], topology, module })
     }
 
-    /// Points and lines, as the eye and as the light sees them.
+    /// Pipelines for points and lines, in the picture and in the shadow map.
     fn strokes(&self, module: &ShaderModule) -> [RenderPipeline; 2] {
         let tip = wgpu::vertex_attr_array![0 => Float32x4, 1 => Float32x4];
         let buffers = [
@@ -247,7 +247,7 @@ impl<'a> Kitchen<'a> {
         })
     }
 
-    /// Solids with what is painted on them.
+    /// A pipeline for textured solids.
     fn painted(
         &self,
         buffers: &[Option<VertexBufferLayout<'_>>],
@@ -269,7 +269,7 @@ impl<'a> Kitchen<'a> {
         let taps = f64::from(self.shadow_taps);
         let encode = ("ENCODE_SRGB", flag(!self.format.is_srgb()));
         let constants = [encode, ("SHADOW_TAPS", taps)];
-        // lines lie a little nearer than what they outline: a millimetre and a half at a metre
+        // lines are drawn a little nearer than the surface they outline: 1.5 mm at 1 m
         let nudge = [encode, ("NUDGE", if lines { 1.5e-3 } else { 0.0 })];
         let options = |constants| wgpu::PipelineCompilationOptions { constants, ..Default::default() };
         let targets =
@@ -302,7 +302,7 @@ impl<'a> Kitchen<'a> {
     }
 }
 
-/// Depths are reversed in the picture (nearer is greater) and plain in the shadow, where they are pushed back a little.
+/// Depths are reversed in the picture (nearer is greater) and plain in the shadow map, where a bias pushes them back.
 fn depth_state(shadow: bool) -> wgpu::DepthStencilState {
     let bias = wgpu::DepthBiasState { constant: 2, slope_scale: 2.0, clamp: 0.0 };
     wgpu::DepthStencilState {

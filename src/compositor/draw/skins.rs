@@ -1,4 +1,4 @@
-//! The skins of soft bodies on the GPU: one mesh, written anew every frame.
+//! The skins of soft bodies on the GPU: one mesh, rewritten every frame.
 //!
 //! In: corners and triangles. Out: draws. Never here: pipelines, instances.
 
@@ -32,11 +32,11 @@ impl SkinBuffers {
         self.sides.write(device, queue, bytemuck::cast_slice(&skins.sides));
     }
 
-    /// Draws one skin, as triangles or as their sides; the number of draws.
+    /// Draws one skin, as triangles or as their sides; returns the number of draws.
     pub fn draw(&self, pass: &mut wgpu::RenderPass<'_>, run: &SkinRun, edges: bool) -> u32 {
         let indices = if edges { &self.sides } else { &self.triangles };
         let (Some(corners), Some(indices)) = (self.corners.buffer(), indices.buffer()) else { return 0 };
-        // three corners a triangle, and as many sides of two ends
+        // indices per triangle: three corners, or three sides with two ends each
         let each = if edges { 6 } else { 3 };
         let (from, count) = run.triangles;
         pass.set_vertex_buffer(0, corners.slice(..));

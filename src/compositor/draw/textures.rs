@@ -1,16 +1,16 @@
-//! Textures on the GPU: what is painted on meshes, uploaded once.
+//! Textures on the GPU: images on meshes, uploaded once.
 //!
-//! In: the textures of a picture. Out: what the painted pipeline is bound to. Never here: how they lie on a mesh.
+//! In: the textures of a picture. Out: bind groups of the painted pipeline. Never here: texture coordinates.
 
 use super::super::picture::Picture;
 use metachron_geometry::Texture;
 use std::sync::Arc;
 use wgpu::util::DeviceExt;
 
-/// Most pixels of a texture across and down that are uploaded; a larger one is halved until it fits.
+/// Largest width and height in pixels that are uploaded; a larger texture is halved until it fits.
 const SIDE_MAX: u32 = 2048;
 
-/// What was made of the textures of a picture.
+/// GPU data made from the textures of a picture.
 #[derive(Debug)]
 pub struct Textures {
     layout: wgpu::BindGroupLayout,
@@ -20,7 +20,7 @@ pub struct Textures {
 }
 
 impl Textures {
-    /// None yet.
+    /// No textures yet.
     pub fn new(device: &wgpu::Device, layout: wgpu::BindGroupLayout) -> Self {
         let sampler = device.create_sampler(&wgpu::SamplerDescriptor {
             label: Some("texture"),
@@ -34,7 +34,7 @@ impl Textures {
         Self { layout, sampler, known: Arc::default(), groups: Vec::new() }
     }
 
-    /// Uploads the textures of `picture` where they are others than before.
+    /// Uploads the textures of `picture` if they differ from the last ones.
     pub fn prepare(&mut self, device: &wgpu::Device, queue: &wgpu::Queue, picture: &Picture) {
         if Arc::ptr_eq(&self.known, &picture.textures) {
             return;
@@ -43,7 +43,7 @@ impl Textures {
         self.groups = self.known.iter().map(|texture| self.group_of(device, queue, texture)).collect();
     }
 
-    /// What a run with this [`SolidKind::texture`](super::super::picture::SolidKind::texture) is bound to.
+    /// The bind group for a run with this [`SolidKind::texture`](super::super::picture::SolidKind::texture).
     pub fn group(&self, number: u32) -> Option<&wgpu::BindGroup> {
         self.groups.get(number.checked_sub(1)? as usize)
     }
@@ -61,7 +61,7 @@ impl Textures {
     }
 }
 
-/// A texture with its smaller copies, each half as large as the one before.
+/// Uploads a texture with its mipmaps.
 fn upload(device: &wgpu::Device, queue: &wgpu::Queue, texture: &Texture) -> wgpu::TextureView {
     let larger = |texture: &Texture, side: u32| texture.size().0.max(texture.size().1) > side;
     let mut level = texture.clone();

@@ -6,7 +6,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
 use std::time::Duration;
 
-/// Frames whose stamps may be under way at once.
+/// Frames whose stamps may be pending simultaneously.
 const RING: usize = 3;
 /// Two stamps of 64 bits.
 const BYTES: u64 = 16;
@@ -27,7 +27,7 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Stamps, where the device has them.
+    /// Time stamps; `None` if the device has no such feature.
     pub fn new(device: &wgpu::Device, queue: &wgpu::Queue) -> Option<Self> {
         if !device.features().contains(wgpu::Features::TIMESTAMP_QUERY) {
             return None;
@@ -69,7 +69,7 @@ impl Timing {
         }
     }
 
-    /// Has the stamps of this frame copied to where they can be read, if a buffer is free.
+    /// Copies the stamps of this frame to where they can be read, if a buffer is free.
     pub fn resolve(&mut self, encoder: &mut wgpu::CommandEncoder) {
         self.collect();
         self.next = self.ring.iter().position(|(_, state)| state.load(Ordering::Acquire) == IDLE);
@@ -79,7 +79,7 @@ impl Timing {
         }
     }
 
-    /// Asks for the stamps of the frame just submitted.
+    /// Requests the stamps of the frame just submitted.
     pub fn request(&mut self) {
         let Some(slot) = self.next.take() else { return };
         let (buffer, state) = &self.ring[slot];

@@ -1,12 +1,12 @@
-//! The texture of wet tissue: mottling, veins and folds, made from noise when a renderer starts.
+//! The texture of wet tissue: mottling, veins and folds, generated from noise when a renderer starts.
 //!
-//! In: nothing. Out: one repeating texture with its smaller copies: red = mottling, green = veins, blue and alpha = slopes of
-//! the folds along and around. Never here: colours; those are the object's own.
+//! In: nothing. Out: one repeating texture with its mipmaps: red = mottling, green = veins, blue and alpha = slopes of the folds along and
+//! around. Never here: colours, which are the object's own.
 
 /// Texels across.
 pub const TEXELS: u32 = 512;
 
-/// Every level of the texture, from the finest to 1 × 1, RGBA of 8 bits, one after the other.
+/// Every mipmap level, from the finest to 1 × 1, RGBA of 8 bits, one after another.
 #[must_use]
 pub fn levels() -> Vec<u8> {
     let mut level = finest();
@@ -82,7 +82,7 @@ fn noise(x: f32, y: f32, cells: u32) -> f32 {
     1.6 * (top + (bottom - top) * ev)
 }
 
-/// A number in 0 … 1 from three: splitmix's finaliser.
+/// A number in 0 … 1 from three integers, by the finaliser of splitmix.
 fn hash(x: u32, y: u32, seed: u32) -> f32 {
     let mut h = (u64::from(x) << 40) ^ (u64::from(y) << 20) ^ u64::from(seed) ^ 0x9e37_79b9_7f4a_7c15;
     h = (h ^ (h >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -90,7 +90,7 @@ fn hash(x: u32, y: u32, seed: u32) -> f32 {
     ((h ^ (h >> 31)) >> 40) as f32 / (1 << 24) as f32
 }
 
-/// The texture at half its size: means of four.
+/// The texture at half its size: means of four texels.
 fn halved(texels: &[u8], size: usize) -> Vec<u8> {
     let half = size / 2;
     let mean = |i: usize| {
@@ -109,7 +109,7 @@ mod tests {
     fn noise_repeats_without_a_seam() {
         for i in 0..20 {
             let y = i as f32 / 20.0;
-            // one cell is 1/6; across the seam the same polynomial is met from its other end
+            // one cell is 1/6; across the seam the same polynomial is evaluated from its other end
             assert!((noise(0.0, y, 6) - noise(1.0, y, 6)).abs() < 1e-5);
         }
     }
@@ -119,7 +119,7 @@ mod tests {
         let n = 16;
         let texels: Vec<u8> = (0..4 * n * n).map(|i| (i * 7 % 251) as u8).collect();
         let mean = |t: &[u8]| t.iter().map(|&v| f64::from(v)).sum::<f64>() / t.len() as f64;
-        // each texel is rounded once: half a step at most
+        // each texel is rounded once: off by half a step at most
         assert!((mean(&texels) - mean(&halved(&texels, n))).abs() <= 0.5);
     }
 }

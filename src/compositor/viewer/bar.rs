@@ -1,6 +1,6 @@
 //! The bar at the top: the scene, the transport buttons, the clock and the frame rate.
 //!
-//! In: the [`Status`] and the frames' summary. Out: [`Command`]s. Never here: what they change.
+//! In: the [`Status`] and the frames' summary. Out: [`Command`]s. Never here: their effect.
 
 use super::commands::{self, Command};
 use super::history::FrameSummary;
@@ -10,15 +10,15 @@ use super::text;
 use super::theme::{Palette, palette};
 use egui::{Align, Color32, Layout, RichText, Ui};
 
-/// In a bar of fewer points the name and the real-time factor give way to buttons.
+/// A bar narrower than this, points, omits the program's name and the real-time factor.
 const WIDE: f32 = 800.0;
-/// In one of fewer than this the scene's name, the speed and the tools give way too: all have keys.
+/// A bar narrower than this also omits the scene's name, the speed and the tools: all have keys.
 const NARROW: f32 = 560.0;
 
-/// In one of fewer than this the clock gives way to the frame rate.
+/// A bar narrower than this omits the clock, but not the frame rate.
 const SLIM: f32 = 360.0;
 
-/// What the factor means.
+/// Tooltip of the real-time factor.
 const REAL_TIME: &str = "Simulated time that was stepped for each second, by the agent that keeps up least: \
                          what it cannot make up is dropped. The wanted speed is on the left";
 

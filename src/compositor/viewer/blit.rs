@@ -1,8 +1,8 @@
-//! Lays the picture's texture under the panels inside egui's own render pass.
+//! Draws the picture's texture under the panels inside egui's own render pass.
 //!
 //! In: a texture. Out: a shape for egui. Never here: drawing the picture.
-//! egui's shader could show the texture too, but it costs about 100 ns a pixel on a processor that draws (it runs every
-//! branch of its filtering); a plain load of one texel costs a twentieth of that.
+//! egui's shader can draw the texture too, but costs about 100 ns per pixel on a software rasteriser (which runs every branch of its
+//! filtering); a plain load of one texel costs a twentieth of that.
 
 use egui_wgpu::wgpu;
 use std::sync::Arc;
@@ -26,7 +26,7 @@ fn texel(in: Corner) -> @location(0) vec4<f32> {
 }
 ";
 
-/// The pipeline that lays textures under the panels of one device.
+/// The pipeline that draws textures under the panels, for one device.
 pub struct Blit {
     pipeline: wgpu::RenderPipeline,
     layout: wgpu::BindGroupLayout,
@@ -64,7 +64,7 @@ impl Blit {
         Self { pipeline, layout }
     }
 
-    /// What shows `view`, for as long as its texture lives.
+    /// A drawable for `view`; it keeps the texture alive.
     pub fn show(&self, device: &wgpu::Device, view: &wgpu::TextureView) -> Arc<Shown> {
         let entry = wgpu::BindGroupEntry { binding: 0, resource: wgpu::BindingResource::TextureView(view) };
         let group = device.create_bind_group(&wgpu::BindGroupDescriptor {
@@ -76,14 +76,14 @@ impl Blit {
     }
 }
 
-/// A texture that egui's render pass shows.
+/// A texture drawn in egui's render pass.
 pub struct Shown {
     pipeline: wgpu::RenderPipeline,
     group: wgpu::BindGroup,
 }
 
 impl Shown {
-    /// The shape that shows it in `rect`.
+    /// The shape that draws it in `rect`.
     pub fn shape(self: &Arc<Self>, rect: egui::Rect) -> egui::Shape {
         egui_wgpu::Callback::new_paint_callback(rect, InPass(Arc::clone(self))).into()
     }

@@ -1,20 +1,20 @@
-//! What the keys do: one table drives the handler, the help, the palette and the tooltips.
+//! Keyboard commands: one table drives the handler, the help, the palette and the tooltips.
 //!
 //! In: egui's input. Out: [`Command`]s in the order they were pressed.
-//! Never here: what a command changes ([`super::Viewer`] decides).
+//! Never here: the effect of a command (see [`super::Viewer`]).
 
 use egui::{Key, KeyboardShortcut, Modifiers};
 
-/// Something that one key press can ask for.
+/// A command that a key press can issue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Command {
-    /// Let time pass, or hold it.
+    /// Run or pause the simulation.
     PauseOrRun,
     /// Advance by one frame.
     Step,
-    /// Start the scene again.
+    /// Restart the scene.
     Reset,
-    /// Read the scene file again.
+    /// Reload the scene file.
     Reload,
     /// Next higher speed.
     Faster,
@@ -22,41 +22,41 @@ pub enum Command {
     Slower,
     /// Real time.
     RealTime,
-    /// Look at the selected object, or at everything.
+    /// Frame the selected object, or everything.
     Frame,
-    /// Keep the selected object in the middle.
+    /// Keep the selected object in the middle of the picture.
     Track,
-    /// Leave an overlay, a selection, the scene's camera.
+    /// Close an overlay, clear the selection, detach from the scene's camera.
     Free,
-    /// Look through the scene's own camera.
+    /// View through the scene's own camera.
     SceneCamera,
-    /// Show resolutions as colours.
+    /// Colour by resolution.
     Colours,
-    /// Show edges.
+    /// Draw edges.
     Wireframe,
-    /// Show ages as colours.
+    /// Colour by age.
     Ages,
-    /// Only the picture.
+    /// Hide the panels.
     HideUi,
-    /// Dark on light, or light on dark.
+    /// Switch between light and dark.
     Theme,
     /// Write the picture to a file.
     Screenshot,
-    /// Keys and mouse.
+    /// Show keys and mouse.
     Help,
-    /// Numbers of the run.
+    /// Show numbers of the run.
     Info,
-    /// Cost and rate of each agent.
+    /// Show cost and rate of each agent.
     Costs,
-    /// Histories of the selected agent.
+    /// Show histories of the selected agent.
     Histories,
-    /// Every command by name.
+    /// List every command by name.
     Palette,
     /// End the run.
     Quit,
 }
 
-/// Where the help lists a command.
+/// The section of the help that lists a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Group {
     /// Time and scene.
@@ -70,13 +70,13 @@ pub enum Group {
 /// A command and its keys.
 #[derive(Debug, Clone, Copy)]
 pub struct Shortcut {
-    /// What it asks for.
+    /// The command.
     pub command: Command,
-    /// Any of these presses.
+    /// Alternative key presses.
     pub keys: &'static [KeyboardShortcut],
-    /// What it does, for a person.
+    /// Description for the user.
     pub does: &'static str,
-    /// Where the help lists it.
+    /// Section of the help.
     pub group: Group,
 }
 
@@ -92,7 +92,7 @@ const fn row(command: Command, keys: &'static [KeyboardShortcut], does: &'static
     Shortcut { command, keys, does, group }
 }
 
-/// Every key of the window.
+/// Every key binding of the window.
 pub const SHORTCUTS: [Shortcut; 23] = [
     row(Command::PauseOrRun, &[key(Key::Space)], "Pause or run", Group::Time),
     row(Command::Step, &[key(Key::ArrowRight)], "Step one frame", Group::Time),
@@ -119,7 +119,7 @@ pub const SHORTCUTS: [Shortcut; 23] = [
     row(Command::Palette, &[ctrl(Key::P)], "Command palette", Group::Picture),
 ];
 
-/// What the mouse does over the picture, for the help.
+/// Mouse actions over the picture, for the help.
 pub const MOUSE: [(&str, &str); 7] = [
     ("Left drag on an object", "Pull it with a spring; the wheel moves the hand in depth"),
     ("Left drag beside objects, or with Alt", "Orbit"),
@@ -130,10 +130,10 @@ pub const MOUSE: [(&str, &str); 7] = [
     ("Double click", "Select and frame"),
 ];
 
-/// The speeds that the keys step through, simulated seconds for each second.
+/// The speeds that the keys step through, simulated seconds per second.
 pub const SPEEDS: [f64; 10] = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0];
 
-/// The next speed of [`SPEEDS`] above (`up`) or below `speed`; the end of the table past it.
+/// The next speed of [`SPEEDS`] above (`up`) or below `speed`; beyond the table its last entry.
 #[must_use]
 pub fn next_speed(speed: f64, up: bool) -> f64 {
     const SLACK: f64 = 1e-9; // a speed that came through a file or a factor still counts as its table entry
@@ -144,12 +144,13 @@ pub fn next_speed(speed: f64, up: bool) -> f64 {
 
 /// Takes the commands pressed in this frame out of the input.
 ///
-/// While a text is typed only keys with Ctrl and function keys count; while a widget is focused, neither do Space and arrows.
+/// While text is typed only keys with Ctrl and function keys count; while a widget has focus, Space, Right and Backspace do not count
+/// either.
 #[must_use]
 pub fn pressed(ctx: &egui::Context) -> Vec<Command> {
     let typing = ctx.text_edit_focused();
     let focused = ctx.memory(|memory| memory.focused().is_some());
-    // WASD fly while the right button is down, and are no toggles then
+    // WASD fly the camera while the right button is down, and do not toggle then
     let flying = ctx.input(|input| input.pointer.secondary_down());
     let mut found = Vec::new();
     for shortcut in &SHORTCUTS {
@@ -176,7 +177,7 @@ fn is_function(key: Key) -> bool {
     matches!(key, Key::F1 | Key::F2 | Key::F3 | Key::F4 | Key::F12)
 }
 
-/// The keys of `command` as a person reads them, such as `Ctrl+L` or `= or +`.
+/// The keys of `command` as shown to the user, such as `Ctrl+L` or `= or +`.
 #[must_use]
 pub fn keys_text(ctx: &egui::Context, command: Command) -> String {
     let shortcut = SHORTCUTS.iter().find(|row| row.command == command);

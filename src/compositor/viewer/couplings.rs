@@ -1,13 +1,13 @@
-//! The list of couplings: who acts on whom, by which law, how hard, and what is left in its energy tank.
+//! The list of couplings: the pair of agents, its law, its force, and the energy left in its tank.
 //!
-//! In: the rows of a [`super::Status`]. Out: a part of the panel at the side. Never here: which couplings there are.
+//! In: the rows of a [`super::Status`]. Out: a section of the side panel. Never here: the choice of couplings.
 
 use super::show::CouplingRow;
 use super::text;
 use super::theme::palette;
 use egui::{Grid, RichText, Ui};
 
-/// The columns, and what stands in them.
+/// The columns and their tooltips.
 const COLUMNS: [(&str, &str); 4] = [
     ("Pair", "Who owns the contact, and the other"),
     ("Law", "How the two act on each other"),
@@ -55,7 +55,7 @@ fn spoken(row: &CouplingRow) -> String {
     )
 }
 
-/// How heavy the two feel where they press hardest.
+/// Tooltip: the effective mass of both at the contact with the largest force.
 fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
     let felt = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
     format!(
@@ -111,7 +111,7 @@ mod tests {
             told([60.0, 20.0]),
             "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
         );
-        // what is led does not give way at all
+        // a driven body has no inverse mass: it does not give way at all
         assert!(told([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
     }
 }

@@ -1,4 +1,4 @@
-//! What happened lately: rings of frames and of each agent's numbers, for the plots.
+//! Recent history: ring buffers of frames and of each agent's numbers, for the plots.
 //!
 //! In: the times of each frame and the panels' numbers. Out: the last few seconds of both.
 //! Never here: drawing. Nothing is allocated once the rings are full.
@@ -6,16 +6,16 @@
 use super::show::{AgentRow, FrameTimes, Status};
 use std::collections::VecDeque;
 
-/// Frames kept: five seconds at 60 frames per second.
+/// Frames stored: five seconds at 60 frames per second.
 pub const FRAMES: usize = 300;
-/// Samples kept of each agent: a minute.
+/// Samples stored per agent: a minute.
 pub const SAMPLES: usize = 600;
 /// Time between two samples of the agents, seconds.
 const SAMPLE_S: f64 = 0.1;
-/// Agents whose histories are kept; the table shows all of them.
+/// Agents with stored histories; the table shows all of them.
 const AGENTS: usize = 256;
 
-/// One agent at one moment.
+/// The numbers of one agent at one moment.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Sample {
     /// Wall time of the window, seconds.
@@ -41,11 +41,11 @@ pub struct Sample {
 pub struct FrameSummary {
     /// Mean work, seconds.
     pub mean_s: f64,
-    /// The work that 99 of 100 frames stay below, seconds.
+    /// 99th percentile of the work, seconds.
     pub p99_s: f64,
     /// Frames per second, from the mean interval.
     pub rate_hz: f64,
-    /// Share of the intervals that were more than a tenth too long, 0 … 1.
+    /// Fraction of the intervals that were more than a tenth too long, 0 … 1.
     pub late_share: f64,
 }
 
@@ -58,12 +58,12 @@ pub struct History {
 }
 
 impl History {
-    /// Takes a finished frame.
+    /// Appends a finished frame.
     pub fn push_frame(&mut self, times: &FrameTimes) {
         push_bounded(&mut self.frames, *times, FRAMES);
     }
 
-    /// Takes the agents' numbers at wall time `at_s`, at most ten times a second.
+    /// Appends the agents' numbers at wall time `at_s`, at most ten times a second.
     pub fn sample(&mut self, at_s: f64, status: &Status) {
         if self.sampled_at_s.is_some_and(|last| at_s - last < SAMPLE_S) {
             return;
@@ -91,7 +91,7 @@ impl History {
         self.agents.get(row)
     }
 
-    /// Recent frames in four numbers, against a wanted rate of `target_hz`.
+    /// Recent frames in four numbers, against a target rate of `target_hz`.
     #[must_use]
     pub fn summary(&self, target_hz: f64) -> FrameSummary {
         let work: Vec<f64> = self.frames.iter().filter(|f| f.skip.is_none()).map(|f| f.work.as_secs_f64()).collect();
@@ -111,10 +111,10 @@ impl History {
     }
 }
 
-/// Over how long a time the frame rate is counted, seconds: long enough to be read, short enough to follow a slider.
+/// Time over which the frame rate is averaged, seconds: long enough to be read, short enough to follow a slider.
 const RATE_OVER_S: f64 = 1.0;
 
-/// Frames a second over the newest of these gaps.
+/// Frames per second over the newest of these intervals.
 fn rate_hz(gaps: &[f64]) -> f64 {
     let (mut count, mut sum_s) = (0.0, 0.0);
     for gap in gaps.iter().rev() {

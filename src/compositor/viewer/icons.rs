@@ -1,11 +1,11 @@
-//! Buttons with drawn icons: sharp at every scale, named for screen readers and tests.
+//! Buttons with vector icons: sharp at every scale, named for screen readers and tests.
 //!
-//! In: an [`Icon`] and its name. Out: a button's response. Never here: what a press does.
+//! In: an [`Icon`] and its name. Out: a button's response. Never here: the effect of a press.
 
 use super::theme::palette;
 use egui::{Color32, Pos2, Rect, Response, Role, Sense, Shape, Stroke, Ui, WidgetInfo, pos2, vec2};
 
-/// A drawn sign.
+/// A vector icon.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Icon {
     /// A triangle.
@@ -30,7 +30,7 @@ pub enum Icon {
 
 const SIDE: f32 = 28.0;
 
-/// A square button with a sign; `name` is what a screen reader says, `hover` what the pointer shows.
+/// A square button with an icon; `name` is the text for screen readers, `hover` the tooltip.
 pub fn icon_button(ui: &mut Ui, icon: Icon, name: &str, hover: &str) -> Response {
     let (rect, response) = ui.allocate_exact_size(vec2(SIDE, SIDE), Sense::click());
     response.widget_info(|| WidgetInfo::labeled(Role::Button, true, name));

@@ -1,7 +1,7 @@
 //! The window: panels around the picture, keys and mouse, and the shell that survives a lost device.
 //!
-//! In: a [`Show`] (what to draw, numbers, hits). Out: [`Action`]s. Never here: the runtime, scenes, controllers.
-//! [`Viewer`] is the whole user interface without a window, so that tests drive it; [`run_window`] puts it into one.
+//! In: a [`Show`] (picture, numbers, picking). Out: [`Action`]s. Never here: the runtime, scenes, controllers.
+//! [`Viewer`] is the whole user interface without a window, so that tests can drive it; [`run_window`] opens a window around it.
 
 mod bar;
 mod blit;
@@ -36,17 +36,17 @@ use mouse::Hand;
 use overlays::Finder;
 use std::time::{Duration, Instant};
 
-/// Where a frame's picture comes from: the window's device, or a test.
+/// The source of a frame's picture: the window's device, or a test.
 pub trait Screen {
-    /// Draws what `show` composes for this request, or gives the last picture again when the next is not due.
-    /// The shape shows it in `over`.
+    /// Draws the picture that `show` composes for this request, or returns the last picture if the next is not due yet.
+    /// The shape covers `over`.
     fn draw(&mut self, show: &mut dyn Show, view: &ViewRequest, over: Rect) -> Option<egui::Shape>;
 
     /// The adapter's name, for the information panel.
     fn adapter(&self) -> &str;
 }
 
-/// What the window itself must do after a frame.
+/// Requests to the window after a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Wishes {
     /// Write the picture to a file.
@@ -56,7 +56,7 @@ pub struct Wishes {
     theme: bool,
 }
 
-/// How the picture is drawn, as it is kept between runs.
+/// Drawing options of the picture, stored between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Looks {
@@ -82,19 +82,19 @@ impl Looks {
     }
 }
 
-/// What of the layout outlives a run.
+/// The part of the layout that is stored between runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 #[serde(default)]
 pub struct Layout {
-    /// How the picture is shown.
+    /// Drawing options of the picture.
     pub looks: Looks,
     /// Whether the panels are shown.
     pub panels: bool,
-    /// Whether the run's numbers lie over the picture.
+    /// Whether the run's numbers are shown over the picture.
     pub info: bool,
-    /// Whether costs and rates are open.
+    /// Whether the window of costs and rates is open.
     pub costs: bool,
-    /// Whether histories are open.
+    /// Whether the window of histories is open.
     pub histories: bool,
 }
 
@@ -104,25 +104,25 @@ impl Default for Layout {
     }
 }
 
-/// The user interface: everything but the window and the device.
+/// The user interface, without the window and the device.
 #[derive(Debug)]
 pub struct Viewer {
-    /// What of the layout outlives a run.
+    /// The part of the layout that is stored between runs.
     pub layout: Layout,
     hand: Hand,
     history: History,
     help: bool,
     finder: Option<Finder>,
     size: Size,
-    /// What the window has to say besides the show's own messages.
+    /// The window's own messages, in addition to the show's.
     notes: Vec<(f64, Message)>,
 }
 
-/// Below the bar panels need a room this high and this broad, points: in a smaller one the picture has all of it.
+/// Least room below the bar for the panels, height and width, points: in a smaller window the picture takes all of it.
 const TALL: f32 = 340.0;
 const BROAD: f32 = 600.0;
 
-/// How long the window's own messages stay, seconds.
+/// Display time of the window's own messages, seconds.
 const NOTE_S: f64 = 6.0;
 
 impl Default for Viewer {
@@ -140,14 +140,14 @@ impl Default for Viewer {
 }
 
 impl Viewer {
-    /// Gives egui its look. To be called once for a context.
+    /// Sets egui's theme. Call once per context.
     pub fn install(ctx: &egui::Context) {
         theme::install(ctx);
     }
 
-    /// Draws one frame of the interface and applies what the user did in it.
+    /// Draws one frame of the interface and applies the user's input.
     ///
-    /// Gives what the window must do, and how long `screen` took of it.
+    /// Returns the requests to the window, and the time that `screen` took.
     pub fn ui(&mut self, ui: &mut Ui, show: &mut dyn Show, screen: &mut dyn Screen) -> (Wishes, Duration) {
         let now = ui.ctx().time();
         self.history.sample(now, show.status());
@@ -171,12 +171,12 @@ impl Viewer {
         (wishes, drawing)
     }
 
-    /// Takes the times of a finished frame for the plots.
+    /// Stores the times of a finished frame for the plots.
     pub fn measured(&mut self, times: &FrameTimes) {
         self.history.push_frame(times);
     }
 
-    /// Shows a message of the window's own for a few seconds; `now_s` is egui's time.
+    /// Shows a message of the window for a few seconds; `now_s` is egui's time.
     pub fn note(&mut self, now_s: f64, message: Message) {
         self.notes.push((now_s + NOTE_S, message));
     }
@@ -191,7 +191,7 @@ impl Viewer {
         });
         let room = ui.available_size();
         if room.y < TALL {
-            return; // the picture and the bar are what fits
+            return; // only the picture and the bar fit
         }
         Panel::bottom("agents").resizable(true).default_size(182.0).min_size(70.0).frame(frame(8, 6)).show(ui, |ui| {
             match table::show(ui, status) {

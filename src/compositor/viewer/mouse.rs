@@ -1,7 +1,7 @@
-//! The hand in the picture: orbit, pan, zoom, fly, select, and the spring that pulls an object.
+//! Mouse and flight in the picture: orbit, pan, zoom, fly, select, and the user spring that pulls an object.
 //!
-//! In: egui's response over the picture. Out: a moved camera and [`Action`]s. Never here: forces (the object's own
-//! solver has the spring) and drawing, but for the spring and the name under the pointer.
+//! In: egui's response over the picture. Out: a moved camera and [`Action`]s. Never here: forces (the spring is part of the object's own
+//! solver) and drawing, except the spring's end and the name under the pointer.
 
 use super::super::{Camera, Hit, Ray, Size};
 use super::show::{Action, Bounds, Show};
@@ -10,29 +10,29 @@ use super::theme::{Palette, palette};
 use egui::{Align2, CursorIcon, FontId, Key, PointerButton, Pos2, Rect, Response, Stroke, Ui, vec2};
 use glam::{DVec2, DVec3};
 
-/// Flight in shares of the distance for each second.
+/// Flight speed, in distances to the target per second.
 const FLY_PER_S: f64 = 0.9;
-/// Depth that the wheel moves the hand by, as a share for each point of scroll.
+/// Relative change of the spring end's depth per point of scroll.
 const DEPTH_PER_POINT: f64 = 0.0015;
 
-/// Zoom for each point of the wheel's smooth scroll, as a share of the distance.
+/// Relative zoom per point of the wheel's smooth scroll.
 const ZOOM_PER_POINT: f64 = 0.0022;
-/// A framed object leaves this much room around it.
+/// Room left around a framed object, as a factor on its radius.
 const FRAME_ROOM: f64 = 1.15;
 
-/// What the user's hand does in the picture.
+/// State of the user's mouse control: camera and user spring.
 #[derive(Debug, Clone, Default)]
 pub struct Hand {
-    /// The free camera; `None` while the scene's camera is looked through.
+    /// The free camera; `None` while the scene's camera is in use.
     own: Option<Camera>,
     /// Follow the selected object.
     pub track: bool,
     tracked: Option<DVec3>,
-    /// The point of space where the hand holds the spring's free end.
+    /// The free end of the user spring, in space; `None` while nothing is pulled.
     grip: Option<DVec3>,
 }
 
-/// The picture's place in the window and the camera it is seen through.
+/// The picture's place in the window and its camera.
 #[derive(Debug, Clone, Copy)]
 struct Window {
     rect: Rect,
@@ -40,7 +40,7 @@ struct Window {
     camera: Camera,
 }
 
-/// What one frame of input changes and asks for.
+/// One frame of input and the actions that it causes.
 struct Turn<'a> {
     ui: &'a Ui,
     response: &'a Response,
@@ -68,7 +68,7 @@ impl Window {
     }
 }
 
-/// The size in pixels of a picture in `rect`, whose edges lie on pixels; at least one by one.
+/// The size in pixels of a picture in `rect` with its edges rounded to pixels; at least one by one.
 #[must_use]
 pub fn size_of(rect: Rect, scale: f32) -> Size {
     let pixels = |range: egui::Rangef| ((range.max * scale).round() - (range.min * scale).round()).max(1.0) as u32;
@@ -76,23 +76,23 @@ pub fn size_of(rect: Rect, scale: f32) -> Size {
 }
 
 impl Hand {
-    /// What the picture is seen through.
+    /// The camera of the picture.
     #[must_use]
     pub fn camera(&self, show: &dyn Show) -> Camera {
         self.own.unwrap_or_else(|| show.scene_camera())
     }
 
-    /// Looks through the scene's own camera.
+    /// Switches to the scene's own camera.
     pub fn follow_scene(&mut self) {
         (self.own, self.track) = (None, false);
     }
 
-    /// Stays where it is; no longer follows anything.
+    /// Keeps the present camera; it follows neither the scene nor an object.
     pub fn free(&mut self, show: &dyn Show) {
         (self.own, self.track) = (Some(self.camera(show)), false);
     }
 
-    /// Looks at all of `bounds` in a picture of this size.
+    /// Frames all of `bounds` in a picture of this size.
     pub fn frame(&mut self, show: &dyn Show, bounds: &Bounds, size: Size) {
         self.steer(show, |camera| camera.show(bounds.centre, FRAME_ROOM * bounds.radius_m, size));
     }
@@ -103,7 +103,7 @@ impl Hand {
         self.own = Some(camera);
     }
 
-    /// Takes this frame's input over the picture; gives what it asks for.
+    /// Applies this frame's input over the picture; returns the resulting actions.
     pub fn input(&mut self, ui: &Ui, response: &Response, show: &dyn Show) -> Vec<Action> {
         self.follow_tracked(show);
         let window = self.window(ui, response, show);
@@ -133,7 +133,7 @@ impl Hand {
         self.tracked = centre;
     }
 
-    /// A drag that begins on an object takes hold of it.
+    /// A drag that begins on an object attaches the user spring to it.
     fn start(&mut self, turn: &mut Turn<'_>) {
         let orbiting = turn.ui.input(|input| input.modifiers.alt);
         if orbiting || !turn.response.drag_started_by(PointerButton::Primary) {
@@ -146,7 +146,7 @@ impl Hand {
         }
     }
 
-    /// The held end of the spring follows the pointer in the plane that faces the eye.
+    /// The free end of the spring follows the pointer in the plane that faces the eye.
     fn pull(&mut self, turn: &mut Turn<'_>) {
         let Some(grip) = self.grip else { return };
         if !turn.ui.input(|input| input.pointer.primary_down()) {
@@ -169,7 +169,7 @@ impl Hand {
         self.steer(turn.show, |camera| if turning { camera.orbit(pixels, size) } else { camera.pan(pixels, size) });
     }
 
-    /// The wheel zooms, or moves the hand in depth while it holds something.
+    /// The wheel zooms, or moves the spring's free end in depth while an object is pulled.
     fn wheel(&mut self, turn: &mut Turn<'_>) {
         if !turn.response.contains_pointer() && self.grip.is_none() {
             return;
@@ -212,7 +212,7 @@ impl Hand {
         }
     }
 
-    /// Draws the hand, its force, and the name of what is under the pointer.
+    /// Draws the spring's free end with its force, and the name of the object under the pointer.
     pub fn draw(&self, ui: &Ui, response: &Response, show: &dyn Show) {
         let window = self.window(ui, response, show);
         let palette = palette(ui);
@@ -235,7 +235,7 @@ fn hovered(ui: &Ui, response: &Response, show: &dyn Show, window: &Window) -> Op
     show.pick(window.ray(response.hover_pos()?))
 }
 
-/// Where `ray` meets the plane through `through` across `normal`; `through` itself where it does not.
+/// The point where `ray` meets the plane through `through` across `normal`; `through` itself where they do not meet.
 fn on_plane(ray: &Ray, through: DVec3, normal: DVec3) -> DVec3 {
     let along = ray.direction.dot(normal);
     let distance = (through - ray.origin).dot(normal);
@@ -256,7 +256,7 @@ fn label(ui: &Ui, at: Pos2, text: &str, palette: &Palette) {
     ui.painter().galley(at, galley, palette.text);
 }
 
-/// The force beside the hand; the spring itself is part of the picture.
+/// The force next to the spring's free end; the spring itself is part of the picture.
 fn draw_hand(ui: &Ui, at: Pos2, force_n: f64, palette: &Palette) {
     ui.painter().circle_stroke(at, 7.0, Stroke::new(1.6, palette.warn));
     label(ui, at + vec2(15.0, -21.0), &format!("{} N", text::figures(force_n)), palette);

@@ -1,6 +1,6 @@
-//! What lies over the picture: help, information, the command palette, messages.
+//! Overlays on the picture: help, information, the command palette, messages.
 //!
-//! In: the [`Status`] and the table of commands. Out: chosen [`Command`]s. Never here: the panels beside the picture.
+//! In: the [`Status`] and the table of commands. Out: chosen [`Command`]s. Never here: the panels next to the picture.
 
 use super::commands::{self, Command, Group, MOUSE, SHORTCUTS};
 use super::history::FrameSummary;
@@ -12,13 +12,13 @@ use egui::{Align2, Area, Frame, Id, Key, Order, Rect, RichText, Ui, vec2};
 /// The palette's state between frames.
 #[derive(Debug, Clone, Default)]
 pub struct Finder {
-    /// What was typed.
+    /// The text typed.
     typed: String,
-    /// The chosen entry of those that match.
+    /// Index of the chosen entry among the matching ones.
     chosen: usize,
 }
 
-/// Keys and mouse, in the middle of the window. Gives false once it was closed.
+/// Keys and mouse, in the middle of the window. Returns false once it is closed.
 pub fn help(ctx: &egui::Context) -> bool {
     let modal = egui::Modal::new(Id::unique("help")).frame(sheet(ctx)).show(ctx, |ui| {
         ui.set_width(660.0);
@@ -136,7 +136,7 @@ pub fn messages(ui: &Ui, over: Rect, messages: &[Message]) {
     });
 }
 
-/// Every command by name, filtered by what is typed. Gives the command that was chosen, and whether to stay open.
+/// Every command by name, filtered by the typed text. Returns the chosen command, and whether the palette stays open.
 pub fn finder(ctx: &egui::Context, finder: &mut Finder) -> (Option<Command>, bool) {
     let mut chosen = None;
     let modal = egui::Modal::new(Id::unique("palette")).frame(sheet(ctx)).show(ctx, |ui| {

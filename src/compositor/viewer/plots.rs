@@ -1,6 +1,6 @@
 //! Plots: frame time against its target, each agent's cost and rate, histories of one agent.
 //!
-//! In: the recent frames and samples. Out: nothing but shapes. Never here: keeping numbers.
+//! In: the recent frames and samples. Out: shapes. Never here: storing numbers.
 
 use super::history::{FRAMES, History, Sample};
 use super::show::Status;
@@ -9,7 +9,7 @@ use super::theme::{Palette, palette};
 use egui::{Align2, Color32, FontId, Rect, Sense, Ui, pos2, vec2};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoints};
 
-/// A frame's time is shown up to this many wanted periods at least.
+/// The axis of frame times reaches at least this many target periods.
 const HEADROOM: f64 = 1.6;
 
 /// Work and interval of recent frames, with the target line.
@@ -60,7 +60,7 @@ fn quiet(name: &'static str, height: f32, palette: &Palette) -> Plot<'static> {
         .set_margin_fraction(vec2(0.0, 0.06))
 }
 
-/// Marks at round numbers that cut the axis into about `parts`, all of one weight, so that each gets its label.
+/// Marks at round numbers that divide the axis into about `parts`, all of one weight, so that each has a label.
 fn even_marks(input: egui_plot::GridInput, parts: f64) -> Vec<egui_plot::GridMark> {
     let (low, high) = input.bounds;
     let step_size = round_step((high - low) / parts);
@@ -89,7 +89,7 @@ fn legend(ui: &mut Ui, entries: &[(&str, Color32)]) {
     });
 }
 
-/// Bars of each agent's share of a core, and of its rate against the one it wants.
+/// Bars of each agent's share of a core, and of its rate relative to the requested one.
 pub fn costs(ui: &mut Ui, status: &Status) {
     let palette = palette(ui);
     let total: f64 = status.agents.iter().map(|row| row.cpu_share).sum();

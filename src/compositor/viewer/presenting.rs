@@ -1,26 +1,28 @@
-//! How long showing a picture takes where nobody tells: what of the time between two pictures was neither work nor waited for.
+//! Estimate of the presentation time where it cannot be measured: the part of the interval between two pictures that was neither work nor
+//! idle waiting.
 //!
-//! In: the work of a picture, and when the next one started. Out: a time. Never here: a clock.
+//! In: the work of a picture, and the start of the next one. Out: a time. Never here: a clock.
 //!
-//! A picture that starts late was kept from starting by the one before, so that all of the time since that one began was spent, and
-//! what was not work was spent on showing it. One that starts on time says only that showing took no longer than what was left.
+//! A picture that starts late was delayed by the one before, so that the whole interval since that one began was spent, and all that was
+//! not work was presentation. A picture that starts on time only gives an upper bound: presentation took no longer than the rest of the
+//! interval.
 
 use std::time::Duration;
 
-/// Late starts that are remembered; their median counts, so that a hiccup of the system does not.
+/// Late starts stored; their median counts, so that a single hiccup of the system does not.
 const REMEMBERED: usize = 9;
 
-/// What is left of the estimate after a picture on time: a tenth less in three seconds at 30 Hz, and the next late start mends it.
+/// Decay of the estimate with every picture on time: a tenth in three seconds at 30 Hz; the next late start corrects it.
 const FADING: f64 = 0.999;
 
-/// The time that showing a picture takes.
+/// Estimator of the presentation time.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Presenting {
-    /// Seconds, newest last; zeros before there are so many.
+    /// Seconds, newest last; zeros in unused entries.
     late_s: [f64; REMEMBERED],
     known: usize,
     estimate_s: f64,
-    /// Work of the newest picture; `None` where that says nothing.
+    /// Work of the newest picture; `None` where it does not count.
     work_s: Option<f64>,
 }
 
@@ -30,12 +32,12 @@ impl Presenting {
         Duration::try_from_secs_f64(self.estimate_s).unwrap_or(Duration::ZERO)
     }
 
-    /// Learns what the newest picture took besides being shown; `counts` where it was a picture like others.
+    /// Stores the work of the newest picture, without presentation; `counts` is false for an unusual picture (warm-up, resized, …).
     pub fn worked(&mut self, work: Duration, counts: bool) {
         self.work_s = counts.then_some(work.as_secs_f64());
     }
 
-    /// Learns that the next picture started so long after the newest one did, and whether that was late.
+    /// Updates the estimate when the next picture starts `interval` after the newest one; `late` if after its due time.
     pub fn started(&mut self, interval: Duration, late: bool) {
         let Some(work_s) = self.work_s.take() else { return };
         let left_s = (interval.as_secs_f64() - work_s).max(0.0);
@@ -65,7 +67,7 @@ mod tests {
         Duration::from_secs_f64(time * 1e-3)
     }
 
-    /// Pictures of `work` on a screen that takes 15 ms to show one, one every 33 ms where that is possible.
+    /// Pictures of `work` with a presentation time of 15 ms, one every 33 ms where possible.
     fn play(presenting: &mut Presenting, work: f64, pictures: usize) {
         for _ in 0..pictures {
             presenting.worked(ms(work), true);

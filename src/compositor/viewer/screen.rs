@@ -1,7 +1,7 @@
 //! The picture on the window's device: a texture that the renderer draws into and egui shows.
 //!
-//! In: a composed picture. Out: a texture's id and where the time went. Never here: pacing, panels.
-//! The picture is waited for, so that its measured work is whole; egui draws after it on the same queue.
+//! In: a composed picture. Out: a texture's id and the times of the picture. Never here: pacing, panels.
+//! The thread waits for the picture, so that its measured work is complete; egui draws after it on the same queue.
 
 use super::super::offscreen::{self, Gpu};
 use super::super::{DrawError, Lost, Renderer, RendererOptions, Size, Target};
@@ -14,16 +14,16 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
-/// Where the time of one picture went.
+/// Times of one picture.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct DrawnTimes {
-    /// Gathering and choosing.
+    /// Gathering states and choosing levels.
     pub compose: Duration,
     /// Drawing, until the device was done.
     pub draw: Duration,
-    /// What of it the device measured itself.
+    /// The part of it that the device measured itself.
     pub gpu: Option<Duration>,
-    /// Whether the picture has another size than the one before.
+    /// Whether the picture's size differs from the one before.
     pub resized: bool,
 }
 
@@ -50,10 +50,10 @@ pub struct GpuScreen {
 }
 
 impl GpuScreen {
-    /// A screen on the device that eframe opened; `lose_after` destroys it after so many pictures.
+    /// A screen on the device that eframe opened; `lose_after` destroys the device after that many pictures.
     ///
     /// # Errors
-    /// [`DrawError::Refused`] where the device cannot do what the shaders need.
+    /// [`DrawError::Refused`] where the device lacks a feature that the shaders need.
     pub fn new(state: &RenderState, lose_after: Option<u64>) -> Result<Self, DrawError> {
         let info = state.adapter.get_info();
         let options = RendererOptions::for_adapter(&info);
@@ -74,35 +74,35 @@ impl GpuScreen {
         })
     }
 
-    /// Whether the device was lost: nothing can be drawn until there is another.
+    /// Whether the device was lost: nothing can be drawn until it is replaced.
     pub fn lost(&self) -> &Lost {
         self.renderer.lost()
     }
 
-    /// Whether a processor draws and shows what is drawn.
+    /// Whether a software rasteriser draws and presents the picture.
     pub fn is_software(&self) -> bool {
         self.gpu.info.device_type == wgpu::DeviceType::Cpu
     }
 
-    /// Whether the next call of [`Screen::draw`] makes a new picture.
+    /// Sets whether the next call of [`Screen::draw`] makes a new picture.
     pub fn set_due(&mut self, due: bool) {
         self.due = due;
     }
 
-    /// The times of the newest picture, once.
+    /// The times of the newest picture; returned once.
     pub fn take_times(&mut self) -> Option<DrawnTimes> {
         self.times.take()
     }
 
-    /// Why the newest picture could not be drawn, once.
+    /// The error of the newest picture; returned once.
     pub fn take_failure(&mut self) -> Option<DrawError> {
         self.failure.take()
     }
 
-    /// Writes the newest picture, without panels, into `folder`; gives the file or what to tell the user.
+    /// Writes the newest picture, without panels, into `folder`; returns the file's path.
     ///
     /// # Errors
-    /// A sentence that names the file and the cause.
+    /// A sentence for the user with the file and the cause.
     pub fn save(&self, folder: &Path, scene: &str) -> Result<PathBuf, String> {
         let Some(canvas) = &self.canvas else { return Err("There is no picture yet.".to_owned()) };
         let now = SystemTime::now().duration_since(UNIX_EPOCH).unwrap_or_default();
@@ -122,19 +122,19 @@ impl GpuScreen {
         let Some(canvas) = &self.canvas else { return Ok(DrawnTimes::default()) };
         let times = self.renderer.render(picture, &view.camera, Target { view: &canvas.view, size })?;
         show.while_drawn(view);
-        // a device that fails here is lost, and that is noticed before the next frame
+        // a failure here means a lost device, which is noticed before the next frame
         let _ = offscreen::wait(&self.gpu.device, self.renderer.lost());
         let gpu = self.renderer.gpu_time().or(times.gpu);
         Ok(DrawnTimes { compose: composed - start, draw: composed.elapsed(), gpu, resized })
     }
 
-    /// Makes the texture of this size, if it is not there already. Gives whether it was made.
+    /// Makes the texture of this size if there is none yet. Returns whether it was made.
     fn resize(&mut self, Size { width, height }: Size) -> bool {
         if self.canvas.as_ref().is_some_and(|c| (c.texture.width(), c.texture.height()) == (width, height)) {
             return false;
         }
         let device = &self.gpu.device;
-        // egui's targets mostly hold encoded bytes as they are; one that encodes what it is given must be given linear light
+        // most targets of egui store sRGB-encoded bytes unchanged; a target that encodes needs linear input, hence the decoding view
         let encodes = self.target_format.is_srgb();
         let decoded = [FORMAT.add_srgb_suffix()];
         let texture = device.create_texture(&wgpu::TextureDescriptor {
@@ -159,10 +159,10 @@ impl GpuScreen {
     }
 }
 
-/// The renderer's shaders encode colours to sRGB themselves: a format that does costs a processor 6 ms a picture more.
+/// The renderer's shaders encode colours to sRGB themselves: an sRGB format costs a software rasteriser 6 ms more per picture.
 const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
 
-/// A scene's name as part of a file's name.
+/// A scene's name reduced to characters that are safe in a file name.
 fn file_name(scene: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
     scene.chars().take(60).map(plain).collect()

@@ -1,4 +1,4 @@
-//! The budget bar: where the time of a frame goes, and how much of the machine simulates.
+//! The budget bar: how the time of a frame is divided, and the fraction of all cores that simulates.
 //!
 //! In: [`Shares`]. Out: two lines of coloured parts. Never here: measuring.
 
@@ -6,7 +6,7 @@ use super::show::Shares;
 use super::theme::palette;
 use egui::{Color32, Rect, RichText, Sense, Ui, pos2, vec2};
 
-/// The bar is as wide as this many times the time of a frame.
+/// Width of the bar in target frame times.
 const ROOM: f64 = 1.25;
 
 /// Height of the bar, points.
@@ -43,7 +43,7 @@ pub fn show(ui: &mut Ui, shares: &Shares) {
     });
 }
 
-/// The parts and what they are.
+/// The parts and their tooltips.
 const NAMES: [(&str, &str); 5] = [
     ("simulation", "What agents take of all cores"),
     ("cull", "Taking the newest states and finding what is seen; 100 % is the time of a frame"),
@@ -52,12 +52,12 @@ const NAMES: [(&str, &str); 5] = [
     ("window", "Panels, and showing all of it on the screen; 100 % is the time of a frame"),
 ];
 
-/// A part of a whole in percent, or as so many times the whole.
+/// A fraction in percent, or as a multiple of the whole.
 fn told(part: f64) -> String {
     if part < 2.0 { format!("{:.0} %", 100.0 * part) } else { format!("{part:.1}×") }
 }
 
-/// Parts side by side, in units of which `room` fill the line.
+/// Parts side by side; the whole line stands for `room`.
 fn bar(ui: &Ui, line: Rect, parts: &[(f64, Color32)], room: f64) {
     ui.painter().rect_filled(line, 2.0, palette(ui).ground);
     let mut from = line.left();

@@ -1,8 +1,8 @@
-//! The window itself: eframe around the [`Viewer`], paced at the target rate, started again when its device is lost.
+//! The window itself: eframe around the [`Viewer`], paced at the target rate, reopened when its device is lost.
 //!
-//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: what is in the window.
-//! eframe reconfigures an outdated surface and makes a lost one anew by itself; a lost device it does not notice, so
-//! [`run_window`] hears of it from wgpu, closes the window and opens it again on a new device. The show runs on meanwhile.
+//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
+//! eframe reconfigures an outdated surface and remakes a lost one, but does not notice a lost device; so [`run_window`] receives the loss
+//! from wgpu, closes the window and opens it again on a new device. The show keeps running.
 
 use super::super::Lost;
 use super::presenting::Presenting;
@@ -18,27 +18,27 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-/// How a window starts.
+/// Start options of a window.
 #[derive(Debug, Clone)]
 pub struct WindowOptions {
-    /// Width and height at the start, points; `None` opens the window as it was closed last time.
+    /// Initial width and height, points; `None` restores the size at which the window was last closed.
     pub size: Option<[f32; 2]>,
-    /// Where screenshots go: a folder that exists.
+    /// Folder for screenshots; it exists.
     pub screenshots: PathBuf,
-    /// Destroys the device after this many pictures, once: shows that the window comes back. Never set by users.
+    /// Destroys the device after this many pictures, once: tests that the window comes back. Never set by users.
     pub lose_device_after: Option<u64>,
 }
 
-/// Why a window is gone.
+/// How a window ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum WindowEnd {
     /// The user closed it.
     Closed,
-    /// The show asked for it ([`Show::wants_close`]).
+    /// The show requested it ([`Show::wants_close`]).
     Finished,
 }
 
-/// Why there is no window.
+/// Reasons for having no window.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum WindowError {
@@ -48,10 +48,10 @@ pub enum WindowError {
     /// No adapter can draw into a window.
     #[error("no graphics adapter can draw into a window: {0}; on Debian and Ubuntu install mesa-vulkan-drivers")]
     NoAdapter(String),
-    /// The device was lost as often as this within a second of being made.
+    /// The device was lost this many times in a row, each within a second of being made.
     #[error("the graphics device was lost {0} times within a second of being made")]
     DeviceUnstable(u32),
-    /// The window was open, and the display it was on is gone.
+    /// The window was open, and its display is gone.
     #[error("the window is gone: {0}")]
     Gone(String),
     /// The window could not be made for another reason.
@@ -59,30 +59,30 @@ pub enum WindowError {
     Failed(String),
 }
 
-/// A device that is lost sooner than this after it was made counts against [`LOSSES_MAX`].
+/// A device that is lost sooner than this counts against [`LOSSES_MAX`].
 const YOUNG: Duration = Duration::from_secs(1);
-/// Lost young devices after which the window gives up.
+/// Early losses in a row after which the window gives up.
 const LOSSES_MAX: u32 = 5;
-/// While the window is hidden the show is asked this often whether it has ended.
+/// While the window is hidden, [`Show::wants_close`] is polled at this interval.
 const HIDDEN_POLL: Duration = Duration::from_millis(200);
-/// While time stands still and nobody touches anything, pictures come this far apart.
+/// Interval between pictures while the simulation is paused and there is no input.
 const STILL_PERIOD: Duration = Duration::from_millis(250);
-/// This long after the last touch a picture of standing time counts as untouched: a single step and a glide have ended.
+/// Seconds without input before a paused picture counts as still: by then a single step and mesh morphs have ended.
 const CALM: f64 = 0.5;
-/// Pictures of a new device that say nothing: shaders are compiled, buffers grow.
+/// First pictures of a new device that are excluded from statistics: shaders are compiled, buffers grow.
 const WARM_UP: u64 = 3;
-/// A picture this much before its time is drawn rather than waited for.
+/// A picture due within this time is drawn now instead of waiting.
 const EARLY: Duration = Duration::from_micros(500);
-/// A picture this much after its time was kept from it by the one before.
+/// A picture later than this was delayed by the one before.
 const LATE: Duration = Duration::from_millis(1);
 
 /// Opens the window and shows `show` in it until the user or the show closes it.
 ///
-/// To be called on the main thread. A lost device is replaced; the show is not told and need not care.
+/// To be called on the main thread. A lost device is replaced; the show is not notified and need not react.
 ///
 /// # Errors
-/// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as nobody sees it any
-/// more; the others where graphics fail. The show is left as it is.
+/// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as its display is gone;
+/// the others where graphics fail. The show is left unchanged.
 pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
     find_display()?;
     let mut viewer = Viewer::default();
@@ -105,10 +105,10 @@ pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<Window
     }
 }
 
-/// Where a display is named, in the order in which they are tried.
+/// Environment variables that name a display, in the order in which they are tried.
 const DISPLAYS: [&str; 3] = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
 
-/// Whether this system names a display at all: without one, winit's own error is hard to read.
+/// Fails if this system names no display: the error of winit is hard to read in that case.
 fn find_display() -> Result<(), WindowError> {
     let unix_desktop = cfg!(unix) && !cfg!(target_os = "macos");
     let named = DISPLAYS.into_iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
@@ -118,7 +118,7 @@ fn find_display() -> Result<(), WindowError> {
     Ok(())
 }
 
-/// What became of a window.
+/// State of a window.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Fate {
     Open,
@@ -127,7 +127,7 @@ enum Fate {
     DeviceLost,
 }
 
-/// One window on one device, until either is gone.
+/// One window on one device, until either ends.
 fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
     let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
     let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
@@ -146,8 +146,8 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
     let run = || eframe::run_native("metachron", native, Box::new(creator));
     let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
     let opened = || device.get().is_some();
-    // egui panics where a device is lost between its own calls, and winit where the display is; nothing of the show or the viewer is
-    // under change there
+    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
+    // modified at that point
     match hearing_winit(|| panic::catch_unwind(AssertUnwindSafe(run))) {
         (_, true) => return Err(no_answer(opened())),
         (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
@@ -157,7 +157,8 @@ fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first
     Ok(fate.get())
 }
 
-/// Gives what `run` gives, and whether winit has panicked meanwhile, as it does where the display does not answer: that is not printed.
+/// Returns the result of `run`, and whether winit panicked meanwhile, as it does where the display does not answer; that panic is not
+/// printed.
 fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
     let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
     let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
@@ -185,7 +186,7 @@ fn named_error(error: eframe::Error, opened: bool) -> WindowError {
     }
 }
 
-/// The display does not answer, or no longer where the window has been `opened`.
+/// The error for a display that does not answer, or no longer answers if the window was already `opened`.
 fn no_answer(opened: bool) -> WindowError {
     let read = |key: &str| std::env::var(key).ok();
     if opened {
@@ -195,7 +196,7 @@ fn no_answer(opened: bool) -> WindowError {
     WindowError::NoDisplay(format!("{why}; name one that does, or run with --headless"))
 }
 
-/// Which display was asked for, and that it `fails`: winit's own words name a line of its source.
+/// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
 fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
     let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
     let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
@@ -217,7 +218,7 @@ fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
         setup.device_descriptor = Arc::new(super::super::offscreen::device_descriptor);
     }
     let renderer = eframe::Renderer::Wgpu;
-    // a size that is given wins over the one that the window was closed with, which is restored before this is asked
+    // an explicit size overrides the stored one, which eframe restores before this hook runs
     let sized = move |size: [f32; 2]| -> eframe::WindowBuilderHook {
         Box::new(move |builder| builder.with_inner_size(size).with_maximized(false).with_fullscreen(false))
     };
@@ -240,14 +241,14 @@ struct Shell<'a> {
     screenshots: PathBuf,
     pace: Pace,
     presenting: Presenting,
-    /// Time that [`Viewer::ui`] spent on the picture in the frame before.
+    /// Time that [`Viewer::ui`] spent on the picture in the previous frame.
     drawing: Duration,
     hidden: bool,
-    /// When the user last did something, in egui's time.
+    /// Time of the last user input, in egui's time.
     touched_s: f64,
 }
 
-/// When pictures are due.
+/// Schedule of the pictures.
 struct Pace {
     due: Instant,
     started: Option<Instant>,
@@ -259,15 +260,15 @@ impl Pace {
         now + EARLY >= self.next(still)
     }
 
-    /// When the next picture is due; `still` is nothing to hurry for.
+    /// Due time of the next picture; `still` allows a long interval.
     fn next(&self, still: bool) -> Instant {
         let calm = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
         calm.map_or(self.due, |calm| calm.max(self.due))
     }
 
-    /// Counts a picture that starts now; gives the time since the one before.
+    /// Counts a picture that starts now; returns the time since the one before.
     fn start(&mut self, now: Instant, period: Duration) -> Duration {
-        // a late picture keeps the beat if it can, and starts a new one if it is a whole period late
+        // a late picture keeps the schedule if possible, and restarts it if a whole period late
         self.due = if self.due + period > now { self.due + period } else { now + period };
         self.pictures += 1;
         let before = self.started.replace(now);
@@ -297,7 +298,7 @@ impl<'a> Shell<'a> {
         }
     }
 
-    /// Whether pictures may come slowly: time stands still and the user's hands lie still.
+    /// Whether pictures may come slowly: the simulation is paused and there is no user input.
     fn is_still(&mut self, ctx: &egui::Context) -> bool {
         let (now_s, touched) = ctx.input(|input| {
             let held = input.pointer.any_down() || !input.keys_down.is_empty();
@@ -314,10 +315,10 @@ impl<'a> Shell<'a> {
         ctx.send_viewport_cmd(egui::ViewportCommand::Close);
     }
 
-    /// Puts together where the time of the picture just drawn went, and tells the show and the plots.
+    /// Collects the times of the picture just drawn, and passes them to the show and the plots.
     fn account(&mut self, interval: Duration, panels: Duration) {
         let Some(drawn) = self.screen.take_times() else { return };
-        // where an adapter presents by itself, waiting for it is no work
+        // a GPU presents on its own: waiting for it is not work
         let present = if self.screen.is_software() { self.presenting.time() } else { Duration::ZERO };
         let skip = if self.pace.pictures <= WARM_UP {
             Some(Skip::WarmUp)
@@ -401,7 +402,7 @@ impl eframe::App for Shell<'_> {
         }
         self.fulfil(ui.ctx(), wishes);
         if self.screen.lost().reason().is_some() {
-            // egui must not draw on a device that is gone: it would find no room for its vertices, and panic
+            // egui must not draw on a lost device: its vertex buffer would be missing, and it would panic
             ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
         }
         ui.ctx().request_repaint_after(self.pace.next(still).saturating_duration_since(Instant::now()));

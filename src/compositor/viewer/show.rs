@@ -1,6 +1,6 @@
-//! The boundary of the window: what it shows and what it can ask for.
+//! The interface between the window and the program: data shown, and actions requested.
 //!
-//! In: a [`Show`], implemented where the rooms are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
+//! In: a [`Show`], implemented where the program's parts are joined. Out: [`Action`]s, and a [`ViewRequest`] for each frame.
 //! Never here: egui, a window, the runtime. The viewer knows the rest of metachron through these types only.
 
 use super::super::{Camera, Hit, Picture, Ray, Size, Style};
@@ -10,84 +10,84 @@ use metachron_core::{AgentId, Resolution, SimTime};
 use std::path::PathBuf;
 use std::time::Duration;
 
-/// What the window shows and what it can ask for.
+/// Supplies the window with its content and applies the user's actions.
 ///
-/// No call may wait for an agent: the window is drawn by the thread that makes these calls.
+/// No call may wait for an agent: the thread that makes these calls draws the window.
 pub trait Show {
-    /// Applies what the user asked for.
+    /// Applies a user action.
     fn apply(&mut self, action: Action);
 
-    /// Gathers the newest states, chooses a level for each object and gives the picture to draw.
+    /// Gathers the newest states, chooses a level for each object and returns the picture to draw.
     fn compose(&mut self, view: &ViewRequest) -> &Picture;
 
-    /// Called while the adapter draws what was composed for this request: there is time for the next picture's sake until it is drawn.
+    /// Called while the adapter draws the picture of this request: CPU time that can be used to prepare the next picture.
     fn while_drawn(&mut self, _view: &ViewRequest) {}
 
-    /// Takes the finished frame's measured work.
+    /// Receives the times of the finished frame.
     fn measured(&mut self, times: &FrameTimes);
 
     /// The numbers of the panels, as of the last frame.
     fn status(&self) -> &Status;
 
-    /// Where the scene's own camera is now.
+    /// The scene's own camera at present.
     fn scene_camera(&self) -> Camera;
 
     /// The nearest movable object on `ray`.
     fn pick(&self, ray: Ray) -> Option<Hit>;
 
-    /// A ball around one object, or around every movable object; `None` where there is nothing to see.
+    /// A bounding ball of one object, or of every movable object; `None` where nothing is drawn.
     fn bounds(&self, of: Option<AgentId>) -> Option<Bounds>;
 
-    /// Where a camera will be when the picture that is drawn next is finished.
+    /// The camera predicted for the time at which the next picture is finished.
     fn ahead(&mut self, camera: Camera) -> Camera {
         camera
     }
 
-    /// Told who draws, each time a device is made.
+    /// Called with the adapter's name each time a device is made; `_on_processor` is true for a software rasteriser.
     fn drawn_by(&mut self, _adapter: &str, _on_processor: bool) {}
 
-    /// Whether the run has ended and the window should close by itself; asked many times a second, hidden or not.
+    /// Whether the run has ended and the window should close by itself; polled many times a second, hidden or not.
     fn wants_close(&mut self) -> bool {
         false
     }
 }
 
-/// What the user asked for.
+/// An action requested by the user.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Action {
-    /// Let simulated time pass.
+    /// Run the simulation.
     Run,
-    /// Hold simulated time.
+    /// Pause the simulation.
     Pause,
-    /// Hold simulated time and advance it by one frame.
+    /// Pause and advance by one frame.
     SingleStep,
-    /// Start the scene again from its first state.
+    /// Restart the scene from its initial state.
     Reset,
-    /// Read the scene file again and start it.
+    /// Reload the scene file and start it.
     Reload,
-    /// Simulated seconds for each second of wall time, > 0.
+    /// Simulated seconds per second of wall time, > 0.
     Speed(f64),
-    /// Wanted frames per second, > 0.
+    /// Target frames per second, > 0.
     TargetFps(f64),
     /// The policy that chooses levels, by name; one of [`Status::policies`].
     Policy(String),
     /// The feedback law and its gains.
     Law(Law),
-    /// How much each factor counts in what a level is worth.
+    /// The weights of the factors in the benefit of a level.
     Sliders(Sliders),
-    /// Keep all levels as they are, or let them be chosen again.
+    /// Freeze all levels, or let them be chosen again.
     Freeze(bool),
-    /// Look for better gains of the feedback law on this scene and this machine, and take them.
+    /// Search better gains of the feedback law for this scene and this machine, and apply them.
     Tune,
-    /// Stop looking and go on as before.
+    /// Stop the search; the gains stay unchanged.
     StopTuning,
-    /// Take hold of an object with a spring.
+    /// Attach the user spring to an object.
     DragStart(Hit),
     /// Move the free end of that spring to this point, metres.
     DragMove(DVec3),
-    /// Let go.
+    /// Release the spring.
     DragEnd,
-    /// Mark an object, or none.
+    /// Select an object, or none.
     Select(Option<AgentId>),
     /// Load the scene file that was dropped on the window.
     OpenScene(PathBuf),
@@ -96,20 +96,20 @@ pub enum Action {
 /// The picture's feedback law and its gains.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Law {
-    /// The law as printed (GDC04, eq. 1), on ε̂ = 40 ε/L.
+    /// The published law (GDC04, eq. 1), on ε̂ = 40 ε/L.
     Printed {
-        /// α: change of ε̂ for each frame per second that is missing, > 0.
+        /// α: change of ε̂ per missing frame per second, > 0.
         alpha: f64,
-        /// β: change of ρ for each unit of ε̂, > 0.
+        /// β: change of ρ per unit of ε̂, > 0.
         beta: f64,
     },
-    /// The law on the logarithm of the measured time, whose gain no machine changes.
+    /// The law on the logarithm of the measured time, whose gain does not depend on the machine.
     Corrected {
-        /// κ, 0.01 … 0.99: the share of an error that one frame removes.
+        /// κ, 0.01 … 0.99: the fraction of an error that one frame removes.
         kappa: f64,
-        /// λ, 0 … 0.99: the share of an error's change that one frame adds; above 0 it is a PI law that cannot wind up.
+        /// λ, 0 … 0.99: the fraction of an error's change that one frame adds; above 0 it is a PI law without wind-up.
         lead: f64,
-        /// Share of the frame's time that is left free, 0 … 0.9.
+        /// Fraction of the frame's time that is left free, 0 … 0.9.
         margin: f64,
     },
 }
@@ -119,13 +119,13 @@ pub enum Law {
 pub struct ViewRequest {
     /// The picture's size; neither side is zero.
     pub size: Size,
-    /// What it is seen through.
+    /// Its camera.
     pub camera: Camera,
-    /// How it is drawn.
+    /// Its drawing options.
     pub style: Style,
 }
 
-/// A ball around something.
+/// A bounding ball.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Bounds {
     /// Its centre, metres.
@@ -134,37 +134,37 @@ pub struct Bounds {
     pub radius_m: f64,
 }
 
-/// The hand's spring as it is now.
+/// The state of the user spring.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Held {
-    /// Where the free end of the spring is, metres.
+    /// Position of the spring's free end, metres.
     pub target: DVec3,
     /// The force on the object in newtons, ≥ 0.
     pub force_n: f64,
 }
 
-/// Where the time of a frame went.
+/// Times of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct FrameTimes {
     /// Gathering states and choosing levels.
     pub compose: Duration,
     /// Drawing the picture, on the CPU.
     pub draw: Duration,
-    /// Drawing the picture, on the adapter, where it has timestamps.
+    /// Drawing the picture, on the GPU, where it has time stamps.
     pub draw_gpu: Option<Duration>,
     /// Panels and plots, as measured in the frame before.
     pub panels: Duration,
-    /// Showing what was drawn, where the processor does it: as it was lately.
+    /// Presentation, where the CPU does it: a recent estimate.
     pub present: Duration,
-    /// All work of the frame until the picture was finished: what the controller holds at its set point.
+    /// All work of the frame until the picture was finished: the controlled variable of the feedback law.
     pub work: Duration,
-    /// From the start of the frame before to the start of this one.
+    /// From the start of the previous frame to the start of this one.
     pub interval: Duration,
-    /// Why this frame must teach a controller nothing.
+    /// Reason to exclude this frame from feedback, if any.
     pub skip: Option<Skip>,
 }
 
-/// Why a frame's times say nothing about the scene.
+/// Reasons why a frame's times do not characterise the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Skip {
     /// The first frames of a device: shaders are compiled, buffers grow.
@@ -173,7 +173,7 @@ pub enum Skip {
     Resized,
     /// The window was hidden before this frame.
     Hidden,
-    /// Simulated time stands still.
+    /// The simulation is paused.
     Still,
 }
 
@@ -184,110 +184,110 @@ pub struct Status {
     pub scene: String,
     /// Simulated time of the picture.
     pub sim_time: SimTime,
-    /// Whether simulated time passes.
+    /// Whether the simulation runs.
     pub running: bool,
-    /// Wanted simulated seconds for each second of wall time, > 0.
+    /// Requested simulated seconds per second of wall time, > 0.
     pub speed: f64,
-    /// Simulated seconds that were stepped for each second of wall time, by the agent that keeps up least, ≥ 0.
+    /// Simulated seconds stepped per second of wall time, of the slowest agent, ≥ 0.
     pub real_time_factor: f64,
-    /// Wanted frames per second, > 0.
+    /// Target frames per second, > 0.
     pub target_hz: f64,
-    /// Which executor runs the agents.
+    /// The executor that runs the agents.
     pub executor: String,
     /// The policy that chooses levels.
     pub policy: String,
-    /// The names a policy can have.
+    /// The names of all policies.
     pub policies: Vec<String>,
     /// The feedback law and its gains; `None` where the policy has none.
     pub law: Option<Law>,
-    /// How much each factor counts in what a level is worth; `None` where the policy does not weigh levels.
+    /// The weights of the factors in the benefit of a level; `None` where the policy does not weigh levels.
     pub sliders: Option<Sliders>,
-    /// Whether the policy heeds the slider of hysteresis.
+    /// Whether the policy uses the slider of hysteresis.
     pub damped: bool,
-    /// Whether levels are kept as they are.
+    /// Whether levels are frozen.
     pub frozen: bool,
-    /// Where the time goes.
+    /// Division of the time.
     pub shares: Shares,
-    /// How far the search for better gains is; `None` while nobody looks for any.
+    /// Progress of the search for better gains; `None` while none runs.
     pub tuning: Option<Tuning>,
-    /// Every law with its default gains; the scene's own where it gives them.
+    /// Every law with its default gains, or the scene's own where given.
     pub laws: Vec<Law>,
-    /// The loop's variable as its law keeps it, for the plots.
+    /// The state variable of the feedback loop, for the plots.
     pub loop_value: Option<f64>,
-    /// Says that the controller rests on a limit, and on which.
+    /// Message that the controller is at a limit, and at which.
     pub clamp: Option<String>,
     /// Triangles in the last picture.
     pub triangles: u64,
     /// Total mechanical energy, joules.
     pub energy_j: f64,
-    /// Hash of every agent's state, where the run keeps one.
+    /// Hash of every agent's state, where the run computes one.
     pub state_hash: Option<u64>,
-    /// The marked object.
+    /// The selected object.
     pub selected: Option<AgentId>,
-    /// The hand's spring while it holds something.
+    /// The user spring while attached.
     pub held: Option<Held>,
     /// One row for each agent, in the scene's order.
     pub agents: Vec<AgentRow>,
-    /// What agents do to each other now.
+    /// The couplings between agents at present.
     pub couplings: Vec<CouplingRow>,
-    /// What the user should know, oldest first.
+    /// Messages for the user, oldest first.
     pub messages: Vec<Message>,
 }
 
 /// A search for better gains.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Tuning {
-    /// The share that is done, 0 … 1.
+    /// The fraction done, 0 … 1.
     pub done: f64,
-    /// What it does now, or the best so far.
+    /// The present stage, or the best gains so far.
     pub words: String,
 }
 
-/// Where the time goes, lately.
+/// Recent division of the time.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Shares {
-    /// Share of all cores that agents work on, 0 … 1.
+    /// Fraction of all cores that agents work on, 0 … 1.
     pub simulation: f64,
-    /// Gathering states and finding what is seen, as a part of the time of a frame.
+    /// Gathering states and culling, as a fraction of the time of a frame.
     pub cull: f64,
-    /// Choosing levels.
+    /// Choosing levels, likewise.
     pub select: f64,
-    /// Making the picture and drawing it.
+    /// Making the picture and drawing it, likewise.
     pub draw: f64,
-    /// Everything else that is work of a frame: panels, presenting.
+    /// All other work of a frame: panels, presenting.
     pub rest: f64,
 }
 
 /// A coupling of two agents in numbers.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CouplingRow {
-    /// The name of the agent that owns it.
+    /// The name of the agent that owns the coupling.
     pub a: String,
-    /// The name of the other.
+    /// The name of the peer.
     pub b: String,
     /// Its law.
     pub kind: &'static str,
-    /// Places that touch or are held.
+    /// Number of contact or attachment points.
     pub contacts: u32,
     /// Mean force of the owner's last step, newtons, ≥ 0.
     pub force_n: f64,
     /// The deepest overlap, metres, ≥ 0.
     pub penetration_m: f64,
-    /// How easily each gave way along the normal where it bore most, 1/kg, where a contact was solved.
+    /// Inverse effective mass of each along the normal at the contact with the largest force, 1/kg, where a contact was solved.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// What is left in its energy tank, joules, where it has one.
+    /// Energy left in its tank, joules, where it has one.
     pub tank_j: Option<f64>,
 }
 
-/// What an agent does now.
+/// Present activity of an agent.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub enum AgentState {
-    /// It steps.
+    /// Stepping.
     #[default]
     Running,
-    /// It sleeps until something touches it.
+    /// Asleep until touched.
     Resting,
-    /// It was stopped, for this reason.
+    /// Stopped, for this reason.
     Parked(String),
 }
 
@@ -300,7 +300,7 @@ pub struct AgentRow {
     pub name: String,
     /// The model's name.
     pub model: String,
-    /// Wanted steps per second, ≥ 0.
+    /// Requested steps per second, ≥ 0.
     pub wanted_hz: f64,
     /// Measured steps per second, ≥ 0.
     pub rate_hz: f64,
@@ -310,21 +310,21 @@ pub struct AgentRow {
     pub simulation: Option<Resolution>,
     /// Resolution of the picture.
     pub picture: Option<Resolution>,
-    /// Age of the state that was drawn, seconds, ≥ 0.
+    /// Age of the displayed state, seconds, ≥ 0.
     pub age_s: f64,
     /// Wall time of a step, seconds, ≥ 0.
     pub step_s: f64,
     /// Share of one core, 0 … 1.
     pub cpu_share: f64,
-    /// Simulated time that could not be made up since the start, seconds, ≥ 0.
+    /// Simulated time that was dropped since the start because it could not be caught up, seconds, ≥ 0.
     pub dropped_s: f64,
     /// The agent's estimate of its own error, metres, ≥ 0.
     pub residual_m: f64,
     /// The force that acts on a tool, newtons.
     pub force_n: Option<f64>,
-    /// Whose clock it keeps while it shares a world with others.
+    /// The agent whose clock it follows while it is a member of an island.
     pub led_by: Option<String>,
-    /// What it does now.
+    /// Present activity.
     pub state: AgentState,
 }
 
@@ -361,22 +361,22 @@ impl Law {
     }
 }
 
-/// How much a message matters.
+/// Severity of a message.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Weight {
-    /// Good to know.
+    /// Information.
     Note,
-    /// Something is not as it was asked for.
+    /// A request could not be fulfilled as given.
     Warning,
     /// Something failed.
     Failure,
 }
 
-/// A line for the user.
+/// A message for the user.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Message {
-    /// How much it matters.
+    /// Severity.
     pub weight: Weight,
-    /// What to say.
+    /// The text.
     pub text: String,
 }

@@ -1,4 +1,4 @@
-//! The panel at the side: frame time against the target, the controller and its gains, how the picture is shown.
+//! The side panel: frame time against the target, the controller and its gains, drawing options of the picture.
 //!
 //! In: the [`Status`] and the recent frames. Out: [`Action`]s, and changed [`Looks`]. Never here: the law itself.
 
@@ -11,10 +11,10 @@ use super::theme::{Palette, palette};
 use egui::{Align, ComboBox, Layout, ProgressBar, RichText, Slider, SliderClamping, Ui};
 use metachron_budget::cost::benefit::Sliders;
 
-/// Wanted frame rates that the slider offers, per second.
+/// Range of target frame rates on the slider, per second.
 const TARGET_HZ: (f64, f64) = (5.0, 144.0);
 
-/// What the button does.
+/// Tooltip of the tuning button.
 const TUNE: &str = "Look for better gains: some seconds of pictures at many resolutions, then a search in the background; the best are taken";
 
 /// Draws the panel.
@@ -94,7 +94,7 @@ fn control(ui: &mut Ui, status: &Status, out: &mut Vec<Action>) {
     }
 }
 
-/// How much each factor counts in what a level is worth; hysteresis only where it is heeded.
+/// Sliders for the weights of a level's benefit; hysteresis only where the policy uses it.
 fn worth(ui: &mut Ui, (sliders, damped): (Sliders, bool), out: &mut Vec<Action>) {
     let mut wanted = sliders;
     let Sliders { size, accuracy, importance, focus, motion, hysteresis } = &mut wanted;
@@ -132,7 +132,7 @@ fn feedback(ui: &mut Ui, law: Law, status: &Status, out: &mut Vec<Action>) {
     }
 }
 
-/// How far the search for gains is, and a way out of it.
+/// Progress of the search for gains, with a cancel button.
 fn progress(ui: &mut Ui, tuning: &Tuning, out: &mut Vec<Action>) {
     ui.horizontal(|ui| {
         if ui.button("Cancel").on_hover_text("Stop tuning; the gains stay as they were").clicked() {
@@ -170,7 +170,7 @@ fn gains(ui: &mut Ui, law: &mut Law) {
             slider(ui, "Lead λ", lead, (0.0, 0.99), |s| s.max_decimals(2));
             let mut percent = *margin * 100.0;
             slider(ui, "Margin", &mut percent, (0.0, 50.0), |s| s.max_decimals(0).suffix(" %"));
-            // moving through percent must not count as a change by itself
+            // the conversion to percent and back must not count as a change
             if (percent - *margin * 100.0).abs() > 1e-9 {
                 *margin = percent / 100.0;
             }
@@ -230,7 +230,7 @@ fn selected(ui: &mut Ui, row: Option<&AgentRow>, out: &mut Vec<Action>) {
         value(ui, "Simulation ε", &text::metres(simulation.eps_m), "Spacing of samples along the shape");
     }
     if let Some(picture) = &row.picture {
-        // a primitive is not divided along a shape: only its level says something
+        // a primitive is not divided along a shape: only its level is meaningful
         let eps = row.simulation.map_or_else(String::new, |_| format!("ε {}, ", text::metres(picture.eps_m)));
         value(ui, "Picture", &format!("{eps}n {}", picture.n), "Interval of the skin, and the level of its patch");
     }
@@ -270,7 +270,7 @@ fn slider(
     shape: impl FnOnce(Slider<'_>) -> Slider<'_>,
 ) {
     labelled(ui, name, |ui| {
-        // a value outside the slider's range stays as it is until it is moved
+        // a value outside the slider's range stays unchanged until the slider is moved
         let free = Slider::new(value, low..=high).clamping(SliderClamping::Edits);
         ui.add(shape(free)).accessible_name(name);
     });

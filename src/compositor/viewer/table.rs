@@ -11,7 +11,7 @@ use metachron_core::{AgentId, Resolution};
 const ROW: f32 = 22.0;
 /// The least width of the table, points.
 const WIDTH_MIN: f32 = 940.0;
-/// Names of the columns, their share of the width, and whether they hold numbers.
+/// Names of the columns, their relative widths, and whether they hold numbers.
 const COLUMNS: [(&str, f32, bool); 10] = [
     ("Agent", 1.5, false),
     ("Model", 0.9, false),
@@ -27,12 +27,12 @@ const COLUMNS: [(&str, f32, bool); 10] = [
 /// A state older than this many of its own periods is stale.
 const STALE_PERIODS: f64 = 3.0;
 
-/// What the user did to the table.
+/// A press on the table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Press {
-    /// Pressed a row.
+    /// Clicked a row.
     Select(AgentId),
-    /// Pressed a row twice.
+    /// Double-clicked a row.
     Frame(AgentId),
 }
 
@@ -40,7 +40,7 @@ pub enum Press {
 pub fn show(ui: &mut Ui, status: &Status) -> Option<Press> {
     let mut press = None;
     let palette = palette(ui);
-    // narrower than this, numbers would lose their first digits: the table scrolls sideways instead
+    // narrower than this, numbers would lose their first digits: the table scrolls horizontally instead
     let width = (ui.available_width() - 12.0).max(WIDTH_MIN);
     egui::ScrollArea::horizontal().auto_shrink([false, false]).show(ui, |ui| {
         ui.set_width(width);

@@ -1,4 +1,4 @@
-//! Numbers as a person reads them: three figures and the unit that fits.
+//! Human-readable numbers: three figures and a fitting unit.
 //!
 //! In: seconds, metres, hertz. Out: short texts. Never here: layout.
 
@@ -44,7 +44,7 @@ pub fn joules(value: f64) -> String {
     }
 }
 
-/// A mass such as `3.20 g` or `1.50 kg`; one without end is that of what is held.
+/// A mass such as `3.20 g` or `1.50 kg`; an infinite one is that of a driven body.
 #[must_use]
 pub fn kilograms(value: f64) -> String {
     if !value.is_finite() {
@@ -69,14 +69,14 @@ pub fn figures(value: f64) -> String {
     }
 }
 
-/// A mark on an axis, without zeros at its end: `0`, `0.5`, `20`.
+/// A mark on an axis, without trailing zeros: `0`, `0.5`, `20`.
 #[must_use]
 pub fn plain(value: f64) -> String {
     let text = format!("{value:.3}");
     text.trim_end_matches('0').trim_end_matches('.').to_owned()
 }
 
-/// A count with thin groups of three: `12 345`.
+/// A count in groups of three digits: `12 345`.
 #[must_use]
 pub fn count(value: u64) -> String {
     let digits = value.to_string();

@@ -1,31 +1,31 @@
-//! The look of the window: one palette for dark and one for light, spacing and type.
+//! The theme of the window: one palette for dark and one for light, spacing and fonts.
 //!
-//! In: egui's context. Out: its styles, and the [`Palette`] that painted parts use. Never here: widgets.
+//! In: egui's context. Out: its styles, and the [`Palette`] for custom painting. Never here: widgets.
 
 use egui::{Color32, CornerRadius, FontFamily, FontId, Margin, Stroke, TextStyle, Theme, Visuals, vec2};
 
 /// The colours of one theme.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Palette {
-    /// Behind the picture.
+    /// Background of the picture.
     pub ground: Color32,
     /// Panels.
     pub panel: Color32,
     /// Buttons, fields and rows under the pointer.
     pub raised: Color32,
-    /// Lines between things.
+    /// Separator lines.
     pub line: Color32,
     /// Text.
     pub text: Color32,
-    /// Text that stands back.
+    /// Secondary text.
     pub weak: Color32,
-    /// What is chosen, and measured work.
+    /// Selection, and measured work.
     pub accent: Color32,
-    /// All is well.
+    /// Good state.
     pub good: Color32,
-    /// Not as asked.
+    /// Warning.
     pub warn: Color32,
-    /// Failed.
+    /// Failure.
     pub bad: Color32,
 }
 
@@ -63,7 +63,7 @@ pub fn palette(ui: &egui::Ui) -> Palette {
     if ui.visuals().dark_mode { DARK } else { LIGHT }
 }
 
-/// Gives both themes their look; the choice between them stays egui's and the user's.
+/// Sets the styles of both themes; the choice between them is left to egui and the user.
 pub fn install(ctx: &egui::Context) {
     for (theme, palette) in [(Theme::Dark, DARK), (Theme::Light, LIGHT)] {
         let base = if theme == Theme::Dark { Visuals::dark() } else { Visuals::light() };

@@ -1,7 +1,7 @@
-//! The order in which a mesh loses its vertices.
+//! The order in which vertices are removed from a mesh.
 //!
 //! In: a welded mesh. Out: a [`Tom`] without its errors. Never here: cuts.
-//! Each position waits in a heap with its cheapest sound collapse; whoever's surroundings change is looked at anew.
+//! Each position waits in a heap with its cheapest valid collapse; positions with changed neighbours are evaluated again.
 
 use super::quadric::Quadric;
 use super::topology::{HUB, Surface, Verdict, direction};
@@ -11,39 +11,40 @@ use glam::{DVec3, Vec3};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// How far faces may turn in a collapse, as cosines: first no more than this, at last as far as it takes.
+/// Limits on the turn of faces in a collapse, as cosines: first limited, in the last pass unlimited.
 const TURNS: [f64; 2] = [0.2, -2.0];
-/// Weight of a rim against a surface of the same width.
+/// Weight of a border relative to a surface of the same width.
 const RIM_WEIGHT: f64 = 4.0;
-/// What a collapse costs for its length alone, as a share of what going off by that length costs: flat regions thin out evenly.
+/// Cost of a collapse for its length alone, as a fraction of the cost of a deviation by that length: flat regions thin out evenly.
 const LENGTH_SHARE: f64 = 1e-4;
 
-/// A collapse that waits: the bits of its cost (not negative, so they sort as it does), who goes, to whom, at which look.
+/// A queued collapse: the bits of its cost (non-negative, so they sort like it), the position removed, the one it moves to, the evaluation
+/// count.
 type Waiting = Reverse<(u64, u32, u32, u32)>;
 
 struct Builder {
     surface: Surface,
-    /// Wedges of each triangle as collapses leave them.
+    /// Wedges of each triangle after the collapses so far.
     corners: Vec<[u32; 3]>,
     /// The normal of each wedge.
     normals: Vec<Vec3>,
     /// Wedges at each position.
     wedges: Vec<Vec<u32>>,
     quadrics: Vec<Quadric>,
-    /// The substitute of each wedge; itself while it stands.
+    /// The substitute of each wedge; itself until it is removed.
     substitutes: Vec<u32>,
-    /// When each triangle vanished, counted in collapses from 1; 0 while it stands.
+    /// The collapse at which each triangle vanished, counted from 1; 0 while it exists.
     gone: Vec<u32>,
-    /// Positions in the order in which they went.
+    /// Positions in the order of removal.
     order: Vec<u32>,
     heap: BinaryHeap<Waiting>,
-    /// How often each position was looked at: what waits from an earlier look is void.
+    /// Evaluations of each position: a queued collapse of an earlier evaluation is void.
     looks: Vec<u32>,
     neighbours: Vec<(u32, u8)>,
     prices: Vec<(f64, u32)>,
 }
 
-/// Orders a mesh.
+/// Computes the order of a mesh.
 pub(super) fn ordered(welded: Welded) -> Tom {
     let full = welded.triangles.clone();
     let mut builder = Builder::new(&welded);
@@ -77,14 +78,14 @@ impl Builder {
         }
     }
 
-    /// Collapses until nothing may go any more.
+    /// Collapses until no valid collapse is left.
     fn collapse_all(&mut self, turn: f64) {
         (0..self.looks.len() as u32).for_each(|p| self.look(p, turn));
         while let Some(Reverse((_, u, v, look))) = self.heap.pop() {
             if self.looks[u as usize] != look {
                 continue;
             }
-            // what is two steps away may have changed since
+            // positions two edges away may have changed since
             let mut of_u = std::mem::take(&mut self.neighbours);
             self.surface.neighbours(u, &mut of_u);
             let sound = self.surface.verdict((u, &of_u), v, turn).is_some();
@@ -97,7 +98,7 @@ impl Builder {
         }
     }
 
-    /// Finds the cheapest sound collapse of `p` and lets it wait.
+    /// Finds the cheapest valid collapse of `p` and queues it.
     fn look(&mut self, p: u32, turn: f64) {
         self.looks[p as usize] += 1;
         if self.surface.around[p as usize].is_empty() || self.surface.is_hub(p) {
@@ -121,7 +122,7 @@ impl Builder {
         self.heap.push(Reverse((price.to_bits(), p, to, self.looks[p as usize])));
     }
 
-    /// What it costs that a small part loses triangles: all of their area goes off by the collapse's length.
+    /// Cost of the triangles that a small part loses: all of their area deviates by the collapse's length.
     fn loss(&self, u: u32, v: u32) -> f64 {
         let both = |t: &&u32| self.surface.triangles[**t as usize].contains(&v);
         let area: f64 = self.surface.around[u as usize].iter().filter(both).map(|&t| self.area(t)).sum();
@@ -145,7 +146,7 @@ impl Builder {
         self.quadrics[v as usize] += of_u;
         self.looks[u as usize] += 1;
         let mut around: Vec<u32> = touched.iter().map(|(p, _)| *p).collect();
-        // what is around a hub and not around `u` finds the hub as it was
+        // neighbours of a hub that are not neighbours of `u` see no change of the hub
         if !self.surface.is_hub(v) {
             self.surface.neighbours(v, &mut touched);
             around.extend(touched.iter().map(|(p, _)| *p).filter(|p| !around.contains(p)).collect::<Vec<_>>());
@@ -163,7 +164,7 @@ impl Builder {
         }
     }
 
-    /// A position that no triangle uses any more goes at once; the last of its part stays where it is.
+    /// A position without triangles is removed immediately; the last of its part keeps its place.
     fn strand(&mut self, p: u32, v: u32) {
         self.looks[p as usize] += 1;
         self.order.push(p);
@@ -172,7 +173,8 @@ impl Builder {
         }
     }
 
-    /// Every wedge of `u` gets the wedge of `v` on its own side of the crease, else the one with the nearest normal (of a hub's first).
+    /// Assigns to every wedge of `u` the wedge of `v` on its side of the crease, else the one with the nearest normal (for a hub only among
+    /// the first).
     fn substitute_wedges(&mut self, u: u32, v: u32) {
         let place = |t: u32, i: usize| self.surface.triangles[t as usize][i];
         let mut pairs: Vec<(u32, u32)> = Vec::with_capacity(self.wedges[u as usize].len());
@@ -196,7 +198,7 @@ impl Builder {
         }
     }
 
-    /// The finished mesh: what went last stands first.
+    /// The finished mesh: vertices and triangles removed last come first.
     fn sorted(&self, welded: &Welded, full: &[[u32; 3]]) -> Tom {
         let mut went = vec![false; self.wedges.len()];
         self.order.iter().for_each(|&p| went[p as usize] = true);
@@ -210,7 +212,7 @@ impl Builder {
             number[self.substitutes[old as usize] as usize] | if later { SAME_PLACE } else { 0 }
         };
         let mut triangles: Vec<u32> = (0..full.len() as u32).collect();
-        // what stands (0) first, then what vanished last
+        // remaining triangles (0) first, then the last to vanish
         triangles.sort_by_key(|&t| Reverse(self.gone[t as usize].wrapping_sub(1)));
         Tom {
             vertices: wedges.iter().map(|&w| welded.wedges[w as usize]).collect(),
@@ -222,7 +224,7 @@ impl Builder {
     }
 }
 
-/// What every position stands for: the planes of its triangles by their areas, and at a rim the planes that stand upright on it.
+/// Initial quadric of every position: the planes of its triangles weighted by area, and at a border the planes perpendicular to it.
 fn quadrics(surface: &Surface) -> Vec<Quadric> {
     let mut quadrics = vec![Quadric::default(); surface.points.len()];
     for t in &surface.triangles {

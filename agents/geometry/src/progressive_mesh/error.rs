@@ -1,4 +1,4 @@
-//! How far a cut is from the full mesh, measured.
+//! The measured distance of cuts from the full mesh.
 //!
 //! In: an ordered mesh. Out: a table of counts and errors, monotone. Never here: estimates.
 
@@ -8,12 +8,12 @@ use glam::DVec3;
 use rapier3d::parry::bounding_volume::Aabb;
 use rapier3d::parry::partitioning::{Bvh, BvhBuildStrategy, TraversalAction};
 
-/// Rows of the table for each doubling of the count.
+/// Rows of the table per doubling of the count.
 const ROWS: f64 = 1.5;
-/// Most vertices whose distance is measured for one row.
+/// Most vertices whose distance is measured per row.
 const SAMPLES: usize = 500;
 
-/// (triangles, error in metres) from coarse to fine; the error never rises.
+/// (triangles, error in metres) from coarse to fine; the error never increases.
 pub(super) fn table(tom: &Tom) -> Vec<(u32, f32)> {
     let (least, most) = tom.range();
     let doublings = libm::log2(f64::from(most) / f64::from(least.max(1)));
@@ -34,7 +34,7 @@ pub(super) fn table(tom: &Tom) -> Vec<(u32, f32)> {
     table
 }
 
-/// The error of a count between the rows, by the power law through the two around it.
+/// The error of a count between the rows, by the power law through the neighbouring two.
 pub(super) fn at(table: &[(u32, f32)], triangles: u32) -> f64 {
     let right = table.partition_point(|row| row.0 <= triangles);
     let Some(&(n0, e0)) = right.checked_sub(1).and_then(|left| table.get(left)) else {
@@ -43,7 +43,7 @@ pub(super) fn at(table: &[(u32, f32)], triangles: u32) -> f64 {
     let Some(&(n1, e1)) = table.get(right) else { return f64::from(e0) };
     let share = libm::log(f64::from(triangles) / f64::from(n0)) / libm::log(f64::from(n1) / f64::from(n0));
     let (e0, e1) = (f64::from(e0), f64::from(e1));
-    // an error of nothing has no logarithm: the last stretch is a line
+    // an error of zero has no logarithm: the last interval is linear
     if e1 > 0.0 { e0 * libm::pow(e1 / e0, share) } else { e0 * (1.0 - share) }
 }
 

@@ -1,12 +1,12 @@
 //! A mesh that can be drawn with any number of triangles: the totally ordered mesh of (GB99).
 //!
 //! In: a triangle mesh. Out: a [`Tom`], whose first n triangles are a coarser mesh for every n, with its error.
-//! Never here: which count is right, the GPU. Theory: `docs/theory/multiresolution.md`.
+//! Never here: the choice of the count, the GPU. Theory: `docs/theory/multiresolution.md`.
 //!
-//! Vertices are taken away one position after the other, each put in the place of a neighbour, the cheapest by the quadric error
-//! (GH97) first. Vertices and triangles are then sorted so that what goes first stands last: the mesh of a count is a prefix of
-//! both lists, whose corners that are no longer there are followed to their substitutes. The substitute of each vertex is all
-//! that is stored beside a plain indexed mesh: when a triangle is born follows from them.
+//! Vertices are removed one position after another, each collapsed onto a neighbour, the cheapest by the quadric error (GH97) first.
+//! Vertices and triangles are then sorted in reverse order of removal: the mesh of a count is a prefix of both lists, whose removed corners
+//! are replaced by following their substitutes. The substitute of each vertex is the only data stored in addition to a plain indexed mesh:
+//! the birth of a triangle follows from them.
 
 mod build;
 mod error;
@@ -20,18 +20,18 @@ mod tests;
 use super::{PrimitiveMesh, PrimitiveVertex};
 pub use weld::TomError;
 
-/// A vertex that stands at the same position as the one before it (a crease) has this bit beside its substitute.
+/// Flag in the substitute of a vertex at the same position as the one before it (a crease).
 const SAME_PLACE: u32 = 1 << 31;
 
 /// A mesh of any number of triangles.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tom {
-    /// Corners, those that go last first; the normals of a crease are vertices of their own, side by side.
+    /// Corners in reverse order of removal; the normals of a crease are separate, consecutive vertices.
     vertices: Vec<PrimitiveVertex>,
-    /// Vertex numbers of each triangle of the full mesh, those that go last first.
+    /// Vertex indices of each triangle of the full mesh, in reverse order of removal.
     triangles: Vec<[u32; 3]>,
-    /// The vertex that takes each one's place, a lesser number. A vertex that never goes names itself, and so does the last one
-    /// of a part that vanishes whole.
+    /// The vertex that replaces each one, of lower index. A vertex that is never removed refers to itself, and so does the last one of a
+    /// part that vanishes entirely.
     substitutes: Vec<u32>,
     /// Triangles of the coarsest cut.
     least: u32,
@@ -39,22 +39,22 @@ pub struct Tom {
     errors: Vec<(u32, f32)>,
 }
 
-/// One of the meshes that a [`Tom`] holds.
+/// One of the meshes of a [`Tom`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Cut {
-    /// How many of the first vertices it uses.
+    /// Number of vertices used, from the first.
     pub vertices: u32,
-    /// How many of the first triangles it has.
+    /// Number of triangles, from the first.
     pub triangles: u32,
 }
 
 impl Tom {
-    /// Orders a mesh.
+    /// Computes the order of a mesh.
     ///
-    /// Triangles without area (two corners at one position) are left out, all others stay as they are.
+    /// Triangles without area (two corners at one position) are left out, all others are unchanged.
     ///
     /// # Errors
-    /// [`TomError`] where a triangle names a corner that is not there, a position is not finite or nothing is left.
+    /// [`TomError`] where a triangle refers to a missing vertex, a position is not finite or no triangle is left.
     pub fn new(mesh: &PrimitiveMesh) -> Result<Self, TomError> {
         let welded = weld::Welded::new(mesh)?;
         let mut tom = build::ordered(welded);
@@ -63,7 +63,7 @@ impl Tom {
         Ok(tom)
     }
 
-    /// The same mesh without its finest cuts: its full mesh is the cut of at most `triangles`, and errors are told against that.
+    /// The same mesh without its finest cuts: its full mesh is the cut of at most `triangles`, and errors are relative to that.
     #[must_use]
     pub fn truncated(mut self, triangles: u32) -> Self {
         let cut = self.cut(triangles);
@@ -97,7 +97,7 @@ impl Tom {
 
     /// The finest mesh of at most `triangles`; the coarsest where that has more.
     ///
-    /// A vertex takes two triangles with it as a rule, so the cut has at most a few fewer than asked for.
+    /// A vertex usually removes two triangles with it, so the cut has at most a few fewer than requested.
     #[must_use]
     pub fn cut(&self, triangles: u32) -> Cut {
         let asked = triangles.max(self.least) as usize;
@@ -109,13 +109,13 @@ impl Tom {
         Cut { vertices, triangles: count as u32 }
     }
 
-    /// Vertex numbers of the triangles of `cut`, appended to `corners`; time proportional to their count.
+    /// Vertex indices of the triangles of `cut`, appended to `corners`; time proportional to their count.
     pub fn resolve(&self, cut: Cut, corners: &mut Vec<[u32; 3]>) {
         let standing = |corner: u32| self.standing(corner, cut.vertices);
         corners.extend(self.triangles[..cut.triangles as usize].iter().map(|t| t.map(standing)));
     }
 
-    /// The vertex that stands for another in a cut of so many vertices; of a part that vanished, the last that it had.
+    /// The vertex that represents another in a cut of `vertices`; for a part that vanished, its last vertex.
     #[must_use]
     pub fn standing(&self, mut vertex: u32, vertices: u32) -> u32 {
         while vertex >= vertices {
@@ -127,8 +127,8 @@ impl Tom {
         vertex
     }
 
-    /// A vertex of a finer cut on its way to a coarser one: `share` 0 is where it is, 1 is where its substitute stands in a cut
-    /// of so many vertices. A mesh drawn so at 1 covers what the coarser one covers: a change of cut need not be seen.
+    /// A vertex of a finer cut morphed to a coarser one of `coarser` vertices: at `share` 0 at its own position, at 1 at its substitute's.
+    /// A mesh morphed to 1 covers the same surface as the coarser one, so a change of cut is invisible there.
     #[must_use]
     pub fn morphed(&self, vertex: u32, coarser: u32, share: f32) -> PrimitiveVertex {
         let from = self.vertices[vertex as usize];
@@ -137,14 +137,14 @@ impl Tom {
         PrimitiveVertex { core: from.core.lerp(to.core, share), normal, uv: from.uv.lerp(to.uv, share) }
     }
 
-    /// How far the full mesh is from the cut of so many triangles, metres: the greatest distance of a sample of its vertices.
-    /// It never falls as the count falls.
+    /// Distance of the full mesh from the cut of `triangles`, metres: the greatest of a sample of its vertices.
+    /// The error never decreases as the count decreases.
     #[must_use]
     pub fn error_m(&self, triangles: u32) -> f64 {
         error::at(&self.errors, triangles)
     }
 
-    /// Bytes that it needs, and those of a plain indexed mesh of the same vertices and triangles.
+    /// Bytes of its storage, and those of a plain indexed mesh of the same vertices and triangles.
     #[must_use]
     pub fn bytes(&self) -> (usize, usize) {
         let plain = size_of_val(&self.vertices[..]) + size_of_val(&self.triangles[..]);
@@ -155,7 +155,7 @@ impl Tom {
         self.substitutes[vertex as usize] & !SAME_PLACE
     }
 
-    /// The first vertex that stands at the same position.
+    /// The first vertex at the same position.
     fn first_here(&self, mut vertex: u32) -> u32 {
         while self.substitutes[vertex as usize] & SAME_PLACE != 0 {
             vertex -= 1;
@@ -163,9 +163,9 @@ impl Tom {
         vertex
     }
 
-    /// A triangle is part of every cut of more vertices than this: 0 for one that never goes.
+    /// A triangle is part of every cut of more vertices than this: 0 for one that is never removed.
     ///
-    /// Its last corner is followed to its substitute until two corners are at one position.
+    /// Its last corner is replaced by its substitute until two corners coincide.
     fn birth(&self, mut t: [u32; 3]) -> u32 {
         loop {
             t.sort_unstable();

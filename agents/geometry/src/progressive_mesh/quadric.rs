@@ -5,7 +5,7 @@
 use glam::DVec3;
 use std::ops::AddAssign;
 
-/// Σ w (n·p + d)², kept as pᵀAp + 2 bᵀp + c.
+/// Σ w (n·p + d)², stored as pᵀAp + 2 bᵀp + c.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Quadric {
     /// xx, yy, zz, xy, yz, zx of A.

@@ -1,59 +1,59 @@
-//! Whether a position may be put in another's place without spoiling the surface.
+//! Validity of a collapse: whether a position may move to another's place without damaging the surface.
 //!
 //! In: triangles around positions. Out: a verdict. Never here: cost.
-//! A surface without branches keeps its kind under a collapse that meets the link condition (DEGN99): whoever neighbours both
-//! ends forms a triangle with them; a boundary shrinks along itself and never below three edges. What is smaller than that, the
-//! last few triangles of a part that hangs on nothing, may vanish.
+//! A surface without branches keeps its topology under a collapse that meets the link condition (DEGN99): every common neighbour of both
+//! ends forms a triangle with them; a boundary shrinks along itself and never below three edges. Smaller parts, the last few triangles of a
+//! disconnected component, may vanish.
 
 use glam::DVec3;
 use std::collections::HashMap;
 
-/// A position of more triangles than this is a hub: it stays until it has fewer, and what is around it is not looked through. The
-/// time that a fan of n triangles takes stays in proportion to n.
+/// A position of more triangles than this is a hub: it stays until it has fewer, and its triangles are not enumerated. This keeps the time
+/// for a fan of n triangles proportional to n.
 pub(super) const HUB: usize = 64;
-/// Most positions of a part that may vanish: a tetrahedron's.
+/// Most positions of a component that may vanish: a tetrahedron's.
 const TINY: usize = 4;
-/// A triangle flatter than this, height to longest side, has no direction.
+/// A triangle flatter than this, height to longest side, has no normal.
 const FLAT: f64 = 1e-6;
 
-/// Triangles and what is around each position, as collapses leave them.
+/// Triangles and neighbourhoods of each position after the collapses so far.
 #[derive(Debug)]
 pub(super) struct Surface {
     /// Positions.
     pub points: Vec<DVec3>,
-    /// Positions of each triangle; those of one that is gone do not change any more.
+    /// Positions of each triangle; those of a removed triangle no longer change.
     pub triangles: Vec<[u32; 3]>,
-    /// Triangles around each position; around a hub also some that are gone.
+    /// Triangles around each position; around a hub also some removed ones.
     pub around: Vec<Vec<u32>>,
-    /// How many triangles are left.
+    /// Number of remaining triangles.
     pub left: usize,
-    /// Which of them.
+    /// Whether each triangle remains.
     stands: Vec<bool>,
-    /// How many of the triangles around each position are gone.
+    /// Number of removed triangles still listed around each position.
     stale: Vec<u32>,
-    /// How many triangles share each edge, the lesser position first.
+    /// Number of triangles that share each edge; the lesser position first.
     edges: HashMap<[u32; 2], u32>,
-    /// Edges at each position that one triangle has, and those that more than two share.
+    /// Number of edges at each position with one triangle, and with more than two.
     uneven: Vec<[u32; 2]>,
 }
 
-/// What the triangles around a position make of it.
+/// Kind of a position by the triangles around it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Standing {
-    /// Surrounded.
+    /// Interior.
     Inner,
-    /// On a rim.
+    /// On a border.
     Rim,
-    /// Where surfaces branch or rims cross.
+    /// Where surfaces branch or borders cross.
     Branch,
 }
 
-/// A collapse that may be made.
+/// A valid collapse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Verdict {
-    /// The surface keeps its kind.
+    /// The surface keeps its topology.
     Keeps,
-    /// A small part loses some of its last triangles.
+    /// A small component loses some of its last triangles.
     Vanishes,
 }
 
@@ -77,17 +77,17 @@ impl Surface {
         Self { triangles, ..surface }
     }
 
-    /// How many triangles share the edge between two positions; 0 where there is none.
+    /// Number of triangles that share the edge between two positions; 0 where there is none.
     pub fn sharing(&self, a: u32, b: u32) -> u32 {
         self.edges.get(&[a.min(b), a.max(b)]).copied().unwrap_or(0)
     }
 
-    /// Whether too many triangles are around a position to look at each.
+    /// Whether a position has too many triangles to enumerate.
     pub fn is_hub(&self, p: u32) -> bool {
         self.around[p as usize].len() > HUB
     }
 
-    /// One triangle more or less has an edge.
+    /// Changes an edge's number of triangles by `by`.
     fn share(&mut self, [a, b]: [u32; 2], by: i32) {
         let edge = [a.min(b), a.max(b)];
         let count = self.edges.entry(edge).or_default();
@@ -104,7 +104,7 @@ impl Surface {
         }
     }
 
-    /// Every neighbour of `p`, which is no hub, with the number of triangles on their edge, into `found`.
+    /// Every neighbour of `p`, which must not be a hub, with the number of triangles on their edge, into `found`.
     pub fn neighbours(&self, p: u32, found: &mut Vec<(u32, u8)>) {
         found.clear();
         let corners = self.around[p as usize].iter().flat_map(|&t| self.triangles[t as usize]);
@@ -116,7 +116,7 @@ impl Surface {
         }
     }
 
-    /// Whether `u`, which is no hub and has these neighbours, may be put in the place of `v`; faces may turn until the cosine is `turn`.
+    /// Whether `u`, which is not a hub and has these neighbours, may collapse onto `v`; faces may turn until the cosine is `turn`.
     pub fn verdict(&self, (u, of_u): (u32, &[(u32, u8)]), v: u32, turn: f64) -> Option<Verdict> {
         let shared = self.sharing(u, v);
         let tiny = self.is_tiny(u, v);
@@ -128,7 +128,7 @@ impl Surface {
         sound.then_some(if tiny { Verdict::Vanishes } else { Verdict::Keeps })
     }
 
-    /// Whether the part that `u` and `v` belong to has no more than [`TINY`] positions.
+    /// Whether the component of `u` and `v` has at most [`TINY`] positions.
     fn is_tiny(&self, u: u32, v: u32) -> bool {
         if self.is_hub(u) || self.is_hub(v) {
             return false;
@@ -168,7 +168,7 @@ impl Surface {
         }
     }
 
-    /// Whether the faces that move with `u` keep an area and do not turn over.
+    /// Whether the faces that move with `u` keep an area and do not flip.
     fn keeps_faces(&self, u: u32, v: u32, turn: f64) -> bool {
         self.around[u as usize].iter().all(|&t| {
             let t = self.triangles[t as usize];
@@ -186,7 +186,7 @@ impl Surface {
         })
     }
 
-    /// Puts `u`, which is no hub, in the place of `v`: moves its triangles, and tells `gone` those that vanish.
+    /// Collapses `u`, which must not be a hub, onto `v`: moves its triangles, and calls `gone` with those that vanish.
     pub fn collapse(&mut self, u: u32, v: u32, mut gone: impl FnMut(u32)) {
         for number in std::mem::take(&mut self.around[u as usize]) {
             let t = self.triangles[number as usize];
@@ -206,7 +206,7 @@ impl Surface {
         }
     }
 
-    /// A triangle that is gone is not around `p` any more. A long list is put in order only when half of it is gone.
+    /// Removes a vanished triangle from the list around `p`. A long list is compacted only when half of it has vanished.
     fn forget(&mut self, p: u32, number: u32) {
         let (around, stale) = (&mut self.around[p as usize], &mut self.stale[p as usize]);
         if around.len() <= HUB {
@@ -221,7 +221,7 @@ impl Surface {
     }
 }
 
-/// The unit normal of a triangle; `None` where it is too flat to have one.
+/// The unit normal of a triangle; `None` where it is too flat.
 pub(super) fn direction([a, b, c]: [DVec3; 3]) -> Option<DVec3> {
     let normal = (b - a).cross(c - a);
     let longest = (b - a).length_squared().max((c - a).length_squared()).max((c - b).length_squared());

@@ -1,41 +1,41 @@
-//! A mesh with each position once: what can be collapsed is positions; the normals and places on a texture at one are its wedges.
+//! A mesh with unique positions: collapses act on positions; the normals and texture coordinates at a position are its wedges.
 //!
-//! In: a mesh as it is given. Out: positions, wedges, triangles with an area. Never here: order.
+//! In: a mesh as given. Out: positions, wedges, triangles with an area. Never here: order.
 
 use super::super::{PrimitiveMesh, PrimitiveVertex};
 use glam::Vec3;
 use std::collections::BTreeMap;
 
-/// Why a mesh cannot be ordered.
+/// Reasons why a mesh cannot be ordered.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[non_exhaustive]
 pub enum TomError {
     /// A position is not finite.
     #[error("vertex {vertex} is not finite")]
     NotFinite {
-        /// Number of the vertex, from 0.
+        /// Index of the vertex, from 0.
         vertex: usize,
     },
-    /// A triangle names a vertex that does not exist.
+    /// A triangle refers to a vertex that does not exist.
     #[error("triangle {triangle} names vertex {corner}, but there are only {vertices}")]
     BadCorner {
-        /// Number of the triangle, from 0.
+        /// Index of the triangle, from 0.
         triangle: usize,
-        /// The vertex it names.
+        /// The vertex it refers to.
         corner: u32,
-        /// How many vertices there are.
+        /// Number of vertices.
         vertices: usize,
     },
     /// No triangle has three corners at different positions.
     #[error("none of the {triangles} triangles has three different corners")]
     Empty {
-        /// How many triangles there are.
+        /// Number of triangles.
         triangles: usize,
     },
-    /// More vertices or triangles than can be numbered.
+    /// More vertices or triangles than can be indexed.
     #[error("{count} vertices or triangles are too many: at most {} can be numbered", TomError::MOST)]
     TooLarge {
-        /// How many there are.
+        /// Number of vertices or triangles, whichever is greater.
         count: usize,
     },
 }
@@ -45,12 +45,12 @@ impl TomError {
     pub const MOST: usize = 1 << 30;
 }
 
-/// A mesh with each position once.
+/// A mesh with unique positions.
 #[derive(Debug, Default)]
 pub(super) struct Welded {
     /// Positions.
     pub places: Vec<Vec3>,
-    /// Every different position with a normal and a place on a texture that a triangle uses.
+    /// Every distinct combination of position, normal and texture coordinates that a triangle uses.
     pub wedges: Vec<PrimitiveVertex>,
     /// The position of each wedge.
     pub place_of: Vec<u32>,
@@ -83,7 +83,7 @@ impl Welded {
         places: &mut BTreeMap<[u32; 3], u32>,
         wedges: &mut BTreeMap<[u32; 8], u32>,
     ) -> u32 {
-        // adding zero makes one of the two zeros
+        // adding zero makes -0.0 equal to 0.0
         let core = vertex.core + Vec3::ZERO;
         let (p, n) = (core.to_array().map(f32::to_bits), (vertex.normal + Vec3::ZERO).to_array().map(f32::to_bits));
         let uv = vertex.uv.to_array().map(f32::to_bits);
