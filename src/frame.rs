@@ -1,6 +1,6 @@
 //! The frame loop that connects runtime, control and compositor: gather, choose, draw, measure.
 //!
-//! In: a checked [`crate::scene::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
+//! In: a checked [`crate::world::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
 //! A [`Session`] is a running scene; [`play_headless`] and [`play_in_window`] drive it. Never here: a control law, physics.
 
 mod calibrate;
@@ -20,7 +20,6 @@ mod purse;
 mod push;
 mod session;
 mod sight;
-mod ties;
 mod trace;
 mod tuning;
 mod walk;

@@ -10,3 +10,4 @@ pub mod frame;
 pub mod runtime;
 pub mod scene;
 pub mod tune;
+pub mod world;

@@ -2,7 +2,7 @@
 
 use super::assignment::assignment;
 use super::report::Goal;
-use crate::scene::format::PolicyKind;
+use crate::world::kinds::{PolicyKind};
 use crate::scene::papers::Paper;
 use clap::builder::PossibleValuesParser;
 use clap::{Args, Parser, Subcommand, ValueHint};

@@ -4,7 +4,8 @@ use super::Exit;
 use super::args::CheckArgs;
 use super::output::{data, message, pictured, tell_overlaps};
 use super::report::{MovedReport, OverlapReport};
-use crate::scene::{Scene, SceneError, SceneProblem, Source, load};
+use crate::world::{Scene};
+use crate::scene::{SceneError, SceneProblem, Source, load};
 use serde::Serialize;
 
 #[derive(Serialize)]

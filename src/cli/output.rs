@@ -2,8 +2,9 @@
 
 use super::Exit;
 use crate::runtime::Priority;
-use crate::scene::format::{ExecutorKind, PriorityKind};
-use crate::scene::{Moved, Overlap, Scene, SceneError};
+use crate::world::kinds::{ExecutorKind, PriorityKind};
+use crate::world::{Moved, Overlap, Scene};
+use crate::scene::{SceneError};
 use std::io::{ErrorKind, Write};
 
 /// Writes data to standard output. A reader that has gone away (`| head`) is no error.

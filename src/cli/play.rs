@@ -14,8 +14,8 @@ use crate::frame::{
     WindowFailure, WindowPlan, consult_oracle, play_headless, play_in_window,
 };
 use crate::runtime::{AgentState, Spread};
-use crate::scene::Scene;
-use crate::scene::format::ExecutorKind;
+use crate::world::{Scene};
+use crate::world::kinds::{ExecutorKind};
 use metachron_budget::Bound;
 use metachron_core::AgentId;
 use std::path::PathBuf;

@@ -3,46 +3,45 @@
 //! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
 //! Never here: time passing.
 
-use super::error::SessionError;
 use super::governor::{ErrorGovernor, RateGovernor};
 use super::holding::Holding;
 use super::purse::Tally;
-use super::ties::{Ties, faults};
 use crate::compositor::{self, Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
 use crate::control::{
     self, ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy,
     Prices, RateControl, RateDemand, RateLimits, Stages, Value,
 };
-use crate::runtime::{
-    AUTO_THREADS_MAX, AgentSpawn, DrawPrice, Governor, Machine, ObjectPrice, Priority, StepPrice, Watch,
-};
-use crate::scene::format::{self, ExecutorKind, LawKind, PolicyKind, PriorityKind, ShadingKind, ValueKind};
-use crate::scene::{self, Member, Scene, Scenery, Spec};
+use crate::runtime::{DrawPrice, Governor, ObjectPrice};
+use crate::world::kinds;
+use crate::world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
+use crate::world::{self, Member, Scene, Scenery, Spec, machine};
 use glam::DVec3;
 use metachron_contact::Agent;
 use metachron_core::{AgentId, N_MAX, ResolutionRange};
 use metachron_geometry::FormKind;
 use metachron_geometry::{Primitive, Solid, ToolShape, patch};
-use metachron_models::rigid::RigidBody;
-use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::{SoftShape, SoftSpec};
-use metachron_models::synthetic::Synthetic;
-use metachron_models::tool::Instrument;
-use std::borrow::Cow;
 use std::sync::Arc;
 
-/// The agents of `scene`, ready to run.
-///
-/// # Errors
-/// [`SessionError::Build`] if a model rejects its object.
-pub(super) fn spawns(scene: &Scene) -> Result<(Vec<AgentSpawn>, Steered), SessionError> {
-    let share = fair_share(machine(scene).cores, scene.agents.len());
-    let mut ties = Ties::of(scene);
-    let mut steered = Steered::default();
-    let spawn = |member| spawn(scene, member, (share, &mut steered), &mut ties);
-    let spawns: Result<_, _> = scene.agents.iter().map(spawn).collect();
-    Ok((spawns?, steered))
+/// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
+pub(super) struct Governors {
+    share: f64,
+    /// The shared data so far.
+    pub steered: Steered,
+}
+
+impl Governors {
+    /// Of the agents of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        let share = fair_share(machine(scene).cores, scene.agents.len());
+        Self { share, steered: Steered::default() }
+    }
+
+    /// The governor of one agent; none where the scene fixes its step and its resolution.
+    pub fn governor(&mut self, member: &Member) -> Option<Box<dyn Governor>> {
+        governor(member, self.share, &mut self.steered)
+    }
 }
 
 /// Data that the agents' controllers share with the frame loop.
@@ -54,23 +53,6 @@ pub(super) struct Steered {
     pub holdings: Vec<Arc<Holding>>,
 }
 
-/// The executor of `scene`; if the scene leaves it open, chosen by the number of agents.
-pub(super) fn executor(scene: &Scene) -> ExecutorKind {
-    match scene.executor {
-        ExecutorKind::Auto if scene.agents.len() <= AUTO_THREADS_MAX => ExecutorKind::Threads,
-        ExecutorKind::Auto => ExecutorKind::Pool,
-        asked => asked,
-    }
-}
-
-/// The scheduling priority of the agents' threads.
-pub(super) const fn priority(scene: &Scene) -> Priority {
-    match scene.priority {
-        PriorityKind::Normal => Priority::Normal,
-        PriorityKind::Realtime => Priority::Realtime,
-    }
-}
-
 /// The share of its period that one agent's work may take, so that all agents fit on `cores` next to the frame loop.
 fn fair_share(cores: u32, agents: usize) -> f64 {
     (ROOM * f64::from(cores) / agents.max(1) as f64).min(SHARE_MAX)
@@ -80,47 +62,6 @@ fn fair_share(cores: u32, agents: usize) -> f64 {
 pub(super) const ROOM: f64 = 0.75;
 /// Largest share of its period that an agent may take even if cores are idle: past it every hiccup makes the agent late.
 const SHARE_MAX: f64 = 0.6;
-
-fn spawn(
-    scene: &Scene,
-    member: &Member,
-    (share, steered): (f64, &mut Steered),
-    ties: &mut Ties,
-) -> Result<AgentSpawn, SessionError> {
-    let agent = build(member, scene.executor)
-        .map_err(|reason| SessionError::Build { name: member.name.clone(), reason: reason.to_string() })?;
-    let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
-    let watches = watches.filter_map(|probe| Some(Watch { at: probe.at, every: probe.every? }));
-    Ok(AgentSpawn {
-        name: member.name.clone(),
-        agent,
-        rate_hz: member.pace.rate_hz,
-        dt: member.pace.dt,
-        dt_range: member.pace.dt_range,
-        range: Some(member.simulation),
-        links: member.links.clone(),
-        laws: ties.laws(member.id),
-        attached: ties.attached(member.id),
-        together: ties.together(member.id),
-        faults: faults(member.faults),
-        watches: watches.collect(),
-        governor: governor(member, share, steered),
-    })
-}
-
-fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<dyn std::error::Error>> {
-    Ok(match member.spec.clone() {
-        Spec::Tube(tube) => Box::new(Tube::new(tube)?),
-        Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
-        Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
-        Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
-        Spec::Synthetic(synthetic) => {
-            let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
-            // lockstep charges declared costs, so no CPU time has to be burnt
-            Box::new(if executor == ExecutorKind::Lockstep { agent.declared_only() } else { agent })
-        }
-    })
-}
 
 /// The governor of the agent's dt and ε; none where the scene fixes both.
 fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
@@ -161,40 +102,6 @@ fn error_governor(
     let holding = Holding::new(member.id, tolerance_m);
     steered.holdings.push(Arc::clone(&holding));
     Some(Box::new(ErrorGovernor(control, holding)))
-}
-
-/// The machine declared by `scene`.
-pub(super) fn machine(scene: &Scene) -> Machine {
-    let wish = &scene.machine;
-    let mut machine = Machine::preset(&wish.preset).unwrap_or_else(Machine::two_cores_software);
-    machine.cores = wish.cores.unwrap_or(machine.cores);
-    for (model, base_us, unit_us) in &wish.steps {
-        let known = machine.steps.iter().position(|price| price.model == *model);
-        let at = known.unwrap_or_else(|| {
-            machine.steps.push(StepPrice { model: Cow::Owned(model.clone()), base_us: 0.0, unit_us: 0.0 });
-            machine.steps.len() - 1
-        });
-        let price = &mut machine.steps[at];
-        price.base_us = base_us.unwrap_or(price.base_us);
-        price.unit_us = unit_us.unwrap_or(price.unit_us);
-    }
-    let draw = &mut machine.draw;
-    draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
-    draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
-    for (price, own) in draw.objects.iter_mut().zip(&wish.shading) {
-        price.setup_us = own.object_us.or(wish.draw_object_us).unwrap_or(price.setup_us);
-        price.triangle_us = own.triangle_us.or(wish.draw_triangle_us).unwrap_or(price.triangle_us);
-        price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);
-        price.pixel_ns = own.pixel_ns.unwrap_or(price.pixel_ns);
-    }
-    machine.choice_ns = (wish.cull_object_ns.unwrap_or(0.0), wish.choose_object_ns.unwrap_or(0.0));
-    machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
-    machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
-    machine.spikes = wish.spikes.unwrap_or(machine.spikes);
-    machine.load.clone_from(&wish.load);
-    machine.step_load.clone_from(&wish.step_load);
-    machine.seed = wish.seed.unwrap_or(machine.seed);
-    machine
 }
 
 /// All drawable objects: agents, then scenery, then the proxies of groups.
@@ -244,12 +151,12 @@ fn soft_form(spec: &SoftSpec) -> Form {
     }
 }
 
-const fn look(wish: &scene::Look) -> Look {
+const fn look(wish: &world::Look) -> Look {
     let material = match wish.material {
-        format::Material::Tissue => Material::Tissue,
-        format::Material::Metal => Material::Metal,
-        format::Material::Plastic => Material::Plastic,
-        format::Material::Skin => Material::Skin,
+        kinds::Material::Tissue => Material::Tissue,
+        kinds::Material::Metal => Material::Metal,
+        kinds::Material::Plastic => Material::Plastic,
+        kinds::Material::Skin => Material::Skin,
     };
     Look { colour: wish.colour, material }
 }
@@ -302,7 +209,7 @@ pub(super) fn prices(draw: &DrawPrice) -> Prices {
 }
 
 /// The feedback law configured by a target.
-pub(super) fn law(target: &scene::Target) -> Law {
+pub(super) fn law(target: &world::Target) -> Law {
     let gains = &target.gains;
     match target.law {
         LawKind::Printed => {
@@ -377,7 +284,7 @@ fn view(seen: &Seen, member: &Member) -> ObjectView {
     view_of(seen, (kind, member.picture), &member.look)
 }
 
-fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &scene::Look) -> ObjectView {
+fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &world::Look) -> ObjectView {
     ObjectView {
         id: seen.id,
         kind,
@@ -473,7 +380,7 @@ mod tests {
 
     #[test]
     fn a_group_may_have_as_many_levels_as_control_chooses_among() {
-        assert_eq!(crate::scene::GROUP_LEVELS_MAX, control::IMPOSTORS_MAX);
+        assert_eq!(crate::world::GROUP_LEVELS_MAX, control::IMPOSTORS_MAX);
     }
 
     #[test]

@@ -4,7 +4,7 @@
 //! A pair is read again only when one of its agents has a new state: a heap at rest costs nothing. Never here: forces; only the owners of
 //! the pairs know them.
 
-use crate::scene::Scene;
+use crate::world::{Scene};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, Snapshot};
 use metachron_core::{PairKind, PairState};

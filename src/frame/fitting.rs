@@ -5,14 +5,14 @@
 //!
 //! Runs are in virtual time, and steps take none of it: the result depends on the settings only, not on the machine.
 
-use super::cast;
 use super::error::SessionError;
 use super::session::Session;
 use crate::fit::{Path, Setting};
 use crate::runtime::AgentState;
-use crate::scene::format::{ExecutorKind, MODELS};
-use crate::scene::ties::Faults;
-use crate::scene::{Member, Probe, Scene, Spec};
+use crate::scene::format::{MODELS};
+use crate::world::kinds::{ExecutorKind};
+use crate::world::couplings::Faults;
+use crate::world::{Member, Probe, Scene, Spec};
 use metachron_contact::Agent;
 use metachron_core::{AgentId, Body, ResolutionRange, SimSpan, Snapshot};
 use metachron_models::rod::Integrator;
@@ -180,7 +180,7 @@ pub fn play_points(
     seconds: f64,
     go_on: &mut dyn FnMut() -> bool,
 ) -> Result<Option<Played>, SessionError> {
-    let machine = cast::machine(scene);
+    let machine = crate::world::machine(scene);
     let mut session = Session::open(watched(scene, points, seconds))?;
     let looks = (seconds / LOOK_S).ceil().max(1.0);
     for look in 1..=looks as u32 {

@@ -7,8 +7,8 @@ use super::session::Session;
 use crate::compositor::viewer::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
 use crate::control::{self, Policy};
 use crate::runtime::{self, AgentStats};
-use crate::scene::Spec;
-use crate::scene::format::PolicyKind;
+use crate::world::{Spec};
+use crate::world::kinds::{PolicyKind};
 use metachron_core::{Body, SimTime, Snapshot};
 use std::time::Duration;
 

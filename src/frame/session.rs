@@ -18,9 +18,9 @@ use super::sight::Sight;
 use super::trace::Trace;
 use crate::compositor::{Camera, Gpu, Level, Picture, Stage, States};
 use crate::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
-use crate::runtime::{self, AgentHandle, Command, Drive, Lockstep, Machine, Pool, Reader, Run, Threads};
-use crate::scene::Scene;
-use crate::scene::format::{ExecutorKind, LawKind, StatesKind};
+use crate::runtime::{self, AgentHandle, Command, Drive, Machine, Reader};
+use crate::world::{Scene, World, machine};
+use crate::world::kinds::{ExecutorKind, LawKind, StatesKind};
 use metachron_contact::Pull;
 use metachron_core::{AgentId, Body, SimTime};
 use std::sync::Arc;
@@ -32,7 +32,7 @@ pub struct Session {
     machine: Machine,
     /// Drawing costs on the declared machine.
     declared: Prices,
-    run: Box<dyn Run>,
+    world: World,
     stage: Stage,
     control: PictureControl,
     /// Whether pictures are drawn on the processor that agents step on.
@@ -114,30 +114,26 @@ impl Session {
     /// Creates the agents of `scene`; real time is held until [`Session::begin`].
     ///
     /// # Errors
-    /// [`SessionError::Build`] and [`SessionError::Run`]; nothing runs then.
+    /// [`SessionError::World`]; nothing runs then.
     pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
-        scene.executor = cast::executor(&scene);
-        let machine = cast::machine(&scene);
-        let (spawns, steered) = cast::spawns(&scene)?;
+        let machine = machine(&scene);
+        let mut governors = cast::Governors::of(&scene);
+        let world = World::start_governed(&scene, scene.executor, &mut |member| governors.governor(member))?;
+        scene.executor = world.executor();
+        let steered = governors.steered;
         let mut stage = cast::stage(&scene);
         stage.glide_over(GLIDE_FRAMES);
-        let clock = || Arc::new(runtime::SystemClock::new());
-        let run: Box<dyn Run> = match scene.executor {
-            ExecutorKind::Threads => Box::new(Threads::start(spawns, clock(), cast::priority(&scene))?),
-            ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock(), cast::priority(&scene))?),
-            ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, machine.clone())?),
-        };
         Ok(Self {
             control: cast::picture_control(&scene),
             shares_processor: scene.executor == ExecutorKind::Lockstep,
             sight: Sight::new(&steered.tallies),
             purse: Purse::new(steered.tallies),
             holdings: steered.holdings,
-            reader: Reader::new(run.agents()),
+            reader: Reader::new(world.agents()),
             stage,
             declared: cast::prices(&machine.draw),
             machine,
-            run,
+            world,
             views: Vec::new(),
             levels: Vec::new(),
             couplings: Couplings::of(&scene),
@@ -167,13 +163,13 @@ impl Session {
     /// Wall time since the start; virtual in lockstep.
     #[must_use]
     pub fn now(&self) -> Duration {
-        self.run.now()
+        self.world.now()
     }
 
     /// Simulated time now.
     #[must_use]
     pub fn sim_now(&self) -> SimTime {
-        self.run.sim_now()
+        self.world.time()
     }
 
     /// Whether time is virtual and costs are declared.
@@ -213,7 +209,7 @@ impl Session {
     /// The agents.
     #[must_use]
     pub fn agents(&self) -> &[AgentHandle] {
-        self.run.agents()
+        self.world.agents()
     }
 
     /// The controller of the picture.
@@ -315,13 +311,13 @@ impl Session {
 
     /// Waits until the wall time `until`, while the agents run.
     pub fn wait_until(&mut self, until: Duration) {
-        self.run.wait_until(until);
+        self.world.wait_until(until);
     }
 
     /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
     pub fn hold(&mut self) {
         if !self.is_virtual() {
-            self.run.drive(Drive::Pause);
+            self.world.drive(Drive::Pause);
         }
     }
 
@@ -329,18 +325,18 @@ impl Session {
     pub fn begin(&mut self) {
         if !self.is_virtual() {
             self.begun = self.now();
-            self.run.drive(Drive::Run);
+            self.world.drive(Drive::Run);
         }
     }
 
     /// Changes the flow of time: pause, run, speed, single step.
     pub fn drive(&mut self, drive: Drive) {
-        self.run.drive(drive);
+        self.world.drive(drive);
     }
 
     /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
     pub fn hand(&self, to: AgentId, pull: Option<Pull>) -> Result<(), runtime::SendError> {
-        self.run.send(to, Command::Hand(pull))
+        self.world.send(to, Command::Hand(pull))
     }
 
     /// Ends the frame that began at `started`.
@@ -377,12 +373,12 @@ impl Session {
     #[must_use]
     pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
         self.gather();
-        self.reader.finish(self.run.agents());
-        let handles = self.run.agents().to_vec();
+        self.reader.finish(self.world.agents());
+        let handles = self.world.agents().to_vec();
         let clamp = self.clamp();
         let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
         let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
-        let stats = self.run.shutdown();
+        let stats = self.world.stop();
         let held = |at: usize| holding::held(&self.holdings, AgentId(at as u32));
         let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
         Outcome {
@@ -431,15 +427,15 @@ impl Session {
     }
 
     fn gather(&mut self) {
-        let now = self.run.sim_now();
+        let now = self.world.time();
         let (stage, couplings) = (&mut self.stage, &mut self.couplings);
-        self.reader.read(self.run.agents(), now, |agent, newest, awake| {
+        self.reader.read(self.world.agents(), now, |agent, newest, awake| {
             stage.see(agent.id(), newest, awake);
             couplings.hear(agent.id());
         });
         self.stage.pose(now, states(self.scene.states));
         self.chosen.sim = now;
-        let agents = self.run.agents();
+        let agents = self.world.agents();
         let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
         self.couplings.note(self.reader.newest(), leader);
         if let Some(trace) = &mut self.trace {

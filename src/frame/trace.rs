@@ -3,7 +3,7 @@
 //! In: the newest states. Out: a [`Trace`]. Never here: the comparison.
 
 use super::couplings::Coupling;
-use crate::scene::{Scene, Spec};
+use crate::world::{Scene, Spec};
 use glam::DVec3;
 use metachron_core::{AgentId, Body, CurveState, SimTime, Snapshot};
 use std::collections::BTreeMap;

@@ -10,7 +10,7 @@ use super::outcome::FrameRecord;
 use super::session::Session;
 use crate::compositor::{Camera, PictureFile, Size, Style};
 use crate::runtime::Drive;
-use crate::scene::Scene;
+use crate::world::{Scene};
 
 /// A walk through a scene.
 pub struct Walk {
@@ -28,7 +28,7 @@ impl Walk {
     /// # Errors
     /// As [`Session::open`].
     pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
-        let length_s = scene.camera.as_ref().and_then(crate::scene::Camera::length_s).unwrap_or(0.0);
+        let length_s = scene.camera.as_ref().and_then(crate::world::Camera::length_s).unwrap_or(0.0);
         let mut session = Session::open(scene)?;
         session.drive(Drive::Pause);
         if let Drawing::Every(screen) = &drawing {

@@ -14,7 +14,8 @@ use crate::compositor::viewer::{
 use crate::compositor::{Camera, Gpu, Hand, Hit, Picture, Ray, viewer};
 use crate::control::Policy;
 use crate::runtime::Drive;
-use crate::scene::{self, Scene, SceneError, Source};
+use crate::world::{Scene};
+use crate::scene::{self, SceneError, Source};
 use glam::DVec3;
 use metachron_contact::Pull;
 use metachron_core::{AgentId, SimSpan};

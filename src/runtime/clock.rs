@@ -63,7 +63,7 @@ impl Clock for ManualClock {
 }
 
 /// Sleeps until `clock` reads `until`.
-pub(super) fn wait_until(clock: &dyn Clock, until: Duration) {
+pub fn wait_until(clock: &dyn Clock, until: Duration) {
     loop {
         let left = until.saturating_sub(clock.now());
         if left.is_zero() {

@@ -43,7 +43,7 @@ mod turn;
 mod watch;
 
 pub use account::{AgentState, AgentStats, Spread};
-pub use clock::{Clock, ManualClock, SystemClock};
+pub use clock::{Clock, ManualClock, SystemClock, wait_until};
 pub use faults::Faults;
 pub use governor::{Demand, Governor, TurnMeasure};
 pub use handle::{AgentHandle, state_hash};
@@ -85,7 +85,7 @@ pub trait Run: Send {
 
     /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
     /// the last states.
-    fn shutdown(self: Box<Self>) -> Vec<AgentStats>;
+    fn shutdown(&mut self) -> Vec<AgentStats>;
 
     /// Simulated time now.
     fn sim_now(&self) -> SimTime {

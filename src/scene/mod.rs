@@ -3,35 +3,27 @@
 //! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
 //! [`SceneError`] that shows every problem at its position. Never here: running agents, drawing, the command line.
 
-mod apart;
 mod build;
 pub mod builtin;
-mod cast;
 mod check;
 mod document;
 mod excerpt;
-mod figure;
 pub mod format;
-mod overlap;
 pub mod papers;
 mod problem;
 mod schema;
 mod source;
-pub mod ties;
 
-pub use apart::Moved;
-pub use cast::{
-    Camera, GROUP_LEVELS_MAX, Gains, Group, Look, Machine, Member, PaceWish, Probe, Scene, Scenery, Spec, Target, View,
-};
-pub use overlap::Overlap;
 pub use problem::{SceneError, SceneProblem};
 pub use schema::json_schema;
 pub use source::{SCENE_BYTES_MAX, Source};
 
+use crate::world::Scene;
+use crate::world::kinds::ExecutorKind;
 use build::{Around, Objects};
 use check::{Checker, Place};
 use document::Document;
-use format::{ExecutorKind, SceneFile, WorldFile};
+use format::{SceneFile, WorldFile};
 use glam::DVec3;
 use metachron_models::rigid::Joint;
 use problem::Problem;
@@ -71,9 +63,7 @@ fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
     let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
     match (scene, c.finish()) {
         (Some(mut scene), problems) if problems.is_empty() => {
-            let inside = scene.inside_each_other();
-            scene.overlaps = scene.name_overlaps(&inside);
-            scene.set_apart(&inside);
+            scene.resolve_initial_overlaps();
             Ok(scene)
         }
         (_, problems) => Err(problems),

@@ -6,8 +6,9 @@ use image::{ImageFormat, Rgba, RgbaImage};
 use metachron::compositor::{
     Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, Style,
 };
-use metachron::scene::format::ShadingKind;
-use metachron::scene::{self, Scene, Source};
+use metachron::world::kinds::{ShadingKind};
+use metachron::world::{Scene};
+use metachron::scene::{self, Source};
 use metachron_core::{AgentId, Resolution};
 use metachron_geometry::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
 use std::io::Cursor;

@@ -1,6 +1,8 @@
 //! Scenes as users write them: what loads, and what an error shows.
 
-use metachron::scene::{Scene, SceneError, Source, builtin, json_schema, load};
+use metachron::world::{Scene};
+
+use metachron::scene::{SceneError, Source, builtin, json_schema, load};
 use proptest::prelude::*;
 
 /// The least scene with a tube, for the tests to change.

@@ -1,8 +1,9 @@
 //! Joints, couplings, grids and faults as users write them: what loads, and what an error shows.
 
 use glam::DVec3;
-use metachron::scene::ties::CouplingKind;
-use metachron::scene::{Scene, SceneError, Source, Spec, load};
+use metachron::world::couplings::CouplingKind;
+use metachron::world::{Scene, Spec};
+use metachron::scene::{SceneError, Source, load};
 use metachron_contact::Law;
 use metachron_core::Anchor;
 use metachron_models::rigid::JointKind;

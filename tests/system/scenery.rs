@@ -6,7 +6,8 @@ use image::RgbaImage;
 use metachron::compositor::{
     Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
 };
-use metachron::scene::{self, Scene, Source};
+use metachron::world::{Scene};
+use metachron::scene::{self, Source};
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
 use std::collections::BTreeSet;

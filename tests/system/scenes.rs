@@ -2,7 +2,9 @@
 //!
 //! Agents are stepped in turn here, each seeing the others' states of the step before: no runtime, no picture.
 
-use metachron::scene::{Scene, Spec, builtin, load};
+use metachron::world::{Scene, Spec};
+
+use metachron::scene::{builtin, load};
 use metachron_contact::{Agent, Neighbour, Surroundings};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_models::rigid::RigidBody;

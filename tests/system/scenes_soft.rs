@@ -1,7 +1,8 @@
 //! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
 
 use crate::play::{Folder, agent, lockstep, number, point};
-use metachron::scene::{Scene, SceneError, Source, Spec, load};
+use metachron::world::{Scene, Spec};
+use metachron::scene::{SceneError, Source, load};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftShape;
 

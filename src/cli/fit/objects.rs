@@ -2,7 +2,7 @@
 //!
 //! In: a scene and its text. Out: every object that moves, with its agents. Never here: what may be chosen for one.
 
-use crate::scene::Scene;
+use crate::world::{Scene};
 use metachron_core::AgentId;
 use toml_edit::{DocumentMut, Item, Table};
 

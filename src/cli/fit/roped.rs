@@ -3,7 +3,7 @@
 //! In: the table, the rope. Out: the table with other keys. Never here: whether a rope would do.
 
 use super::written::{set, tidy};
-use crate::scene::{Member, Spec};
+use crate::world::{Member, Spec};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftShape;
 use toml_edit::{Array, Table, Value};

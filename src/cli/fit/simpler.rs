@@ -7,7 +7,7 @@ use super::length;
 use super::task::{Task, is_free};
 use crate::fit::{Choice, Converged, Found, Path, Search, Setting};
 use crate::frame::Played;
-use crate::scene::Spec;
+use crate::world::{Spec};
 
 /// What moves by less than this share of the tolerance does not move.
 const STILL: f64 = 0.01;

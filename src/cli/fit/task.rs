@@ -10,7 +10,7 @@ use super::names;
 use super::objects::Object;
 use crate::fit::{Choice, Path, Setting, Trial, farthest_m};
 use crate::frame::{Played, Point, SessionError, apply, method_of, play_points, setting_of, slacken, solve_prices};
-use crate::scene::{Member, Scene, Spec};
+use crate::world::{Member, Scene, Spec};
 use metachron_core::AgentId;
 use metachron_models::rod::Integrator;
 use std::cell::Cell;

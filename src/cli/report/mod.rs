@@ -11,7 +11,7 @@ pub use choices::{ChoiceSummary, summarise_choices};
 pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
 pub use goal::{Goal, GoalError, Verdict};
 
-use crate::scene::{Moved, Overlap};
+use crate::world::{Moved, Overlap};
 use serde::Serialize;
 
 /// The report of a run.

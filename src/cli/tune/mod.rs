@@ -15,8 +15,9 @@ use super::progress::Bar;
 use crate::compositor::{Gpu, Offscreen, RendererOptions, Size};
 use crate::control::Law;
 use crate::frame::{Drawing, Experiment, Session, experiment};
-use crate::scene::format::ExecutorKind;
-use crate::scene::{Scene, Source, load};
+use crate::world::kinds::{ExecutorKind};
+use crate::world::{Scene};
+use crate::scene::{Source, load};
 use crate::tune::{
     Contender, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
 };

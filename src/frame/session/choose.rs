@@ -25,7 +25,7 @@ impl Session {
         self.chosen.triangles = picture.triangles();
         self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
         self.chosen.select += chosen.saturating_sub(culled);
-        self.chosen.build = self.run.now().saturating_sub(chosen);
+        self.chosen.build = self.world.now().saturating_sub(chosen);
         self.stage.picture()
     }
 
@@ -37,7 +37,7 @@ impl Session {
         let seconds = self.declared.backdrop_s(backdrop) + objects_s;
         let draw = self.machine.frame_time(seconds, self.frames(), self.now());
         let started = self.now();
-        self.run.spend(cull + select + draw.max(beside.unwrap_or_default()));
+        self.world.spend(cull + select + draw.max(beside.unwrap_or_default()));
         self.now().saturating_sub(started + cull + select)
     }
 
@@ -70,7 +70,7 @@ impl Session {
     /// Whether most of the time of the frame that began at `started` is gone; while time is paused no frame is late.
     fn is_late(&self, started: Duration) -> bool {
         let gone = self.now().saturating_sub(started) + self.declared_cull() + self.chosen.select;
-        let passes = self.run.timeline().runs_at(self.now());
+        let passes = self.world.timeline().runs_at(self.now());
         passes && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
     }
 

@@ -6,7 +6,7 @@ use super::super::outcome::{FrameRecord, ProbeOutcome};
 use super::{Chosen, Finished, Session};
 use crate::control::Shading;
 use crate::runtime::AgentHandle;
-use crate::scene::{Probe, Scene};
+use crate::world::{Probe, Scene};
 use std::time::Duration;
 
 impl Session {

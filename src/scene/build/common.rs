@@ -1,9 +1,10 @@
 //! Keys that objects of every model share: time, primitive levels, appearance.
 
-use crate::scene::cast::{Look, PaceWish};
+use crate::world::{Look, PaceWish};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
-use crate::scene::format::{CommonFile, FaultsFile, HoldKind, Material, OneOrRange, ShadingKind};
-use crate::scene::ties::Faults;
+use crate::scene::format::{CommonFile, FaultsFile, HoldKind, OneOrRange};
+use crate::world::kinds::{Material, ShadingKind};
+use crate::world::couplings::Faults;
 use metachron_core::{N_MAX, ResolutionRange, SimSpan};
 
 /// Default rate, hertz, of an object for which the scene gives neither rate nor step.

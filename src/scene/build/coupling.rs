@@ -6,10 +6,10 @@
 use super::POSITION_MAX_M;
 use super::object::{Named, Objects};
 use super::soft;
-use crate::scene::cast::Spec;
+use crate::world::Spec;
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
-use crate::scene::ties::{Coupling, CouplingKind};
+use crate::world::couplings::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::{AgentId, Anchor};

@@ -3,7 +3,7 @@
 //! In: the common keys of one object. Out: [`Copies`]. Never here: what the object is.
 
 use super::POSITION_MAX_M;
-use crate::scene::cast::{Member, Spec};
+use crate::world::{Member, Spec};
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::{CommonFile, OneOrEach};
 use glam::DVec3;

@@ -5,7 +5,7 @@
 
 use super::impostors::impostors;
 use super::object::{Named, Objects};
-use crate::scene::cast::Group;
+use crate::world::Group;
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::GroupFile;
 use crate::scene::source::Source;

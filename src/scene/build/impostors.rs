@@ -4,7 +4,7 @@
 //! Never here: membership of groups, choice of the level drawn. Theory: `docs/theory/multiresolution.md`, section 2.
 
 use super::scenery::mesh_model;
-use crate::scene::cast::{GROUP_LEVELS_MAX, Look, Scenery};
+use crate::world::{GROUP_LEVELS_MAX, Look, Scenery};
 use crate::scene::check::{Checker, Place, allowed};
 use crate::scene::format::GroupFile;
 use crate::scene::source::Source;
@@ -139,7 +139,8 @@ fn mean_colour(members: &[Scenery]) -> [u8; 3] {
 
 #[cfg(test)]
 mod tests {
-    use crate::scene::{Scene, SceneError, Source, load};
+    use crate::world::{Scene};
+    use crate::scene::{SceneError, Source, load};
 
     /// A forest of 25 balls of 200 triangles as a group with these keys in addition to its name and members.
     fn wood(keys: &str) -> Result<Scene, SceneError> {

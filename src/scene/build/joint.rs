@@ -7,7 +7,7 @@ use super::POSITION_MAX_M;
 use super::joint_keys::{Leaves, leaves};
 use super::joint_rules::{Held, check_start, contradictions};
 use super::object::{Named, Objects};
-use crate::scene::cast::Spec;
+use crate::world::Spec;
 use crate::scene::check::{Checker, Place};
 use crate::scene::format::{JointFile, JointKind as Kind, Point};
 use glam::{DQuat, DVec3};

@@ -4,12 +4,10 @@ use super::common::{faults, levels, look, pace, tolerance, untolerated};
 use super::grid::{Copies, copies};
 use super::joint::WORLD;
 use super::{instrument, rigid, scenery, soft, synthetic, tube};
-use crate::scene::cast::{Look, Member, Scenery, Spec};
+use crate::world::{Look, Member, Scenery, Spec};
 use crate::scene::check::{Checker, Place};
-use crate::scene::format::{
-    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, Material, MeshFile, RigidFile, RopeFile, SheetFile,
-    SolidFile, SyntheticFile, TreeFile, TubeFile,
-};
+use crate::scene::format::{COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile, SyntheticFile, TreeFile, TubeFile};
+use crate::world::kinds::{Material};
 use crate::scene::problem::{Problem, did_you_mean};
 use crate::scene::source::Source;
 use glam::DVec3;

@@ -1,7 +1,7 @@
 //! Reads target, camera, machine and probes of a scene file.
 
 use super::{Names, POSITION_MAX_M};
-use crate::scene::cast::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
+use crate::world::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
 use crate::scene::check::{Allowed, Checker, Place, allowed};
 use crate::scene::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile};
 use crate::scene::problem::{Problem, did_you_mean};

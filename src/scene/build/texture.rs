@@ -5,9 +5,10 @@
 use super::glb;
 use super::object::Entry;
 use super::scenery::Parts;
-use crate::scene::cast::Look;
+use crate::world::Look;
 use crate::scene::check::{Checker, allowed};
-use crate::scene::format::{MeshFile, ShadingKind};
+use crate::scene::format::{MeshFile};
+use crate::world::kinds::{ShadingKind};
 use crate::scene::source::Source;
 use glam::Vec2;
 use image::{ImageFormat, ImageReader, Limits};

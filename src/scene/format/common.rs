@@ -1,6 +1,7 @@
 //! The keys that objects of every model share.
 
-use super::{FaultsFile, OneOrEach, OneOrRange, Point, ShadingKind};
+use super::{FaultsFile, OneOrEach, OneOrRange, Point};
+use crate::world::kinds::{Material, ShadingKind};
 use schemars::JsonSchema;
 use serde::Deserialize;
 
@@ -86,20 +87,6 @@ pub enum HoldKind {
     Rate,
     /// The error of its result.
     Error,
-}
-
-/// Material of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum Material {
-    /// Wet tissue.
-    Tissue,
-    /// Brushed metal.
-    Metal,
-    /// Matt plastic.
-    Plastic,
-    /// Dry skin.
-    Skin,
 }
 
 #[cfg(test)]

@@ -15,16 +15,16 @@ mod synthetic;
 mod tube;
 mod value;
 
-pub use common::{COMMON_KEYS, CommonFile, HoldKind, Material};
+pub use common::{COMMON_KEYS, CommonFile, HoldKind};
 pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
 pub use instrument::{InstrumentFile, KeyframeFile};
 pub use joint::{JointFile, JointKind};
 pub use rigid::{RigidFile, Shape};
 pub use scene::{
-    CameraFile, CameraKeyFile, ExecutorKind, LawKind, LoadFile, MachineFile, ModelCostFile, PolicyKind, PriorityKind,
-    ProbeFile, SceneFile, StatesKind, TargetFile, ValueKind, WorldFile,
+    CameraFile, CameraKeyFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile,
+    TargetFile, WorldFile,
 };
-pub use scenery::{GeneratorKind, GroupFile, MeshFile, ShadingKind, TreeFile, TreeLod};
+pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
 pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
 pub use synthetic::SyntheticFile;
 pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};

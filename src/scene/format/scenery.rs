@@ -128,19 +128,3 @@ pub enum TreeLod {
     Prefix,
 }
 
-/// Shading of a surface.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub enum ShadingKind {
-    /// One colour per triangle.
-    Flat,
-    /// Colours at vertices, interpolated between them.
-    Gouraud,
-    /// Lighting at every pixel.
-    #[default]
-    PerPixel,
-    /// Lighting at every pixel of a textured surface; the default of a mesh with a `texture`.
-    Textured,
-    /// Any of them, as the policy chooses.
-    Any,
-}

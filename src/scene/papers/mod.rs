@@ -85,7 +85,8 @@ const FLOOR: &str = "\n[[object]]\nname = \"floor\"\nmodel = \"rigid\"\nshape = 
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::scene::{Scene, Source, builtin, load};
+    use crate::world::{Scene};
+    use crate::scene::{Source, builtin, load};
     use metachron_geometry::Model;
 
     fn scene(paper: Paper, choices: &Choices) -> Scene {
@@ -158,7 +159,7 @@ mod tests {
     fn the_library_has_the_papers_polygons_and_leaves_its_shading_to_the_policy() {
         let scene = scene(Paper::Library, &Choices::default());
         assert_eq!(triangles(&scene).1, 19_800); // the paper: 19,821
-        assert!(scene.scenery.iter().all(|it| it.look.shading == crate::scene::format::ShadingKind::Any));
+        assert!(scene.scenery.iter().all(|it| it.look.shading == crate::world::kinds::ShadingKind::Any));
     }
 
     #[test]

@@ -3,10 +3,10 @@
 //! In: built by [`super::load`]. Out: plain data that the frame loop turns into agents, obstacles, a camera and a target.
 //! Never here: the file's text, running agents.
 
-use super::apart::Moved;
-use super::format::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
+use super::initial_overlap::Moved;
+use super::kinds::{ExecutorKind, LawKind, Material, PolicyKind, PriorityKind, ShadingKind, StatesKind, ValueKind};
 use super::overlap::Overlap;
-use super::ties::{Coupling, Faults};
+use super::couplings::{Coupling, Faults};
 use glam::DVec3;
 use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan};
 use metachron_geometry::{Model, Obstacle, Placement, Texture};

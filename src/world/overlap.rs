@@ -4,9 +4,9 @@
 //! pair of rigid bodies so near that rotation could bring them into contact.
 //! Never here: the response to it.
 
-use super::cast::{Scene, Spec};
-use super::figure::{Figure, figure};
-use super::ties::{Coupling, CouplingKind};
+use super::scene::{Scene, Spec};
+use super::initial_shape::{Figure, figure};
+use super::couplings::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_contact::Law;
 use metachron_core::AgentId;
@@ -157,7 +157,7 @@ impl Scene {
     /// Pairs whose contact differs from the scene's `contacts`: where that is true those that do not collide, else those that do.
     pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
         let contact =
-            |c: &&super::ties::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
+            |c: &&super::couplings::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
         let coupled = self.couplings.iter().filter(contact).map(|c| (c.a, c.b));
         let jointed = self.joints.iter().filter(|j| !j.collide && self.contacts).filter_map(|j| Some((j.a, j.b?)));
         coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()

@@ -3,8 +3,8 @@
 //! In: a [`Scene`]. Out: for each agent its laws, links, faults, and the leader of the island in which it begins. Never here: forces.
 
 use crate::runtime::Faults;
-use crate::scene::ties::{Coupling, CouplingKind};
-use crate::scene::{Scene, Spec};
+use super::couplings::{Coupling, CouplingKind};
+use super::{Scene, Spec};
 use metachron_contact::{Law, Link};
 use metachron_core::AgentId;
 use std::collections::BTreeMap;
@@ -47,8 +47,8 @@ impl Ties {
 }
 
 /// Converts injected faults to the runtime's type.
-pub(super) const fn faults(faults: crate::scene::ties::Faults) -> Faults {
-    let crate::scene::ties::Faults { jitter, loss, seed } = faults;
+pub(super) const fn faults(faults: super::couplings::Faults) -> Faults {
+    let super::couplings::Faults { jitter, loss, seed } = faults;
     Faults { jitter, loss, seed }
 }
 

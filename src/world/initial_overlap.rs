@@ -9,10 +9,10 @@
 //! The parts of a tool deep inside a light box would push the box in different directions, each with the full force of the drive. Drawn
 //! back along its shaft, the tool enters as it would from outside.
 
-use super::cast::{Scene, Spec};
-use super::figure::{Figure, figure};
+use super::scene::{Scene, Spec};
+use super::initial_shape::{Figure, figure};
 use super::overlap::{Inside, OVERLAP_MIN_M};
-use super::ties::{Coupling, CouplingKind};
+use super::couplings::{Coupling, CouplingKind};
 use glam::DVec3;
 use metachron_core::AgentId;
 use metachron_geometry::Touch;
@@ -40,6 +40,13 @@ const PLACES: usize = 64;
 const AXES: [DVec3; 6] = [DVec3::Z, DVec3::X, DVec3::NEG_X, DVec3::Y, DVec3::NEG_Y, DVec3::NEG_Z];
 
 impl Scene {
+    /// Finds what starts inside each other and moves apart what can be moved without strain; fills [`Scene::overlaps`] and [`Scene::moved`].
+    pub fn resolve_initial_overlaps(&mut self) {
+        let inside = self.inside_each_other();
+        self.overlaps = self.name_overlaps(&inside);
+        self.set_apart(&inside);
+    }
+
     /// Moves every free deformable out of the objects that it starts inside, along the shortest way that leaves it clear of all; of two
     /// deformables the later one. A free rigid body is moved out of a deformable that is held, a tool out of all that it does not grasp.
     /// Where there is no such way, nothing is moved.

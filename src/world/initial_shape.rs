@@ -3,7 +3,7 @@
 //! In: a member of the scene, an obstacle. Out: its form, its pose and a box around it.
 //! Never here: detection of contacts.
 
-use super::cast::{Member, Spec};
+use super::scene::{Member, Spec};
 use glam::{DQuat, DVec3};
 use metachron_contact::Agent;
 use metachron_core::{AgentId, Body, CurveState, Snapshot, SoftState};

@@ -1,0 +1,223 @@
+//! Choices by name that a scene makes: executor, priority, policy, law, states, shading, material.
+//!
+//! Only their names are known here. The runtime, the policies and the renderer give them their meaning.
+
+/// How agents are run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum ExecutorKind {
+    /// Threads for a few agents, the pool for many.
+    #[default]
+    Auto,
+    /// One named OS thread per agent; at most 1000 agents.
+    Threads,
+    /// One worker per core for any number of agents; each agent keeps its own clock as on its own thread.
+    Pool,
+    /// One thread, virtual time, declared costs: bit-identical on every run.
+    Lockstep,
+}
+
+/// How the operating system schedules the threads of agents.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum PriorityKind {
+    /// Ordinary priority.
+    #[default]
+    Normal,
+    /// Before all threads of ordinary priority, including the frame loop, where the operating system permits that; where it does not, a
+    /// note says so and agents run at ordinary priority. Agents that use all cores then leave no time for pictures.
+    Realtime,
+}
+
+/// Policy that chooses levels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum PolicyKind {
+    /// The finest level of everything, at any cost.
+    Full,
+    /// The finest level whose polygons cover 1024 pixels each (FS93).
+    Static,
+    /// The same with a threshold that follows the time of the previous frame (FS93).
+    Threshold,
+    /// Levels in falling benefit per cost (FS93).
+    Greedy,
+    /// The same, starting from the levels of the previous frame (FS93).
+    GreedyIncremental,
+    /// The better of the greedy solution and the best single object.
+    GreedyRepaired,
+    /// Objects and groups, starting from the cut of the previous frame (MB97).
+    Hierarchical,
+    /// Objects and groups in falling benefit per cost (MB97).
+    HierarchicalFlat,
+    /// Objects and groups, always refining the most important one next (MS95).
+    MacielShirley,
+    /// A share of the time for every object, by its value (RH05).
+    RobinHood,
+    /// Any number of triangles, the exact optimum (GB99).
+    Convex,
+    /// Any number of triangles, by interior point (GB99).
+    ConvexBarrier,
+    /// Refinement steps in falling gain per cost, up to the first that does not fit.
+    MarginalStop,
+    /// The same, followed by every later step that still fits.
+    MarginalFill,
+    /// Feedback on (ε, n) from the measured frame work (GDC04).
+    Feedback,
+    /// Refinement steps in falling gain per cost, with costs learned from measurements, hysteresis and a certificate of optimality.
+    #[default]
+    Adaptive,
+}
+
+/// How `robin-hood` values an object (RH05, eq. 8 … 11): from its surface a and its depth z, or its distance d from the point that
+/// the camera looks at.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum ValueKind {
+    /// a/√z.
+    Gentle,
+    /// a/z.
+    #[default]
+    Plain,
+    /// a/z².
+    Steep,
+    /// √(a/d²).
+    Focus,
+    /// √a/d².
+    FocusSteep,
+}
+
+/// Feedback law.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum LawKind {
+    /// The logarithmic law, whose gain does not depend on the machine.
+    #[default]
+    Corrected,
+    /// The law as the paper prints it.
+    Printed,
+}
+
+/// Time at which states are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum StatesKind {
+    /// Interpolated between the two newest states, slightly late.
+    #[default]
+    Interpolate,
+    /// The newest state extrapolated to the frame's time.
+    Extrapolate,
+    /// The newest state as it is.
+    Latest,
+}
+
+impl ExecutorKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Auto => "auto",
+            Self::Threads => "threads",
+            Self::Pool => "pool",
+            Self::Lockstep => "lockstep",
+        }
+    }
+}
+
+impl PolicyKind {
+    /// All of them.
+    pub const ALL: [Self; 16] = [
+        Self::Full,
+        Self::Static,
+        Self::Threshold,
+        Self::Greedy,
+        Self::GreedyIncremental,
+        Self::GreedyRepaired,
+        Self::Hierarchical,
+        Self::HierarchicalFlat,
+        Self::MacielShirley,
+        Self::RobinHood,
+        Self::Convex,
+        Self::ConvexBarrier,
+        Self::MarginalStop,
+        Self::MarginalFill,
+        Self::Feedback,
+        Self::Adaptive,
+    ];
+
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Full => "full",
+            Self::Static => "static",
+            Self::Threshold => "threshold",
+            Self::Greedy => "greedy",
+            Self::GreedyIncremental => "greedy-incremental",
+            Self::GreedyRepaired => "greedy-repaired",
+            Self::Hierarchical => "hierarchical",
+            Self::HierarchicalFlat => "hierarchical-flat",
+            Self::MacielShirley => "maciel-shirley",
+            Self::RobinHood => "robin-hood",
+            Self::Convex => "convex",
+            Self::ConvexBarrier => "convex-barrier",
+            Self::MarginalStop => "marginal-stop",
+            Self::MarginalFill => "marginal-fill",
+            Self::Feedback => "feedback",
+            Self::Adaptive => "adaptive",
+        }
+    }
+}
+
+impl LawKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Corrected => "corrected",
+            Self::Printed => "printed",
+        }
+    }
+}
+
+impl StatesKind {
+    /// The name as scenes write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Interpolate => "interpolate",
+            Self::Extrapolate => "extrapolate",
+            Self::Latest => "latest",
+        }
+    }
+}
+
+/// Shading of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum ShadingKind {
+    /// One colour per triangle.
+    Flat,
+    /// Colours at vertices, interpolated between them.
+    Gouraud,
+    /// Lighting at every pixel.
+    #[default]
+    PerPixel,
+    /// Lighting at every pixel of a textured surface; the default of a mesh with a `texture`.
+    Textured,
+    /// Any of them, as the policy chooses.
+    Any,
+}
+
+/// Material of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Deserialize, schemars::JsonSchema), serde(rename_all = "kebab-case"))]
+pub enum Material {
+    /// Wet tissue.
+    Tissue,
+    /// Brushed metal.
+    Metal,
+    /// Matt plastic.
+    Plastic,
+    /// Dry skin.
+    Skin,
+}
