@@ -52,7 +52,7 @@ impl Play {
         Some(id)
     }
 
-    /// Links `of` to another agent.
+    /// Links `of` to another agent; both have the link.
     pub(super) fn link(&mut self, of: AgentId, link: Link) {
         self.stage.link(of, link);
         self.links.push((of, link));
