@@ -310,7 +310,7 @@ pub struct FitArgs {
     /// Greatest distance of a probe from its place in the converged answer, metres
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub tolerance: f64,
-    /// Hold the probes of this object only; the ends and the middle of it where it has none
+    /// Compare only the probes of this object; its ends and its middle where it has none
     #[arg(long, value_name = "NAME")]
     pub probe: Option<String>,
     /// Simulated seconds that are compared, 0.01 to 1000
