@@ -1,4 +1,4 @@
-//! The arguments, and the help that teaches them.
+//! The command-line arguments and their help texts.
 
 use super::assignment::assignment;
 use super::report::Goal;
@@ -88,7 +88,7 @@ Examples:
 #[derive(Debug, Parser)]
 #[command(name = "metachron", version, after_help = EXAMPLES, max_term_width = 120)]
 pub struct Cli {
-    /// What to do; nothing at all runs the tube demo.
+    /// The command; without one, the tube demo runs.
     #[command(subcommand)]
     pub command: Command,
 }
@@ -99,13 +99,13 @@ pub enum Command {
     /// Run a scene: in a window where there is a display, otherwise headless
     #[command(after_help = RUN_EXAMPLES, allow_negative_numbers = true)]
     Run(Box<RunArgs>),
-    /// Validate scenes; every problem is shown where it stands
+    /// Validate scenes; every problem is shown at its place in the file
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Find feedback gains for a scene, or explain given ones
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
-    /// Find the cheapest steps, segments and integrators that keep a scene's probes where its converged answer has them
+    /// Find the cheapest steps, segments and integrators that keep a scene's probes within a tolerance of its converged answer
     #[command(after_help = FIT_EXAMPLES, allow_negative_numbers = true)]
     Fit(FitArgs),
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
@@ -114,7 +114,7 @@ pub enum Command {
     /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
-    /// Write a scene of the papers' experiments, with a seed and choices of its own
+    /// Write a scene of the papers' experiments as a scene file, with a seed and options
     #[command(after_help = GENERATE_EXAMPLES)]
     Generate(GenerateArgs),
     /// Print the JSON Schema of scene files
@@ -142,24 +142,24 @@ pub struct GenerateArgs {
     /// Seed of everything random in it
     #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u32).range(..=1_000_000))]
     pub seed: u32,
-    /// Trees of the grove: 600 where this is left out
+    /// Number of trees of the grove; 600 where not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(3..=3000))]
     pub trees: Option<u32>,
-    /// The way through the grove with two sudden turns, not the straight one along it
+    /// Lead the camera through the grove with two sudden turns instead of straight along it
     #[arg(long)]
     pub zigzag: bool,
-    /// Trees of the grove without levels: what there is time for is drawn of the full mesh
+    /// Trees of the grove without levels of detail: as much of the full mesh is drawn as there is time for
     #[arg(long)]
     pub prefix: bool,
-    /// Write it here, not to standard output
+    /// Write the scene to this file instead of standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub out: Option<PathBuf>,
-    /// Overwrite the file that is there
+    /// Overwrite an existing file
     #[arg(long, requires = "out")]
     pub force: bool,
 }
 
-/// A word of `--style`.
+/// A value of `--style`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum StyleWord {
     /// Draw every edge
@@ -190,20 +190,20 @@ pub struct RunArgs {
     /// Frames a second to hold, 1 to 1000
     #[arg(long, value_name = "F", env = "METACHRON_TARGET_FPS", value_parser = target_fps)]
     pub target_fps: Option<f64>,
-    /// Who chooses the level of every visible object
+    /// Policy that chooses the level of detail of every visible object
     #[arg(long, env = "METACHRON_POLICY", value_parser = PossibleValuesParser::new(PolicyKind::ALL.map(PolicyKind::name)))]
     pub policy: Option<String>,
     /// The feedback law: corrected (its gain does not depend on the machine) or as the paper prints it
     #[arg(long, env = "METACHRON_LAW", value_parser = PossibleValuesParser::new(["corrected", "printed"]))]
     pub law: Option<String>,
-    /// Take the gains of the feedback law from here: what `metachron tune` wrote (TOML); --set and flags go before it
+    /// Take the gains of the feedback law from this file (TOML, as `metachron tune` writes it); --set and flags take precedence over it
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub gains: Option<PathBuf>,
     /// How agents run: a thread each, a pool of workers, the cheaper of the two by their number (auto), or one thread in
     /// virtual time with declared costs (lockstep: the same bits on every run)
     #[arg(long, env = "METACHRON_EXECUTOR", value_parser = PossibleValuesParser::new(["auto", "threads", "pool", "lockstep"]))]
     pub executor: Option<String>,
-    /// Size of the picture in pixels, or of the window, each 1 to 8192; a picture nobody sized has 1280x720
+    /// Size of the picture or the window in pixels, each 1 to 8192; pictures are 1280x720 where no size is given
     #[arg(long, value_name = "WxH", env = "METACHRON_SIZE", value_parser = size)]
     pub size: Option<[u32; 2]>,
     /// Seed of the declared machine's noise
@@ -212,28 +212,28 @@ pub struct RunArgs {
     /// Change a key of the scene, such as target.frame_hz=60 or object.NAME.rate_hz=120; may be repeated
     #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
     pub set: Vec<(String, String)>,
-    /// Play the scene a second time on one tiny common clock, and report what its own clocks changed (without a window alone)
+    /// Run the scene a second time on one very fine common clock, and report what its own clocks changed (headless only)
     #[arg(long)]
     pub oracle: bool,
     /// Write the last frame's picture here (PNG)
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub png: Option<PathBuf>,
-    /// How pictures without a window show things: wireframe, and colours by resolution, by age or by detail; more than one with a comma
+    /// How headless pictures show things: wireframe, or colours by resolution, age or detail; several are separated by commas
     #[arg(long, value_name = "STYLE", value_delimiter = ',')]
     pub style: Vec<StyleWord>,
     /// Write the report here (JSON); - is standard output
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub report: Option<PathBuf>,
-    /// Write one row a frame here (CSV); a window without an end remembers the newest 108000 frames at least
+    /// Write one row per frame here (CSV); a window without an end keeps at least the newest 108000 frames
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub frames_csv: Option<PathBuf>,
-    /// End with code 4 where this holds of the report, such as missed_share>0.01 or frame_ms.p99>40; may be repeated
+    /// End with code 4 where this holds for the report, such as missed_share>0.01 or frame_ms.p99>40; may be repeated
     #[arg(long, value_name = "CONDITION", value_parser = goal)]
     pub fail_on: Vec<Goal>,
     /// Print the report as JSON on standard output, instead of the summary
     #[arg(long)]
     pub json: bool,
-    /// Errors alone: no progress, no summary, no word of what was written
+    /// Print errors only: no progress, no summary, no list of the files written
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -244,12 +244,12 @@ pub struct CheckArgs {
     /// Built-in scenes or paths of scene files
     #[arg(required = true, value_name = "SCENE", value_hint = ValueHint::FilePath)]
     pub scenes: Vec<String>,
-    /// What it shares with others that judge scenes.
+    /// The arguments common to `check`, `tune` and `fit`.
     #[command(flatten)]
     pub common: CommonArgs,
 }
 
-/// What commands that judge scenes have in common: `check`, `tune`, `fit`.
+/// The arguments common to the commands that judge scenes: `check`, `tune`, `fit`.
 #[derive(Debug, Args)]
 pub struct CommonArgs {
     /// Change a key of the scene; may be repeated
@@ -258,7 +258,7 @@ pub struct CommonArgs {
     /// Print the result as JSON on standard output and nothing else there
     #[arg(long)]
     pub json: bool,
-    /// No progress, and no word of scenes that are sound
+    /// No progress, and no output for scenes without problems
     #[arg(short, long)]
     pub quiet: bool,
 }
@@ -275,13 +275,13 @@ pub struct TuneArgs {
     /// Write the gains here (TOML); SCENE.gains.toml where not given
     #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
     pub gains: Option<PathBuf>,
-    /// Overwrite the gains that are there
+    /// Overwrite an existing gains file
     #[arg(long)]
     pub force: bool,
-    /// Write the figure here; the folder is made where it does not exist
+    /// Write the figure here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
-    /// Draw the experiment on the machine and the adapter present, instead of the declared machine
+    /// Run the experiment on this machine and its graphics adapter instead of the declared machine
     #[arg(long)]
     pub live: bool,
     /// Frames a second to hold, 1 to 1000
@@ -296,7 +296,7 @@ pub struct TuneArgs {
     /// Fewer frames and fewer seeds: seconds instead of a minute
     #[arg(long)]
     pub quick: bool,
-    /// What it shares with others that judge scenes.
+    /// The arguments common to `check`, `tune` and `fit`.
     #[command(flatten)]
     pub common: CommonArgs,
 }
@@ -307,22 +307,22 @@ pub struct FitArgs {
     /// A built-in scene or the path of a scene file
     #[arg(value_hint = ValueHint::FilePath)]
     pub scene: String,
-    /// How far a probe may be from where the converged answer has it, metres
+    /// Greatest distance of a probe from its place in the converged answer, metres
     #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
     pub tolerance: f64,
-    /// Hold the probes of this object only; the ends and the middle of it where it has none
+    /// Compare only the probes of this object; its ends and its middle where it has none
     #[arg(long, value_name = "NAME")]
     pub probe: Option<String>,
     /// Simulated seconds that are compared, 0.01 to 1000
     #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = fit_seconds)]
     pub seconds: f64,
-    /// No more runs of the scene than this, whatever they are for
+    /// Greatest number of runs of the scene, of all kinds together
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub runs: u32,
-    /// Write what was found into the scene file; every other line stays as it is
+    /// Write the settings found into the scene file; every other line stays as it is
     #[arg(long)]
     pub write: bool,
-    /// What it shares with others that judge scenes.
+    /// The arguments common to `check`, `tune` and `fit`.
     #[command(flatten)]
     pub common: CommonArgs,
 }
@@ -332,13 +332,13 @@ pub struct FitArgs {
 pub struct ChartArgs {
     /// What to chart
     pub subject: Subject,
-    /// Write the files here; the folder is made where it does not exist
+    /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
     /// A small part of the cases, or shorter runs: minutes become seconds
     #[arg(long)]
     pub quick: bool,
-    /// Policies: on the adapter present, through the renderer, instead of a declared machine
+    /// For policies: run on the graphics adapter present, through the renderer, instead of on a declared machine
     #[arg(long)]
     pub live: bool,
     /// Only this experiment; may be repeated
@@ -357,22 +357,22 @@ pub struct ChartArgs {
 pub struct BenchArgs {
     /// What to measure
     pub subject: BenchSubject,
-    /// Write the files here; the folder is made where it does not exist
+    /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "bench", value_hint = ValueHint::DirPath)]
     pub out: PathBuf,
     /// Fewer cases, each for a second
     #[arg(long)]
     pub quick: bool,
-    /// Of agents, only this executor; may be repeated
+    /// For agents: only this executor; may be repeated
     #[arg(long, value_parser = PossibleValuesParser::new(["threads", "pool", "lockstep"]))]
     pub executor: Vec<String>,
-    /// Of agents, only this model; may be repeated
+    /// For agents: only this model; may be repeated
     #[arg(long, value_parser = PossibleValuesParser::new(["synthetic", "asleep", "rod", "rigid"]))]
     pub model: Vec<String>,
-    /// Of agents, only cases of up to so many
+    /// For agents: only cases of at most this many agents
     #[arg(long, value_name = "N")]
     pub agents: Option<usize>,
-    /// How long each case runs; of a pile, simulated seconds
+    /// How long each case runs; for pile: simulated seconds
     #[arg(long, value_name = "S", value_parser = seconds)]
     pub seconds: Option<f64>,
     /// Print the rows as JSON on standard output and nothing else there
@@ -386,13 +386,13 @@ pub struct BenchArgs {
 /// A subject of `bench`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum BenchSubject {
-    /// Agents on threads, in a pool and in lockstep: CPU a step against the bare loop, lateness, ages, memory
+    /// Agents on threads, in a pool and in lockstep: CPU per step against the bare loop, lateness, ages, memory
     Agents,
-    /// A tube's step by its segments, with and without the search for contact with itself
+    /// Cost of a tube's step by number of segments, with and without the search for self-contact
     Rod,
-    /// How long choosing a level for everything takes, by policy and number of objects
+    /// Time to choose a level of detail for every object, by policy and number of objects
     Select,
-    /// A thousand boxes as agents that share worlds while they touch, beside one rapier3d world of the same boxes
+    /// A thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes
     Pile,
     /// Pictures on this machine's adapter, by triangles, pixels and shading
     Render,
@@ -401,15 +401,15 @@ pub enum BenchSubject {
 /// A subject of `chart`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 pub enum Subject {
-    /// How wrong each method is against an independent answer, and what it costs, with other engines' points behind
+    /// Error of each method against an independent answer, and its cost, next to the points of other engines
     Accuracy,
     /// How cost grows with segments, contacts and agents, and how far it is from what the machine could do
     Scaling,
     /// Where integrators and couplings blow up, and where they are bounded but wrong
     Stability,
-    /// How far a scene with clocks apart is from the same under one tiny clock
+    /// How far a scene with separate clocks is from the same scene under one very fine common clock
     Coupling,
-    /// How well each policy of a frame's budget keeps to its time, on the scenes of the papers
+    /// How well each frame-budget policy keeps its time, on the scenes of the papers
     Policies,
 }
 

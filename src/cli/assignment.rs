@@ -1,11 +1,11 @@
-//! What `--set` is given: a key and a value.
+//! Parses the KEY=VALUE argument of `--set`.
 //!
-//! In: text. Out: both parts. Never here: whether there is such a key.
+//! In: text. Out: key and value. Never here: whether there is such a key.
 
-/// Takes KEY=VALUE apart; white space around both is no part of them.
+/// Splits KEY=VALUE; white space around key and value is dropped.
 ///
 /// # Errors
-/// A sentence for text without a key or without the sign.
+/// A sentence for text without a key or without the `=` sign.
 pub(super) fn assignment(text: &str) -> Result<(String, String), String> {
     match equals_sign(text).map(|at| (&text[..at], &text[at + 1..])) {
         Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
@@ -13,7 +13,7 @@ pub(super) fn assignment(text: &str) -> Result<(String, String), String> {
     }
 }
 
-/// The sign between a key and its value: parts of the key that stand in quotes may hold others.
+/// The position of the `=` between key and value; parts of the key in quotes may contain others.
 fn equals_sign(text: &str) -> Option<usize> {
     let (mut open, mut before) = (None, '.');
     for (at, c) in text.char_indices() {

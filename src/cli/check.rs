@@ -39,7 +39,7 @@ struct ProblemRow<'a> {
     help: Option<&'a str>,
 }
 
-/// Checks every scene; one that is bad makes the whole command end with code 2.
+/// Checks every scene; the command ends with code 2 if one of them is bad.
 pub(super) fn command(args: &CheckArgs) -> anyhow::Result<Exit> {
     let results: Vec<(&str, Result<Scene, SceneError>)> = args
         .scenes

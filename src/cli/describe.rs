@@ -1,4 +1,4 @@
-//! `schema`, `list`, `completions`, `man`: what the program says about itself.
+//! `schema`, `list`, `completions`, `man`: descriptions of the program.
 
 use super::Exit;
 use super::args::{Cli, ListArgs};

@@ -1,6 +1,6 @@
 //! `generate`: writes a scene of the papers' experiments.
 //!
-//! In: which one, and what of it is chosen. Out: TOML on standard output or in a file. Never here: what is in a scene.
+//! In: the scene's name and options. Out: TOML on standard output or in a file. Never here: the content of a scene.
 
 use super::Exit;
 use super::args::GenerateArgs;
@@ -29,7 +29,7 @@ pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// Only the grove has trees and two ways.
+/// Refuses the grove's options for other scenes: only the grove has trees and two paths.
 fn refuse_strays(args: &GenerateArgs, paper: Paper) -> Result<(), BadInput> {
     let given = [("--trees", args.trees.is_some()), ("--zigzag", args.zigzag), ("--prefix", args.prefix)];
     match given.iter().find(|(_, given)| *given) {

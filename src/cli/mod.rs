@@ -1,6 +1,6 @@
 //! The command line: arguments in, exit code out.
 //!
-//! In: arguments and environment. Out: data on standard output, messages on standard error, files that were asked for.
+//! In: arguments and environment. Out: data on standard output, messages on standard error, requested files.
 //! Never here: physics, drawing, the format of scenes.
 
 mod args;
@@ -25,7 +25,7 @@ use std::process::ExitCode;
 /// How a command ends: the exit codes that scripts can rely on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Exit {
-    /// All went well.
+    /// Success.
     Ok,
     /// The run failed.
     Failed,
@@ -33,7 +33,7 @@ pub enum Exit {
     BadInput,
     /// A goal given with `--fail-on` was missed.
     GoalMissed,
-    /// Ctrl-C; what there was has been written.
+    /// Ctrl-C; the results so far have been written.
     Interrupted,
 }
 
@@ -49,7 +49,7 @@ impl From<Exit> for ExitCode {
     }
 }
 
-/// Runs the command that the arguments ask for.
+/// Runs the command given by the arguments.
 #[must_use]
 pub fn main() -> ExitCode {
     let mut arguments: Vec<_> = std::env::args_os().collect();

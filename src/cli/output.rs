@@ -1,4 +1,4 @@
-//! Where words go: data to standard output, messages to standard error.
+//! Output streams: data to standard output, messages to standard error.
 
 use super::Exit;
 use crate::runtime::Priority;
@@ -7,7 +7,7 @@ use crate::world::{Moved, Overlap, Scene};
 use crate::scene::{SceneError};
 use std::io::{ErrorKind, Write};
 
-/// Writes data to standard output. A reader that has gone away (`| head`) is no error.
+/// Writes data to standard output. A reader that has closed the pipe (`| head`) is no error.
 pub(super) fn data(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
@@ -16,16 +16,16 @@ pub(super) fn data(text: &str) -> anyhow::Result<()> {
     }
 }
 
-/// A message for people. Where nobody can read it, it is lost.
+/// Writes a message for people to standard error; a failure to write it is ignored.
 pub(super) fn message(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
-/// More overlaps than this are counted, not told.
+/// More overlaps than this are counted, not listed.
 const OVERLAPS_TOLD: usize = 10;
 
-/// Tells of agents that start inside each other or fixed solids, which is no error: what bends begins elsewhere, the others come
-/// apart without a jump.
+/// Reports agents that start inside each other or inside fixed solids, which is no error: deformables are moved to start elsewhere,
+/// other agents separate without a jump.
 pub(super) fn tell_overlaps(scene: &Scene) {
     let overlaps = &scene.overlaps;
     for overlap in overlaps.iter().take(OVERLAPS_TOLD) {
@@ -44,7 +44,7 @@ pub(super) fn tell_overlaps(scene: &Scene) {
     }
 }
 
-/// Tells that the system refuses the priority a scene asks for; the run goes on without.
+/// Reports that the system refuses the priority that a scene requests; the run goes on without it.
 pub(super) fn tell_priority(scene: &Scene) {
     let asked = scene.priority == PriorityKind::Realtime && scene.executor != ExecutorKind::Lockstep;
     if asked && let Err(refused) = Priority::Realtime.ask() {
@@ -52,7 +52,7 @@ pub(super) fn tell_priority(scene: &Scene) {
     }
 }
 
-/// Tells an error, and with which code the program ends.
+/// Reports an error; returns how the program ends.
 pub(super) fn tell(error: &anyhow::Error) -> Exit {
     if let Some(bad) = error.downcast_ref::<SceneError>() {
         message(&pictured(bad));
@@ -62,7 +62,7 @@ pub(super) fn tell(error: &anyhow::Error) -> Exit {
     if error.is::<BadInput>() { Exit::BadInput } else { Exit::Failed }
 }
 
-/// What is wrong with a scene, with the lines underlined; colours and width follow the terminal.
+/// The problems of a scene, with the lines underlined; colours and width follow the terminal.
 pub(super) fn pictured(error: &SceneError) -> String {
     let handler = miette::MietteHandlerOpts::new().build();
     format!("{:?}", Shown { error, handler: &handler })

@@ -1,4 +1,4 @@
-//! Plays a request and turns what happened into a report.
+//! Plays a request and turns the outcome into a report.
 //!
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
@@ -20,16 +20,16 @@ use metachron_budget::Bound;
 use metachron_core::AgentId;
 use std::path::PathBuf;
 
-/// Told of every frame; answers whether to go on.
+/// Called for every frame; returns whether to go on.
 type GoOn<'a> = &'a mut dyn FnMut(Step) -> bool;
 
-/// Width and height of a headless picture that nobody sized, pixels.
+/// Width and height of a headless picture where no size is given, pixels.
 const PICTURE_SIZE: [u32; 2] = [1280, 720];
 
-/// Plays what is asked for: in a window where there can be one, else without.
+/// Plays a request: in a window where one can be opened, else without.
 ///
 /// # Errors
-/// What the models, the executor or the adapter refuse.
+/// Errors of the models, the executor or the adapter.
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
     if !request.quiet {
@@ -67,7 +67,7 @@ fn window_plan(request: &Request) -> WindowPlan {
     }
 }
 
-/// A window was wanted and is not to be had: the run goes on without, and leaves a picture.
+/// A window was requested and cannot be opened: the run goes on without it, and leaves a picture.
 fn without_window(session: Session, why: &WindowError, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = request.png.clone().unwrap_or_else(|| request.png_without_window.clone());
     let mut played = headless(session, request, Some(png), go_on)?;
@@ -99,8 +99,8 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
     Ok(played)
 }
 
-/// Who draws: in virtual time only a picture that is wanted, in real time every frame if there is an adapter. Without one there is
-/// no run where the user has asked for a picture by name.
+/// How frames are drawn: in virtual time only a requested picture, in real time every frame if there is an adapter. Without an
+/// adapter the run fails where the user named a file for the picture.
 fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> anyhow::Result<Drawing> {
     if session.is_virtual() && !picture {
         return Ok(Drawing::Nothing);

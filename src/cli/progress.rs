@@ -1,11 +1,11 @@
-//! The progress of a headless run, on standard error; hidden where that is no terminal.
+//! The progress of a headless run, on standard error; hidden where that is not a terminal.
 
 use indicatif::{ProgressBar, ProgressStyle};
 
-/// Steps of the bar: finer than any terminal is wide.
+/// Positions of the bar: more than any terminal has columns.
 const STEPS: u64 = 1000;
 
-/// A bar that knows when it is not wanted.
+/// A progress bar, which may be hidden.
 pub(super) struct Bar(ProgressBar);
 
 impl Bar {
@@ -18,12 +18,12 @@ impl Bar {
         Self(bar)
     }
 
-    /// Shows how far the run is: the share that is done, and the last frame.
+    /// Shows the progress of the run: the share that is done, and the last frame.
     pub(super) fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
         self.tell(done, format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
     }
 
-    /// Shows the share that is done, and words beside it.
+    /// Shows the share that is done, and words next to it.
     pub(super) fn tell(&self, done: f64, words: String) {
         self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
         self.0.set_message(words);

@@ -1,4 +1,4 @@
-//! `run`: plays a scene and tells how it went.
+//! `run`: plays a scene and reports the result.
 //!
 //! In: arguments. Out: a picture, a report, rows of frames, verdicts on goals.
 //! Never here: the loop itself.
@@ -22,34 +22,34 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Seconds of a headless run that is given no end.
+/// Length of a headless run without a given end, seconds.
 const HEADLESS_S: f64 = 10.0;
 
-/// What a run is asked for.
+/// The request for a run.
 #[derive(Debug, Clone)]
 pub struct Request {
-    /// The scene, with everything that flags, overrides and environment changed in it.
+    /// The scene, with the changes by flags, overrides and environment.
     pub scene: Scene,
-    /// Where it came from, so that it can be read again.
+    /// The source of the scene, so that it can be read again.
     pub source: Source,
-    /// Whether nothing is said but what is asked for.
+    /// Whether only requested output is written.
     pub quiet: bool,
-    /// What was laid over it, in rising precedence.
+    /// The overrides applied to it, in rising precedence.
     pub overrides: Vec<(String, String)>,
-    /// Whether a window is wanted; where none can be opened the run goes headless.
+    /// Whether a window is requested; where none can be opened the run goes headless.
     pub window: bool,
     /// When the run ends by itself; `None`: a window stays open, a headless run takes 10 s.
     pub end: Option<RunLength>,
     /// Width and height of the picture in pixels, or of the window in points, each 1 … 8192; `None`: 1280 × 720, or the
     /// window as it was closed last time.
     pub size: Option<[u32; 2]>,
-    /// How pictures without a window show things.
+    /// Style of pictures without a window.
     pub style: Style,
-    /// Whether to play the scene once more on one tiny common clock; a run without a window alone.
+    /// Whether to play the scene again under one very fine common clock; only without a window.
     pub oracle: bool,
     /// Where to write the last picture as PNG.
     pub png: Option<PathBuf>,
-    /// Where to write it when a window was wanted and none could be opened, and `png` says nothing.
+    /// Where to write it when the requested window could not be opened, and `png` is `None`.
     pub png_without_window: PathBuf,
 }
 
@@ -62,29 +62,29 @@ pub enum RunLength {
     Seconds(f64),
 }
 
-/// What a run gives back.
+/// The result of a run.
 #[derive(Debug, Clone)]
 pub struct Played {
-    /// Its numbers.
+    /// Its report.
     pub report: Report,
     /// Its frames.
     pub frames: Vec<FrameRecord>,
-    /// Why there was no window though one was wanted.
+    /// Why a requested window could not be opened.
     pub no_window: Option<String>,
-    /// Why the window that was open is gone; the run ended there.
+    /// Why the open window was lost; the run ended there.
     pub window_gone: Option<String>,
-    /// The picture that was written.
+    /// The file of the picture.
     pub picture: Option<PathBuf>,
-    /// Whether levels were chosen by the usual prices of drawing, because there was no time to measure the adapter's.
+    /// Whether levels were chosen by default prices of drawing, because there was no time to measure the adapter's.
     pub unpriced: bool,
     /// Whether it was interrupted.
     pub interrupted: bool,
 }
 
-/// How far a headless run is.
+/// The progress of a headless run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Step {
-    /// Share that is done, 0 … 1; `None` where the run has no end.
+    /// Share done, 0 … 1; `None` where the run has no end.
     pub done: Option<f64>,
     /// Simulated seconds.
     pub sim_s: f64,
@@ -126,7 +126,7 @@ pub(super) fn command(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::R
     }
 }
 
-/// The request that the arguments make. Precedence: flags, `--set`, environment, scene, defaults.
+/// The request given by the arguments. Precedence: flags, `--set`, environment, scene, defaults.
 fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Request> {
     let flags = [
         ("target_fps", "target.frame_hz", args.target_fps.map(|f| f.to_string())),
@@ -162,7 +162,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
     })
 }
 
-/// Of two colourings the last counts.
+/// The style given by words; of two colourings the last counts.
 fn style(words: &[StyleWord]) -> Style {
     words.iter().fold(Style::default(), |style, word| match word {
         StyleWord::Wireframe => Style { wireframe: true, ..style },
@@ -176,12 +176,12 @@ fn quoted(text: &str) -> String {
     format!("\"{text}\"")
 }
 
-/// The scene's name as a part of a file's name.
+/// The scene's name as part of a file name.
 fn stem(name: &str) -> String {
     Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
 }
 
-/// Two outputs on standard output would be neither; a folder that is not there is better known before the run.
+/// Refuses two outputs on standard output, and files in missing folders: before the run rather than after.
 fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
     if args.json && args.report.as_deref() == Some(Path::new("-")) {
         return Err(BadInput("--json and --report - both print the report; choose one".to_owned()).into());
@@ -211,7 +211,7 @@ fn check_outputs(args: &RunArgs) -> anyhow::Result<()> {
     check_ending(args)
 }
 
-/// What is written is PNG, and a name that says otherwise would be believed.
+/// Refuses a picture file with another ending than .png, because the content is PNG.
 fn check_ending(args: &RunArgs) -> anyhow::Result<()> {
     let Some((path, ending)) = args.png.as_deref().and_then(|path| Some((path, path.extension()?))) else {
         return Ok(());
@@ -223,7 +223,7 @@ fn check_ending(args: &RunArgs) -> anyhow::Result<()> {
     Err(BadInput(format!("{why}; name one that ends in .png")).into())
 }
 
-/// No output may overwrite another one, or what is read.
+/// Refuses an output that would overwrite another one, or an input.
 fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
     let scene = Path::new(&args.scene);
     let files = [
@@ -236,7 +236,7 @@ fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
     let places: Vec<_> =
         files.iter().filter_map(|(what, path)| Some((*what, (*path)?, place(path.as_ref()?)?))).collect();
     for (k, (what, path, at)) in places.iter().enumerate().skip(1) {
-        // what is read may be read twice
+        // inputs may be the same file
         let before = places[..k].iter().find(|(_, _, other)| other == at && !["the scene", "--gains"].contains(what));
         if let Some((other, ..)) = before {
             let why =
@@ -247,7 +247,7 @@ fn check_apart(args: &RunArgs) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// Where a file is or would be, by whatever way it is named; `None` of devices, which take everything.
+/// The place of a file, existing or not, independent of how its path is written; `None` for devices, which take any output.
 fn place(path: &Path) -> Option<PathBuf> {
     match path.canonicalize() {
         Ok(there) => there.is_file().then_some(there),
@@ -260,7 +260,7 @@ fn place(path: &Path) -> Option<PathBuf> {
 
 fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     let report = serde_json::to_string_pretty(&played.report)? + "\n";
-    // a demo without a display still shows what it did
+    // a demo without a display still leaves a report
     let fallback = played.no_window.as_ref().map(|_| format!("metachron-{}.json", stem(&played.report.scene)).into());
     match args.report.as_ref().or(fallback.as_ref()) {
         Some(path) if path == Path::new("-") => data(&report)?,
@@ -288,7 +288,7 @@ fn write_all(args: &RunArgs, played: &Played) -> anyhow::Result<()> {
     Ok(())
 }
 
-/// What people may want to know beside the report.
+/// Prints notes in addition to the report.
 fn tell_notes(args: &RunArgs, played: &Played) {
     if let Some(why) = &played.no_window {
         message(&format!("ran without a window: {why}"));

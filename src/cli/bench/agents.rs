@@ -1,7 +1,7 @@
-//! `bench agents`: what being an agent costs over the bare physics, and how late anyone gets.
+//! `bench agents`: the cost of an agent over the bare physics, and the lateness of agents.
 //!
-//! In: executor, model, number and rate. Out: a row: CPU a step beside the bare loops of the same run, ages as a reader at 60 Hz
-//! finds them, lateness, dropped time, memory, switches of threads. Never here: files, tables.
+//! In: executor, model, number and rate. Out: a row: CPU per step next to the bare loops of the same run, ages as a reader at 60 Hz
+//! finds them, lateness, dropped time, memory, thread switches. Never here: files, tables.
 
 use super::bare;
 use super::cast::{Model, agent, spawn};
@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-/// Who runs the agents.
+/// The executor of the agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::cli) enum Executor {
@@ -20,18 +20,18 @@ pub(in crate::cli) enum Executor {
     Lockstep,
 }
 
-/// One question.
+/// One case to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::cli) struct Case {
     pub executor: Executor,
     pub model: Model,
     pub agents: usize,
     pub priority: Priority,
-    /// Mean rate of an agent; far above what the machine can do where no pace is meant to be kept.
+    /// Mean rate of an agent; far above what the machine can do where the case is unpaced.
     pub rate_hz: f64,
 }
 
-/// One answer. Times are those of the agent at which half, or 99 in 100, are better.
+/// The measurements of one case. Times are those of the agent at which half, or 99 in 100, of the agents are better.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in crate::cli) struct Row {
     pub executor: Executor,
@@ -39,16 +39,16 @@ pub(in crate::cli) struct Row {
     pub realtime: bool,
     pub agents: usize,
     pub rate_hz: f64,
-    /// CPU time of all threads but the reader's, a step; no number where nobody steps.
+    /// CPU time of all threads but the reader's, per step; NaN where no agent steps.
     pub cpu_us_per_step: f64,
-    /// The same, a second.
+    /// The same per second of wall time.
     pub cores: f64,
-    /// The ceiling: the same steps in a loop.
+    /// The limit of speed: the same steps in a loop that never sleeps.
     pub bare_us_per_step: f64,
     /// The same steps in a loop that sleeps to the same due times.
     pub sleeping_us_per_step: f64,
-    /// The same steps on a plain thread each that sleeps to the same due times, where agents have threads; and how many times
-    /// that an agent's step is.
+    /// The same steps on a plain thread each that sleeps to the same due times, for agents on threads only; and the ratio of an
+    /// agent's step to that.
     pub thread_us_per_step: Option<f64>,
     pub over_thread: Option<f64>,
     pub steps_per_s: f64,
@@ -59,14 +59,14 @@ pub(in crate::cli) struct Row {
     pub late_ms_p99: f64,
     /// Mean over the agents.
     pub dropped_ms: f64,
-    /// Memory that appeared with the run, without the models' own.
+    /// Memory added by the run, without the models' own.
     pub bytes_per_agent: Option<f64>,
     pub switches_per_step: Option<f64>,
-    /// How late the reader's frames began, 99 in 100.
+    /// Lateness of the starts of the reader's frames, 99 in 100.
     pub frame_late_ms_p99: f64,
-    /// What the reader needs to take all newest states, an agent.
+    /// Time for the reader to take all newest states, per agent.
     pub read_ns_per_agent: f64,
-    /// Until all agents were running.
+    /// Time until all agents were running.
     pub start_ms: f64,
     pub shutdown_ms: f64,
 }
@@ -74,10 +74,10 @@ pub(in crate::cli) struct Row {
 /// A rate that no machine keeps.
 pub(super) const UNPACED_HZ: f64 = 1e5;
 
-/// A rate at which one agent in ten has something new in each of the reader's frames.
+/// A rate at which one agent in ten has a new state in each of the reader's frames.
 pub(super) const TENTH_HZ: f64 = 6.0;
 
-/// The first turns of all agents take no longer.
+/// Longest wait for the first steps of all agents.
 const WARM_UP: Duration = Duration::from_secs(20);
 
 const FRAME: Duration = Duration::from_micros(16_667);
@@ -113,7 +113,7 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
     cases
 }
 
-/// Measures one case for about `span` each for the loops and the run.
+/// Measures one case: about `span` for the bare loops and about `span` for the run.
 pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
     let on_threads = || bare::on_threads(case.model, case.agents, case.rate_hz, span / 2);
@@ -164,7 +164,7 @@ pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row
     })
 }
 
-/// What was seen of a run from outside.
+/// Measurements of a run from outside.
 struct Watched {
     wall: Duration,
     cpu: Duration,
@@ -180,17 +180,17 @@ impl Watched {
     }
 }
 
-/// Lets `run` go on for `span` and reads all states at 60 Hz; a run in virtual time is made by this thread itself.
+/// Lets `run` go on for `span` and reads all states at 60 Hz; a run in virtual time is stepped by this thread itself.
 fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
     let cpu = || if is_virtual { own_cpu() } else { others_cpu() };
     let mut reader = Reader::new(run.agents());
     read(run, &mut reader, is_virtual, span / 4);
-    // a warm-up: the first turns of everybody, as long as there is patience
+    // warm-up: until every agent has made its first step, at most WARM_UP
     let began = Instant::now();
     while run.agents().iter().any(|agent| agent.steps() == 0) && began.elapsed() < WARM_UP {
         read(run, &mut reader, is_virtual, FRAME);
     }
-    // to ask a thousand threads for their switches takes seconds on a busy machine: those are held against steps of their own
+    // reading the switches of a thousand threads takes seconds on a busy machine: they are divided by the steps between these readings
     let from_switched = (switches(), steps(run));
     let (from_cpu, from_steps, from) = (cpu(), steps(run), Instant::now());
     let (late_s, read_s) = read(run, &mut reader, is_virtual, span);
@@ -201,19 +201,19 @@ fn watch(run: &mut dyn Run, is_virtual: bool, span: Duration) -> Watched {
     Watched { wall, cpu, steps: made, switches_per_step: rise(from_switched, switched), late_s, read_s }
 }
 
-/// By how much a count rose a step, from one moment to another: each a count and the steps that were made by then.
+/// Rise of a count per step from one moment to another; each is a count and the number of steps made by then.
 fn rise(from: (Option<f64>, f64), to: (Option<f64>, f64)) -> Option<f64> {
     let count = to.0.zip(from.0).map(|(to, from)| (to - from).max(0.0))?;
     let steps = to.1 - from.1;
     Some(if steps > 0.0 { count / steps } else { f64::NAN })
 }
 
-/// Reads frame by frame: how late each frame began, and how long the reading took, seconds.
+/// Reads frame by frame; returns the lateness of each frame's start and the duration of its reading, seconds.
 fn read(run: &mut dyn Run, reader: &mut Reader, is_virtual: bool, span: Duration) -> (Vec<f64>, Vec<f64>) {
     let (began, start) = (Instant::now(), run.now());
     let (mut late_s, mut read_s) = (Vec::new(), Vec::new());
     let mut frame = start;
-    // virtual time is as fast as it is: it must not make the benchmark longer
+    // virtual time does not follow the wall clock: it must not make the benchmark longer
     while began.elapsed() < span && (is_virtual || run.now() < start + span) {
         frame += FRAME;
         run.wait_until(frame);
@@ -230,7 +230,7 @@ fn steps(run: &dyn Run) -> f64 {
     run.agents().iter().map(|agent| agent.steps() as f64).sum()
 }
 
-/// The number that a share of the agents do not pass.
+/// The value that a share `part` of the agents does not exceed.
 fn among(stats: &[AgentStats], part: f64, of: impl Fn(&AgentStats) -> f64) -> f64 {
     share(stats.iter().map(of).collect(), part)
 }

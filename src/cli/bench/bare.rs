@@ -1,6 +1,6 @@
-//! The same steps without agents around them: what nothing can be faster than.
+//! The same steps without agents around them: a lower bound for the cost of a step.
 //!
-//! In: a model, a number, a rate. Out: CPU time a step, of a loop that never sleeps, of one that sleeps to the same due times
+//! In: a model, a number, a rate. Out: CPU time per step, of a loop that never sleeps, of one that sleeps to the same due times
 //! as the agents do, and of as many threads that each do. Never here: the runtime.
 
 use super::cast::{Model, agent, rate_hz};
@@ -27,7 +27,7 @@ pub(super) struct Bare {
 pub(super) fn measure(model: Model, count: usize, mean_hz: f64, span: Duration) -> anyhow::Result<Bare> {
     let mut agents = (0..count).map(|k| agent(model, k)).collect::<Result<Vec<_>, _>>()?;
     let spans: Vec<_> = (0..count).map(|k| period(k, mean_hz)).collect();
-    // one round that fills caches and sizes
+    // one round to fill caches and size buffers
     for (agent, dt) in agents.iter_mut().zip(&spans) {
         step(&mut **agent, *dt)?;
     }
@@ -62,8 +62,8 @@ fn paced(agents: &mut [Box<dyn Agent>], spans: &[SimSpan], span: Duration) -> an
     Ok(micros(own_cpu() - cpu) / steps.max(1) as f64)
 }
 
-/// CPU time a step, microseconds, of as many threads as agents, no more than [`THREADS_MAX`]: each sleeps to the due times of
-/// one agent, makes its bare step, and nothing else. No agent on a thread of its own can take less than the switches of these.
+/// CPU time per step, microseconds, of one thread per agent, at most [`THREADS_MAX`]: each sleeps to the due times of one agent
+/// and makes its bare steps, nothing else. The thread switches of these are a lower bound for agents on threads of their own.
 pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duration) -> anyhow::Result<f64> {
     let agents = (0..count.min(THREADS_MAX)).map(|k| agent(model, k)).collect::<Result<Vec<_>, _>>()?;
     let start = Instant::now();
@@ -80,7 +80,7 @@ pub(super) fn on_threads(model: Model, count: usize, mean_hz: f64, span: Duratio
     Ok(micros(cpu) / steps.max(1) as f64)
 }
 
-/// Steps of one agent at its due times until `span` after `start`: the CPU time of this thread, and how many those were.
+/// Steps one agent at its due times until `span` after `start`; returns the CPU time of this thread and the number of steps.
 fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> anyhow::Result<(Duration, u64)> {
     step(agent, dt)?;
     let (cpu, mut due, mut steps) = (own_cpu(), start.elapsed(), 0);
@@ -93,7 +93,7 @@ fn alone(agent: &mut dyn Agent, dt: SimSpan, start: Instant, span: Duration) -> 
     Ok((own_cpu() - cpu, steps))
 }
 
-/// A step of somebody who meets nobody.
+/// One step of an agent without neighbours.
 pub(super) fn step(agent: &mut dyn Agent, dt: SimSpan) -> anyhow::Result<()> {
     let around = Surroundings { me: AgentId(0), time: SimTime::ZERO, neighbours: &[], hands: &[], links: &[] };
     agent.step(dt, &around)?;

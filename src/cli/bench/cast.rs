@@ -1,6 +1,6 @@
 //! The agents of a benchmark.
 //!
-//! In: a model and a number. Out: agents that step and meet nobody. Never here: time passing.
+//! In: a model and a number. Out: agents that step and touch nothing. Never here: time passing.
 
 use crate::runtime::AgentSpawn;
 use anyhow::Context;
@@ -15,13 +15,13 @@ use metachron_models::rod::{Material, Section, TubeSpec};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
 use serde::{Deserialize, Serialize};
 
-/// What an agent is.
+/// The kind of an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub(in crate::cli) enum Model {
-    /// Half a microsecond of arithmetic a step: as cheap as agents get.
+    /// Half a microsecond of arithmetic per step: as cheap as agents get.
     Synthetic,
-    /// As synthetic, and at rest after its first step.
+    /// As synthetic, but at rest after its first step.
     Asleep,
     /// A tube of 64 segments, clamped at one end.
     Rod,
@@ -43,7 +43,7 @@ impl Model {
 /// Nominal cost of a synthetic step, microseconds: on a core of 4 GHz it takes 0.56, as a plain rod of 64 particles does.
 const SYNTHETIC_US: f64 = 0.85;
 
-/// An agent that nobody can touch: what is measured is agents, not contacts.
+/// An agent that takes part in no contact: the benchmark measures agents, not contacts.
 struct Aloof {
     agent: Box<dyn Agent>,
     rests: bool,
@@ -51,7 +51,7 @@ struct Aloof {
 
 /// Agent number `k`.
 pub(super) fn agent(model: Model, k: usize) -> anyhow::Result<Box<dyn Agent>> {
-    // far apart, and none where another one is
+    // far apart: no agent overlaps another
     let place = DVec3::new((k % 320) as f64, (k / 320) as f64, 0.0) * 2.0;
     let agent: Box<dyn Agent> = match model {
         Model::Synthetic | Model::Asleep => Box::new(synthetic()?),
@@ -95,13 +95,13 @@ fn ball(place: DVec3) -> anyhow::Result<RigidBody> {
     RigidBody::new(spec).context("the ball")
 }
 
-/// The rate of agent `k` where `rate_hz` is meant: spread by ± 5 %, so that not all are due at once.
+/// The rate of agent `k` for a mean of `rate_hz`: spread by ± 5 %, so that not all are due simultaneously.
 pub(super) fn rate_hz(k: usize, rate_hz: f64) -> f64 {
     const GOLDEN: f64 = 0.618_033_988_749_894_9;
     rate_hz * (0.95 + 0.1 * (k as f64 * GOLDEN).fract())
 }
 
-/// On its way into a run.
+/// Wraps agent `k` for the start of a run.
 pub(super) fn spawn(agent: Box<dyn Agent>, k: usize, mean_hz: f64) -> AgentSpawn {
     AgentSpawn::alone(format!("agent {k}"), agent, rate_hz(k, mean_hz))
 }

@@ -1,12 +1,12 @@
-//! What the process has used of the machine so far.
+//! Resources of the machine that the process has used so far.
 //!
-//! Out: CPU time, memory, switches of threads; nothing where the system does not tell. Never here: what was done with it.
+//! Out: CPU time, memory, thread switches; nothing where the system does not report them. Never here: their use.
 
 use cpu_time::{ProcessTime, ThreadTime};
 use std::fs;
 use std::time::Duration;
 
-/// Bytes of a page of memory, on the systems that tell of pages.
+/// Bytes of a page of memory, on the systems that report pages.
 const PAGE_BYTES: f64 = 4096.0;
 
 /// CPU time of all threads but this one.
@@ -26,7 +26,7 @@ pub(super) fn resident_bytes() -> Option<f64> {
     Some(text.split_whitespace().nth(1)?.parse::<f64>().ok()? * PAGE_BYTES)
 }
 
-/// How often threads of the process have gone to sleep or were sent away, so far, by those that live.
+/// Context switches of the live threads of the process so far, voluntary and involuntary.
 pub(super) fn switches() -> Option<f64> {
     let tasks = fs::read_dir("/proc/self/task").ok()?;
     // a thread may end while it is read

@@ -1,4 +1,4 @@
-//! `bench`: how much one machine carries, as CSV, JSON, SVG and PNG in a folder and a table on standard output.
+//! `bench`: how much load one machine carries, as CSV, JSON, SVG and PNG in a folder and a table on standard output.
 //!
 //! In: what to measure, which folder. Out: files, a table. Never here: what is measured (each subject is a file).
 

@@ -1,10 +1,10 @@
-//! `bench pile`: a thousand boxes as agents that share worlds while they touch, beside one rapier3d world of the same boxes.
+//! `bench pile`: a thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes.
 //!
-//! In: the built-in scene `pile`. Out: rows of whole steps (every box by 1/240 s) a second of CPU time, each over the same
-//! simulated seconds: boxes that fall into a bin, and lie. Only what is really stepped counts, and nobody sleeps. Agents that gave
-//! up time are held against as many first steps of the plain world: boxes that fall cost less than a heap.
-//! It has rapier3d's own settings, and beside it those of an island. What was published of others for a thousand boxes follows.
-//! Never here: how agents find together.
+//! In: the built-in scene `pile`. Out: rows of whole steps (every box by 1/240 s) per second of CPU time, each over the same
+//! simulated seconds: boxes fall into a bin and come to rest. Only steps really made count, and no box sleeps. Agents that gave
+//! up time are compared with as many first steps of the plain world, because boxes that fall cost less than a heap.
+//! The plain world runs with rapier3d's own settings and with those of an island. Published results for a thousand boxes follow.
+//! Never here: how agents form islands.
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -30,21 +30,21 @@ use serde::{Deserialize, Serialize};
 /// The subject.
 pub(super) struct Pile;
 
-/// Simulated seconds: the boxes lie after two.
+/// Simulated seconds, in full and with `--quick`: the boxes rest after two.
 const SECONDS: [f64; 2] = [5.0, 2.0];
 
-/// Steps a simulated second, of the scene and of the plain world.
+/// Steps per simulated second, of the scene and of the plain world.
 const STEP_HZ: f64 = 240.0;
 
-/// What others need for 1000 boxes in columns at 240 Hz, whole steps a second of CPU time on a core of an AMD EPYC.
+/// Other engines with 1000 boxes in columns at 240 Hz: whole steps per second of CPU time on a core of an AMD EPYC.
 const OTHERS: [(&str, f64); 3] =
     [("MuJoCo 4.0.0, Newton", 277.6), ("MuJoCo 4.0.0, CG", 216.8), ("PyBullet 3.2.7, 50 iterations", 74.0)];
 
-/// Somebody's whole steps.
+/// The step rate of one engine or executor.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(super) struct Row {
     pub who: String,
-    /// Whether it was measured now; else it was measured elsewhere, boxes in columns.
+    /// Whether it was measured in this run; otherwise it was measured elsewhere, with boxes in columns.
     pub here: bool,
     pub boxes: usize,
     pub sim_s: f64,
@@ -52,7 +52,7 @@ pub(super) struct Row {
     pub dropped_s: f64,
     pub cpu_s: f64,
     pub steps_per_cpu_s: f64,
-    /// Of the plain world's, over as many steps.
+    /// Ratio to the plain world's rate over as many steps.
     pub share: f64,
 }
 
@@ -127,13 +127,13 @@ impl Subject for Pile {
     }
 }
 
-/// Steps a second of CPU time over so many first steps of those that `spent` tells of, or over all of them.
+/// Steps per second of CPU time over the first `steps` entries of `spent`, or over all of them where there are fewer.
 fn first_steps_per_s(spent: &[f64], steps: f64) -> f64 {
     let steps = (steps.round() as usize).clamp(1, spent.len().max(1));
     spent.get(steps - 1).map_or(f64::NAN, |cpu_s| steps as f64 / cpu_s)
 }
 
-/// The scene's boxes as agents.
+/// Measures the scene's boxes as agents.
 fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result<Row> {
     let session = Session::open(Scene { executor, ..scene.clone() })?;
     let plan = Headless {
@@ -149,7 +149,7 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
     let boxes = outcome.agents.len();
     let dropped_s = outcome.agents.iter().map(|a| a.stats.dropped.as_secs_f64()).sum::<f64>() / boxes.max(1) as f64;
     let who = format!("agents, {}", executor.name());
-    // the time that its steps have made, however long they were: what it lags behind is not made
+    // the simulated time of the steps made, however long they were: time that agents lag behind is not counted
     let made_s = |s: &AgentStats| {
         let lived_s = if s.steps == 0 { 0.0 } else { s.steps as f64 / s.mean_hz };
         (lived_s - s.dropped.as_secs_f64() - s.late.p50_s).max(0.0)
@@ -159,12 +159,12 @@ fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result
     Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })
 }
 
-/// How the plain world solves.
+/// Solver settings of the plain world.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Settings {
-    /// As rapier3d does where nothing but the size of the bodies is told.
+    /// rapier3d's defaults; only the size of the bodies is set.
     Own,
-    /// As an island of rigid agents does (`agents/src/rigid/island/pile.rs`).
+    /// Those of an island of rigid agents (`agents/src/rigid/island/pile.rs`).
     Island,
 }
 
@@ -191,7 +191,7 @@ impl Settings {
 /// Half the diagonal of a box of the scene, metres.
 const BOX_RADIUS_M: f64 = 0.034_64;
 
-/// The same boxes in one world; what it has used after each step.
+/// Measures the same boxes in one world; `spent` receives the CPU time used after each step.
 fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> anyhow::Result<Row> {
     let mut world = PhysicsWorld { gravity: scene.gravity.as_vec3(), ..PhysicsWorld::default() };
     world.integration_parameters = settings.parameters();

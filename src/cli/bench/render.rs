@@ -1,6 +1,6 @@
-//! `bench render`: what pictures take on this machine's adapter, by triangles, pixels and shading.
+//! `bench render`: the time of a picture on this machine's adapter, by triangles, pixels and shading.
 //!
-//! In: an adapter. Out: rows of wall time a picture, the least of a few drawings. Never here: a fit of prices to them.
+//! In: an adapter. Out: rows of wall time per picture, the least of a few drawings. Never here: a fit of costs to them.
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};

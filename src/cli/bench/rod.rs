@@ -1,6 +1,6 @@
-//! `bench rod`: what a step of a tube costs, by its segments, with and without the search for contact with itself.
+//! `bench rod`: the cost of a tube's step, by number of segments, with and without the search for self-contact.
 //!
-//! In: numbers of segments. Out: rows of CPU time a step. Never here: agents, threads.
+//! In: numbers of segments. Out: rows of CPU time per step. Never here: agents, threads.
 
 use super::super::args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -20,13 +20,13 @@ pub(super) struct Rod;
 
 const SEGMENTS: [usize; 6] = [16, 32, ROD_SEGMENTS, 128, 256, 512];
 
-/// CPU time that each case is given, seconds.
+/// CPU time of each case, in full and with `--quick`, seconds.
 const SPANS_S: [f64; 2] = [2.0, 0.3];
 
 /// The length of a step: 198 Hz.
 const DT: SimSpan = SimSpan::from_nanos(1_000_000_000 / 198);
 
-/// Steps between two looks at the clock.
+/// Steps between two readings of the clock.
 const BATCH: u32 = 20;
 
 /// The cost of one tube's steps.
@@ -88,7 +88,7 @@ impl Subject for Rod {
 
 fn measure((segments, self_contact): (usize, bool), span: Duration) -> anyhow::Result<Row> {
     let mut tube = rod(DVec3::ZERO, segments, self_contact)?;
-    // sizes and caches
+    // fills caches and sizes buffers
     (0..BATCH).try_for_each(|_| step(&mut tube, DT))?;
     let (from, mut steps) = (own_cpu(), 0_u32);
     while own_cpu() - from < span {

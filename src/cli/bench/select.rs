@@ -1,4 +1,4 @@
-//! `bench select`: how long it takes to choose a level for everything that is seen, by policy and number of objects.
+//! `bench select`: the time to choose a level for every visible object, by policy and number of objects.
 //!
 //! In: the experiment of `chart policies --only selection`. Out: its rows in the form of a benchmark. Never here: a policy.
 

@@ -16,7 +16,7 @@ use std::time::Duration;
 /// The subject.
 pub(super) struct Agents;
 
-/// How long each case runs: long enough for a few hundred frames, or only to see that all is well.
+/// How long each case runs: long enough for a few hundred frames, or, with `--quick`, only to see that it works.
 const SPANS: [Duration; 2] = [Duration::from_secs(4), Duration::from_secs(1)];
 
 impl Subject for Agents {
@@ -121,7 +121,7 @@ fn table(rows: &[Row]) -> Table {
     table
 }
 
-/// CPU a step over the number of agents, paced and not, and lateness.
+/// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
 fn drawn(all: &[Row]) -> Figure {
     let of_a_kind = |row: &&Row| row.model == Model::Synthetic && ![1000.0, TENTH_HZ].contains(&row.rate_hz);
     let (free, rows): (Vec<&Row>, Vec<&Row>) = all.iter().filter(of_a_kind).partition(|row| row.rate_hz == UNPACED_HZ);
@@ -156,7 +156,7 @@ fn drawn(all: &[Row]) -> Figure {
     Figure { title: "What being an agent costs".to_owned(), panels, columns: 2 }
 }
 
-/// What a step of each agent costs in all, where they step as fast as they can.
+/// CPU time of a round (one step of every agent), where agents step as fast as they can.
 fn growth(rows: &[&Row]) -> Panel {
     let line = |y: fn(&Row) -> f64| rows.iter().map(|row| (row.agents as f64, y(row) * row.agents as f64)).collect();
     let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));

@@ -32,21 +32,21 @@ pub(super) trait Subject {
     fn figure(rows: &[Self::Row]) -> Figure;
 }
 
-/// Who follows a benchmark: it is told how far that is, and says whether to go on.
+/// Follows a benchmark: receives its progress and says whether to go on.
 pub(super) struct Watch {
     bar: Bar,
     stopped: Arc<AtomicBool>,
 }
 
 impl Watch {
-    /// Tells of a case that is about to be measured: the share that is done, and words beside it. `false`: measure no more.
+    /// Reports a case that is about to be measured: the share that is done, and its description. `false`: measure no more.
     pub(super) fn goes_on(&self, done: f64, words: String) -> bool {
         self.bar.tell(done, words);
         !self.stopped.load(Ordering::Relaxed)
     }
 }
 
-/// Measures a subject, and tells what came out.
+/// Measures a subject, writes its files and prints its rows.
 pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
     let stopped = stopper()?;
     let folder = prepared(&args.out)?;
@@ -93,7 +93,7 @@ fn json<S: Subject>(rows: &[S::Row]) -> anyhow::Result<String> {
     Ok(serde_json::to_string_pretty(&serde_json::json!({ "bench": S::NAME, "rows": rows }))?)
 }
 
-/// The row with percentiles under one name.
+/// The row with each pair of percentiles under one name.
 fn paired(mut row: serde_json::Value) -> serde_json::Value {
     let Some(fields) = row.as_object_mut() else { return row };
     let names: Vec<String> = fields.keys().filter_map(|key| Some(key.strip_suffix("_p50")?.to_owned())).collect();

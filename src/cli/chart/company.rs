@@ -1,6 +1,6 @@
-//! Agents in a run of their own in virtual time: what the program itself does with them, islands included.
+//! Agents in a run of their own in virtual time, by the program's own runtime, islands included.
 //!
-//! In: agents with rates. Out: a run whose turns cost nothing, and its agents' newest states. Never here: what is measured.
+//! In: agents with rates. Out: a run whose steps cost nothing, and its agents' newest states. Never here: measurements.
 
 use crate::runtime::{AgentSpawn, DrawPrice, Lockstep, Machine, Run, RunError, StepPrice};
 use metachron_contact::audit::Member;
@@ -11,7 +11,7 @@ use std::time::Duration;
 /// A run.
 pub(super) struct Company(Lockstep);
 
-/// A machine on which everything is done at once.
+/// A machine on which every step takes no time.
 fn tireless() -> Machine {
     let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
     Machine {
@@ -26,12 +26,12 @@ impl Company {
     /// Begins a run.
     ///
     /// # Errors
-    /// What the runtime refuses.
+    /// The runtime's refusal.
     pub(super) fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
         Ok(Self(Lockstep::start(spawns, tireless())?))
     }
 
-    /// Goes on until all have come to `seconds`.
+    /// Goes on until all agents have reached `seconds`.
     pub(super) fn run_to(&mut self, seconds: f64) {
         self.0.wait_until(Duration::from_secs_f64(seconds));
     }
@@ -41,7 +41,7 @@ impl Company {
         self.0.agents().iter().map(|agent| agent.latest()).collect()
     }
 
-    /// How many steps each has made, and who leads it.
+    /// The number of steps of each agent, and the leader of its island.
     pub(super) fn steps(&self) -> Vec<(u64, Option<AgentId>)> {
         self.0.agents().iter().map(|agent| agent.stats()).map(|stats| (stats.steps, stats.led_by)).collect()
     }

@@ -1,4 +1,4 @@
-//! What an experiment is: cases that are data, and a function from a case to a row.
+//! The form of an experiment: cases that are data, and a function from a case to a row.
 //!
 //! In: whether to be quick. Out: cases, rows, a figure, a table, findings. Never here: files, threads, drawing.
 
@@ -8,25 +8,25 @@ use crate::compositor::PictureFile;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 
-/// One question, asked of many cases.
+/// One measurement, made for many cases.
 pub(in crate::cli) trait Experiment: Sync {
-    /// What tells one row from another: rows of the same case are the same measurement.
+    /// Identifies a row: rows of the same case are the same measurement.
     type Case: PartialEq + Sync;
-    /// A case with what was measured of it; its fields are the columns of the CSV file.
+    /// A case with its measurements; its fields are the columns of the CSV file.
     type Row: Serialize + DeserializeOwned + Clone + Send + Sync;
 
     /// The name that `--only` takes; the files are called after it.
     const NAME: &'static str;
-    /// What it shows, in one sentence.
+    /// One sentence that says what it shows.
     const TITLE: &'static str;
 
-    /// Whether cases are measured one at a time, because they are about the time that this machine takes.
+    /// Whether cases are measured one at a time, because they measure the time of this machine.
     const ALONE: bool = false;
 
     /// The cases in the order of the rows; `quick`: a small part of them, or shorter runs.
     fn cases(quick: bool) -> Vec<Self::Case>;
 
-    /// Measures one case. The same case gives the same row, whoever measures it and when, but for times of this machine.
+    /// Measures one case. The same case gives the same row, whenever and on whichever thread, except for times of this machine.
     fn measure(case: &Self::Case) -> Self::Row;
 
     /// The case that a row is of.
@@ -35,10 +35,10 @@ pub(in crate::cli) trait Experiment: Sync {
     /// The picture of the rows there are.
     fn figure(rows: &[Self::Row]) -> Figure;
 
-    /// Pictures that show more than the figure tells, each with the end of its file's name.
+    /// Further pictures, each with the ending of its file's name.
     ///
     /// # Errors
-    /// What cannot be drawn.
+    /// A picture that cannot be drawn.
     fn pictures(_: &[Self::Row]) -> anyhow::Result<Vec<(String, PictureFile)>> {
         Ok(Vec::new())
     }
@@ -46,11 +46,11 @@ pub(in crate::cli) trait Experiment: Sync {
     /// The table that is printed.
     fn table(rows: &[Self::Row]) -> Table;
 
-    /// What was claimed, and what came out.
+    /// The claims and their measured values.
     fn findings(rows: &[Self::Row]) -> Vec<Finding>;
 }
 
-/// A claim held against the rows.
+/// A claim compared with the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub(in crate::cli) struct Finding {
     /// The claim, as a sentence with its limit.
@@ -59,17 +59,17 @@ pub(in crate::cli) struct Finding {
     pub(super) measured: f64,
     /// The limit.
     pub(super) limit: f64,
-    /// Whether the claim holds; `None` where the rows that would tell were not measured.
+    /// Whether the claim holds; `None` where the rows that it needs were not measured.
     pub(super) holds: Option<bool>,
 }
 
 impl Finding {
-    /// Holds where `measured` is at most `limit`; a number that is none holds nothing.
+    /// Holds where `measured` is at most `limit`; does not hold for NaN.
     pub(super) fn at_most(claim: impl Into<String>, measured: f64, limit: f64) -> Self {
         Self { claim: claim.into(), measured, limit, holds: Some(measured <= limit) }
     }
 
-    /// The same of `rows` rows that are not all: what needs others is not measured, and neither kept nor broken.
+    /// The same for an incomplete set of `rows` rows: a claim that needs missing rows neither holds nor fails.
     pub(super) fn unfinished(self, rows: usize) -> Self {
         let measured = rows > 0 && !self.measured.is_nan();
         Self { holds: self.holds.filter(|_| measured), ..self }

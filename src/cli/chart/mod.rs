@@ -39,7 +39,7 @@ use table::{Cell, Table};
 pub(super) use experiment::Experiment;
 pub(super) use policies::selection::Selection;
 
-/// What a command's experiments share.
+/// Settings that the experiments of a command share.
 struct Setting<'a> {
     subject: &'static str,
     folder: &'a Path,
@@ -48,7 +48,7 @@ struct Setting<'a> {
     stopped: &'a AtomicBool,
 }
 
-/// What an experiment came to.
+/// The result of an experiment.
 #[derive(Serialize)]
 struct Done {
     name: &'static str,
@@ -145,7 +145,7 @@ pub(super) fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
         _ => return Err(BadInput("--live is for policies: nothing else is drawn".to_owned()).into()),
     };
     if args.live {
-        // better known before the first experiment than by its rows
+        // fails here rather than in the rows of the first experiment
         Gpu::headless()?;
     }
     let chosen = chosen(all, &args.only)?;
@@ -189,7 +189,7 @@ fn unknown(all: &[Entry], name: &str) -> anyhow::Error {
     BadInput(format!("there is no experiment `{name}`{hint} (there are: {})", names.join(", "))).into()
 }
 
-/// The folder, made and tried: better known before an hour's work than after.
+/// Creates the folder and checks that it can be written: before an hour's work rather than after.
 pub(super) fn prepared(folder: &Path) -> anyhow::Result<&Path> {
     let refused = |why: std::io::Error| BadInput(format!("the folder {} cannot be written: {why}", folder.display()));
     std::fs::create_dir_all(folder).map_err(refused)?;
@@ -198,7 +198,7 @@ pub(super) fn prepared(folder: &Path) -> anyhow::Result<&Path> {
     Ok(folder)
 }
 
-/// A flag that Ctrl-C raises; pressed again, the program ends at once.
+/// A flag that Ctrl-C sets; pressed again, it ends the program immediately.
 pub(super) fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
     let (stopped, presses) = (Arc::new(AtomicBool::new(false)), AtomicU32::new(0));
     let flag = Arc::clone(&stopped);
@@ -240,7 +240,7 @@ fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
     })
 }
 
-/// What must be the same for rows to be taken up: the experiment, its extent, and the program that measured them.
+/// Identifies rows that may be reused: the experiment, its extent, and the program that measured them.
 fn settings<E: Experiment>(quick: bool) -> String {
     let built = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
     format!("{} quick={quick} version={} built={:?}\n", E::NAME, env!("CARGO_PKG_VERSION"), built.ok())
@@ -257,7 +257,7 @@ fn drawn<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::R
     Ok(paths)
 }
 
-/// Writes the pictures beside the figure.
+/// Writes the pictures next to the figure.
 fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<Vec<PathBuf>> {
     let write = |(name, picture): (String, PictureFile)| {
         let path = folder.join(format!("{stem}-{name}.png"));

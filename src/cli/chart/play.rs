@@ -1,7 +1,7 @@
-//! A stage whose energy is known: agents, their springs, and the sums over them.
+//! A stage with energy sums: agents, their springs, and the sums over them.
 //!
-//! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent tells it at its
-//! own time, and energy and momentum at a common time. Never here: which bodies, what is claimed of them.
+//! In: bodies and tubes with rates, springs from fixed points, links between them. Out: energy as each agent reports it at its
+//! own time, and energy and momentum at a common time. Never here: which bodies, which claims.
 
 use super::stage::{Faults, Stage};
 use glam::DVec3;
@@ -16,7 +16,7 @@ use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::Tube;
 use metachron_models::rod::TubeSpec;
 
-/// Agents, and what is needed to sum over them.
+/// Agents, and the data for sums over them.
 pub(super) struct Play {
     /// The agents.
     pub(super) stage: Stage,
@@ -24,16 +24,16 @@ pub(super) struct Play {
     links: Vec<(AgentId, Link)>,
 }
 
-/// What the energy of one agent hangs on.
+/// The terms of one agent's energy.
 struct Solid {
-    /// Zero for a tube, which tells all of its energy itself.
+    /// Zero for a tube, which reports all of its energy itself.
     mass_kg: f64,
     gravity: DVec3,
     springs: Vec<Pull>,
 }
 
 impl Play {
-    /// Nobody yet; all pairs touch by `law`.
+    /// An empty stage; all pairs touch by `law`.
     pub(super) fn new(law: Law, faults: Faults) -> Self {
         Self { stage: Stage::new(law, faults), solids: Vec::new(), links: Vec::new() }
     }
@@ -56,13 +56,13 @@ impl Play {
         Some(id)
     }
 
-    /// Ties `of` to another agent; both know it.
+    /// Links `of` to another agent; both have the link.
     pub(super) fn link(&mut self, of: AgentId, link: Link) {
         self.stage.link(of, link);
         self.links.push((of, link));
     }
 
-    /// Plays up to `seconds`, and looks after every step: who stepped; `false` ends it. What an agent refuses ends it too.
+    /// Plays up to `seconds` and calls `look` with the agent after every step; `false` ends the run, and so does a failed step.
     pub(super) fn run(mut self, seconds: f64, mut look: impl FnMut(&Self, AgentId) -> bool) -> Self {
         self.stage.look();
         while let Some(who) = self.stage.next(seconds) {
@@ -79,7 +79,7 @@ impl Play {
         times.min().unwrap_or(SimTime::ZERO)
     }
 
-    /// Energy as every agent tells it at its own time, simply added, joules.
+    /// Sum of the energies that agents report, each at its own time, joules.
     pub(super) fn raw_j(&self) -> f64 {
         let own = |id: u32| self.stage.own(AgentId(id));
         let one = |(id, solid): (u32, &Solid)| {
@@ -93,7 +93,7 @@ impl Play {
         (0..).zip(&self.solids).map(one).sum::<f64>() + self.links_j(|id, anchor| own(id.0).body.point(anchor))
     }
 
-    /// Energy and momentum at the time `at`, every impulse that was given delivered.
+    /// Energy and momentum at the time `at`, with every given impulse delivered.
     pub(super) fn common(&self, at: SimTime) -> Audit {
         let members = self.stage.members();
         let mut sum = audit(&members, at, &mut |id, state| {
@@ -110,7 +110,7 @@ impl Play {
         sum
     }
 
-    /// A rigid body at the time `at`, every impulse that it was given delivered.
+    /// A rigid body at the time `at`, with every impulse given to it delivered.
     pub(super) fn body(&self, id: AgentId, at: SimTime) -> Option<RigidState> {
         let members = self.stage.members();
         settled(members.get(id.0 as usize)?, &members, at)
@@ -126,7 +126,7 @@ impl Play {
         found.map_or(0.0, |(_, gap_m)| -gap_m)
     }
 
-    /// The linear impulse that others have given `id` and it has not taken, N·s.
+    /// The linear impulse that other agents have given `id` and that it has not yet taken, N·s.
     pub(super) fn in_flight(&self, id: AgentId) -> DVec3 {
         let members = self.stage.members();
         let mut sum = DVec3::ZERO;
@@ -155,13 +155,13 @@ fn springs_j(springs: &[Pull], state: &RigidState) -> f64 {
     springs.iter().map(one).sum()
 }
 
-/// What a contact has given a rigid body step by step: the change of its momentum, less gravity's and its springs' part.
+/// The impulse of contacts on a rigid body, step by step: the change of its momentum minus the parts of gravity and its springs.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Given {
     momentum: Option<DVec3>,
-    /// All of it, N·s.
+    /// The sum, N·s.
     pub(super) sum: DVec3,
-    /// Its magnitudes added, N·s.
+    /// Sum of the magnitudes, N·s.
     pub(super) size: f64,
 }
 

@@ -1,9 +1,9 @@
-//! By which power of one quantity another one grows or falls.
+//! The power of one quantity with which another one grows or falls.
 //!
 //! In: pairs of numbers above zero. Out: an exponent. Never here: what was measured.
 
-/// The exponent of the power law y ~ xᵖ that is nearest to the points, by least squares in logarithms; what is not a number
-/// above zero is left out; none of fewer than two places.
+/// The exponent of the power law y ~ xᵖ closest to the points, by least squares in logarithms; pairs that are not finite and
+/// above zero are left out; `None` for fewer than two different x.
 pub(in crate::cli) fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> = points
         .iter()

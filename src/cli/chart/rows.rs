@@ -1,7 +1,7 @@
-//! The CSV file of an experiment, which grows row by row and can be taken up again.
+//! The CSV file of an experiment, which grows row by row and can be continued after an interruption.
 //!
-//! In: rows as they come. Out: a file that holds every finished row at any moment, in the order of the cases once all are
-//! there. While rows are missing a mark stands beside it: the settings it is made with. Never here: what a row means.
+//! In: rows as they come. Out: a file that contains every finished row at any moment, in the order of the cases once it is
+//! complete. While rows are missing, a mark file next to it holds the settings of the run. Never here: what a row means.
 
 use super::experiment::Experiment;
 use anyhow::Context;
@@ -19,7 +19,7 @@ impl RowFile {
     /// Opens the file of `E` in `folder` and returns the rows that an interrupted run of the same settings left there.
     ///
     /// # Errors
-    /// What the file system refuses.
+    /// Errors of the file system.
     pub(super) fn open<E: Experiment>(
         folder: &Path,
         stem: &str,
@@ -32,25 +32,25 @@ impl RowFile {
         replace::<E>(&path, &kept)?;
         let file = OpenOptions::new().append(true).open(&path);
         let file = file.with_context(|| format!("{} cannot be written", path.display()))?;
-        // the names of the columns come with the first row
+        // the column names are written with the first row
         let out = csv::WriterBuilder::new().has_headers(kept.is_empty()).from_writer(file);
         fs::write(&mark, settings).with_context(|| format!("{} cannot be written", mark.display()))?;
         Ok((Self { path, mark, out }, kept))
     }
 
-    /// Adds a row; it is in the file when this returns.
+    /// Adds a row; it is on file when this returns.
     ///
     /// # Errors
-    /// What the file system refuses.
+    /// Errors of the file system.
     pub(super) fn add<E: Experiment>(&mut self, row: &E::Row) -> anyhow::Result<()> {
         let written = self.out.serialize(row).map_err(anyhow::Error::from).and_then(|()| Ok(self.out.flush()?));
         written.with_context(|| format!("{} cannot be written", self.path.display()))
     }
 
-    /// All rows are there: writes them once more, in order, and takes the mark away.
+    /// Completes the file: writes all rows again, in order, and removes the mark.
     ///
     /// # Errors
-    /// What the file system refuses.
+    /// Errors of the file system.
     pub(super) fn finish<E: Experiment>(self, rows: &[E::Row]) -> anyhow::Result<()> {
         drop(self.out);
         replace::<E>(&self.path, rows)?;
@@ -58,7 +58,7 @@ impl RowFile {
     }
 }
 
-/// Writes rows beside the file and moves them over it: there is no moment without the finished rows.
+/// Writes rows to a second file and renames it over the first: at no moment are finished rows missing.
 fn replace<E: Experiment>(path: &Path, rows: &[E::Row]) -> anyhow::Result<()> {
     let beside = path.with_extension("csv.new");
     let write = || -> anyhow::Result<()> {
@@ -70,7 +70,7 @@ fn replace<E: Experiment>(path: &Path, rows: &[E::Row]) -> anyhow::Result<()> {
     write().with_context(|| format!("{} cannot be written", path.display()))
 }
 
-/// The rows of a file that are of these cases, one a case; a last line that was cut off is none.
+/// The rows of a file that belong to these cases, one per case; a last line that was cut off is skipped.
 fn read<E: Experiment>(path: &Path, cases: &[E::Case]) -> Vec<E::Row> {
     let Ok(mut file) = csv::Reader::from_path(path) else { return Vec::new() };
     let mut seen: Vec<E::Case> = Vec::new();

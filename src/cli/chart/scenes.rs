@@ -1,6 +1,6 @@
-//! Small scenes of two clocks that several experiments ask the same of.
+//! Small scenes with two clocks, shared by several experiments.
 //!
-//! In: the rates of the two. Out: agents that touch. Never here: what is measured.
+//! In: the two rates. Out: agents in contact. Never here: measurements.
 
 use super::play::Play;
 use super::stability::common::{GRAVITY, plain_body, plain_tube};
@@ -13,12 +13,12 @@ use metachron_geometry::{Obstacle, Solid};
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::TubeSpec;
 
-/// A scene of two kinds of agents: the first keep one rate, the others the second.
+/// A scene of two kinds of agents: the first kind has one rate, the second the other.
 pub(super) struct Scene {
     pub(super) play: Play,
     /// Points that are followed.
     pub(super) points: Vec<(AgentId, Anchor)>,
-    /// The energy of the scene where everything lies as low as it can, joules: energies are told above this.
+    /// The energy of the scene in its lowest state, joules: energies are reported above this.
     pub(super) zero_j: f64,
 }
 
@@ -27,7 +27,7 @@ pub(super) const WITH_TUBES: [&str; 3] = ["tube-on-bar", "gripper", "crossing"];
 
 const TUBE_RADIUS_M: f64 = 0.015;
 
-/// The scene of that name.
+/// The scene with a name.
 pub(super) fn scene(name: &str, rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
     match name {
         "tube-on-bar" => tube_on_bar(rates_hz, faults),
@@ -54,12 +54,12 @@ fn floor() -> Obstacle {
     }
 }
 
-/// A soft tube of half a metre, half its mass damped away every tenth of a second.
+/// A soft tube along `path_m` under gravity, with friction and a damping of 2/s.
 fn tube(path_m: Vec<DVec3>) -> TubeSpec {
     TubeSpec { gravity: gravity(), friction: 0.5, damping_per_s: 2.0, ..plain_tube(path_m, TUBE_RADIUS_M, 20) }
 }
 
-/// A tube falls a centimetre across a bar that stands free on the floor, and bends over it.
+/// A tube falls a centimetre onto a bar that rests freely on the floor, and bends over it.
 fn tube_on_bar([tube_hz, bar_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     let mut play = Play::new(Law::Ledger, faults);
     let half = DVec3::new(0.04, 0.15, 0.1);
@@ -113,7 +113,7 @@ fn gripper([tube_hz, finger_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     Some(Scene { play, points, zero_j })
 }
 
-/// A tube that is held at one end swings down two centimetres on another that is held at both.
+/// A tube clamped at one end swings down two centimetres onto another that is clamped at both.
 fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     let mut play = Play::new(Law::Ledger, faults);
     let half = 0.2;
@@ -128,7 +128,7 @@ fn crossing([lower_hz, upper_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     Some(Scene { play, points, zero_j })
 }
 
-/// A ball falls a centimetre on a box that stands free on the floor, and stays there.
+/// A ball falls a centimetre onto a box that rests freely on the floor, and stays there.
 fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     let mut play = Play::new(Law::Ledger, faults);
     let (half, radius_m, fall_m) = (0.1, 0.05, 0.01);
@@ -144,7 +144,7 @@ fn ball_on_box([ball_hz, box_hz]: [f64; 2], faults: Faults) -> Option<Scene> {
     Some(Scene { play, points, zero_j })
 }
 
-/// Two balls meet off their centres, with friction.
+/// Two balls collide off-centre, with friction.
 fn oblique_blow(rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
     let mut play = Play::new(Law::Ledger, faults);
     let ball = |at: DVec3, velocity: DVec3, mass: f64| RigidSpec {
@@ -159,7 +159,7 @@ fn oblique_blow(rates_hz: [f64; 2], faults: Faults) -> Option<Scene> {
     Some(Scene { play, points, zero_j: 0.0 })
 }
 
-/// What so much of the tube weighs, newtons.
+/// Weight of so much of the tube, newtons.
 fn weight_n(length_m: f64) -> f64 {
     plain_tube(vec![DVec3::ZERO, DVec3::X], TUBE_RADIUS_M, 2).mass_per_length_kg_m * length_m * GRAVITY
 }

@@ -1,8 +1,8 @@
-//! Agents in turn, without a runtime: so that a law of coupling is measured alone, without islands and without threads.
+//! Agents stepped in turn without a runtime: a coupling law is measured alone, without islands and without threads.
 //!
-//! In: agents, their rates, laws, springs and faults. Out: what each published last, and sums at a common time. Whoever's time
-//! is earliest steps next, of equals the lower number; what it publishes is seen at once, stamped with the end of its step, as
-//! in a run whose turns cost nothing, or when that time has come. Never here: what is measured of it.
+//! In: agents, their rates, laws, springs and faults. Out: the last published state of each, and sums at a common time. The agent
+//! with the earliest time steps next, among equals the lower number; its state is visible immediately, stamped with the end of
+//! its step, as in a run whose steps cost nothing, or only when that time has come. Never here: measurements.
 
 use metachron_contact::audit::Member;
 use metachron_contact::{Agent, Neighbour, Pull, Surroundings};
@@ -11,16 +11,16 @@ use metachron_core::{AgentId, SimSpan, SimTime, Snapshot, StepError};
 use metachron_geometry::Form;
 use std::sync::Arc;
 
-/// What goes wrong on purpose.
+/// Deliberate faults.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Faults {
     /// Each step is longer or shorter by up to this share.
     pub(super) jitter: f64,
-    /// The share of states that nobody ever sees.
+    /// The share of states that never become visible.
     pub(super) loss: f64,
     /// Equal seeds disturb equally.
     pub(super) seed: u64,
-    /// Whether a state is seen only when its time has come: as where a turn takes as long as the step that it makes.
+    /// Whether a state becomes visible only when its time has come: as where a step takes as long as the time that it covers.
     pub(super) due: bool,
 }
 
@@ -32,14 +32,14 @@ pub(super) struct Stage {
     noise: u64,
 }
 
-/// One of them.
+/// An agent on the stage.
 struct Actor {
     agent: Box<dyn Agent>,
     form: Option<Arc<Form>>,
     rate_hz: f64,
-    /// What it is, seen by others or not.
+    /// Its newest state, visible to others or not.
     own: Snapshot,
-    /// What others see, and what they saw before.
+    /// The state visible to others, and the one visible before.
     shown: [Arc<Snapshot>; 2],
     /// Springs from fixed points.
     hands: Vec<Pull>,
@@ -56,7 +56,7 @@ impl Stage {
         Self { actors: Vec::new(), law, faults, noise: faults.seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) | 1 }
     }
 
-    /// Adds an agent that steps `rate_hz` times a second; `weight`: of a tube its mass per length and rotary inertia.
+    /// Adds an agent that steps `rate_hz` times a second; `weight`: for a tube its mass per length and rotary inertia.
     pub(super) fn add(&mut self, agent: Box<dyn Agent>, rate_hz: f64, weight: [f64; 2]) -> AgentId {
         let mut own = Snapshot::default();
         agent.write_snapshot(&mut own);
@@ -76,22 +76,22 @@ impl Stage {
         AgentId(self.actors.len() as u32 - 1)
     }
 
-    /// Lets fixed springs pull at an agent.
+    /// Attaches fixed springs to an agent.
     pub(super) fn hold(&mut self, id: AgentId, hands: Vec<Pull>) {
         self.actors[id.0 as usize].hands = hands;
     }
 
-    /// An agent's own newest state, seen by others or not.
+    /// An agent's own newest state, visible to others or not.
     pub(super) fn own(&self, id: AgentId) -> &Snapshot {
         &self.actors[id.0 as usize].own
     }
 
-    /// How long an agent's last step was, seconds.
+    /// Length of an agent's last step, seconds.
     pub(super) fn last_s(&self, id: AgentId) -> f64 {
         self.actors[id.0 as usize].last_s
     }
 
-    /// Ties `of` to the link's other end; both know it.
+    /// Links `of` to the link's other end; both agents have the link.
     pub(super) fn link(&mut self, of: AgentId, link: Link) {
         self.actors[of.0 as usize].links.push(link);
         let back = Link { other: of, here: link.there, there: link.here, ..link };
@@ -103,7 +103,7 @@ impl Stage {
         self.actors[id.0 as usize].form.as_ref()
     }
 
-    /// Everybody's newest own states, for an audit.
+    /// The newest own states of all agents, for an audit.
     pub(super) fn members(&self) -> Vec<Member<'_>> {
         let all = (0..).map(AgentId).zip(&self.actors);
         all.map(|(id, actor)| Member {
@@ -115,13 +115,13 @@ impl Stage {
         .collect()
     }
 
-    /// Who steps next; `None` where everybody has come to `seconds`.
+    /// The agent that steps next; `None` where all have reached `seconds`.
     pub(super) fn next(&self, seconds: f64) -> Option<AgentId> {
         let first = (0..).zip(&self.actors).min_by_key(|(id, actor)| (actor.own.time, *id));
         first.filter(|(_, actor)| actor.own.time.as_secs_f64() < seconds).map(|(id, _)| AgentId(id))
     }
 
-    /// Everybody looks around before the first step.
+    /// Lets every agent look around before the first step.
     pub(super) fn look(&mut self) {
         for i in 0..self.actors.len() {
             let me = AgentId(i as u32);
@@ -139,7 +139,7 @@ impl Stage {
     /// Makes a step of an agent.
     ///
     /// # Errors
-    /// What the agent refuses.
+    /// A step that the agent refuses.
     pub(super) fn step(&mut self, me: AgentId) -> Result<(), StepError> {
         let i = me.0 as usize;
         let stretch = 1.0 + self.faults.jitter * (2.0 * self.random() - 1.0);
@@ -162,12 +162,12 @@ impl Stage {
         Ok(())
     }
 
-    /// How one agent sees all others.
+    /// All other agents as neighbours of one.
     fn sights(&self, me: usize) -> Vec<Neighbour> {
         (0..self.actors.len()).filter(|&other| other != me).map(|other| self.sight(me, other)).collect()
     }
 
-    /// How one agent sees another.
+    /// Another agent as a neighbour of one.
     fn sight(&self, me: usize, other: usize) -> Neighbour {
         let standing = |i: usize| {
             let actor = &self.actors[i];

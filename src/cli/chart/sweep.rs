@@ -1,7 +1,7 @@
-//! Measures the cases of an experiment, on all cores where they are not about time.
+//! Measures the cases of an experiment, on all cores unless they measure time.
 //!
-//! In: cases, rows that are there already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
-//! as it is measured. Which core measures which case is chance; what comes out is not. Never here: what is measured.
+//! In: cases, rows that exist already, a flag that stops it. Out: rows in the order of the cases, each in the file as soon
+//! as it is measured. The core that measures a case is left to chance; the rows do not depend on it. Never here: measurements.
 
 use super::experiment::Experiment;
 use super::rows::RowFile;
@@ -11,19 +11,19 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc;
 use std::thread;
 
-/// What a sweep left.
+/// The result of a sweep.
 pub(super) struct Swept<R> {
-    /// The rows there are, in the order of the cases.
+    /// The rows so far, in the order of the cases.
     pub(super) rows: Vec<R>,
     /// Whether all cases were measured.
     pub(super) complete: bool,
 }
 
-/// Measures every case of `E` that `kept` has no row of; `stopped` ends it after the rows in hand; `told` hears of every
-/// row: how many are done, out of how many.
+/// Measures every case of `E` without a row in `kept`; `stopped` ends it after the rows in progress; `told` is called for every
+/// row with the number of rows done and of all rows.
 ///
 /// # Errors
-/// What the file system refuses; a case that panicked.
+/// Errors of the file system; a case that panicked.
 pub(super) fn sweep<E: Experiment>(
     cases: &[E::Case],
     (mut file, kept): (RowFile, Vec<E::Row>),

@@ -1,24 +1,24 @@
-//! A table for people and for programs: columns, and cells that are words or numbers.
+//! A table for people and for programs: columns, and cells of text or numbers.
 //!
 //! In: cells. Out: aligned text, or JSON. Never here: where it is printed.
 
 use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
-/// What stands in a cell.
+/// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::cli) enum Cell {
-    /// Words.
+    /// Text.
     Text(String),
-    /// A number, and how many digits after the point people see.
+    /// A number, and its digits after the point in text.
     Number(f64, usize),
 }
 
-/// Rows of cells under names.
+/// Rows of cells under column names.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::cli) struct Table {
     /// The names of the columns; keys in JSON.
     pub(in crate::cli) columns: Vec<String>,
-    /// As many cells a row as there are columns.
+    /// Each row has as many cells as there are columns.
     pub(in crate::cli) rows: Vec<Vec<Cell>>,
 }
 
@@ -57,8 +57,8 @@ impl Cell {
     }
 }
 
-/// A number as people read it: what is too large or too small for `digits` after the point is written as a power of ten, what is
-/// no number as a dash.
+/// A number as text: a value too large or too small for `digits` after the point is written as a power of ten, NaN
+/// as a dash.
 fn readable(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "–".to_owned();

@@ -1,4 +1,4 @@
-//! What a call costs at least, what nothing that touches the same memory can be faster than, and how fast the machine is.
+//! The least cost of a call, a lower bound for calls that touch the same memory, and the speed of the machine.
 //!
 //! In: a call, or a number of bytes. Out: CPU time. Never here: what the call does.
 
@@ -6,12 +6,12 @@ use cpu_time::ThreadTime;
 use std::hint::black_box;
 use std::time::Duration;
 
-/// A batch lasts about so long: far above what looking at the clock takes.
+/// Duration of a batch: far above the cost of reading the clock.
 const BATCH: Duration = Duration::from_micros(500);
 
-/// CPU time of one call in the fastest of many batches, over about `span`, microseconds; none where a call fails.
+/// CPU time of one call in the fastest of many batches, over about `span`, microseconds; `None` where a call fails.
 ///
-/// What a shared machine adds is never negative, so the least is nearest to the call's own.
+/// Load of a shared machine only adds time, so the least is closest to the call's own.
 pub(in super::super) fn least_us(span: Duration, mut call: impl FnMut() -> Option<()>) -> Option<f64> {
     let start = ThreadTime::now();
     call()?;
@@ -39,11 +39,11 @@ pub(in super::super) fn floor_us(bytes: usize, span: Duration) -> Option<f64> {
     })
 }
 
-/// What [`calibration_us`] is on the machine for which goals were set, two cores of a virtual AMD EPYC, microseconds.
+/// [`calibration_us`] on the machine for which goals were set, two cores of a virtual AMD EPYC, microseconds.
 const GOALS_US: f64 = 0.88;
 
-/// CPU time of a thousand multiplications and additions that wait for each other, microseconds: a clock for whatever is measured
-/// beside it.
+/// CPU time of a thousand dependent multiplications and additions, microseconds: a reference for the speed of the machine at the
+/// time of a measurement.
 pub(in super::super) fn calibration_us() -> Option<f64> {
     const SPAN: Duration = Duration::from_millis(2);
     let mut x = 1_u64;
@@ -55,8 +55,8 @@ pub(in super::super) fn calibration_us() -> Option<f64> {
     })
 }
 
-/// By what times are multiplied to be those of the machine for which goals were set: by the least of the calibrations measured beside
-/// them, as what a shared machine adds is never negative. NaN where there is none.
+/// Factor that scales times to the machine for which goals were set: by the least of the calibrations measured with them, because load
+/// of a shared machine only adds time. NaN where there is none.
 pub(in super::super) fn pace_for_goals(calibrations_us: impl Iterator<Item = Option<f64>>) -> f64 {
     GOALS_US / calibrations_us.flatten().reduce(f64::min).unwrap_or(f64::NAN)
 }

@@ -1,15 +1,15 @@
-//! Why a tolerance cannot be met: the best that was reached, and what keeps it from being better.
+//! Explains why a tolerance cannot be met: the best error reached, and its limit.
 //!
-//! In: the finest settings that were tried. Out: a sentence. Never here: the search.
+//! In: the finest settings tried. Out: a sentence. Never here: the search.
 
 use super::length;
 use super::task::Task;
 use crate::fit::{Converged, Setting};
 
-/// An error that falls below this share of itself has found what limits it.
+/// A refinement that lowers the error below this share of itself addresses its limit.
 const FALLS: f64 = 0.8;
 
-/// One sentence on the best reached and what limits it, for a tolerance and the least error of all runs, metres.
+/// One sentence on the best error reached and its limit, for a tolerance and the least error of all runs, metres.
 pub(super) fn told(task: &mut Task<'_>, answer: &Converged, (tolerance_m, best_m): (f64, f64)) -> String {
     let said =
         format!("{} cannot be held: the best reached is {}", length(tolerance_m), length(best_m + answer.error_m));
@@ -37,7 +37,7 @@ pub(super) fn told(task: &mut Task<'_>, answer: &Converged, (tolerance_m, best_m
     format!("{said}; what limits it are {what} than {}", describe(&fine))
 }
 
-/// The finest of all settings, in words.
+/// The finest of all settings, as text.
 fn describe(settings: &[Setting]) -> String {
     let dt_s = settings.iter().map(|setting| setting.dt_s).fold(f64::INFINITY, f64::min);
     let pieces = settings.iter().map(|setting| setting.pieces).max().unwrap_or(0);

@@ -1,7 +1,7 @@
-//! `fit`: the cheapest steps, divisions and integrators with which a scene's points stay where its converged answer has them.
+//! `fit`: the cheapest steps, divisions and integrators that keep a scene's points within a tolerance of its converged answer.
 //!
-//! In: a scene, a tolerance. Out: a table of what is paid and what is needed, words on what a simpler model would do, and with
-//! `--write` the scene. Never here: how a search goes ([`crate::fit`]), how a scene is played ([`crate::frame`]).
+//! In: a scene, a tolerance. Out: a table of present and needed costs, notes on simpler models, and with `--write` the scene.
+//! Never here: the search itself ([`crate::fit`]), how a scene is played ([`crate::frame`]).
 
 mod limits;
 mod objects;
@@ -25,24 +25,24 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use task::Task;
 
-/// Step and spacing are halved so often at most for the converged answer.
+/// Greatest number of halvings of step and spacing for the converged answer.
 const LEVELS_MAX: u32 = 4;
-/// Runs that are kept for after the search, and for why there was none: CPU before and after, and what simpler models come to.
+/// Runs reserved for after the search, or for explaining why it failed: CPU before and after, and simpler models.
 const AFTER_SEARCH: u32 = 3;
-/// The converged answer is to be known to this share of the tolerance.
+/// The converged answer must be known to this share of the tolerance.
 const KNOWN: f64 = 0.2;
 
-/// What a fit came to.
+/// The result of a fit.
 struct Fitted {
-    /// What the converged answer is known to, metres.
+    /// Error bound of the converged answer, metres.
     known_m: f64,
-    /// The settings that the scene has, and what they came to.
+    /// The present settings of the scene, and their trial.
     now: (Vec<Setting>, Trial),
-    /// The cheapest that were found to hold.
+    /// The cheapest settings found to hold.
     need: Found,
-    /// Measured CPU of each object, seconds a simulated second: now, and as is needed.
+    /// Measured CPU of each object, seconds per simulated second: with the present and with the needed settings.
     cpu_s: [Vec<f64>; 2],
-    /// What a simpler model would do, object by object.
+    /// The simpler model of each object, where one would do.
     simpler: Vec<Option<Simpler>>,
 }
 
@@ -92,7 +92,7 @@ pub(super) fn command(args: &FitArgs) -> anyhow::Result<Exit> {
     Ok(Exit::Ok)
 }
 
-/// Scenes that come with the program are not files.
+/// Refuses scenes that come with the program, which are not files.
 fn refuse_built_in(name: &str) -> anyhow::Result<()> {
     if builtin::find(name).is_none() {
         return Ok(());
@@ -103,15 +103,15 @@ fn refuse_built_in(name: &str) -> anyhow::Result<()> {
     Err(BadInput(what).into())
 }
 
-/// How a fit ends.
+/// The outcomes of a fit.
 enum Outcome {
     Fitted(Fitted),
-    /// Nothing holds the tolerance: the best reached, and what limits it.
+    /// No settings hold the tolerance: the best reached, and its limit.
     OutOfReach(String),
     Interrupted,
 }
 
-/// Finds the converged answer, what holds, and the cheapest of that.
+/// Finds the converged answer, settings that hold, and the cheapest of these.
 fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     let tolerance_m = args.tolerance;
     let now = task.settings();
@@ -146,18 +146,18 @@ fn fit(task: &mut Task<'_>, args: &FitArgs) -> anyhow::Result<Outcome> {
     Ok(Outcome::Fitted(Fitted { known_m: answer.error_m, now: (now, present), need, cpu_s, simpler }))
 }
 
-/// Why there is no answer, unless the user wanted an end.
+/// The outcome without an answer: the reason, unless the user interrupted.
 fn ended<'a>(task: &mut Task<'a>, told: impl FnOnce(&mut Task<'a>) -> String) -> Outcome {
     if task.is_stopped() { Outcome::Interrupted } else { Outcome::OutOfReach(told(task)) }
 }
 
-/// The runs were over before anything was found.
+/// The outcome where the runs were used up before anything was found.
 fn too_few(task: &mut Task<'_>, args: &FitArgs) -> Outcome {
     let what = "runs are too few to find the converged answer and settings that hold: give more with --runs";
     ended(task, |_| format!("{} {what}", args.runs))
 }
 
-/// The coarsest settings that hold by halving alone: as the scene is, with a method of second order, or ever finer.
+/// The coarsest settings that hold by halving alone: as in the scene, with a method of second order, or ever finer.
 fn start(task: &mut Task<'_>, answer: &Converged, room_m: f64, best: &mut f64) -> Option<(Vec<Setting>, Trial)> {
     for level in 0..=answer.level {
         for second in [false, true] {
@@ -172,7 +172,7 @@ fn start(task: &mut Task<'_>, answer: &Converged, room_m: f64, best: &mut f64) -
     None
 }
 
-/// A length as people say it.
+/// A length with a suitable unit.
 fn length(metres: f64) -> String {
     match metres {
         m if !m.is_finite() => "no".to_owned(),
@@ -183,7 +183,7 @@ fn length(metres: f64) -> String {
     }
 }
 
-/// The objects' names, as a list in words.
+/// The objects' names, as a list in text.
 fn names(objects: &[Object]) -> String {
     objects.iter().map(|object| format!("`{}`", object.name)).collect::<Vec<_>>().join(", ")
 }

@@ -1,6 +1,6 @@
-//! The objects of a scene file and the agents that they are.
+//! The objects of a scene file and their agents.
 //!
-//! In: a scene and its text. Out: every object that moves, with its agents. Never here: what may be chosen for one.
+//! In: a scene and its text. Out: every object that moves, with its agents. Never here: the choices for an object.
 
 use crate::world::{Scene};
 use metachron_core::AgentId;

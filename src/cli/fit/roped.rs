@@ -1,4 +1,4 @@
-//! A tube's table as that of the rope it becomes: of the same course, weight, stiffness and look.
+//! Turns a tube's table into that of a rope with the same course, weight, stiffness and look.
 //!
 //! In: the table, the rope. Out: the table with other keys. Never here: whether a rope would do.
 
@@ -31,10 +31,10 @@ const TUBE_KEYS: [&str; 20] = [
     "pressure_pa",
     "self_contact",
 ];
-/// What a tube looks like where its table does not say.
+/// The look of a tube whose table does not name one.
 const MATERIAL: &str = "tissue";
 
-/// Makes the table of a tube that of the rope `member`; how many keys that changed.
+/// Turns the table of a tube into that of the rope `member`; returns the number of changed keys.
 pub(super) fn put(table: &mut Table, member: &Member) -> usize {
     let Spec::Soft(spec) = &member.spec else { return 0 };
     let SoftShape::Rope { path_m, segments, .. } = &spec.shape else { return 0 };
@@ -60,7 +60,7 @@ pub(super) fn put(table: &mut Table, member: &Member) -> usize {
     changes
 }
 
-/// A coordinate to the nanometre.
+/// A coordinate rounded to the nanometre.
 fn nanometres(metres: f64) -> f64 {
     format!("{metres:.9}").parse().unwrap_or(metres)
 }

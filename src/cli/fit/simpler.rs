@@ -1,6 +1,6 @@
-//! When a simpler model would do.
+//! Finds objects for which a simpler model would do.
 //!
-//! In: a scene at the settings that were found. Out: a word and a sentence for every object that one would do for; tubes that are
+//! In: a scene at the settings found. Out: a word and a sentence for every object for which one would do; tubes that are
 //! cheaper as ropes become ropes. Never here: any other change of the scene.
 
 use super::length;
@@ -9,29 +9,29 @@ use crate::fit::{Choice, Converged, Found, Path, Search, Setting};
 use crate::frame::Played;
 use crate::world::{Spec};
 
-/// What moves by less than this share of the tolerance does not move.
+/// A point that moves by less than this share of the tolerance does not move.
 const STILL: f64 = 0.01;
-/// A rope is tried with the steps of the tube, and with steps so many times shorter.
+/// A rope is tried with the step of the tube divided by each of these.
 const SHORTER: [f64; 3] = [1.0, 2.0, 4.0];
 /// The most pieces of a rope.
 const PIECES_MAX: u32 = 2047;
 
-/// What to say of an object.
+/// The note on an object.
 pub(super) struct Simpler {
-    /// For the table.
+    /// A word for the table.
     pub(super) word: &'static str,
-    /// In full.
+    /// The full sentence.
     pub(super) note: String,
 }
 
-/// A search for ropes: the answer, how far from it points may be, and how many trials there are in all.
+/// Limits of a search for ropes: the answer, the allowed distance of points from it, and the greatest number of trials in all.
 pub(super) struct Limits<'a> {
     pub(super) answer: &'a Converged,
     pub(super) room_m: f64,
     pub(super) trials_max: u32,
 }
 
-/// What a simpler model would do, object by object; `need` is what is needed of the models that are left.
+/// The simpler model of each object, where one would do; `need` is updated where a tube becomes a rope.
 pub(super) fn find(task: &mut Task<'_>, need: &mut Found, limits: &Limits<'_>) -> Vec<Option<Simpler>> {
     let Some(played) = task.play(&need.settings) else { return Vec::new() };
     let plain = |object: usize| {
@@ -55,7 +55,7 @@ fn paths(task: &Task<'_>, played: &Played, object: usize) -> Vec<Path> {
     all.filter(|(point, _)| agents.contains(&point.agent)).map(|(_, path)| path.clone()).collect()
 }
 
-/// What to say of what may not be chosen.
+/// The note on an object whose settings may not be chosen.
 fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
     let tolerance_m = task.member(object).tolerance_m?;
     let (name, held) = (&task.objects[object].name, length(tolerance_m));
@@ -63,7 +63,7 @@ fn own(task: &Task<'_>, object: usize) -> Option<Simpler> {
     Some(Simpler { word: "its own choice", note })
 }
 
-/// What to say of what does not move.
+/// The note on an object that does not move.
 fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
     let paths = paths(task, played, object);
     let still = !paths.is_empty() && paths.iter().all(|path| path.extent_m() <= STILL * room_m);
@@ -75,7 +75,7 @@ fn resting(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> 
     still.then_some(Simpler { word: "fixed: no agent", note })
 }
 
-/// What to say of a body that nothing touches.
+/// The note on a body that nothing touches.
 fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> Option<Simpler> {
     let Spec::Rigid(spec) = &task.member(object).spec else { return None };
     let agents = &task.objects[object].agents;
@@ -89,7 +89,7 @@ fn flying(task: &Task<'_>, played: &Played, (object, room_m): (usize, f64)) -> O
     (!paired && !jointed && flies).then_some(Simpler { word: "flight: no solver", note })
 }
 
-/// Tries a tube as a rope, and makes it one where that is cheaper; what to say where it would do.
+/// Tries a tube as a rope, and keeps the rope where it is cheaper; returns a note where a rope would do.
 fn slack(task: &mut Task<'_>, object: usize, need: &mut Found, limits: &Limits<'_>) -> Option<Simpler> {
     if !matches!(task.member(object).spec, Spec::Tube(_)) || !is_free(task.member(object)) {
         return None;
@@ -118,7 +118,7 @@ fn slack(task: &mut Task<'_>, object: usize, need: &mut Found, limits: &Limits<'
     Some(Simpler { word: "rope", note })
 }
 
-/// The cheapest rope that holds, all else as it is.
+/// The cheapest rope that holds, with all other settings unchanged.
 fn as_rope(task: &mut Task<'_>, object: usize, need: &Found, limits: &Limits<'_>) -> Option<Found> {
     let (mut tried, mut start) = (need.tried, None);
     for shorter in SHORTER {

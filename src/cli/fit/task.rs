@@ -1,6 +1,6 @@
-//! A scene that is played again and again at other settings.
+//! A scene that is played repeatedly at different settings.
 //!
-//! In: settings for every object. Out: how far its points end from the converged answer's, and the costs. Never here: which
+//! In: settings for every object. Out: the distance of its points from the converged answer's, and the costs. Never here: which
 //! settings are tried.
 
 use super::super::args::FitArgs;
@@ -16,40 +16,40 @@ use metachron_models::rod::Integrator;
 use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// No step is longer than this, seconds, nor than a tenth of the run.
+/// Longest step, seconds; at most a tenth of the run as well.
 const DT_MAX_S: f64 = 0.1;
 /// The fewest pieces of a tube or rope, and of a sheet or solid where it has most.
 const PIECES_MIN: [u32; 2] = [4, 2];
-/// The most pieces of a tube, and of a soft body, for the converged answer.
+/// The most pieces of a tube, and of a soft body, in the converged answer.
 const PIECES_MAX: [u32; 2] = [4096, 64];
 
 /// A scene under fit.
 pub(super) struct Task<'a> {
-    /// As it was read.
+    /// The scene as it was read.
     pub(super) first: Scene,
-    /// With the models that were chosen.
+    /// The scene with the models chosen so far.
     pub(super) scene: Scene,
     pub(super) objects: Vec<Object>,
-    /// All points: first those that are held, then some of every other agent, for what is said of it.
+    /// All points: first those held to the tolerance, then some of every other agent, for the notes on it.
     pub(super) points: Vec<Point>,
-    /// How many of them are held.
+    /// Number of points held to the tolerance.
     pub(super) held: usize,
     pub(super) seconds: f64,
     stopped: &'a AtomicBool,
     bar: Option<Bar>,
     pub(super) runs: Cell<u32>,
     runs_max: u32,
-    /// What a solve of every integrator costs beside one of implicit Euler, as measured on this machine.
+    /// Cost of a solve of every integrator relative to implicit Euler, as measured on this machine.
     pub(super) prices: Vec<f64>,
     failed: Option<SessionError>,
     parked: Option<String>,
 }
 
 impl<'a> Task<'a> {
-    /// The scene with the points that are to be held.
+    /// The task of a scene, with the points to be held.
     ///
     /// # Errors
-    /// [`BadInput`] for a scene in which nothing moves, and for a name that nothing has.
+    /// [`BadInput`] for a scene in which nothing moves, and for an unknown name.
     pub(super) fn new(
         args: &FitArgs,
         scene: Scene,
@@ -68,22 +68,22 @@ impl<'a> Task<'a> {
         Ok(Self { first, scene, objects, points, held, seconds, stopped, bar, runs, runs_max, prices, failed, parked })
     }
 
-    /// Takes the progress off the screen.
+    /// Removes the progress bar from the screen.
     pub(super) fn clear_bar(&mut self) {
         self.bar = None;
     }
 
-    /// Whether the user wants an end.
+    /// Whether the user has interrupted.
     pub(super) fn is_stopped(&self) -> bool {
         self.stopped.load(Ordering::Relaxed)
     }
 
-    /// What a model refused, if one did.
+    /// The failure of a model, if there was one.
     pub(super) fn failure(&mut self) -> Result<(), SessionError> {
         self.failed.take().map_or(Ok(()), Err)
     }
 
-    /// Why there is no answer.
+    /// The reason why there is no answer.
     pub(super) fn lost(&self) -> String {
         let why = self.parked.as_deref().unwrap_or("no run came to its end");
         format!("there is no answer to hold it against: {why}")
@@ -94,17 +94,17 @@ impl<'a> Task<'a> {
         &self.scene.agents[self.objects[object].agents[0].0 as usize]
     }
 
-    /// The same as it was read.
+    /// The same in the scene as it was read.
     pub(super) fn first_member(&self, object: usize) -> &Member {
         &self.first.agents[self.objects[object].agents[0].0 as usize]
     }
 
-    /// The settings that the scene has.
+    /// The present settings of the scene.
     pub(super) fn settings(&self) -> Vec<Setting> {
         (0..self.objects.len()).map(|object| setting_of(self.member(object))).collect()
     }
 
-    /// The same with step and spacing halved so often, where they may change; tubes by a rule of second order if `second`.
+    /// The present settings with step and spacing halved `level` times where they may change; tubes by a second-order rule if `second`.
     pub(super) fn refined(&self, level: u32, second: bool) -> Vec<Setting> {
         let finer = f64::from(1_u32 << level);
         let refine = |object: usize| {
@@ -121,7 +121,7 @@ impl<'a> Task<'a> {
         (0..self.objects.len()).map(refine).collect()
     }
 
-    /// The paths of the points that are held, with step and spacing halved so often.
+    /// The paths of the held points, with step and spacing halved `level` times.
     pub(super) fn reference(&mut self, level: u32) -> Option<Vec<Path>> {
         let settings = self.refined(level, true);
         let mut played = self.play(&settings)?;
@@ -133,8 +133,8 @@ impl<'a> Task<'a> {
         Some(played.paths)
     }
 
-    /// What settings come to against the converged answer; `None` where the run was stopped, or only the last run is left, which is
-    /// kept for what is found.
+    /// Error against the converged answer and costs of some settings; `None` where the run was stopped, or only the last run is left,
+    /// which is reserved for the result.
     pub(super) fn attempt(&mut self, settings: &[Setting], answer: &[Path]) -> Option<Trial> {
         if self.left() <= 1 {
             return None;
@@ -147,14 +147,14 @@ impl<'a> Task<'a> {
         Some(Trial { error_m, costs_s })
     }
 
-    /// What a solve of an object costs by a method, beside one of the declared machine.
+    /// Cost of an object's solve by a method, relative to that of the declared machine.
     fn price(&self, object: usize, method: usize) -> f64 {
         let tube = matches!(self.member(object).spec, Spec::Tube(_));
         let price = self.prices.get(method).filter(|price| tube && price.is_finite());
         price.copied().unwrap_or(1.0)
     }
 
-    /// Makes a rope of a tube; `false` where none can be made of it.
+    /// Turns a tube into a rope; `false` where that is impossible.
     pub(super) fn slacken(&mut self, object: usize) -> bool {
         let mut scene = self.scene.clone();
         let can = self.objects[object].agents.iter().all(|agent| slacken(&mut scene, *agent));
@@ -164,7 +164,7 @@ impl<'a> Task<'a> {
         can
     }
 
-    /// Measured CPU of every object, seconds a simulated second.
+    /// Measured CPU of every object, seconds per simulated second.
     pub(super) fn cpu(&mut self, settings: &[Setting]) -> Vec<f64> {
         self.play(settings).map_or_else(|| vec![f64::NAN; self.objects.len()], |played| self.sums(&played.cpu_s))
     }
@@ -180,12 +180,12 @@ impl<'a> Task<'a> {
         scene
     }
 
-    /// How many runs are left.
+    /// Number of runs left.
     pub(super) fn left(&self) -> u32 {
         self.runs_max - self.runs.get()
     }
 
-    /// Plays the scene at these settings to its end; `None` where the user wants an end, no run is left, or it failed.
+    /// Plays the scene at these settings to its end; `None` where the user interrupted, no run is left, or it failed.
     pub(super) fn play(&mut self, settings: &[Setting]) -> Option<Played> {
         if self.left() == 0 {
             return None;
@@ -205,7 +205,7 @@ impl<'a> Task<'a> {
         }
     }
 
-    /// What may be chosen, object by object.
+    /// The choices for every object.
     pub(super) fn choices(&self) -> Vec<Choice> {
         let dt_max_s = DT_MAX_S.min(0.1 * self.seconds);
         let choice = |object: usize| {
@@ -230,13 +230,13 @@ impl<'a> Task<'a> {
     }
 }
 
-/// Whether anything of an agent may be chosen: what has no matter has no answer, and who holds an error chooses by itself.
-/// A tool keeps to its script at any step, but what it holds and pushes is told of it once a step.
+/// Whether settings of an agent may be chosen: a synthetic agent has no answer, and an agent with a tolerance chooses for itself.
+/// A tool follows its script at any step, but the bodies that it grasps and pushes receive its state once per step.
 pub(super) fn is_free(member: &Member) -> bool {
     member.tolerance_m.is_none() && !matches!(member.spec, Spec::Synthetic(_))
 }
 
-/// Points of an agent that say where all of it is.
+/// Points that represent the place of an agent.
 fn points_of(member: &Member) -> Vec<Point> {
     let at: &[f64] = match member.spec {
         Spec::Tube(_) | Spec::Soft(_) => &[0.0, 0.5, 1.0],
@@ -246,7 +246,7 @@ fn points_of(member: &Member) -> Vec<Point> {
     at.iter().map(|at| Point { agent: member.id, at: *at }).collect()
 }
 
-/// The points that are held: the scene's probes, those of one object, or where there are none some of everything.
+/// The points to be held: the scene's probes, those of one object, or where there are none some points of every agent.
 fn held(scene: &Scene, objects: &[Object], wanted: Option<&str>) -> Result<Vec<Point>, BadInput> {
     let own = |agent: AgentId| {
         objects.iter().find(|object| object.agents.contains(&agent)).is_some_and(|object| wanted == Some(&object.name))

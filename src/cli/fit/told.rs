@@ -1,6 +1,6 @@
-//! What `fit` found, as text for people and as JSON for programs.
+//! Formats the result of `fit`, as text for people and as JSON for programs.
 //!
-//! In: settings and costs, now and as they need to be. Out: text. Never here: where it is printed.
+//! In: settings and costs, present and needed. Out: text. Never here: where it is printed.
 
 use super::super::args::FitArgs;
 use super::super::chart::table::{Cell, Table};
@@ -10,7 +10,7 @@ use crate::fit::Setting;
 use metachron_models::rod::Integrator;
 use serde_json::{Value, json};
 
-/// The table, and what it was found on.
+/// The table, and the basis of its results.
 pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
     let columns = ["object", "model", "", "integrator", "dt_ms", "segments", "ms_per_s", "cpu_ms_per_s", "simpler"];
     let mut table = Table::new(&columns);
@@ -60,7 +60,7 @@ fn row(task: &Task<'_>, fitted: &Fitted, (object, which): (usize, usize), head: 
     cells
 }
 
-/// The model that an object has, and the one that is needed.
+/// The present model of an object, and the needed one.
 fn models(task: &Task<'_>, object: usize) -> [&'static str; 2] {
     [task.first_member(object), task.member(object)].map(|member| member.spec.model())
 }
@@ -73,13 +73,13 @@ fn notes(fitted: &Fitted) -> impl Iterator<Item = &str> {
     fitted.simpler.iter().flatten().map(|told| told.note.as_str())
 }
 
-/// What a solve costs by every integrator.
+/// The cost of a solve by every integrator.
 fn prices(task: &Task<'_>) -> String {
     let price = |(integrator, price): (Integrator, &f64)| format!("{} {price:.2}", integrator.name());
     Integrator::ALL.into_iter().zip(&task.prices).map(price).collect::<Vec<_>>().join(", ")
 }
 
-/// An object's setting and cost: now, or as is needed.
+/// An object's setting and cost: present or needed.
 fn picked(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
     match which {
         0 => (fitted.now.0[object], fitted.now.1.costs_s[object]),
@@ -91,7 +91,7 @@ fn method(model: &str, setting: Setting) -> Option<&'static str> {
     (model == "tube").then(|| Integrator::ALL[setting.method].name())
 }
 
-/// The same for programs.
+/// The same as JSON.
 pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bool) -> anyhow::Result<String> {
     let side = |object: usize, which: usize| -> Value {
         let (setting, cost_s) = picked(fitted, object, which);

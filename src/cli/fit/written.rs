@@ -1,6 +1,6 @@
-//! The scene written back with what was found: every other line stays as it was.
+//! Writes the settings found into the scene file; every other line stays as it was.
 //!
-//! In: a scene file and settings. Out: the same file with other steps, segments and integrators. Never here: what they should be.
+//! In: a scene file and settings. Out: the same file with other steps, segments and integrators. Never here: the search for them.
 
 use super::super::output::BadInput;
 use super::objects::{name, tables};
@@ -15,7 +15,7 @@ use metachron_models::rod::Integrator;
 use std::path::Path;
 use toml_edit::{Array, DocumentMut, Item, Table, Value};
 
-/// Writes the settings that are needed into the file; how many keys that changed.
+/// Writes the needed settings into the file; returns the number of changed keys.
 pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Result<usize> {
     let shown = path.display();
     let before = std::fs::read_to_string(path).with_context(|| format!("{shown} cannot be read"))?;
@@ -29,7 +29,7 @@ pub(super) fn write(path: &Path, task: &Task<'_>, fitted: &Fitted) -> anyhow::Re
     Ok(changes)
 }
 
-/// The text with the settings that are needed, and how many keys that changed.
+/// The text with the needed settings, and the number of changed keys.
 fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usize), String> {
     let mut document: DocumentMut = text.parse().map_err(|error| format!("{error}"))?;
     let scene = task.scene_at(&fitted.need.settings);
@@ -49,7 +49,7 @@ fn changed(text: &str, task: &Task<'_>, fitted: &Fitted) -> Result<(String, usiz
     Ok((document.to_string(), changes))
 }
 
-/// Puts a step into an object's table; how many keys that changed.
+/// Puts a step into an object's table; returns the number of changed keys.
 fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
     let mut changes = 0;
     if need.dt_s != now.dt_s {
@@ -65,7 +65,7 @@ fn put_dt(table: &mut Table, (now, need): (&Setting, &Setting)) -> usize {
     changes
 }
 
-/// Puts a division and a method into an object's table; how many keys that changed.
+/// Puts a division and a method into an object's table; returns the number of changed keys.
 fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) -> usize {
     let mut changes = 0;
     if need.pieces != now.pieces {
@@ -77,7 +77,7 @@ fn put(table: &mut Table, member: &Member, (now, need): (&Setting, &Setting)) ->
     changes
 }
 
-/// How a body is divided, as its table says it.
+/// The division of a body, in the form of its table.
 fn segments(member: &Member) -> Value {
     match &member.spec {
         Spec::Tube(tube) => Value::from(tube.segments.unwrap_or(0) as i64),
@@ -88,7 +88,7 @@ fn segments(member: &Member) -> Value {
     }
 }
 
-/// Gives a key its value; what is written around the old one stays.
+/// Sets the value of a key; the text around the old value stays.
 pub(super) fn set(table: &mut Table, key: &str, value: Value) -> usize {
     match table.get_mut(key).and_then(Item::as_value_mut) {
         Some(old) => {
@@ -101,7 +101,7 @@ pub(super) fn set(table: &mut Table, key: &str, value: Value) -> usize {
     1
 }
 
-/// Six digits, so that 0.1 + 0.2 is 0.3.
+/// Rounds to six digits after the point, so that 0.1 + 0.2 is 0.3.
 pub(super) fn tidy(value: f64) -> f64 {
     format!("{value:.6}").parse().unwrap_or(value)
 }

@@ -1,37 +1,37 @@
-//! What a run's choices of levels came to: promises, certificates, unrest, and the time of each stage of a frame.
+//! Summary of a run's choices of levels: predictions, certificates, changes, and the time of each stage of a frame.
 //!
-//! In: one row a frame. Out: shares, errors and spreads. Never here: measuring.
+//! In: one row per frame. Out: shares, errors and spreads. Never here: measuring.
 
 use super::frames::Spread;
 use crate::frame::FrameRecord;
 use serde::Serialize;
 
-/// What the choices of a run's frames say together; `None` in it where there was no frame that says anything of it.
+/// Summary of the choices in a run's frames; a field is `None` where no frame has a value for it.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct ChoiceSummary {
-    /// Mean of the value of a choice over its bound; `None` of a policy without a certificate.
+    /// Mean of the value of a choice over its bound; `None` for a policy without a certificate.
     pub value_over_bound: Option<f64>,
-    /// The certificate: 19 of 20 choices are proven to be worth at least all but this part of the best.
+    /// The certificate: 19 of 20 choices are proven to lack at most this part of the best value.
     pub certificate: Option<f64>,
-    /// Levels that changed, an object and frame in view.
+    /// Levels that changed, per object and frame in view.
     pub level_changes: Option<f64>,
-    /// Levels that changed back within three frames, an object and frame in view.
+    /// Levels that changed back within three frames, per object and frame in view.
     pub reversals: Option<f64>,
-    /// 19 of 20 frames took what was predicted to within this part of it; `None` of a policy that predicts nothing.
+    /// 19 of 20 frames took the predicted time to within this part of it; `None` for a policy without predictions.
     pub model_error: Option<f64>,
-    /// Gathering states and finding what is seen.
+    /// Time for gathering states and finding what is visible.
     pub cull_ms: Option<Spread>,
-    /// Choosing levels.
+    /// Time for choosing levels.
     pub select_ms: Option<Spread>,
-    /// Making the picture and drawing it.
+    /// Time for building the picture and drawing it.
     pub draw_ms: Option<Spread>,
-    /// From where the camera was read to the finished picture.
+    /// From reading the camera to the finished picture.
     pub lag_ms: Option<Spread>,
-    /// Objects in view that were left out for want of time, all frames together.
+    /// Objects in view that were left out for lack of time, over all frames.
     pub holes: Option<u64>,
 }
 
-/// The choices of `frames`.
+/// Summarises the choices of `frames`.
 #[must_use]
 pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
     let spread = |of: fn(&FrameRecord) -> f64| Spread::of(frames.iter().map(of));
@@ -55,7 +55,7 @@ pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
 }
 
 impl ChoiceSummary {
-    /// The same of frames that nothing drew and whose cost nobody declared: what drawing took is not known of them.
+    /// The same for frames that were not drawn and have no declared cost: the fields that need drawing times are `None`.
     #[must_use]
     pub fn undrawn(self) -> Self {
         Self { model_error: None, draw_ms: None, lag_ms: None, ..self }

@@ -1,9 +1,9 @@
-//! Statistics of a run's frames, with the definitions that every policy is compared by.
+//! Statistics of a run's frames, with the definitions by which all policies are compared.
 //!
-//! In: one row a frame and the target. Out: spreads, misses, errors on binding frames, settling. Never here: measuring.
+//! In: one row per frame and the target. Out: spreads, misses, errors on binding frames, settling. Never here: measuring.
 //!
 //! x is a frame's work in units of the target. *Binding* frames are those whose full-detail cost exceeds 1.15 of it:
-//! the others would be on time by themselves and say nothing of a policy.
+//! the others would be on time without any policy and say nothing about one.
 
 use crate::frame::FrameRecord;
 use serde::Serialize;
@@ -14,7 +14,7 @@ const MISS: f64 = 1.05;
 const BINDING: f64 = 1.15;
 /// Frames of the median that has to settle.
 const SETTLE_MEDIAN: usize = 9;
-/// The median must stay this near to the later mean, as a share of it …
+/// The median must stay this close to the later mean, as a share of it …
 const SETTLE_BAND: f64 = 0.06;
 /// … for so many frames.
 const SETTLE_HOLD: usize = 20;
@@ -38,10 +38,10 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// What the frames of a run say together.
+/// Summary of the frames of a run.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct FrameSummary {
-    /// Work of the frames; `None` where none was made, or nothing drew them and their cost was not declared either.
+    /// Work of the frames; `None` where there was no frame, or frames were not drawn and have no declared cost.
     pub frame_ms: Option<Spread>,
     /// The adapter's own time; `None` where it has no time stamps or nothing was drawn.
     pub gpu_ms: Option<Spread>,
@@ -58,7 +58,7 @@ pub struct FrameSummary {
 }
 
 impl Spread {
-    /// The spread of `values`; `None` where there are none. Values that are no numbers are left out.
+    /// The spread of `values`; `None` where there are none. Values that are not finite are left out.
     #[must_use]
     pub fn of(values: impl IntoIterator<Item = f64>) -> Option<Self> {
         let mut sorted: Vec<f64> = values.into_iter().filter(|v| v.is_finite()).collect();
@@ -112,13 +112,13 @@ pub fn summarise(frames: &[FrameRecord], target_ms: f64) -> FrameSummary {
     }
 }
 
-/// The same of `frames` that nothing drew and whose cost nobody declared: only when they came is known of them.
+/// The same for `frames` that were not drawn and have no declared cost: only their intervals are known.
 #[must_use]
 pub fn summarise_undrawn(frames: &[FrameRecord]) -> FrameSummary {
     FrameSummary { interval_ms: Spread::of(frames.iter().map(|row| row.interval_ms)), ..summarise(&[], 1.0) }
 }
 
-/// The first frame after which the running median stays near the later mean.
+/// The first frame after which the running median stays close to the later mean.
 fn settle(x: &[f64]) -> Option<u64> {
     let medians: Vec<f64> = x.windows(SETTLE_MEDIAN).map(median).collect();
     let mut sum = 0.0;

@@ -35,39 +35,39 @@ const OPERATORS: [(&str, Operator); 6] = [
     ("<", Operator::Less),
 ];
 
-/// Why an expression is no goal.
+/// Reasons why an expression is not a goal.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum GoalError {
-    /// There is no operator in it.
+    /// There is no operator.
     #[error(
         "`{0}` is no condition; expected FIELD OPERATOR NUMBER, such as missed_share>0.01 (operators: > >= < <= == !=)"
     )]
     NoOperator(String),
-    /// What it compares with is no number.
+    /// The limit is not a number.
     #[error("`{0}` is no number to compare with")]
     NoNumber(String),
     /// The report has no such field.
     #[error("the report has no field `{path}`{hint}; fields here: {known}")]
     UnknownField {
-        /// The path as it was given.
+        /// The given path.
         path: String,
         /// A suggestion, or nothing.
         hint: String,
-        /// What there is instead.
+        /// The fields that exist there.
         known: String,
     },
-    /// The field is there and is no number.
+    /// The field exists but is not a number.
     #[error("the field `{0}` is no number")]
     NotANumber(String),
 }
 
-/// What a report says of a goal.
+/// The verdict of a report on a goal.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Verdict {
     /// The condition does not hold: the run is good.
     Kept,
-    /// The condition holds, by this value.
+    /// The condition holds, with this value.
     Missed(f64),
     /// The number was not measured in this run; this counts as missed.
     NotMeasured,
@@ -104,7 +104,7 @@ impl fmt::Display for Goal {
 }
 
 impl Goal {
-    /// Whether reports have this field, and in it a number: known before anything runs.
+    /// Checks, before anything runs, that reports have this field and that it is a number.
     fn check_field(&self) -> Result<(), GoalError> {
         let template = serde_json::to_value(Report::template()).unwrap_or_default();
         match find(&template, &self.path, true)? {
@@ -113,7 +113,7 @@ impl Goal {
         }
     }
 
-    /// What `report` says of this goal.
+    /// Judges this goal by `report`.
     ///
     /// # Errors
     /// [`GoalError::UnknownField`] for an agent or probe that the run did not have.
@@ -136,12 +136,12 @@ impl Goal {
     }
 }
 
-/// The value at a dotted path. In a list the next part is a number or the entry's name; `any` takes the first for every name.
+/// The value at a dotted path. In a list the next part is a number or the entry's name; `any` takes the first entry for every name.
 fn find<'v>(root: &'v Value, path: &str, any: bool) -> Result<&'v Value, GoalError> {
     let mut here = root;
     for part in path.split('.') {
         let next = match here {
-            // nothing was measured of the whole table
+            // the whole table was not measured
             Value::Null if !any => return Ok(here),
             Value::Object(table) => table.get(part),
             Value::Array(list) if any => list.first(),

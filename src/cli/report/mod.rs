@@ -1,4 +1,4 @@
-//! What a run tells about itself: the report, the frames, and goals on the report's numbers.
+//! The output of a run: the report, statistics of frames, and goals on the report's numbers.
 //!
 //! In: measured numbers. Out: JSON, CSV rows, verdicts. Never here: measuring (the frame loop does), and where files go.
 
@@ -19,11 +19,11 @@ use serde::Serialize;
 pub struct Report {
     /// The scene's name.
     pub scene: String,
-    /// Who chose levels.
+    /// The policy that chose levels.
     pub policy: String,
-    /// Which feedback law.
+    /// The feedback law.
     pub law: String,
-    /// How agents were run.
+    /// The executor of the agents.
     pub executor: String,
     /// The adapter that drew; `None` where nothing was drawn.
     pub adapter: Option<String>,
@@ -31,28 +31,28 @@ pub struct Report {
     pub frames: u64,
     /// Simulated seconds.
     pub sim_s: f64,
-    /// Seconds on the wall from the first step on; in lockstep, of the virtual clock.
+    /// Wall-clock seconds from the first step on; in lockstep, seconds of the virtual clock.
     pub wall_s: f64,
     /// Seconds before that: opening the adapter, measuring it, a first picture.
     pub start_up_s: f64,
-    /// CPU seconds of the agents' turns alone, really measured.
+    /// CPU seconds of the agents' turns alone, as measured.
     pub cpu_s: f64,
     /// Hash of every agent's last state, 16 hexadecimal digits: equal hashes mean equal bits.
     pub state_hash: String,
-    /// Milliseconds that a frame should take.
+    /// Target time of a frame, milliseconds.
     pub target_ms: f64,
     /// Work, intervals and misses of the frames.
     #[serde(flatten)]
     pub summary: FrameSummary,
     /// The agents, in the scene's order.
     pub agents: Vec<AgentReport>,
-    /// What agents did to each other.
+    /// The couplings between agents.
     pub couplings: Vec<CouplingReport>,
     /// Agents that started inside each other or fixed solids.
     pub overlaps: Vec<OverlapReport>,
-    /// What starts elsewhere than the scene puts it, because of that.
+    /// Objects that start elsewhere than the scene puts them, because of that.
     pub moved: Vec<MovedReport>,
-    /// What different clocks changed, where that was asked for.
+    /// The effect of different clocks, where requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub oracle: Option<OracleReport>,
     /// How the frame budget was spent.
@@ -68,13 +68,13 @@ pub struct AgentReport {
     pub name: String,
     /// Its model.
     pub model: String,
-    /// What it did at the end: `running`, `resting` or `parked`.
+    /// Its state at the end: `running`, `resting` or `parked`.
     pub state: &'static str,
     /// Steps taken.
     pub steps: u64,
-    /// Steps a simulated second while it was awake.
+    /// Steps per simulated second while it was awake.
     pub rate_hz: f64,
-    /// Steps a second it wanted.
+    /// Requested steps per second.
     pub wanted_hz: f64,
     /// Last step length, milliseconds.
     pub dt_ms: f64,
@@ -84,38 +84,38 @@ pub struct AgentReport {
     pub n: Option<u8>,
     /// Spacing that its picture was last drawn with, metres; `None` for a model without one.
     pub picture_eps_m: Option<f64>,
-    /// CPU seconds of its turns, really measured.
+    /// CPU seconds of its turns, as measured.
     pub cpu_s: f64,
-    /// Age of its state where it was drawn.
+    /// Age of its state when drawn.
     pub age_ms: Quantiles,
-    /// How late its turns began.
+    /// Lateness of the starts of its turns.
     pub late_ms: Quantiles,
     /// Simulated milliseconds that could not be made up.
     pub dropped_ms: f64,
     /// Simulated milliseconds at rest.
     pub rested_ms: f64,
-    /// Name of the agent whose clock it shared at the end; `None` where it kept its own.
+    /// Name of the agent that led it and whose clock it shared at the end; `None` where it kept its own clock.
     pub led_by: Option<String>,
-    /// Whether it was taken out of the run after a failed step.
+    /// Whether it was removed from the run after a failed step.
     pub parked: bool,
-    /// Why it was parked.
+    /// The reason for parking.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub parked_reason: Option<String>,
     /// Mechanical energy, joules, gravity included, zero at the origin.
     pub energy_j: f64,
     /// Its own estimate of its error, metres.
     pub residual_m: f64,
-    /// The part of it that its steps made, metres.
+    /// The part of that error caused by its steps, metres.
     pub drift_m: f64,
-    /// The error that it was to hold, metres; `None` where it kept a rate.
+    /// Its error tolerance, metres; `None` where it kept a rate.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tolerance_m: Option<f64>,
-    /// The end of its ranges at which it rested while it held an error: `finest` (out of reach) or `coarsest`.
+    /// The end of its ranges at which it rested under a tolerance: `finest` (out of reach) or `coarsest`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rests: Option<&'static str>,
 }
 
-/// The middle and the tail of a measured time, milliseconds.
+/// Median and tail of a measured time, milliseconds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Quantiles {
     /// Median.
@@ -124,37 +124,37 @@ pub struct Quantiles {
     pub p99: f64,
 }
 
-/// What two agents did to each other.
+/// The coupling of two agents.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct CouplingReport {
     /// The first agent's name.
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// How they were coupled: `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
+    /// The kind of coupling: `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
     pub kind: String,
-    /// Contacts, holds or joints at the end of the run.
+    /// Contacts, grasps, attachments or joints at the end of the run.
     pub contacts: u64,
-    /// Difference of both sides' accounts of the same impulses, as a share of the impulse exchanged, without what is on its way;
-    /// `None` where there are no two accounts, as in an island.
+    /// Difference between both sides' records of the same impulses, as a share of the impulse exchanged, without impulses in flight;
+    /// `None` where there are no two records, as in an island.
     pub momentum_error: Option<f64>,
     /// Impulses exchanged, magnitudes summed, newton seconds.
     pub impulse_n_s: f64,
-    /// What one had given and the other had not taken yet when it was last seen, newton seconds.
+    /// Impulse that one side had given and the other not yet taken in the last states, newton seconds.
     pub in_flight_n_s: f64,
-    /// How easily `a` and `b` gave way along the normal at the contact that bore most, 1/kg, when they last pressed on each other: the
-    /// sum is the contact's W, its inverse the mass that either feels there. `None` where the two share one solve (islands), and
+    /// Inverse effective masses of `a` and `b` along the normal at the contact with the greatest load, 1/kg, when they last pressed on
+    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` where the two share one solve (islands), and
     /// where no contact was solved between them.
     pub inverse_mass_per_kg: Option<[f64; 2]>,
-    /// What was left in the energy tank, joules; `None` where the law keeps none.
+    /// Energy left in the energy tank, joules; `None` where the law has none.
     pub tank_j: Option<f64>,
     /// Overlap at the end of the run, metres.
     pub penetration_m: f64,
-    /// Greatest overlap that a frame saw, metres.
+    /// Greatest overlap found in a frame, metres.
     pub penetration_max_m: f64,
     /// Force at the end of the run, newtons.
     pub force_n: f64,
-    /// Greatest force that a frame saw, newtons.
+    /// Greatest force found in a frame, newtons.
     pub force_max_n: f64,
     /// Mass that the law added, kilograms.
     pub parasitic_kg: f64,
@@ -167,16 +167,16 @@ pub struct OverlapReport {
     pub a: String,
     /// The second agent's name, or the fixed solid's.
     pub b: String,
-    /// How deep, metres.
+    /// Depth, metres.
     pub depth_m: f64,
 }
 
-/// An object that starts clear of others, and not where the scene puts it.
+/// An object that was moved from its place in the scene, to start clear of others.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct MovedReport {
     /// Its name.
     pub object: String,
-    /// From where the scene puts it to where it starts, metres.
+    /// Displacement from its place in the scene to its start, metres.
     pub by_m: [f64; 3],
 }
 
@@ -192,12 +192,12 @@ impl MovedReport {
     }
 }
 
-/// The same scene on one tiny common clock, and what its own clocks changed.
+/// The same scene under one very fine common clock, and the difference from its own clocks.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct OracleReport {
     /// Step of the common clock, milliseconds.
     pub dt_ms: f64,
-    /// Simulated seconds that both have played: all of the run, unless Ctrl-C ended the second one.
+    /// Simulated seconds that both runs have played: all of the run, unless Ctrl-C ended the second one.
     pub sim_s: f64,
     /// Points compared.
     pub states: u64,
@@ -205,22 +205,22 @@ pub struct OracleReport {
     pub couplings: Vec<CouplingError>,
 }
 
-/// What different clocks changed for two coupled agents.
+/// The effect of different clocks on two coupled agents.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct CouplingError {
     /// The first agent's name.
     pub a: String,
     /// The second agent's name.
     pub b: String,
-    /// Root mean square distance of both from where the common clock has them, metres.
+    /// Root mean square distance of both agents from their positions under the common clock, metres.
     pub position_rms_m: f64,
     /// Greatest such distance, metres.
     pub position_max_m: f64,
-    /// Greatest difference of either one's momentum, newton seconds.
+    /// Greatest difference of either agent's momentum, newton seconds.
     pub momentum_max_n_s: f64,
-    /// Impulse exchanged in the run, newton seconds; `None` where an island kept it to itself.
+    /// Impulse exchanged in the run, newton seconds; `None` where an island does not report it.
     pub impulse_n_s: Option<f64>,
-    /// Impulse exchanged on the common clock, newton seconds.
+    /// Impulse exchanged under the common clock, newton seconds.
     pub impulse_oracle_n_s: Option<f64>,
 }
 
@@ -229,14 +229,14 @@ pub struct CouplingError {
 pub struct BudgetReport {
     /// Mean frame work as a share of the target; `None` where `frame_ms` is.
     pub spent_share: Option<f64>,
-    /// On which limit the control rested at the end, in words; `None` where it did not.
+    /// The limit at which the control rested at the end, as text; `None` where it did not.
     pub clamped: Option<String>,
-    /// What frames came to.
+    /// Summary of the choices of levels.
     #[serde(flatten)]
     pub choices: ChoiceSummary,
 }
 
-/// Where a probe was.
+/// The motion of a probe.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct ProbeReport {
     /// Name of the object.
@@ -247,13 +247,13 @@ pub struct ProbeReport {
     pub position_m: [f64; 3],
     /// Last velocity, m/s.
     pub velocity_m_s: [f64; 3],
-    /// `[t, x, y, z]` in seconds and metres, where the scene wants samples.
+    /// `[t, x, y, z]` in seconds and metres, where the scene requests samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub samples: Option<Vec<[f64; 4]>>,
 }
 
 impl Report {
-    /// A report with one of everything, to tell names that exist from names that do not.
+    /// A report with one of every entry, to distinguish names that exist from others.
     #[must_use]
     fn template() -> Self {
         let frame = crate::frame::FrameRecord { gpu_ms: Some(0.0), ..Default::default() };

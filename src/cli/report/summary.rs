@@ -63,7 +63,7 @@ fn choices_line(out: &mut String, choices: &ChoiceSummary) {
     let _ = writeln!(out);
 }
 
-/// How far off what policies foretell is, in 19 of 20 frames, as a part of what it was.
+/// The error of predictions in 19 of 20 frames, relative to the predicted time, as text.
 fn off_by(error: f64) -> String {
     if error < 1.0 {
         format!("off by less than {:.1} % (19 of 20 frames)", 100.0 * error)
@@ -92,7 +92,7 @@ fn agent_row(out: &mut String, agent: &AgentReport) {
     let _ = if agent.parked { writeln!(out, "  {reason}") } else { writeln!(out) };
 }
 
-/// Says so where an agent cannot hold the error that it is to hold.
+/// Notes where an agent cannot hold its error tolerance.
 fn out_of_reach(out: &mut String, agent: &AgentReport) {
     let AgentReport { name, residual_m, dt_ms, eps_m, .. } = agent;
     let (Some(tolerance_m), Some("finest")) = (agent.tolerance_m, agent.rests) else { return };

@@ -1,6 +1,6 @@
-//! The gains that were found, held against the scene's own frames: what was predicted of a push, and what came of it.
+//! Checks the gains found on the scene's own frames: settling after a push, predicted and measured.
 //!
-//! In: a plant and what was found on it. Out: settling times, predicted and measured. Never here: a judgement of them.
+//! In: a plant and the gains found on it. Out: settling times, predicted and measured. Never here: a judgement of them.
 
 use super::super::args::TuneArgs;
 use super::super::progress::Bar;
@@ -11,11 +11,11 @@ use crate::tune::{Start, Trial, play, settled_after};
 use serde_json::{Value, json};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Parts of the wanted rate at which frames come after a push.
+/// Frame rates after a push, as parts of the target rate.
 const RATES: [f64; 2] = [0.4, 2.5];
-/// How often a push is made where frames scatter: by 7 % there, and the median of so many frames by 1.8 %, a third of the band.
+/// Number of pushes where frames scatter: by 7 % there, so that the median of so many scatters by 1.8 %, a third of the band.
 const TIMES_LIVE: usize = 25;
-/// Seconds of a watch: so many predicted settling times, within these bounds.
+/// Duration of the observation in predicted settling times, and its bounds in seconds.
 const WATCH: f64 = 4.0;
 const WATCH_S: (f64, f64) = (1.0, 2.0);
 
@@ -27,7 +27,7 @@ pub(super) struct Checked {
 }
 
 impl Checked {
-    /// A line for people.
+    /// A line of text.
     pub fn told(&self) -> String {
         let told = |settle: Option<f64>| settle.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
         format!(
@@ -38,14 +38,14 @@ impl Checked {
         )
     }
 
-    /// The same for programs.
+    /// The same as JSON.
     pub fn json(&self) -> Value {
         json!({ "rate": self.rate, "predicted_s": self.predicted_s, "measured_s": self.measured_s })
     }
 }
 
-/// Pushes the scene from its target on the machine on which the plant was found; nothing where that leaves nothing to control, or where
-/// it was stopped.
+/// Pushes the scene from its target on the machine on which the plant was identified; empty where that machine leaves nothing to control,
+/// or where it was stopped.
 pub(super) fn check(
     args: &TuneArgs,
     on: &Identified,
@@ -81,7 +81,7 @@ pub(super) fn check(
         .collect())
 }
 
-/// When the fitted plant is settled after the same pushes: as often, with its scatter, and told by the same median.
+/// Settling time of the fitted plant after the same pushes: as many of them, with its scatter, and by the same median.
 fn predicted_s(on: &Identified, law: Law, rate: f64, times: usize) -> Option<f64> {
     let noise = if on.live { on.plant.line.scatter } else { 0.0 };
     let trial = Trial { start: Start::Rate(rate), seconds: WATCH_S.1, noise, ..Trial::calm(law, on.target_hz) };
@@ -93,7 +93,7 @@ fn predicted_s(on: &Identified, law: Law, rate: f64, times: usize) -> Option<f64
     settled_s(&median(&runs), law.set_share() / on.target_hz)
 }
 
-/// Seconds after which frames stay within ± 5 % of the time that is wanted of them.
+/// Seconds after which frames stay within ± 5 % of their target time.
 fn settled_s(frames: &[After], set_s: f64) -> Option<f64> {
     let rows: Vec<_> = frames.iter().map(|(time_s, work_s)| (*time_s, work_s / set_s)).collect();
     settled_after(&rows, |_| false)

@@ -1,6 +1,6 @@
-//! The figure of a tuning: the plant, step responses, where gains swing, and late frames over the speed of the machine.
+//! The figure of a tuning: the plant, step responses, the map of gains, and late frames over the speed of the machine.
 //!
-//! In: a plant and what was found. Out: SVG and PNG in a folder. Never here: numbers that are not in the table or played for it.
+//! In: a plant and the gains found. Out: SVG and PNG in a folder. Never here: numbers neither in the table nor played for the figure.
 
 use super::super::chart::figure::{self, Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::{Identified, Tuned};
@@ -9,18 +9,18 @@ use crate::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, measure
 use anyhow::Context;
 use std::path::{Path, PathBuf};
 
-/// Starts that are shown, in parts of the wanted rate.
+/// Starting rates shown, in parts of the target rate.
 const STARTS: [f64; 2] = [0.4, 2.5];
-/// Seconds of a step response that are shown.
+/// Seconds shown of a step response.
 const SHOWN_S: f64 = 2.0;
 /// Cells of the map along α and along β.
 const CELLS: [usize; 2] = [24, 12];
-/// The map's α and β, unless what was found needs more room.
+/// The map's ranges of α and β, unless the gains found need more room.
 const ALPHA: (f64, f64) = (1e-6, 1e-1);
 const BETA: (f64, f64) = (0.05, 50.0);
 /// Seconds of a map cell's trial.
 const MAP_S: f64 = 3.0;
-/// Speeds of the machine that are charted.
+/// Speeds of the machine in the chart.
 const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
 
 /// Draws and writes the figure.
@@ -40,7 +40,7 @@ fn layer(label: impl Into<String>, colour: Colour, mark: Mark) -> Layer {
     Layer { label: label.into(), colour, mark }
 }
 
-/// The fitted line over what was measured.
+/// The measured points and the fitted line.
 fn fit(plant: &Plant) -> Panel {
     let points: Vec<_> = plant.points.iter().map(|&(x, y)| (1e-3 * x, 1e3 * y)).collect();
     let x = span(points.iter().map(|p| p.0).chain([0.0]), false);
@@ -64,14 +64,14 @@ fn calm(on: &Identified, contender: impl Into<Contender>, rate: f64, seconds: f6
 /// How a law's points are drawn.
 type Drawn = fn(Vec<(f64, f64)>) -> Mark;
 
-/// A colour for every law of the table: those that were found as lines, those that they are compared with dashed.
+/// A colour for every law of the table: laws that were found as lines, laws for comparison dashed.
 fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
     let found = tuned.found.len();
     let mark = move |k: usize| if k < found { Mark::Line } else { Mark::Dashed };
     Colour::LINES.into_iter().cycle().enumerate().map(move |(k, colour)| (colour, mark(k) as Drawn))
 }
 
-/// From 0.4 and from 2.5 times the wanted rate.
+/// Step responses from 0.4 and from 2.5 times the target rate.
 fn responses(on: &Identified, tuned: &Tuned) -> Panel {
     let plant = judged_on(on, tuned);
     let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
@@ -95,7 +95,7 @@ fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
     on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
 }
 
-/// Where the printed law swings, is slow, or holds, over (α, β); the chosen gains as a dot.
+/// The printed law over (α, β): where it settles, is slow, or swings; the chosen gains as a dot.
 fn map(on: &Identified, tuned: &Tuned) -> Panel {
     let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
     let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
@@ -133,7 +133,7 @@ fn map(on: &Identified, tuned: &Tuned) -> Panel {
     }
 }
 
-/// A range that holds these values too, with half a decade of room about each.
+/// A range extended to contain these values, with half a decade of room around each.
 fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
     const ROOM: f64 = 3.2;
     values.fold(range, |(low, high), value| (low.min(value / ROOM), high.max(value * ROOM)))
@@ -148,7 +148,7 @@ fn kind(measured: &[Measures]) -> usize {
     }
 }
 
-/// Late frames over the speed of the machine, the load 40 % up for a third of the time.
+/// Late frames over the speed of the machine, with 40 % more load for a third of the time.
 fn misses(on: &Identified, tuned: &Tuned) -> Panel {
     let trial = |contender: Contender, speed: f64| Trial {
         speed,

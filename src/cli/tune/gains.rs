@@ -1,4 +1,4 @@
-//! Gains in words: as they are typed after `--analyse`, and as the TOML fragment that `run --gains` and a scene take.
+//! Gains as text: as typed after `--analyse`, and as the TOML fragment that `run --gains` and a scene take.
 //!
 //! In: text. Out: a contender with its gains, or overrides of a scene. Never here: which gains are good.
 
@@ -15,7 +15,7 @@ const MARGIN: &str = "margin";
 /// Longest fragment, bytes.
 const BYTES_MAX: u64 = 1 << 16;
 
-/// Gains by name, and the laws that have them.
+/// The names of each gain, and its key.
 const GAINS: [(&[&str], &str); 7] = [
     (&["α", "alpha"], "alpha"),
     (&["β", "beta"], "beta"),
@@ -25,7 +25,7 @@ const GAINS: [(&[&str], &str); 7] = [
     (&["margin"], MARGIN),
     (&["law"], "law"),
 ];
-/// Laws by name, each with the gains that it has.
+/// Laws by name, each with its gains.
 const LAWS: [(&str, &[&str]); 5] = [
     ("printed", &["alpha", "beta"]),
     ("normalised", &["k", "beta"]),
@@ -34,7 +34,7 @@ const LAWS: [(&str, &[&str]); 5] = [
     ("adaptive", &[MARGIN]),
 ];
 
-/// Who is meant by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target; what is not said is the law's own.
+/// The contender given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
 pub(super) fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
     let (mut law, mut given) = (None, Vec::new());
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
@@ -128,12 +128,12 @@ pub(super) fn told(contender: Contender) -> String {
     }
 }
 
-/// A number that may be small, so that it can be typed again.
+/// A number that may be small, in a form that can be typed again.
 fn digits(value: f64) -> String {
     if value < 0.01 { format!("{value:.3e}") } else { format!("{value:.3}") }
 }
 
-/// The fragment of a scene that asks for `law`, with `comment` above it.
+/// The scene fragment that selects `law`, with `comment` above it.
 pub(super) fn fragment(law: Law, comment: &str) -> String {
     let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
     let gains = match law {
@@ -145,7 +145,7 @@ pub(super) fn fragment(law: Law, comment: &str) -> String {
     format!("{comment}[target]\npolicy = \"feedback\"\n{gains}")
 }
 
-/// Refuses a place for the fragment that is taken, or in a folder that is not there.
+/// Refuses a path that is already taken, or in a folder that does not exist.
 pub(in crate::cli) fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if folder.is_some_and(|f| !f.is_dir()) {
@@ -161,10 +161,10 @@ pub(in crate::cli) fn check_place(path: &Path, flag: &str, force: bool) -> anyho
     Ok(())
 }
 
-/// The overrides of a scene that the fragment in `path` means.
+/// The scene overrides in the fragment at `path`.
 ///
 /// # Errors
-/// [`BadInput`] where it cannot be read, or says more than gains.
+/// [`BadInput`] where it cannot be read, or contains more than gains.
 pub(in crate::cli) fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
     let bad = |why: String| BadInput(format!("the gains {}: {why}", path.display()));
     let size = std::fs::metadata(path).map_err(|e| bad(format!("cannot be read: {e}")))?.len();

@@ -1,4 +1,4 @@
-//! `tune`: finds, explains and writes down feedback gains for a scene.
+//! `tune`: finds feedback gains for a scene, explains them and writes them to a file.
 //!
 //! In: a scene, a machine (declared, or the one present with `--live`). Out: a table, a fragment of TOML that `run --gains` and a scene
 //! take, a figure. Never here: how gains are judged ([`crate::tune`] does), the experiment's frames ([`crate::frame`] draws them).
@@ -26,12 +26,12 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Frames of the experiment, and of the quick one.
+/// Frames of the experiment, in full and with `--quick`.
 const FRAMES: [u64; 2] = [360, 150];
 /// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
 const NORMALISED: f64 = 0.046;
 
-/// A plant, and on what it was found.
+/// A plant, and the scene and machine on which it was identified.
 struct Identified {
     scene: Scene,
     plant: Plant,
@@ -42,23 +42,23 @@ struct Identified {
     machine: String,
 }
 
-/// One law beside its name in the table.
+/// A law's name in the table, and its verdict.
 struct Row {
     name: &'static str,
     verdict: Verdict,
 }
 
-/// What a search over all families came to.
+/// The result of a search over all families.
 struct Tuned {
     rows: Vec<Row>,
     found: Vec<(Family, Found)>,
-    /// The best of the feedback laws: what the fragment says.
+    /// The best of the feedback laws, which the fragment contains.
     best: Law,
     interrupted: bool,
 }
 
 impl Tuned {
-    /// What the best was judged to be.
+    /// The verdict on the best law.
     fn verdict(&self) -> Option<&Verdict> {
         self.rows.iter().map(|row| &row.verdict).find(|v| v.contender == self.best.into())
     }
@@ -110,7 +110,7 @@ fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Resu
     Ok(Some(Identified { scene, plant, size, live: args.live, target_hz, machine }))
 }
 
-/// The scene with what the arguments change in it; in virtual time unless the machine present is meant.
+/// The scene with the changes by the arguments; in virtual time except with `--live`.
 fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
     let executor = if args.live { ExecutorKind::Threads } else { ExecutorKind::Lockstep };
     let flags = [
@@ -133,7 +133,7 @@ fn extent(args: &TuneArgs) -> Extent {
     if args.quick { Extent::QUICK } else { Extent::FULL }
 }
 
-/// Explains the gains that were given.
+/// Explains given gains.
 fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Result<Exit> {
     let explanation = explain(&on.plant, contender, on.target_hz);
     let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
@@ -145,7 +145,7 @@ fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Re
     Ok(Exit::Ok)
 }
 
-/// Finds gains, tells of them and writes them down.
+/// Finds gains, reports them and writes them to files.
 fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool) -> anyhow::Result<Exit> {
     refuse_out_of_reach(on)?;
     let folder = &args.out;
@@ -155,7 +155,7 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     gains::write(fragment, &gains::fragment(tuned.best, &told::comment(on, &tuned)))?;
     let mut files = vec![fragment.to_owned()];
     let mut checked = Vec::new();
-    // who interrupts does not want to wait for pictures
+    // after an interrupt the user does not wait for figures
     if !tuned.interrupted {
         files.extend(figures::write(folder, &stem(&on.scene.name), on, &tuned)?);
         checked = checked::check(args, on, &tuned, stopped)?;
@@ -172,12 +172,12 @@ fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool)
     Ok(Exit::Ok)
 }
 
-/// A target that no resolution can reach has no gains.
+/// Refuses a target that no resolution can reach: it has no gains.
 fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
     refusal(&on.plant, on.target_hz).map_or(Ok(()), |why| Err(BadInput(format!("{}: {why}", on.scene.name)).into()))
 }
 
-/// Searches every family, and judges what they are to be compared with.
+/// Searches every family, and judges the laws for comparison.
 fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuned> {
     let extent = extent(args);
     let mut found = Vec::new();
@@ -202,8 +202,8 @@ fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> any
     Ok(Tuned { rows, found, best, interrupted })
 }
 
-/// The best of the laws whose gain is the same at every rate. The printed law's is not, and the policy that predicts has no gains to be
-/// written down: they stand beside it.
+/// The best of the laws whose gain is the same at every rate. The printed law's gain is not, and the predicting policy has no gains to
+/// write to the fragment: both are only shown in the table.
 fn best_law(found: &[(Family, Found)]) -> Option<Law> {
     let law = |(_, f): &(Family, Found)| match f.best.contender {
         Contender::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
@@ -212,7 +212,7 @@ fn best_law(found: &[(Family, Found)]) -> Option<Law> {
     found.iter().filter_map(law).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(law, _)| law)
 }
 
-/// What the gains that are found are compared with, a relay's with the same margin.
+/// The laws for comparison with the gains found; the relay's law has the same margin.
 fn rivals(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
     let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
     let margin = 1.0 - best.contender.set_share();

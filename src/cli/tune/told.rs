@@ -1,4 +1,4 @@
-//! What `tune` found, as text for people and as JSON for programs.
+//! Formats the result of `tune`, as text for people and as JSON for programs.
 //!
 //! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
 
@@ -10,7 +10,7 @@ use crate::tune::{Contender, Explanation, Margins, Verdict};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// The table of a tuning, what it was found on, the files.
+/// The table of a tuning, the plant, the files.
 pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> String {
     let mut table = Table::new(&[
         "law",
@@ -54,7 +54,7 @@ pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &
     )
 }
 
-/// Said where the gains were judged on another machine, because what is in view leaves nothing to control on this one.
+/// A note where the gains were judged on another machine, because the view leaves nothing to control on this one.
 fn elsewhere(tuned: &Tuned) -> String {
     let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
     if speed == 1.0 {
@@ -65,7 +65,7 @@ fn elsewhere(tuned: &Tuned) -> String {
     )
 }
 
-/// What the plant is, in a few lines.
+/// The plant, in a few lines.
 fn plant(on: &Identified) -> String {
     let line = &on.plant.line;
     let reach = on.plant.reach(1.0);
@@ -86,7 +86,7 @@ fn plant(on: &Identified) -> String {
     )
 }
 
-/// The speeds of the machine that a law bears.
+/// The speeds of the machine at which a law still works.
 fn robust(v: &Verdict) -> String {
     match (&v.robust_to[..], v.asked.len()) {
         (_, 0) => "out of reach".to_owned(),
@@ -95,12 +95,12 @@ fn robust(v: &Verdict) -> String {
     }
 }
 
-/// How far a law is from swinging.
+/// The stability margins of a law.
 fn margins(Margins { gain, delay }: Margins) -> String {
     format!("gain margin {gain:.2}, delay margin {delay} frames")
 }
 
-/// What stands above the fragment.
+/// The comment above the fragment.
 pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
     let worth = tuned.verdict().map_or_else(String::new, |v| {
         let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
@@ -113,7 +113,7 @@ pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
     format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
 }
 
-/// The same as JSON: what was found at the top, everything else beside it.
+/// The same as JSON: the best law at the top level, together with everything else.
 pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
     let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(row.name, &row.verdict)).collect();
     let tried: Vec<_> = tuned
@@ -175,7 +175,7 @@ fn gains_json(contender: Contender) -> Value {
     }
 }
 
-/// Given gains, explained.
+/// The explanation of given gains.
 pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String {
     let near = e.near.map_or_else(String::new, |near| {
         format!(

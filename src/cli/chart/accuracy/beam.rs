@@ -1,4 +1,4 @@
-//! A solid that sticks out of a wall under its own weight, against Timoshenko's beam.
+//! A solid clamped to a wall at one end, under its own weight, against Timoshenko's beam.
 
 use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case};
@@ -12,7 +12,7 @@ use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
 /// The benchmark.
 pub(in super::super) struct SolidBeam;
 
-/// Names, and heights in lengths.
+/// Names, and heights in units of the length.
 const HEIGHTS: [(&str, f64); 2] = [("h = L/10", 0.1), ("h = L/20", 0.05)];
 const LENGTH_M: f64 = 0.4;
 /// So stiff that the sag is below 0.2 % of the length: beam theory is one of small angles.

@@ -1,7 +1,8 @@
 //! The twist at which a tube between two clamps buckles, a straight one (Greenhill) and a ring (Michell, Zajac), found from each side.
 //!
-//! The middle is pushed aside and let go. Once only the slowest motion is left, the rate at which that grows or dies away tells
-//! its stiffness, which falls through zero where the tube buckles. Runs of one side lead to there step by step; a run that
+//! The middle is pushed sideways and released. Once only the slowest motion is left, the rate at which that grows or decays gives
+//! its stiffness, which passes through zero where the tube buckles. Runs on one side approach that twist step by step; a run that
+//! turns out to be on the other side is a failure. Theory: docs/theory/rod.md, eq. 50–53.
 //! belongs to the other side is a failure. Theory: docs/theory/rod.md, eq. 50–53.
 
 use super::super::stability::common::dead_load;
@@ -18,12 +19,12 @@ pub(in super::super) struct TwistBuckling;
 /// The benchmark of the ring.
 pub(in super::super) struct MichellRing;
 
-/// The sign of a run's twist less the critical one, by the side that it comes from.
+/// The sign of a run's twist minus the critical one, by the side from which the runs approach.
 const BELOW: f64 = -1.0;
 const ABOVE: f64 = 1.0;
 /// Names of the straight tube's cases, and sides.
 const STRAIGHT: [(&str, f64); 2] = [("from below", BELOW), ("from above", ABOVE)];
-/// Names of the rings' cases, twist stiffness over bend stiffness, and sides.
+/// Names of the rings' cases, ratios of twist stiffness to bend stiffness, and sides.
 const RINGS: [(&str, f64, f64); 8] = [
     ("C/B = 1 from below", 1.0, BELOW),
     ("C/B = 1 from above", 1.0, ABOVE),
@@ -34,41 +35,41 @@ const RINGS: [(&str, f64, f64); 8] = [
     ("C/B = 3 from below", 3.0, BELOW),
     ("C/B = 3 from above", 3.0, ABOVE),
 ];
-/// M L/B of a straight tube between clamps, no thrust: twice the least root of tan x = x.
+/// M L/B of a straight tube between clamps without thrust: twice the least root of tan x = x.
 const GREENHILL: f64 = 8.986_818_915_818_128;
 const YOUNG_PA: f64 = 1e6;
-/// Points around the ring that the path goes through.
+/// Points of the path around the ring.
 const POINTS: u32 = 512;
-/// Lets all but the slowest motion die away within [`WAIT_S`], the slowest creep.
+/// Lets all but the slowest motion decay within the waiting time ([`SECONDS`]), and the slowest creep.
 const DAMPING_PER_S: f64 = 30.0;
-/// A push that leaves the middle a tenth of a millimetre aside: linear theory holds.
+/// A push that displaces the middle by a tenth of a millimetre: linear theory holds.
 const PUSH_N: f64 = 0.004;
-/// How long the push lasts, how long it is waited then, and how long growth is watched, seconds.
+/// How long the push lasts, how long the run then waits, and how long growth is observed, seconds.
 const SECONDS: [f64; 3] = [0.05, 1.0, 0.25];
-/// Farther than this from where it began no point of a tube may be that counts as hardly moved, metres.
+/// A tube of which a point is farther than this from its start has left the linear range, metres.
 const LINEAR_M: f64 = 0.01;
-/// How far from the twist of theory the first two runs of a side are, in that.
+/// Distance of the first two runs of a side from the critical twist of theory, as a share of that twist.
 const STARTS: [f64; 2] = [0.1, 0.06];
-/// Runs after those, each half-way from the one before to where the last two point: the last one is about 0.01 away.
+/// Runs after those, each half-way from the one before to the zero of the line through the last two: the last is about 0.01 away.
 const APPROACHES: usize = 3;
-/// The issue's bound of the error.
+/// The bound of the error that was set as the goal.
 const ERROR_MAX: f64 = 0.02;
-/// The issue asks for no speed here: at least that of the clock.
+/// The goal sets no bound on cost here: real time at least.
 const REAL_TIME_MS: f64 = 1000.0;
 
-/// A tube between two clamps that can be turned against each other.
+/// A tube between two clamps that can be twisted against each other.
 struct Twisted {
-    /// The tube but for its twist.
+    /// The tube without its twist.
     spec: TubeSpec,
-    /// The twist at which theory lets it buckle, radians.
+    /// The critical twist of theory, radians.
     critical_rad: f64,
-    /// Where its middle is pushed to.
+    /// The direction in which its middle is pushed.
     aside: DVec3,
 }
 
 impl Twisted {
-    /// The straight tube of the references without shear, but with its stretch: what bows out between walls is drawn taut, and
-    /// a stiffer tube by more than a tenth of a millimetre allows.
+    /// The straight tube of the references without shear, but with its stretch: bowing out between fixed ends stretches the tube, and
+    /// a tube stiffer in stretch would leave the linear range within a tenth of a millimetre.
     fn straight() -> Self {
         let mut spec = slender_tube(YOUNG_PA, metre());
         spec.section.ea_n = reference_tube(YOUNG_PA, metre()).section.ea_n;
@@ -76,9 +77,9 @@ impl Twisted {
         Self { spec, critical_rad, aside: DVec3::Z }
     }
 
-    /// The same tube bent to a ring of a metre around, with another twist stiffness. A push along the ring, which turns to its
-    /// mirror image by half a turn about the diameter through the clamp, is seen apart from how the ring settles, and apart
-    /// from its swinging about the clamp, which nothing resists.
+    /// The same tube bent to a ring of a metre around, with another twist stiffness. A push along the ring, which becomes its mirror
+    /// image under half a turn about the diameter through the clamp, is measured separately from how the ring settles, and separately
+    /// from its swing about the clamp, which meets no resistance.
     fn ring(ratio: f64) -> Self {
         let mut spec = TubeSpec { straight: true, ..slender_tube(YOUNG_PA, circle()) };
         spec.section.gj_n_m2 = ratio * spec.section.ei_n_m2;
@@ -86,7 +87,7 @@ impl Twisted {
     }
 
     /// The stiffness λ of the slowest motion at a share of the critical twist, over its mass, 1/s² (eq. 52); `None` where the tube is lost
-    /// or no longer nearly as it began: what settles in another shape is not what dies away.
+    /// or has left the linear range: settling into another shape is not decay.
     fn stiffness(&self, share: f64, case: &Case) -> Option<(Play, f64)> {
         let twist_rad = share * self.critical_rad;
         let spec = TubeSpec { twist_rad, clamp: [true; 2], damping_per_s: DAMPING_PER_S, ..self.spec.clone() };
@@ -103,8 +104,8 @@ impl Twisted {
         (sound && linear).then_some((play, -rate * (rate + DAMPING_PER_S)))
     }
 
-    /// By how much the twist that runs of one side lead to misses that of theory, in that; `None` where one of them is of the
-    /// other side.
+    /// Relative error of the twist that runs on one side converge to, against theory; `None` where a run belongs to the other side or
+    /// fails.
     fn error(&self, side: f64, case: &Case) -> Option<(Play, f64)> {
         let run = |share: f64| {
             let (play, stiffness) = self.stiffness(share, case)?;
@@ -121,18 +122,18 @@ impl Twisted {
     }
 }
 
-/// How far apart the same point of two states of a tube is at most, metres.
+/// The greatest distance between the same point in two states of a tube, metres.
 fn farthest_m(a: &CurveState, b: &CurveState) -> f64 {
     a.positions.iter().zip(&b.positions).map(|(a, b)| a.distance(*b)).fold(0.0, f64::max)
 }
 
-/// Where the line through two points is zero.
+/// The zero of the line through two points.
 fn zero(a: (f64, f64), b: (f64, f64)) -> f64 {
     b.0 - b.1 * (b.0 - a.0) / (b.1 - a.1)
 }
 
-/// A ring of a metre around that begins and ends at the origin, along x. The second point from each end is so near that the
-/// path leaves along the ring, not along a chord of it.
+/// A ring of a metre around that begins and ends at the origin, along x. The second point from each end is so close that the
+/// path starts along the ring, not along a chord of it.
 fn circle() -> Vec<DVec3> {
     const NEAR: f64 = 1e-3;
     let last = f64::from(POINTS);

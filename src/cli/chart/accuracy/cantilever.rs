@@ -1,4 +1,4 @@
-//! A clamped tube under its own weight at rest, against shooting ([`super::super::stability::hanging`]).
+//! A clamped tube at rest under its own weight, against shooting ([`super::super::stability::hanging`]).
 
 use super::super::stability::common::GRAVITY;
 use super::super::stability::hanging::Hanging;
@@ -21,7 +21,7 @@ const MODULI: [(&str, f64); 6] = [
     ("E = 1e10 Pa", 1e10),
 ];
 const DAMPING_PER_S: f64 = 6.0;
-/// How long the tube has to come to rest: that of the other engines.
+/// Time for the tube to come to rest: the same as for the other engines.
 const SECONDS: f64 = 8.0;
 
 impl Benchmark for Cantilever {
@@ -37,10 +37,10 @@ impl Benchmark for Cantilever {
                 let sizes: &[u32] = match (quick, explicit) {
                     (true, _) => &[8, 16],
                     (false, true) => &[8, 16, 32],
-                    // 40 and 48: the fewest that err by less than 1e-3, and some to spare
+                    // 40 and 48: the fewest that err by less than 1e-3, and a little more
                     (false, false) => &[8, 16, 32, 40, 48, 64, 128, 256],
                 };
-                // an explicit step of a stiff tube is microseconds: its cost is known without waiting for it
+                // an explicit step of a stiff tube is microseconds: the case would take long and show nothing new
                 if explicit && young_pa > 1e7 {
                     continue;
                 }

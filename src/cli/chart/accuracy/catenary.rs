@@ -1,4 +1,4 @@
-//! A cable without bending stiffness between two points: the catenary in closed form.
+//! A cable without bending stiffness between two points, against the catenary in closed form.
 
 use super::super::stability::common::GRAVITY;
 use super::diagram::{Benchmark, Case};
@@ -11,7 +11,7 @@ use metachron_models::rod::TubeSpec;
 pub(in super::super) struct Catenary;
 
 const SPAN_M: f64 = 0.8;
-/// Bend and twist stiffness, N·m²: so small that the ends' boundary layers are micrometres.
+/// Bend and twist stiffness, N·m²: so small that the boundary layers at the ends are micrometres.
 const BENDING_N_M2: f64 = 1e-7;
 const SECONDS: f64 = 20.0;
 
@@ -44,7 +44,7 @@ impl Benchmark for Catenary {
     }
 }
 
-/// The sag of an inextensible cable: sinh u / u = L/d, sag = d/(2u) (cosh u − 1), by Newton's steps.
+/// The sag of an inextensible cable: sinh u / u = L/d, sag = d/(2u) (cosh u − 1), by Newton's method.
 fn sag_m(length_m: f64) -> f64 {
     let mut u: f64 = 1.0;
     for _ in 0..50 {

@@ -1,4 +1,4 @@
-//! A work-precision diagram: error against CPU time of every method of a benchmark, other engines behind, the front drawn.
+//! A work-precision diagram: error against CPU time for every method of a benchmark, with other engines and the Pareto front.
 //!
 //! In: a [`Benchmark`]. Out: an experiment. Never here: what a benchmark is.
 
@@ -14,22 +14,22 @@ use metachron_models::rod::Integrator;
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// A question with an answer that was found in another way.
+/// A problem whose answer is known from an independent source.
 pub(in super::super) trait Benchmark: Send + Sync + 'static {
     /// As [`Experiment::NAME`].
     const NAME: &'static str;
     /// As [`Experiment::TITLE`].
     const TITLE: &'static str;
-    /// What the error is, for the axis.
+    /// Label of the error axis.
     const ERROR: &'static str;
 
-    /// What is asked of every method.
+    /// The problems given to every method.
     fn cases(quick: bool) -> Vec<Case>;
 
-    /// Plays a case: the error, none where the tube was lost.
+    /// Plays a case; the run and its error, `None` where the tube was lost.
     fn play(case: &Case) -> Option<(Play, f64)>;
 
-    /// What is to be reached, a line each.
+    /// The goals, one line each.
     fn goals() -> Vec<Goal> {
         Vec::new()
     }
@@ -60,25 +60,25 @@ impl Case {
         list
     }
 
-    /// The same for problems in which hands pull: meanwhile every implicit method moves by implicit Euler.
+    /// The same for problems with user pulls: under these every implicit method falls back to implicit Euler.
     pub(super) fn pulled(cases: &[&str], quick: bool) -> Vec<Self> {
         let sizes = if quick { &[8, 16][..] } else { &[8, 16, 32, 64, 128] };
         Self::ladder(cases, &[Integrator::ImplicitEuler], sizes, 10.0)
     }
 }
 
-/// What some method should reach.
+/// A bound that some method should reach.
 pub(in super::super) struct Goal {
     pub(super) case: &'static str,
-    /// Only with so many segments; with any where it is zero.
+    /// Only rows with this many segments; any where it is zero.
     pub(super) segments: u32,
     pub(super) error: f64,
-    /// At no more than so many CPU milliseconds a simulated second, as they would be where goals were set.
+    /// Greatest CPU milliseconds per simulated second, scaled to the machine on which goals were set.
     pub(super) cpu_ms_per_s: f64,
 }
 
 impl Goal {
-    /// Holds the goal against the rows; nothing where none of them is of its case.
+    /// Compares the goal with the rows; `None` where no row is of its case.
     fn finding(self, rows: &[Row]) -> Option<Finding> {
         let Self { case, segments, error, cpu_ms_per_s } = self;
         let asked = || rows.iter().filter(|r| r.case == case && (segments == 0 || r.segments == segments));
@@ -90,7 +90,7 @@ impl Goal {
     }
 }
 
-/// A run with what came out.
+/// A run with its results.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     case: String,
@@ -102,7 +102,7 @@ pub(in super::super) struct Row {
     /// Empty where the tube was lost.
     error: Option<f64>,
     cpu_ms_per_s: f64,
-    /// The calibration measured beside it ([`calibration_us`]).
+    /// The calibration measured right after it ([`calibration_us`]).
     calibration_us: Option<f64>,
 }
 
@@ -173,8 +173,8 @@ impl<B: Benchmark> Experiment for Diagram<B> {
     }
 }
 
-/// CPU milliseconds a simulated second: the least of some repetitions where a run takes milliseconds, as what a shared
-/// machine adds is never negative.
+/// CPU milliseconds per simulated second: the least of several repetitions where a run takes only milliseconds, because load of
+/// a shared machine only ever adds time.
 fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
     const SHORT_S: f64 = 0.02;
     const REPETITIONS: usize = 4;
@@ -183,12 +183,12 @@ fn cost<B: Benchmark>(case: &Case, first: &Play) -> f64 {
     more.fold(first.cpu_ms_per_s(), f64::min)
 }
 
-/// A number in a cell, or that there is none.
+/// A number in a cell, or a dash where there is none.
 fn told(value: Option<f64>, digits: usize) -> Cell {
     value.map_or_else(|| "–".into(), |value| (value, digits).into())
 }
 
-/// The different values of a column, in the order of the rows.
+/// The distinct values of a column, in the order of the rows.
 fn names(rows: &[Row], of: fn(&Row) -> &String) -> Vec<&str> {
     let mut list: Vec<&str> = Vec::new();
     for row in rows {
@@ -199,19 +199,19 @@ fn names(rows: &[Row], of: fn(&Row) -> &String) -> Vec<&str> {
     list
 }
 
-/// The least cost of a run that errs by no more than `error`.
+/// The least cost of a run whose error is at most `error`.
 fn cheapest<'a>(rows: impl Iterator<Item = &'a Row>, error: f64) -> Option<f64> {
     rows.filter(|r| r.error.is_some_and(|e| e <= error)).map(|r| r.cpu_ms_per_s).min_by(f64::total_cmp)
 }
 
-/// By which power of the substep errors fall, with the most segments.
+/// The power of the substep with which errors fall, at the greatest number of segments.
 fn dt_order(rows: &[&Row]) -> Option<f64> {
     let most = rows.iter().map(|r| r.segments).max()?;
     let points = rows.iter().filter(|r| r.segments == most && r.substeps_per_step > 0.0);
     exponent(&points.filter_map(|r| Some((r.dt_ms / r.substeps_per_step, r.error?))).collect::<Vec<_>>())
 }
 
-/// By which power of their length errors fall with segments, with the shortest substeps.
+/// The power of the segment length with which errors fall, at the shortest substeps.
 fn segment_order(rows: &[&Row]) -> Option<f64> {
     let least = |r: &&&Row| r.dt_ms / f64::from(r.substeps);
     let shortest = rows.iter().map(|r| least(&r)).min_by(f64::total_cmp)?;
@@ -219,7 +219,7 @@ fn segment_order(rows: &[&Row]) -> Option<f64> {
     exponent(&points.filter_map(|r| Some((1.0 / f64::from(r.segments), r.error?))).collect::<Vec<_>>())
 }
 
-/// One problem of the benchmark: methods as lines, other engines as dots, the front of all as a broken line.
+/// One problem of the benchmark: methods as lines, other engines as dots, the front of all as a dashed line.
 fn panel<B: Benchmark>(case: &str, rows: &[Row]) -> Panel {
     let here = || rows.iter().filter(|r| r.case == case);
     let ours = |method: &str| {

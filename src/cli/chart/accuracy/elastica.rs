@@ -9,7 +9,7 @@ use metachron_models::rod::TubeSpec;
 /// The benchmark.
 pub(in super::super) struct Elastica;
 
-/// P L²/EI, and where the tip is: to the side and down, metres of a length of 1 m.
+/// P L²/EI, and the position of the tip: sideways and down, metres for a length of 1 m.
 const LOADS: [(&str, f64, [f64; 2]); 3] = [
     ("PL²/EI = 1", 1.0, [0.943_566_763_716_623_1, 0.301_720_773_799_813_8]),
     ("PL²/EI = 5", 5.0, [0.612_371_639_275_570_1, 0.713_791_523_612_911_8]),

@@ -1,7 +1,7 @@
 //! A moment at the end of a straight tube: M = 2π EI/L bends it to a circle.
 //!
-//! Nothing turns a tube but pulls, so the moment is a pair of them on a piece beyond the length that is looked at; the pair
-//! stays across the piece however that turns, and what is looked at feels the moment and no force.
+//! A tube takes pulls but no moments from outside, so the moment is a pair of pulls on a piece beyond the measured length; the
+//! pair stays perpendicular to the piece however that turns, so the measured length feels the moment and no force.
 
 use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
@@ -14,13 +14,13 @@ use std::f64::consts::TAU;
 /// The benchmark.
 pub(in super::super) struct EndMoment;
 
-/// Names, and the angle M L/EI that the end is turned by.
+/// Names, and the angle M L/EI by which the end is turned.
 const ANGLES: [(&str, f64); 3] = [("a quarter circle", 0.25 * TAU), ("half a circle", 0.5 * TAU), ("a circle", TAU)];
-/// The piece that is pulled at, in lengths of what is looked at.
+/// Length of the pulled piece, as a share of the measured length.
 const LEVER: f64 = 0.25;
-/// How long the moment rises, and how long it then stays, seconds.
+/// How long the moment rises, and how long it is then constant, seconds.
 const SECONDS: [f64; 2] = [3.0, 7.0];
-/// Where the tube is compared with the circle, shares of the length.
+/// Points at which the tube is compared with the circle, shares of the length.
 const LOOKS: [f64; 4] = [0.25, 0.5, 0.75, 1.0];
 
 impl Benchmark for EndMoment {
@@ -50,19 +50,19 @@ impl Benchmark for EndMoment {
     }
 }
 
-/// The point at an arc length of what is looked at.
+/// The point at an arc length of the measured part.
 fn at(play: &Play, arc_m: f64) -> DVec3 {
     play.point(arc_m / (1.0 + LEVER))
 }
 
-/// Two opposite pulls across the piece, whose moment about y bends the tube upwards.
+/// Two opposite pulls across the lever piece whose moment about y bends the tube upwards.
 fn couple(play: &Play, moment: f64) -> [Pull; 2] {
     let lever = at(play, 1.0 + LEVER) - at(play, 1.0);
     let force = DVec3::NEG_Y.cross(lever) * (moment / lever.length_squared());
     [dead_load(1.0, -force), dead_load(1.0 + LEVER, force)]
 }
 
-/// A point of a circle that leaves the origin along x and turns upwards by `angle` over its metre.
+/// A point of a circle that leaves the origin along x and turns upwards by `angle` over one metre.
 fn circle_m(angle: f64, arc_m: f64) -> DVec3 {
     let turned = angle * arc_m;
     DVec3::new(libm::sin(turned), 0.0, 1.0 - libm::cos(turned)) / angle

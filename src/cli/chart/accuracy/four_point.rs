@@ -9,9 +9,9 @@ use metachron_models::rod::TubeSpec;
 /// The benchmark.
 pub(in super::super) struct FourPoint;
 
-/// How far the loads are from the supports, metres of 1 m.
+/// Distances of the loads from the supports, metres of 1 m.
 const PLACES: [(&str, f64); 2] = [("a = L/4", 0.25), ("a = L/8", 0.125)];
-/// Deflection in the middle, metres: what theory leaves out is its square over that of the radius, 1e-7.
+/// Deflection in the middle, metres: the theory's relative error is its square over that of the radius, 1e-7.
 const DEFLECTION_M: f64 = 1e-5;
 const SECONDS: f64 = 4.0;
 

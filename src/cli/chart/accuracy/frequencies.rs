@@ -1,7 +1,7 @@
-//! How fast a clamped tube vibrates, against beam and wave theory: the first four modes of bending, of stretch and of twist.
+//! Frequencies of a clamped tube, against beam and wave theory: the first four modes of bending, of stretch and of twist.
 //!
-//! A mode is set off by a pull of its own shape, or let go from an even twist, and seen through the same shape: what else
-//! moves is not seen.
+//! A mode is excited by pulls in its own shape, or released from an even twist, and is measured by projection onto the same shape:
+//! other motion does not count.
 
 use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
@@ -17,20 +17,20 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 pub(in super::super) struct Frequencies;
 
 const YOUNG_PA: f64 = 1e7;
-/// Rotary inertia is so much less where tubes bend: the theory of slender beams has none.
+/// Rotary inertia is reduced to this share in bending: the theory of slender beams has none.
 const ROTARY_SHARE: f64 = 1e-3;
-/// How far the tip is pulled before it is let go, metres: small beside everything.
+/// How far the tip is pulled before it is released, metres: small compared with every other length.
 const PULLED_M: f64 = 1e-5;
-/// By how much the tip is turned where it twists, radians.
+/// Twist of the tip before release, radians.
 const TWISTED_RAD: f64 = 1e-2;
-/// Periods that are counted, after one that is left to what else was set off.
+/// Periods that are counted, after one in which other excited motion passes.
 const PERIODS: usize = 8;
-/// Steps a period.
+/// Steps per period.
 const STEPS: [f64; 3] = [25.0, 50.0, 100.0];
 /// βL of the bending modes: cos βL cosh βL = −1 (tests/reference/frequencies.json).
 const BETA: [f64; 4] = [1.875_104_068_711_961, 4.694_091_132_974_175, 7.854_757_438_237_613, 10.995_540_734_875_47];
 
-/// What a mode moves.
+/// The motion of a mode.
 #[derive(Clone, Copy, PartialEq)]
 enum Kind {
     Bending,
@@ -57,7 +57,7 @@ impl Mode {
         Some(Self { kind, beta: if kind == Kind::Bending { beta } else { (2.0 * index as f64 + 1.0) * FRAC_PI_2 } })
     }
 
-    /// The tube that vibrates.
+    /// The tube of the mode.
     fn spec(&self) -> TubeSpec {
         let mut spec = match self.kind {
             Kind::Bending => slender_tube(YOUNG_PA, metre()),
@@ -71,7 +71,7 @@ impl Mode {
         TubeSpec { clamp: [true, false], ..spec }
     }
 
-    /// Its frequency by theory, Hz: β² √(EI/μ)/2π, β √(EA/μ)/2π, β √(GJ/2ρI)/2π.
+    /// Its frequency in theory, Hz: β² √(EI/μ)/2π, β √(EA/μ)/2π, β √(GJ/2ρI)/2π.
     fn hz(&self, spec: &TubeSpec) -> f64 {
         let (section, mu) = (&spec.section, spec.mass_per_length_kg_m);
         let speed = match self.kind {
@@ -82,7 +82,7 @@ impl Mode {
         self.beta * speed / TAU
     }
 
-    /// How far it moves at `s` metres from the clamp; 2 or 1 in size at the tip.
+    /// The mode's displacement at `s` metres from the clamp; of size 2 or 1 at the tip.
     fn shape(&self, s: f64) -> f64 {
         let (b, x) = (self.beta, self.beta * s);
         if self.kind != Kind::Bending {
@@ -92,7 +92,7 @@ impl Mode {
         libm::cosh(x) - libm::cos(x) - share * (libm::sinh(x) - libm::sin(x))
     }
 
-    /// Pulls at every node that set the mode off.
+    /// Pulls at every node that excite the mode.
     fn hands(&self, spec: &TubeSpec, nodes: u32) -> Vec<Pull> {
         let axis = if self.kind == Kind::Axial { DVec3::X } else { DVec3::Z };
         let force = PULLED_M * spec.mass_per_length_kg_m * (TAU * self.hz(spec)).powi(2) / f64::from(nodes);
@@ -100,7 +100,7 @@ impl Mode {
         (1..=nodes).map(|k| dead_load(at(k), axis * (force * self.shape(at(k))))).collect()
     }
 
-    /// How much of the mode is in the curve: the mean of what moves, weighed by the shape.
+    /// The amplitude of the mode in the curve: the mean displacement weighted by the shape.
     fn seen(&self, curve: &CurveState) -> f64 {
         let last = curve.positions.len() - 1;
         let sum: f64 = match self.kind {
@@ -142,7 +142,7 @@ impl Benchmark for Frequencies {
         let hz = mode.hz(&spec);
         let hands = mode.hands(&spec, case.segments);
         let mut play = Play::new(spec, case)?;
-        // a pull of a quarter period sets the mode off
+        // a pull of a quarter period excites the mode
         let mut sound = mode.kind == Kind::Torsion || play.run(0.25 / hz, &hands);
         let mut crossings = Vec::new();
         let (mut before, mut then_s) = (mode.seen(&play.curve()), play.time_s());

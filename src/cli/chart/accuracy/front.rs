@@ -1,8 +1,8 @@
-//! Work against precision: what of some points nothing else beats.
+//! Work against precision: the Pareto front of some points.
 //!
 //! In: pairs of cost and error. Out: the Pareto front. Never here: what was measured.
 
-/// Those points that no other is both cheaper and more accurate than, the cheapest first.
+/// The points for which no other is both cheaper and more accurate, the cheapest first.
 pub(super) fn front(points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut sorted: Vec<_> = points.into_iter().filter(|(cost, error)| cost.is_finite() && error.is_finite()).collect();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1)));

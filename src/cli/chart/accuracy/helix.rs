@@ -1,7 +1,7 @@
-//! A helical spring that is pulled along its axis, against the theory of wires: k = 1/(R² L (cos² α/C + sin² α/B)).
+//! A helical spring pulled along its axis, against the theory of wires: k = 1/(R² L (cos² α/C + sin² α/B)).
 //!
-//! The force must act on the axis, where there is no tube: it is shared evenly by points around the last turn, whose middle
-//! the axis is. The turns before it then feel the force on the axis alone and stay an even helix; they are looked at.
+//! The force must act on the axis, where there is no tube: it is shared evenly by points around the last turn, whose centre is on
+//! the axis. The turns before it then feel only the force on the axis and stay an even helix; these are measured.
 
 use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case};
@@ -18,13 +18,13 @@ pub(in super::super) struct Helix;
 /// Names and pitch angles, degrees.
 const PITCHES: [(&str, f64); 3] = [("pitch 5°", 5.0), ("pitch 20°", 20.0), ("pitch 45°", 45.0)];
 const RADIUS_M: f64 = 0.1;
-/// Turns, the last of which is pulled at.
+/// Turns, including the last one, which is pulled.
 const TURNS: u32 = 4;
-/// Points of the path a turn.
+/// Points of the path per turn.
 const POINTS: u32 = 64;
 /// Pulls on the last turn.
 const HANDS: u32 = 16;
-/// By how much of their height the turns are drawn out: what theory leaves out is of that size.
+/// Extension of the turns as a share of their height: the relative error of the linear theory is of that size.
 const DRAWN: f64 = 1e-5;
 const SECONDS: f64 = 10.0;
 
@@ -34,7 +34,7 @@ impl Benchmark for Helix {
     const ERROR: &'static str = "error of the lengthening / lengthening";
 
     fn cases(quick: bool) -> Vec<Case> {
-        // segments a turn: 12 … 96
+        // segments per turn: 12 … 96
         let sizes: Vec<u32> = if quick { &[12, 24][..] } else { &[12, 24, 48, 96] }.iter().map(|n| n * TURNS).collect();
         Case::ladder(&PITCHES.map(|(name, _)| name), &[Integrator::ImplicitEuler], &sizes, 10.0)
     }

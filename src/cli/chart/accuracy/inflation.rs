@@ -1,4 +1,4 @@
-//! A closed tube under pressure: how much wider its outside gets, against the exact solution for any wall (Lamé).
+//! A closed tube under pressure: the widening of its outside, against the exact solution for any wall (Lamé).
 //!
 //! The tube follows the law of thin walls, dr = p r² (1 − ν/2)/(E t): its error is that of the law, and grows with the wall.
 
@@ -10,7 +10,7 @@ use metachron_models::rod::{Material, Section, TubeSpec};
 /// The benchmark.
 pub(in super::super) struct Inflation;
 
-/// Names, and walls in outer radii.
+/// Names, and wall thicknesses in outer radii.
 const WALLS: [(&str, f64); 5] = [
     ("t/r = 0.133", 2.0 / 15.0),
     ("t/r = 0.067", 1.0 / 15.0),
@@ -20,7 +20,7 @@ const WALLS: [(&str, f64); 5] = [
 ];
 const RADIUS_M: f64 = 0.015;
 const MATERIAL: Material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 27.0 / 28.0 };
-/// The stress of the wall over its modulus: small, both theories are linear.
+/// The stress of the wall over its modulus: small, so that both theories are linear.
 const STRAIN: f64 = 1e-3;
 
 impl Benchmark for Inflation {

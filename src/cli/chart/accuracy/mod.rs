@@ -1,4 +1,4 @@
-//! `chart accuracy`: how wrong each method is against an independent answer, and what it costs.
+//! `chart accuracy`: the error of each method against an independent answer, and its cost.
 
 pub(super) mod beam;
 pub(super) mod buckling;

@@ -1,4 +1,4 @@
-//! What other engines reach in the same benchmarks, measured once and kept as a table.
+//! Results of other engines in the same benchmarks, measured once and stored as a table.
 //!
 //! Out: points with engine, version and variant. Measured on two cores of a shared virtual AMD EPYC, no GPU, CPU seconds;
 //! rest shapes against the reference of the same law (docs/accuracy.md). Never here: our own rows.
@@ -22,7 +22,7 @@ pub(in super::super) struct Peer {
     dt_ms: f64,
     /// CPU milliseconds a simulated second.
     pub(super) cpu_ms_per_s: f64,
-    /// In the benchmark's own measure.
+    /// In the benchmark's own unit.
     pub(super) error: f64,
 }
 

@@ -1,7 +1,7 @@
-//! Runs an agent alone and counts what that costs.
+//! Steps a single agent and measures the CPU time of that.
 //!
-//! In: a tube's numbers or a soft body's, a method, a step. Out: CPU time of its steps, and how it lies and moves on the way.
-//! Never here: answers, errors, what is drawn.
+//! In: the spec of a tube or a soft body, a method, a step. Out: CPU time of its steps, and its state on the way.
+//! Never here: answers, errors, drawing.
 
 use super::super::stability::common::plain_tube;
 use super::diagram::Case;
@@ -15,7 +15,7 @@ use metachron_models::rod::{Material, Section, TubeSpec};
 use metachron_models::soft::SoftBody;
 use metachron_models::soft::SoftSpec;
 
-/// Stretch and shear of a [`slender_tube`] are this much stiffer than those of the tube of the references.
+/// Factor by which a [`slender_tube`] is stiffer in stretch and shear than the tube of the references.
 const STIFFER: f64 = 1e3;
 
 /// The tube of the references: 1 m along `path_m`, 15 mm radius, 2 mm wall.
@@ -25,7 +25,7 @@ pub(super) fn reference_tube(young_pa: f64, path_m: Vec<DVec3>) -> TubeSpec {
     TubeSpec { section, mass_per_length_kg_m, ..plain_tube(path_m, 0.015, 16) }
 }
 
-/// The same for answers that know neither stretch nor shear.
+/// The same for reference answers without stretch and shear.
 pub(super) fn slender_tube(young_pa: f64, path_m: Vec<DVec3>) -> TubeSpec {
     let mut spec = reference_tube(young_pa, path_m);
     (spec.section.ea_n, spec.section.ga_n) = (spec.section.ea_n * STIFFER, spec.section.ga_n * STIFFER);
@@ -37,7 +37,7 @@ pub(super) fn metre() -> Vec<DVec3> {
     vec![DVec3::ZERO, DVec3::X]
 }
 
-/// An agent and how it is stepped.
+/// An agent and its stepping.
 pub(in super::super) struct Play {
     agent: Box<dyn Agent>,
     dt: SimSpan,
@@ -48,20 +48,20 @@ pub(in super::super) struct Play {
 }
 
 impl Play {
-    /// The tube of a case; methods that cannot carry its steps whole get the substeps that they need. None where it cannot be.
+    /// The tube of a case, with enough substeps for a method whose limit is below the step. `None` where it cannot be built.
     pub(super) fn new(spec: TubeSpec, case: &Case) -> Option<Self> {
         let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.method)?;
         let segments = Some(case.segments as usize);
         let mut spec = TubeSpec { integrator, segments, substeps: case.substeps, ..spec };
         let dt_s = case.dt_ms * 1e-3;
-        // a tenth to spare: limits shrink with the stretch
+        // a tenth of margin: limits shrink with the stretch
         let needed = |limit_s: f64| libm::ceil(1.1 * dt_s / limit_s) as u32;
         let limit_s = Tube::new(spec.clone()).ok()?.longest_substep_s();
         spec.substeps = spec.substeps.max(limit_s.map_or(1, needed));
         Self::of(Box::new(Tube::new(spec).ok()?), dt_s)
     }
 
-    /// A soft body of a case; none where it cannot be.
+    /// The soft body of a case; `None` where it cannot be built.
     pub(super) fn soft(spec: SoftSpec, case: &Case) -> Option<Self> {
         Self::of(Box::new(SoftBody::new(spec).ok()?), case.dt_ms * 1e-3)
     }
@@ -71,7 +71,7 @@ impl Play {
         Some(Self { agent, dt, time: SimTime::ZERO, cpu_s: 0.0, substeps: 0, steps: 0 })
     }
 
-    /// Goes on for `seconds` under `hands`; whether every step could be made.
+    /// Steps on for `seconds` under `hands`; whether every step succeeded.
     pub(super) fn run(&mut self, seconds: f64, hands: &[Pull]) -> bool {
         let until = self.time.as_secs_f64() + seconds - 0.5 * self.dt.as_secs_f64();
         let start = ThreadTime::now();
@@ -89,14 +89,14 @@ impl Play {
         sound
     }
 
-    /// How it lies and moves.
+    /// The body's state.
     pub(super) fn body(&self) -> Body {
         let mut seen = Snapshot::default();
         self.agent.write_snapshot(&mut seen);
         seen.body
     }
 
-    /// The same of a tube; empty of anything else.
+    /// The state of a tube; empty for anything else.
     pub(super) fn curve(&self) -> CurveState {
         match self.body() {
             Body::Curve(curve) => curve,
@@ -104,7 +104,7 @@ impl Play {
         }
     }
 
-    /// The point of it at a share of its length, metres.
+    /// The point of the body at a share of its length, metres.
     pub(super) fn point(&self, share: f64) -> DVec3 {
         self.body().probe(share).map_or(DVec3::NAN, |(point, _)| point)
     }
@@ -135,7 +135,7 @@ impl Play {
         self.substeps as f64 / self.steps.max(1) as f64
     }
 
-    /// How long it has gone, simulated seconds.
+    /// Simulated time so far, seconds.
     pub(super) fn time_s(&self) -> f64 {
         self.time.as_secs_f64()
     }

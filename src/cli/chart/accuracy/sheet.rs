@@ -15,7 +15,7 @@ pub(in super::super) struct Sheet;
 const MODULI: [(&str, f64); 2] = [("E = 1e6 Pa", 1e6), ("E = 1e7 Pa", 1e7)];
 const SPAN_M: f64 = 0.4;
 const WIDTH_M: f64 = 0.1;
-/// So thin that it does not bend but hang.
+/// So thin that it hangs without bending stiffness.
 const THICKNESS_M: f64 = 1e-4;
 const DENSITY_KG_M3: f64 = 1000.0;
 const SECONDS: f64 = 12.0;
@@ -42,7 +42,7 @@ impl Benchmark for Sheet {
     }
 }
 
-/// A soft body that nothing holds and nothing is near, under gravity.
+/// A soft body under gravity, attached nowhere and without obstacles.
 pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
     SoftSpec {
         shape,
@@ -58,7 +58,7 @@ pub(super) fn soft(shape: SoftShape, matter: SoftMatter) -> SoftSpec {
     }
 }
 
-/// The sag of an elastic cable as long as its span d at rest, w its weight and S its stiffness: with the pull H that makes
+/// The sag of an elastic cable as long as its span d at rest, with weight w and stiffness S: with the tension H that solves
 /// H d/S + 2 H/w asinh(w d/2H) = d, it is w d²/8S + H/w (√(1 + (w d/2H)²) − 1).
 fn sag_m(young_pa: f64) -> f64 {
     let (weight, stiffness) = (DENSITY_KG_M3 * GRAVITY * THICKNESS_M, young_pa * THICKNESS_M);

@@ -1,4 +1,4 @@
-//! A cable pinned at one end and let go from the horizontal, undamped, against the trajectory that rigid links extrapolate to
+//! A cable pinned at one end and released from the horizontal, undamped, against the trajectory extrapolated from rigid links
 //! (tests/reference/swing_cable.json).
 
 use super::super::stability::common::GRAVITY;
@@ -19,7 +19,7 @@ struct Trajectory {
 }
 
 const REFERENCE: &str = include_str!("../../../../tests/reference/swing_cable.json");
-/// How often the tip is compared, in the first second, every 10 ms.
+/// Number of comparisons of the tip, every 10 ms in the first second.
 const LOOKS: usize = 100;
 
 impl Benchmark for Swing {

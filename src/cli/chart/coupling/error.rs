@@ -1,8 +1,8 @@
-//! The coupling error: the same scene with clocks apart, and with all of them tiny and alike.
+//! The coupling error: the same scene with separate clocks, and under one very fine common clock.
 //!
-//! Both runs are looked at whenever the slower clock and the faster show the same time, every impulse that was given delivered:
-//! what is measured is what the clocks change, not how old a state is that somebody shows. The error of each agent's own longer
-//! step is in it too; where the ratio is 1 there is little else.
+//! Both runs are compared whenever the slower and the faster clock show the same time, with every given impulse delivered: this
+//! measures the effect of the clocks, not the age of published states. The error of each agent's own longer step is included;
+//! at a ratio of 1 there is little else.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -22,20 +22,20 @@ pub(in super::super) struct CouplingError;
 const SCENES: [&str; 4] = ["oblique-blow", "ball-on-box", "tube-on-bar", "crossing"];
 const RATIOS: [u32; 5] = [1, 3, 10, 30, 100];
 const QUICK_RATIOS: [u32; 2] = [1, 10];
-/// A step of the faster clock, and of the common clock of the other run: a quarter of it, nanoseconds.
+/// A step of the faster clock, and of the common clock of the other run, a quarter of it, nanoseconds.
 const FAST_NS: u64 = 1_000_000;
 const ORACLE_NS: u64 = FAST_NS / 4;
 /// Clocks that differ by less show the same time, seconds: a sixth of a tenth of a second is no whole number of nanoseconds.
 const SAME_S: f64 = 1e-6;
 const SECONDS: f64 = 1.0;
 const QUICK_SECONDS: f64 = 0.4;
-/// Two balls are held against the closed form as closely, and their momentum closer.
+/// Bounds for two balls: of the impulse, as close as against the closed form, and of the momentum, closer.
 const BLOW_MAX: f64 = 0.01;
 const MOMENTUM_MAX: f64 = 0.005;
-/// How far a body that rests on another may be from where it rests under one clock, metres.
+/// How far a body that rests on another may be from its place under one clock, metres.
 const REST_MAX_M: f64 = 2e-3;
 
-/// A scene, how much slower the second clock is, and which is which.
+/// A scene, the ratio of the clocks, and which agent has the fast one.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     scene: String,
@@ -44,21 +44,21 @@ pub(in super::super) struct Case {
     seconds: f64,
 }
 
-/// How far the two runs are apart.
+/// The difference of the two runs.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     scene: String,
     ratio: u32,
     first_is_fast: bool,
     seconds: f64,
-    /// How often both runs were looked at.
+    /// The number of comparisons of both runs.
     looks: usize,
-    /// Positions of the points that are followed: root of the mean square and greatest, metres.
+    /// Positions of the followed points: root mean square and greatest distance, metres.
     position_rms_m: f64,
     position_max_m: f64,
-    /// What the momenta of the whole differ by at the last look, as a share of the impulse exchanged under one clock.
+    /// Difference of the total momenta at the last comparison, as a share of the impulse exchanged under one clock.
     momentum: f64,
-    /// What the impulses exchanged up to there differ by, as the same share.
+    /// Difference of the impulses exchanged up to there, as the same share.
     impulse: f64,
 }
 
@@ -147,7 +147,7 @@ fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -
     Panel { title: title.to_owned(), x, y: Axis::log(label, low, 30.0 * high), layers }
 }
 
-/// How far two runs are apart.
+/// The difference of two runs.
 struct Apart {
     looks: usize,
     position_rms_m: f64,
@@ -163,7 +163,7 @@ impl Default for Apart {
     }
 }
 
-/// What one run leaves: places at every look, momentum and impulse at the last one.
+/// The record of one run: positions at every comparison, momentum and impulse at the last one.
 #[derive(Default)]
 struct Trail {
     looks: Vec<Vec<DVec3>>,
@@ -188,7 +188,7 @@ fn apart(case: &Case) -> Option<Apart> {
     })
 }
 
-/// Plays the scene and looks at it at every whole number of `every_ns`, up to the case's length; `None` where it broke off.
+/// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
 fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
     let Scene { play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64), Faults::default())?;
     let looks = libm::round(case.seconds * 1e9) as u64 / every_ns;
@@ -207,7 +207,7 @@ fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
     (trail.looks.len() as u64 == looks).then_some(trail)
 }
 
-/// Where a point is with all that is on its way to its agent.
+/// The position of a point, with every impulse on its way to its agent delivered.
 fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
     let members = play.stage.members();
     let Some(member) = members.get(id.0 as usize) else { return DVec3::NAN };
@@ -218,7 +218,7 @@ fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
     body.point(anchor).map_or(DVec3::NAN, |(x, _)| x)
 }
 
-/// A tube moved by what others gave it since they did.
+/// A tube moved by the impulses that other agents gave it since its last step.
 fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
     let mut body = member.snapshot.body.clone();
     let (Body::Curve(state), Some(inertia)) = (&mut body, member.snapshot.inertia.response()) else { return body };

@@ -1,3 +1,3 @@
-//! `chart coupling`: how far apart a coupled scene and the same scene under one tiny common clock are.
+//! `chart coupling`: the difference of a coupled scene with separate clocks and the same scene under one very fine common clock.
 
 pub(super) mod error;

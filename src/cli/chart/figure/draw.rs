@@ -22,15 +22,15 @@ const LARGE: u32 = 17;
 const MIDDLE: u32 = 15;
 const SMALL: u32 = 12;
 const FONT: &str = "sans-serif";
-/// Pixels are drawn so many times finer than units of the SVG text, and then brought to [`SHARP`]: smooth lines.
+/// Pixels are drawn this many times finer than units of the SVG text and then scaled down to [`SHARP`]: smooth lines.
 const FINE: u32 = 4;
-/// Pixels a unit: sharp on fine screens too.
+/// Pixels per unit: sharp on fine screens too.
 const SHARP: u32 = 2;
 
 /// The figure as SVG text; the same figure is always the same text.
 ///
 /// # Errors
-/// What cannot be drawn: an axis that ends where it begins.
+/// A figure that cannot be drawn: an axis that ends where it begins.
 pub(in crate::cli) fn svg(figure: &Figure) -> anyhow::Result<String> {
     let mut text = String::new();
     let [width, height] = size(figure);
@@ -41,7 +41,7 @@ pub(in crate::cli) fn svg(figure: &Figure) -> anyhow::Result<String> {
 /// The figure as the bytes of a PNG file; the same figure is always the same bytes.
 ///
 /// # Errors
-/// What cannot be drawn.
+/// A figure that cannot be drawn.
 pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
     let [width, height] = size(figure);
     let fine = (width * FINE, height * FINE);
@@ -57,7 +57,7 @@ pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
 /// Names in black on white side by side, each at the left of a column of this width and height in pixels.
 ///
 /// # Errors
-/// What cannot be drawn.
+/// Names that cannot be drawn.
 pub(in crate::cli) fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<RgbImage> {
     bring_font(FONT)?;
     let all = (width * names.len() as u32, height);
@@ -85,7 +85,7 @@ fn size(figure: &Figure) -> [u32; 2] {
     [widest * columns(figure) as u32, PANEL[1] * lines(figure) as u32 + TITLE]
 }
 
-/// How many pixels a unit has.
+/// Pixels per unit.
 #[derive(Clone, Copy)]
 struct Pen(u32);
 
@@ -103,7 +103,7 @@ impl Pen {
     }
 }
 
-/// plotters' errors borrow what was drawn on.
+/// An error of plotters as one that does not borrow the drawing area.
 fn undrawn(error: impl std::fmt::Display) -> anyhow::Error {
     anyhow!("the figure cannot be drawn: {error}")
 }
@@ -137,7 +137,7 @@ fn draw_panel<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pe
     draw_legend(area, panel, pen)
 }
 
-/// The legend beside the axes, where it hides nothing.
+/// Draws the legend to the right of the axes, where it hides nothing.
 fn draw_legend<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, pen: Pen) -> anyhow::Result<()> {
     let left = pen.at((width(panel) - LEGEND) as i32);
     for (line, layer) in panel.layers.iter().filter(|l| !l.label.is_empty()).enumerate() {
@@ -160,7 +160,7 @@ fn draw_legend<D: DrawingBackend>(area: &DrawingArea<D, Shift>, panel: &Panel, p
     Ok(())
 }
 
-/// How wide a panel is: with room for its legend, if it has one.
+/// Width of a panel, including its legend if it has one.
 fn width(panel: &Panel) -> u32 {
     PANEL[0] + if panel.layers.iter().any(|l| !l.label.is_empty()) { LEGEND } else { 0 }
 }
@@ -191,7 +191,7 @@ fn draw_layer<D: DrawingBackend>(chart: &mut Chart<'_, D>, layer: &Layer, pen: P
     Ok(())
 }
 
-/// An arrow at the border wherever a layer goes on beyond the axes: what stands there lies farther out.
+/// Draws an arrow at the border wherever a layer leaves the axes: the values there are farther out.
 fn draw_leaving<D: DrawingBackend>(
     chart: &mut Chart<'_, D>,
     panel: &Panel,
@@ -201,7 +201,7 @@ fn draw_leaving<D: DrawingBackend>(
     let (Mark::Line(points) | Mark::Dashed(points) | Mark::Dots(points)) = &layer.mark else { return Ok(()) };
     let (long, half) = (pen.at(9), pen.at(4));
     let arrows = leaving(points, panel).into_iter().map(|(at, [right, up])| {
-        // on the screen y points down; the tip lies on the border
+        // on the screen y points down; the tip is at the border
         let corner = |along: i32, across: i32| (-right * along + up * across, up * along + right * across);
         EmptyElement::at(at)
             + Polygon::new(vec![(0, 0), corner(long, half), corner(long, -half)], rgb(layer.colour).filled())
@@ -210,13 +210,13 @@ fn draw_leaving<D: DrawingBackend>(
     Ok(())
 }
 
-/// Where points go beyond the axes, once for each run beyond one border, and which way: (right, up) of −1, 0, 1.
+/// The points where a layer leaves the axes, once for each run beyond one border, and the direction: (right, up) of −1, 0, 1.
 fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> {
     let mut before = [0, 0];
     let mut all = Vec::new();
     for (x, y) in finite(points) {
         let way = [panel.x.beyond(x), panel.y.beyond(y)];
-        // a point that is beyond both is told of by the border above or below
+        // a point beyond both borders is marked at the one above or below
         let told = if way[1] != 0 { [0, way[1]] } else { way };
         if told != [0, 0] && told != before {
             all.push(((x.clamp(panel.x.low, panel.x.high), y.clamp(panel.y.low, panel.y.high)), told));
@@ -226,7 +226,7 @@ fn leaving(points: &[(f64, f64)], panel: &Panel) -> Vec<((f64, f64), [i32; 2])> 
     all
 }
 
-/// The points that are numbers.
+/// The points with finite coordinates.
 fn finite(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     points.iter().copied().filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
 }
@@ -260,7 +260,7 @@ mod tests {
     #[test]
     fn letters_are_drawn_with_the_font_that_the_program_brings() {
         assert_eq!(dark_pixels(""), 0);
-        // Greek and signs that the charts' labels need: each draws something of its own, none a missing glyph's nothing
+        // Greek and signs that the charts' labels need: each draws a glyph of its own, not an empty one
         let counts = ["μ", "φ", "π", "²", "×", "≤", "Δ", "τ", "₁"].map(dark_pixels);
         assert!(counts.iter().all(|c| *c > 4), "{counts:?}");
     }

@@ -1,4 +1,4 @@
-//! A figure as data: panels with axes, and what lies in them.
+//! A figure as data: panels with axes and layers.
 //!
 //! In: numbers with labels. Out: the same, for `draw` to draw. Never here: pixels, files.
 
@@ -11,24 +11,24 @@ pub(in crate::cli) use draw::{headings, png, svg};
 /// Some panels under one title.
 #[derive(Debug, Clone, Default)]
 pub(in crate::cli) struct Figure {
-    /// What it shows.
+    /// The heading.
     pub title: String,
     /// The panels, row by row.
     pub panels: Vec<Panel>,
-    /// How many panels stand beside each other, ≥ 1.
+    /// Panels per row, ≥ 1.
     pub columns: usize,
 }
 
-/// A pair of axes with what lies between them.
+/// A pair of axes with the layers drawn in it.
 #[derive(Debug, Clone)]
 pub(in crate::cli) struct Panel {
-    /// What it shows.
+    /// The heading.
     pub title: String,
     /// To the right.
     pub x: Axis,
     /// Upward.
     pub y: Axis,
-    /// What is drawn, the first at the back.
+    /// The layers, the first at the back.
     pub layers: Vec<Layer>,
 }
 
@@ -56,30 +56,30 @@ impl Axis {
         Self { label, low, high, log: true }
     }
 
-    /// Whether a value lies beyond the low end (−1) or the high end (1) of the axis by more than rounding, or on it (0).
+    /// Whether a value is below the low end (−1) or above the high end (1) of the axis by more than rounding, or on the axis (0).
     pub(super) fn beyond(&self, value: f64) -> i32 {
         let slack = 1e-9 * (self.high - self.low);
         i32::from(value > self.high + slack) - i32::from(value < self.low - slack)
     }
 }
 
-/// Something of one colour, with a label of its own in the legend (none where it is empty).
+/// A mark of one colour, with a label of its own in the legend (none where it is empty).
 #[derive(Debug, Clone)]
 pub(in crate::cli) struct Layer {
     /// Its name.
     pub label: String,
     /// Its colour.
     pub colour: Colour,
-    /// What is drawn.
+    /// The shape.
     pub mark: Mark,
 }
 
-/// What a layer is made of. Values outside the axes are drawn at their edge, with an arrow that says so; those that are not finite are left out.
+/// The shape of a layer. Values outside the axes are drawn at the border, with an arrow; values that are not finite are left out.
 #[derive(Debug, Clone)]
 pub(in crate::cli) enum Mark {
-    /// A line through points: measured. One point alone is drawn as a dot.
+    /// A line through points: measurements. A single point is drawn as a dot.
     Line(Vec<(f64, f64)>),
-    /// A broken line through points: theory, or a limit.
+    /// A dashed line through points: theory, or a limit.
     Dashed(Vec<(f64, f64)>),
     /// Points.
     Dots(Vec<(f64, f64)>),
@@ -87,12 +87,12 @@ pub(in crate::cli) enum Mark {
     Cells(Vec<[f64; 4]>),
 }
 
-/// Colours that people with any sight tell apart, also printed grey (Okabe and Ito's, the first two those of the other figures).
+/// Colours that are distinct for colour-blind readers and in grey print (Okabe and Ito's; the first two are those of the other figures).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::cli) enum Colour {
-    /// Blue: ours.
+    /// Blue: our own results.
     Blue,
-    /// Red: what it is compared with.
+    /// Red: the comparison.
     Red,
     /// Green.
     Green,
@@ -107,10 +107,10 @@ pub(in crate::cli) enum Colour {
 }
 
 impl Colour {
-    /// Colours for lines in the order they are taken.
+    /// Colours for lines, in order of use.
     pub const LINES: [Self; 6] = [Self::Blue, Self::Red, Self::Green, Self::Orange, Self::Purple, Self::Sky];
 
-    /// The colour of number `k` of those that stand behind our own.
+    /// The colour of number `k` of the layers drawn behind our own.
     pub const fn behind(k: usize) -> Self {
         match k {
             0 => Self::Grey,
@@ -119,7 +119,7 @@ impl Colour {
     }
 }
 
-/// The range that holds all numbers, with a little room; (0, 1) where there are none.
+/// The range that contains all numbers, with a small margin; (0, 1) where there are none.
 pub(in crate::cli) fn span(numbers: impl IntoIterator<Item = f64>, log: bool) -> (f64, f64) {
     let good = |v: &f64| v.is_finite() && (!log || *v > 0.0);
     let (low, high) = numbers

@@ -1,15 +1,15 @@
-//! An axis as plotters wants it: where a value stands, and which values are written beside it.
+//! An axis as plotters needs it: the place of a value, and the values that are labelled.
 
 use super::Axis;
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 use std::ops::Range;
 
-/// An axis that knows its own ticks.
+/// An axis that chooses its own ticks.
 #[derive(Debug, Clone)]
 pub(super) struct Scale(pub(super) Axis);
 
 impl Scale {
-    /// The share of the axis at which `value` stands; beyond its ends, the end.
+    /// The place of `value` as a share of the axis; beyond its ends, the end.
     fn share(&self, value: f64) -> f64 {
         let Axis { low, high, log, .. } = self.0;
         let share =
@@ -17,14 +17,14 @@ impl Scale {
         share.clamp(0.0, 1.0)
     }
 
-    /// At most about `most` values to write beside the axis.
+    /// The values to label, about `most` at most.
     fn ticks(&self, most: usize) -> Vec<f64> {
         let Axis { low, high, log, .. } = self.0;
         if log { decades(low, high, most) } else { round_steps(low, high, most) }
     }
 }
 
-/// 1, 2, 5 of every decade where that is not too many, else 1 of every decade, or of every second one.
+/// 1, 2, 5 of every decade where these are not too many, else 1 of every decade, of every second one, and so on.
 fn decades(low: f64, high: f64, most: usize) -> Vec<f64> {
     let (first, last) = (libm::floor(libm::log10(low)) as i32, libm::ceil(libm::log10(high)) as i32);
     let within = |list: &[f64], every: i32| -> Vec<f64> {

@@ -1,4 +1,4 @@
-//! How much of what is possible each choice reaches: benefit over the bound of the linear relaxation.
+//! Benefit of each policy over the bound of the linear relaxation.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -16,7 +16,7 @@ pub(in super::super) struct Bound;
 const OBJECTS: [usize; 4] = [10, 100, 1000, 10_000];
 const INSTANCES: usize = 40;
 const QUICK_INSTANCES: usize = 8;
-/// The greedy choice under 1000: A = {(1, 500), (510, 511)} and twice {(499, 499)} (`docs/theory/budget.md`, section 3).
+/// An instance that is bad for greedy, budget 1000: {(1, 500), (510, 511)} and twice {(499, 499)} (`docs/theory/budget.md`, section 3).
 const COUNTER_EXAMPLE: &str = "counter-example";
 
 type Choose = fn(&Problem) -> u64;
@@ -40,7 +40,7 @@ pub(in super::super) struct Case {
     policy: String,
 }
 
-/// What it reaches.
+/// Benefits of a policy over some problems.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     set: String,
@@ -135,7 +135,7 @@ impl Experiment for Bound {
     }
 }
 
-/// Objects of five levels, polygons log-normal over two decades, accuracy as of flat shading, a third of what all would take.
+/// Objects of five levels, polygons log-normal over two decades, accuracy as of flat shading; the budget is a third of the full cost.
 fn random(objects: usize, seed: usize) -> Problem {
     const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
     let mut noise = Noise::new(1 + seed as u64);
@@ -162,7 +162,7 @@ fn counter_example() -> Problem {
     problem
 }
 
-/// What the default policy makes of a problem, with no margin for a machine that errs.
+/// Benefit of the default policy on a problem, without a margin for prediction errors; zero where it exceeds the budget.
 fn ours(problem: &Problem) -> u64 {
     let mut adaptive = Adaptive::new(Settings { margin: 0.0, sigmas: 0.0, ..Settings::default() });
     let droppable = problem.mode() == Mode::AtMostOne;

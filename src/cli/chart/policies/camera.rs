@@ -1,22 +1,22 @@
-//! Paths of a camera: keys with a place and a direction, straight lines between them.
+//! Camera paths: keys with a position and a direction, linear between them.
 //!
 //! In: keys and a frame. Out: a camera. Never here: what it sees.
 
 use crate::compositor::Camera;
 use glam::DVec3;
 
-/// Where the eye is at a frame, and where it looks.
+/// Position and direction of the eye at a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Key {
     pub(super) frame: usize,
     pub(super) eye_m: [f64; 3],
-    /// About z from x, degrees; 360 more is a whole turn on the way there.
+    /// About z from x, degrees; 360 more adds a whole turn before this key.
     pub(super) yaw_deg: f64,
     /// Above the horizon, degrees.
     pub(super) pitch_deg: f64,
 }
 
-/// A way through a scene, and the vertical field of view along it.
+/// A path through a scene, and the vertical field of view along it.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Path {
     pub(super) keys: Vec<Key>,
@@ -29,13 +29,13 @@ pub(super) const fn key(frame: usize, eye_m: [f64; 3], yaw_deg: f64, pitch_deg: 
 }
 
 impl Path {
-    /// The camera at a frame; before the first key and after the last it stands still.
+    /// The camera at a frame; before the first key and after the last it does not move.
     pub(super) fn camera(&self, frame: usize) -> Camera {
         let after = self.keys.partition_point(|k| k.frame <= frame);
         let from = self.keys[after.saturating_sub(1)];
         let to = self.keys[after.min(self.keys.len() - 1)];
         let span = to.frame.saturating_sub(from.frame);
-        // at an end to the bit: a camera that stands still must not tremble by roundings
+        // exact at a key: a camera that does not move must not tremble by rounding
         let part = if span > 0 { frame.saturating_sub(from.frame) as f64 / span as f64 } else { 0.0 };
         let between = |a: f64, b: f64| a + (b - a) * part;
         let (yaw, pitch) = (between(from.yaw_deg, to.yaw_deg), between(from.pitch_deg, to.pitch_deg));

@@ -1,7 +1,7 @@
-//! The policies by name, over what is seen of a scene in numbers.
+//! The policies by name, over the visible part of a scene in numbers.
 //!
-//! In: things in view with their levels' costs and gains, the time of a frame, measured times. Out: a level for each, and what
-//! is promised. Never here: a policy's own arithmetic (the crate `metachron-budget` has it), the machine.
+//! In: things in view with their levels' costs and gains, the time of a frame, measured times. Out: a level for each, and a
+//! predicted time. Never here: a policy's own arithmetic (the crate `metachron-budget` has it), the machine.
 
 mod ours;
 mod sharing;
@@ -15,10 +15,10 @@ use metachron_budget::cost::value::Value;
 use metachron_budget::select::Level;
 use metachron_budget::select::threshold::STATIC_PX;
 
-/// The margin that every policy with a prediction leaves, as a part of T: none is better for leaving less.
+/// The margin that every predicting policy leaves, as a part of T: the same for all, so that none gains by leaving less.
 pub(super) const MARGIN: f64 = 0.02;
 
-/// Pixels a polygon of [`Policy::StaticFine`].
+/// Pixels per polygon of [`Policy::StaticFine`].
 const FINE_PX: f64 = 64.0;
 
 /// The time of a frame, microseconds.
@@ -26,48 +26,48 @@ const FINE_PX: f64 = 64.0;
 pub(super) struct Time {
     /// T.
     pub(super) target: f64,
-    /// What logic takes beside drawing.
+    /// Time of the logic, which runs in addition to drawing.
     pub(super) logic: f64,
-    /// How much of the shorter of logic and drawing adds to the longer, 0 … 1.
+    /// Share of the shorter of logic and drawing that adds to the longer, 0 … 1.
     pub(super) overlap: f64,
 }
 
-/// What is drawn of one thing.
+/// The choice for one thing.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Pick {
     /// Its level; `None` where it is left out.
     pub(super) level: Level,
-    /// How much of that level is drawn, 0 … 1.
+    /// Part of that level that is drawn, 0 … 1.
     pub(super) part: f64,
 }
 
-/// What is drawn of everything in view, in its order.
+/// The choices for everything in view, in its order.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Choice {
     pub(super) picks: Vec<Pick>,
-    /// The time that the frame is expected to take, microseconds; NaN where nothing is expected.
+    /// The predicted time of the frame, microseconds; NaN where there is no prediction.
     pub(super) predicted: f64,
-    /// How far below the best it can be, as a part of the best; NaN where that is not known.
+    /// Upper bound of the loss against the best choice, as a part of the best; NaN where unknown.
     pub(super) gap: f64,
 }
 
-/// Who chooses.
+/// A policy at work.
 pub(super) trait Chooser {
     /// Chooses for a frame.
     fn choose(&mut self, frame: u64, scene: &Scene, seen: &[Seen], time: Time) -> Choice;
 
-    /// Learns what a frame took, microseconds.
+    /// Takes in the measured time of a frame, microseconds.
     fn learn(&mut self, _frame: u64, _took: f64, _time: Time) {}
 }
 
-/// A policy, by the name that the command line knows.
+/// A policy, by its name on the command line.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Policy {
-    /// The finest of everything.
+    /// The finest level of everything.
     Full,
-    /// 1024 pixels a polygon.
+    /// 1024 pixels per polygon.
     Static,
-    /// So few pixels a polygon that the static rule spends about the time it has.
+    /// So few pixels per polygon that the static rule uses about the time available.
     StaticFine,
     /// The threshold moved by the last frame's time.
     Threshold,
@@ -79,7 +79,7 @@ pub(super) enum Policy {
     Convex,
     /// Hull steps in falling gain per cost, without learning.
     MarginalFill,
-    /// Ours.
+    /// The default policy of this program.
     Adaptive,
 }
 
@@ -98,7 +98,7 @@ impl Policy {
         }
     }
 
-    /// A chooser that knows nothing yet.
+    /// A chooser without any history.
     pub(super) fn chooser(self) -> Box<dyn Chooser> {
         match self {
             Self::Full => Box::new(whole::Full),
@@ -121,12 +121,12 @@ impl Pick {
 }
 
 impl Time {
-    /// What may be drawn for, microseconds: the rest of a frame beside its logic.
+    /// Time available for drawing, microseconds: the rest of a frame after its logic.
     pub(super) fn drawing(self) -> f64 {
         Overlap::Fitted(self.overlap).drawing(self.target, self.logic)
     }
 
-    /// The same if `margin` of the frame stays free.
+    /// The same with `margin` of the frame left free.
     fn drawing_within(self, margin: f64) -> f64 {
         Self { target: (1.0 - margin) * self.target, ..self }.drawing()
     }

@@ -1,6 +1,6 @@
-//! A policy on its way through a scene: it chooses, the machine draws, and what that took comes back a frame or two later.
+//! A policy run through a scene: it chooses, the machine draws, and the measured time comes back a frame or two later.
 //!
-//! In: a show (scene, path, machine, target) and a policy. Out: what every frame came to. Never here: statistics.
+//! In: a show (scene, path, machine, target) and a policy. Out: the results of every frame. Never here: statistics.
 
 use super::camera::Path;
 use super::chooser::{Choice, Pick, Policy, Time, problem, worth};
@@ -9,7 +9,7 @@ use super::scene::{Scene, Seen};
 use metachron_budget::select::{Level, linear};
 use std::collections::BTreeMap;
 
-/// All that a run depends on besides its policy and its seed.
+/// Everything that a run depends on in addition to its policy and its seed.
 #[derive(Debug, Clone)]
 pub(super) struct Show {
     pub(super) scene: Scene,
@@ -18,24 +18,24 @@ pub(super) struct Show {
     /// T, microseconds.
     pub(super) target: f64,
     pub(super) frames: usize,
-    /// The path begins anew after so many frames.
+    /// The path starts again after this many frames.
     pub(super) lap: usize,
-    /// Frames until what one took is known.
+    /// Frames until the time of one is known.
     pub(super) delay: usize,
-    /// Logic of a visible thing, microseconds, and how much of the shorter of logic and drawing adds to the longer.
+    /// Logic of a visible thing, microseconds, and the share of the shorter of logic and drawing that adds to the longer.
     pub(super) logic: f64,
     pub(super) overlap: f64,
 }
 
-/// What a frame came to; NaN where there was nothing to measure.
+/// The results of a frame; NaN where there was nothing to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Frame {
-    /// Its time, and what full detail would have taken, as parts of T.
+    /// Its time, and the time of full detail, as parts of T.
     pub(super) time: f64,
     pub(super) full: f64,
-    /// The time that was expected of it, as a part of T.
+    /// Its predicted time, as a part of T.
     pub(super) predicted: f64,
-    /// How far below the best the choice can be, by its own certificate.
+    /// Upper bound of the loss against the best choice, by the choice's own certificate.
     pub(super) gap: f64,
     /// Benefit over the bound at the true costs.
     pub(super) quality: f64,
@@ -47,15 +47,15 @@ pub(super) struct Frame {
     pub(super) reversals: usize,
     /// Polygons that were drawn.
     pub(super) polygons: f64,
-    /// Choosing levels, as a part of T.
+    /// Time for choosing levels, as a part of T.
     pub(super) choosing: f64,
 }
 
-/// Every so many frames the bound at the true costs is worked out.
+/// The bound at the true costs is computed once in so many frames.
 const JUDGED: usize = 10;
 
 impl Show {
-    /// What is seen in a frame, and the time that the frame has.
+    /// The things seen in a frame, and the frame's time.
     pub(super) fn seen(&self, frame: usize) -> (Vec<Seen>, Time) {
         let seen = self.scene.seen(&self.path.camera(frame % self.lap));
         let logic = self.logic * seen.len() as f64;
@@ -67,7 +67,7 @@ impl Show {
         self.watch(policy, seed, &mut |_, _, _| {})
     }
 
-    /// Plays all frames and lets `watch` see each of them with what was in view and what was chosen.
+    /// Plays all frames and calls `watch` with the number of each, the things in view and the choice.
     pub(super) fn watch(
         &self,
         policy: Policy,
@@ -118,21 +118,21 @@ impl Show {
         }
     }
 
-    /// Benefit over the bound within a budget, microseconds by the table; NaN where even the least of everything is over it.
+    /// Benefit over the bound within a budget, microseconds by the table; NaN where even the cheapest levels of everything exceed it.
     fn quality(&self, seen: &[Seen], budget: f64, choice: &Choice) -> f64 {
         let bound = linear(&problem(&self.scene, seen, budget));
         bound.map_or(f64::NAN, |bound| worth(&self.scene, seen, &choice.picks) / bound.value)
     }
 }
 
-/// The levels of the last frames, to tell what changes and what changes back.
+/// The levels of the last frames, to count changes and reversals.
 #[derive(Default)]
 struct Memory {
     past: [BTreeMap<usize, Level>; 4],
 }
 
 impl Memory {
-    /// Levels that changed since the frame before, and of these the ones that return to where they were up to three frames
+    /// Levels that changed since the previous frame, and the number of these that return to their level of up to three frames
     /// before that.
     fn count(&mut self, seen: &[Seen], picks: &[Pick]) -> (usize, usize) {
         let (mut changes, mut reversals) = (0, 0);

@@ -1,4 +1,4 @@
-//! What the experiments of this room share: a case, the columns that are printed, the curves of frames.
+//! Shared parts of the policy experiments: a case, the printed columns, the curves of frame times.
 
 use super::super::experiment::Finding;
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -27,13 +27,13 @@ impl Case {
         Self { setting: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
     }
 
-    /// The one of these policies that the case names; the last where it names none of them.
+    /// The policy of `policies` that the case names; the last one where it names none of them.
     pub(super) fn policy_of(&self, policies: &[Policy]) -> Policy {
         let named = policies.iter().find(|p| p.name() == self.policy);
         *named.or(policies.last()).unwrap_or(&Policy::Full)
     }
 
-    /// Plays the show once for every seed; the row of all their frames.
+    /// Plays the show once per seed; returns the row of all frames.
     pub(super) fn measure(&self, show: &Show, policies: &[Policy]) -> Row {
         let (policy, seeds) = (self.policy_of(policies), self.frames / show.frames.max(1));
         let runs: Vec<_> = (1..=seeds as u64).map(|seed| show.play(policy, seed)).collect();
@@ -41,7 +41,7 @@ impl Case {
     }
 }
 
-/// The columns that tell policies apart.
+/// The table of the columns in which policies differ.
 pub(super) fn table(rows: &[Row]) -> Table {
     let mut table = Table::new(&[
         "setting",
@@ -92,7 +92,7 @@ pub(super) fn at_least(claim: impl Into<String>, measured: f64, limit: f64) -> F
     Finding { claim: claim.into(), measured, limit, holds: Some(measured >= limit) }
 }
 
-/// The time of every frame under some policies, beside the target.
+/// The time of every frame under some policies, next to the target.
 pub(super) fn curves(title: &str, show: &Show, policies: &[Policy], greatest: f64) -> Panel {
     let line = |p: &Policy| {
         let times = show.play(*p, 1);
@@ -110,7 +110,7 @@ pub(super) fn curves(title: &str, show: &Show, policies: &[Policy], greatest: f6
     Panel { title: title.to_owned(), x, y, layers }
 }
 
-/// Panels in a row.
+/// A figure of panels in so many columns.
 pub(super) fn figure(title: &str, panels: Vec<Panel>, columns: usize) -> Figure {
     Figure { title: title.to_owned(), panels, columns }
 }

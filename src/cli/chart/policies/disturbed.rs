@@ -1,4 +1,4 @@
-//! The same walk on a machine that is a quarter slower than its table, has 40 % more to do for a while, and stalls.
+//! The same walk on a machine that is a quarter slower than its table, has 40 % more load for a while, and stalls.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::Figure;
@@ -17,11 +17,11 @@ const POLICIES: [Policy; 3] = [Policy::Threshold, Policy::Greedy, Policy::Adapti
 const SEEDS: usize = 5;
 const FRAMES: usize = 4 * LAP;
 const SETTING: &str = "disturbed";
-/// Frames with 40 % more to do.
+/// Frames with 40 % more load.
 const LOADED: std::ops::Range<usize> = 300..700;
-/// The later mean after each of the two steps is that of these frames.
+/// The frames whose mean is the settled time after each of the two steps.
 const LATER: [std::ops::Range<usize>; 2] = [400..690, 750..980];
-/// Frames until what one took is known.
+/// Frames until the time of one is known.
 const DELAY: usize = 2;
 
 fn disturbed() -> Show {

@@ -1,4 +1,4 @@
-//! Domes of struts that turn and come and go, with a coarse ball for a group or without (MB97, §8).
+//! Domes of struts that turn, approach and recede, with or without a coarse ball for a group (MB97, §8).
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -16,18 +16,18 @@ pub(in super::super) struct Domes;
 
 const FRAMES: usize = 240;
 const QUICK_FRAMES: usize = 24;
-/// Half of the nominal cost, all of it and twice: 8 domes of 120 struts at 4 each cost 3840.
+/// Limits of cost: half of the nominal cost, all of it and twice: 8 domes of 120 struts at 4 each cost 3840.
 const LIMITS: [i64; 3] = [1920, 3840, 7680];
-/// Costs of a strut's pictures: the sides of a prism.
+/// Costs of a strut's levels: the sides of a prism.
 const SIDES: [u64; 6] = [4, 6, 8, 12, 16, 24];
-/// The coarse ball that stands for a dome.
+/// Cost of the coarse ball that replaces a dome.
 const BALL_COST: u64 = 20;
-/// What a ball is worth for each pixel of its dome: less than the coarsest struts, of which it shows the outline alone.
+/// Benefit of a ball per pixel of its dome: less than that of the coarsest struts, of which it shows only the outline.
 const BALL_WORTH: f64 = 0.3;
-/// Units of benefit to a pixel.
+/// Units of benefit per pixel.
 const BENEFIT: f64 = 100.0;
 
-/// Who chooses.
+/// The selection algorithm.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Who {
     /// (FS93) with a null impostor for each strut, no groups.
@@ -36,7 +36,7 @@ enum Who {
     Hierarchical,
     /// (MB97, §6).
     HierarchicalFlat,
-    /// The best vertex of the hull of all cuts: ours on trees.
+    /// The best vertex of the hull of all cuts: our own on trees.
     Hull,
 }
 
@@ -55,20 +55,20 @@ pub(in super::super) struct Case {
     frames: usize,
 }
 
-/// What a limit and a policy come to, the mean over frames.
+/// Results of a limit and a policy, means over the frames.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     limit: i64,
     policy: String,
     frames: usize,
-    /// The part of struts that are drawn neither themselves nor by a ball.
+    /// Share of struts that are drawn neither as prisms nor by a ball.
     holes: f64,
-    /// Wrong pixels, as a part of those that the struts cover.
+    /// Wrong pixels, as a share of those that the struts cover.
     error: f64,
-    /// Levels that change from frame to frame, to a strut.
+    /// Changes of level from frame to frame, per strut.
     changes: f64,
     spent: f64,
-    /// The part of domes that are drawn as balls.
+    /// Share of domes that are drawn as balls.
     balls: f64,
 }
 
@@ -161,16 +161,16 @@ impl Experiment for Domes {
     }
 }
 
-/// How a strut is seen.
+/// The form in which a strut is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Shown {
     Hole,
     Ball,
-    /// As a prism: which picture.
+    /// A prism, of this level.
     Prism(u32),
 }
 
-/// What is shown of every strut, and what that costs. `last` is the cut of the frame before.
+/// Chooses the form of every strut; returns the forms and their cost. `last` is the cut of the previous frame.
 fn choose(who: Who, limit: i64, pixels: &[f64], last: &mut Vec<Level>) -> (Vec<Shown>, f64) {
     if who == Who::Flat {
         let mut problem = Problem::new(Mode::AtMostOne, limit);
@@ -198,12 +198,12 @@ fn choose(who: Who, limit: i64, pixels: &[f64], last: &mut Vec<Level>) -> (Vec<S
     (shown, cut.cost as f64)
 }
 
-/// The scene, its domes with a ball each, their struts.
+/// The tree: the scene, its domes with a ball each, their struts.
 fn nodes(pixels: &[f64]) -> Vec<Node> {
     let root = Node { parent: None, impostors: Vec::new() };
     let ball = |dome: usize| {
         let all: f64 = pixels[dome * STRUTS..(dome + 1) * STRUTS].iter().sum();
-        // above the value of its struts, below their benefit (MB97, §3)
+        // benefit per cost above that of its struts, benefit below theirs (MB97, §3)
         let worth = Entry::new(BALL_COST, (BENEFIT * BALL_WORTH * all) as u64);
         Node { parent: Some(0), impostors: vec![worth] }
     };
@@ -211,13 +211,13 @@ fn nodes(pixels: &[f64]) -> Vec<Node> {
     std::iter::once(root).chain((0..DOMES).map(ball)).chain((0..pixels.len()).map(strut)).collect()
 }
 
-/// The pictures of a strut that covers so many pixels: worth what they draw right.
+/// The levels of a strut that covers so many pixels; their benefit is the pixels drawn right.
 fn pictures(pixels: f64) -> [Entry; 6] {
     SIDES.map(|sides| Entry::new(sides, (BENEFIT * pixels * (1.0 - geodesic::prism_error(sides as f64))) as u64))
 }
 
-/// Wrong pixels, as a part of those that struts cover: of a prism what it lacks to the circle, of a ball what it fills in between the
-/// struts, of a hole all.
+/// Wrong pixels, as a share of those that struts cover: for a prism the part that it lacks of the circle, for a ball the part that it
+/// fills between the struts, for a hole all of them.
 fn error(shown: &[Shown], pixels: &[f64]) -> f64 {
     let wrong = |(shown, px): (&Shown, &f64)| match shown {
         Shown::Hole => *px,

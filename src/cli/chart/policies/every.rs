@@ -1,7 +1,7 @@
-//! Every policy on every scene of the papers, as the scenes are, in lockstep on one declared machine.
+//! Every policy on every scene of the papers, from the scenes themselves, in lockstep on one declared machine.
 //!
-//! In: nothing. Out: a row for each pair, with the metrics by which all are compared. Never here: how frames are played
-//! ([`super::played`]), a model of a scene. Without an adapter all is there but the likeness of pictures.
+//! In: nothing. Out: a row for each pair, with the metrics common to all. Never here: how frames are played
+//! ([`super::played`]), a model of a scene. Without an adapter everything but the likeness of pictures is measured.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::Figure;
@@ -13,7 +13,7 @@ use super::played::{Case, PLAYS, Times, curves, table};
 /// The experiment.
 pub(in super::super) struct Every;
 
-/// Those that the figure shows.
+/// The policies in the figure.
 const SHOWN: [&str; 5] = ["threshold", "feedback", "robin-hood", "greedy", "adaptive"];
 
 impl Experiment for Every {

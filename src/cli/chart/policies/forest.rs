@@ -1,7 +1,7 @@
-//! The grove of (RH05) in numbers: trees of three types, trunk and leaves each a thing of its own, and the two paths.
+//! The grove of (RH05) in numbers: trees of three types, with trunk and leaves as separate things, and the two paths.
 //!
-//! In: how many trees, a path, a target, with which forms. Out: a show. Counts of triangles, targets and the frames of the jumps
-//! are the paper's; places, times and the paths' courses are ours.
+//! In: number of trees, a path, a target, the forms. Out: a show. Counts of triangles, targets and the frames of the jumps
+//! are the paper's; positions, times and the paths' courses are our own.
 
 use super::camera::{Path, key};
 use super::closed_loop::Show;
@@ -12,14 +12,14 @@ use metachron_budget::cost::stages::Stages;
 
 /// Triangles of the trunk and of the leaves of each type (RH05, table 1).
 const TRIANGLES: [[f64; 2]; 3] = [[620.0, 480.0], [890.0, 720.0], [1740.0, 1800.0]];
-/// A side of the square in which 600 trees stand, metres; more trees stand in a larger one.
+/// Side of the square of 600 trees, metres; more trees take a larger one.
 const SIDE_M: f64 = 240.0;
 const TREES: f64 = 600.0;
-/// Leaves count half as much as the trunk that tells a tree: the paper gives no number.
+/// Importance of leaves: half that of the trunk, which identifies a tree; the paper gives no number.
 const LEAVES_IMPORTANCE: f64 = 0.5;
-/// Triangles, lines and points, microseconds: 600 trees take half a second.
+/// Costs of triangles, lines and points, microseconds: 600 trees take half a second.
 const STAGES: [Stages; 3] = [of(0.4), of(0.25), of(0.15)];
-/// Logic of a visible instance, microseconds, and how much of it adds to the drawing beside which it runs.
+/// Logic of a visible instance, microseconds, and the share of the shorter of logic and drawing that adds to the longer.
 const LOGIC: f64 = 2.0;
 const OVERLAP: f64 = 0.25;
 /// Widths of lines and sizes of points, pixels (RH05, §7.2: 1 … 20).
@@ -29,27 +29,27 @@ const fn of(polygon: f64) -> Stages {
     Stages { setup: 1.0, polygon, vertex: 0.0, pixel: 0.0 }
 }
 
-/// What a tree can be drawn as.
+/// The forms in which a tree can be drawn.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Forms {
-    /// All its triangles, or as many of them as time is paid for.
+    /// All its triangles, or as many of them as the time pays for.
     Whole,
     /// The first triangles, in steps of half an octave: the same for policies that choose among levels.
     Prefixes,
-    /// Lines for the trunk and points for the leaves, the fewer the wider, and all triangles.
+    /// Lines for the trunk and points for the leaves, wider the fewer they are, and all triangles.
     Levels,
 }
 
-/// The two ways through the grove.
+/// The two paths through the grove.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Way {
-    /// Along one side: most is in view in the middle.
+    /// Along one side: most trees are in view in the middle.
     Linear,
-    /// To and fro with two sudden turns.
+    /// Back and forth with two sudden turns.
     Zigzag,
 }
 
-/// A walk of `frames` frames through a grove, `target` microseconds a frame.
+/// A walk of `frames` frames through a grove, `target` microseconds per frame.
 pub(super) fn show(trees: usize, way: Way, target: f64, forms: Forms, frames: usize) -> Show {
     let side_m = SIDE_M * (trees as f64 / TREES).sqrt();
     let scene = Scene { things: things(trees, side_m, forms), stages: STAGES.to_vec() };
@@ -75,14 +75,14 @@ fn things(trees: usize, side_m: f64, forms: Forms) -> Vec<Thing> {
     (0..trees).flat_map(tree).collect()
 }
 
-/// The forms of something of so many triangles, coarsest first; `simpler` draws what is no triangle.
+/// The forms of a thing of so many triangles, coarsest first; `simpler` is the algorithm that draws lines or points.
 fn list(forms: Forms, triangles: f64, simpler: usize) -> Vec<Form> {
     let whole = Form { polygons: triangles, algorithm: 0, worth: Worth::Part(1.0) };
     let prefix = |k: i32| {
         let part = libm::exp2(-0.5 * f64::from(k));
         Form { polygons: part * triangles, algorithm: 0, worth: Worth::Part(part.sqrt()) }
     };
-    // as many as cover the same pixels with a width to match, and what is coarse looks coarse
+    // as many as cover the same pixels at their width; the benefit falls with the width
     let wide = |w: f64| Form { polygons: triangles / w, algorithm: simpler, worth: Worth::Part(0.9 / w.sqrt()) };
     match forms {
         Forms::Whole => vec![whole],

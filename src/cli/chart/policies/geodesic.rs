@@ -1,7 +1,7 @@
-//! The domes of (MB97) in numbers: struts along the edges of a ball of triangles, which spin and swing to and fro.
+//! The domes of (MB97) in numbers: struts along the edges of a geodesic ball, which spin and swing to and fro.
 //!
-//! In: a frame. Out: the pixels that every strut covers, and what its pictures and the ball lack. Never here: who chooses.
-//! Six pictures a strut and the nominal cost of 3840 are the paper's; eight domes of 120 struts, their places and motion are ours.
+//! In: a frame. Out: the pixels that every strut covers, and the errors of its levels and of the ball. Never here: selection.
+//! Six levels per strut and the nominal cost of 3840 are the paper's; eight domes of 120 struts, their positions and motion are our own.
 
 use super::scene::SCREEN;
 use crate::compositor::Camera;
@@ -11,7 +11,7 @@ use metachron_geometry::geodesic_edges;
 /// Domes, and struts of each.
 pub(super) const DOMES: usize = 8;
 pub(super) const STRUTS: usize = 120;
-/// Radius of a strut to that of its dome, which is 1 m.
+/// Radius of a strut, as a share of the radius of its dome, which is 1 m.
 const STRUT: f64 = 0.05;
 
 /// Pixels that every strut covers in a frame, dome by dome.
@@ -38,18 +38,18 @@ fn strut(camera: &Camera, a: DVec3, b: DVec3) -> f64 {
     across.length() * 2.0 * STRUT * scale * scale
 }
 
-/// The part of a round strut's outline that a prism of so many sides in it lacks: 1 − sin(2π/k) k/2π of its cross-section.
+/// Share of a round strut's cross-section that an inscribed prism of so many sides lacks: 1 − sin(2π/k) k/2π.
 pub(super) fn prism_error(sides: f64) -> f64 {
     let part = std::f64::consts::TAU / sides;
     1.0 - libm::sin(part) / part
 }
 
-/// What a ball fills in between struts that lie at random over its disc, as a part of what they cover: e⁻ˣ/(1 − e⁻ˣ), x their area over
-/// the disc's.
+/// Area that a ball fills between struts placed at random over its disc, as a share of the area that they cover: e⁻ˣ/(1 − e⁻ˣ), with x
+/// their area over the disc's.
 pub(super) fn ball_error() -> f64 {
     use std::f64::consts::PI;
     let length: f64 = geodesic_edges().iter().map(|[a, b]| a.distance(*b)).sum();
-    // the mean of a length seen from all sides is π/4 of it
+    // the mean projection of a length over all directions is π/4 of it
     let x = 0.25 * PI * length * 2.0 * STRUT / PI;
     1.0 / (libm::exp(x) - 1.0)
 }

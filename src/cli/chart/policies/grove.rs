@@ -1,4 +1,4 @@
-//! Walks through the grove: how near to its time every policy keeps (RH05, tables 2 and 3).
+//! Walks through the grove: how close to its target time every policy stays (RH05, tables 2 and 3).
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -13,7 +13,7 @@ use metachron_budget::cost::value::Value;
 /// The experiment.
 pub(in super::super) struct Grove;
 
-/// Mean |t − T|/T of the paper.
+/// A walk; `paper` is the paper's mean |t − T|/T.
 struct Setting {
     name: &'static str,
     trees: usize,
@@ -44,15 +44,15 @@ const SETTINGS: [Setting; 13] = [
     Setting { name: "linear, 2000 trees, 50 ms", trees: 2000, ..plain("", Way::Linear, 50e3, f64::NAN) },
 ];
 const QUICK: [&str; 3] = ["linear, 12.5 ms", "zigzag, 100 ms", "linear with levels, 40 ms"];
-/// Frames of the paths, and of the same paths in steps that are four times as long.
+/// Frames of the two paths; the quick run takes the same paths in steps four times as long.
 const FRAMES: [usize; 2] = [1000, 1680];
 const QUICK_PART: usize = 4;
-/// What a choice is to be worth of what no choice can be worth more than.
+/// Least benefit of a choice, as a share of the upper bound.
 const VALUE_WANTED: f64 = 0.99;
-/// Parts of the target that the figure reaches over: full detail too stays inside.
+/// Range of the figure in parts of the target: full detail stays inside too.
 const TIMES: (f64, f64) = (0.5, 50.0);
 
-/// Robin Hood as the paper ran it: eq. 8 without levels, eq. 11 with them.
+/// Robin Hood as in the paper: eq. 8 without levels, eq. 11 with them.
 const POLICIES: [Policy; 2] = [Policy::RobinHood(Value::Gentle), Policy::Adaptive];
 const WITH_LEVELS: [Policy; 2] = [Policy::RobinHood(Value::Focus), Policy::Adaptive];
 

@@ -1,7 +1,7 @@
 //! The auditorium of (FS93) in numbers: 384 seats in rising rows and 16 pieces of a stage, 87,565 polygons.
 //!
 //! In: nothing. Out: the scene and the path with its events: A, many large things; B, few small ones; the stage; C, half a turn
-//! in six frames. The paper gives the count of polygons and the events; places, levels and path are ours.
+//! in six frames. The paper gives the count of polygons and the events; positions, levels and path are our own.
 
 use super::camera::{Path, key};
 use super::closed_loop::Show;
@@ -14,18 +14,18 @@ use metachron_budget::cost::stages::Stages;
 const ROWS: usize = 16;
 const SEATS: usize = 24;
 const SEAT_POLYGONS: f64 = 186.0;
-/// The first piece has what is lacking to 87,565.
+/// The first piece has the polygons that are missing to 87,565.
 const PIECE_POLYGONS: [f64; 2] = [1021.0, 1008.0];
 const PIECES: usize = 16;
-/// The part of all polygons in each level.
+/// Share of all polygons in each level.
 const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
-/// A polygon takes 13.5 µs (FS93, view A: 0.98 s for 72,570); a pixel so much that a polygon takes 18.9 µs at 5300.
+/// A polygon takes 13.5 µs (FS93, view A: 0.98 s for 72,570); the cost of a pixel is such that a polygon takes 18.9 µs at 5300 of them.
 const STAGES: Stages = Stages { setup: 20.0, polygon: 12.0, vertex: 3.0, pixel: 0.012 };
 /// Frames of the path.
 pub(super) const LAP: usize = 250;
 /// T of the paper, microseconds.
 pub(super) const TARGET: f64 = 1e5;
-/// The paper's run: its target, one frame from drawing to knowing, no logic beside it.
+/// The paper's run: its target, no logic; the time of a frame is known after `delay` frames, one in the paper.
 pub(super) fn show(fault: Fault, frames: usize, delay: usize) -> Show {
     Show { scene: scene(), path: path(), fault, target: TARGET, frames, lap: LAP, delay, logic: 0.0, overlap: 1.0 }
 }

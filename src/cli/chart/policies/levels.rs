@@ -1,7 +1,7 @@
-//! What levels of groups gain: woods that may be drawn as one each, at no level of their own, at one, at four (MB97, §4).
+//! Gain from levels of groups: woods that may each be drawn as one object, with no level of their own, one, or four (MB97, §4).
 //!
 //! In: nothing. Out: a row for each setting and policy, all against full detail of the same trees, in lockstep on the declared machine.
-//! Never here: how frames are played ([`super::played`]). Without an adapter all is there but the likeness of pictures.
+//! Never here: how frames are played ([`super::played`]). Without an adapter everything but the likeness of pictures is measured.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::Figure;
@@ -16,20 +16,20 @@ use std::fmt::Write;
 pub(in super::super) struct Levels;
 
 const POLICIES: [Policy; 2] = [Policy::Adaptive, Policy::Hierarchical];
-/// Frames along the way, and of the quick run.
+/// Frames along the path, in full and in the quick run.
 const FRAMES: [usize; 2] = [150, 10];
-/// How many targets full detail takes in the mean.
+/// Ratios of the mean time of full detail to the target.
 const TIMES_OVER: [f64; 3] = [100.0, 200.0, 400.0];
-/// The levels of every wood as its table says them.
+/// The levels of every wood, with the line of its table in the scene file.
 const LEVELS: [(&str, &str); 4] =
     [("none", ""), ("20", "levels = [20]"), ("80", "levels = [80]"), ("20 to 160", "levels = [20, 40, 80, 160]")];
 
-/// Woods along x and y, trees of each along x and y, metres between trees and between the middles of woods.
+/// Woods along x and y, trees of each along x and y, metres between trees and between the centres of woods.
 const WOODS: [u32; 2] = [6, 6];
 const TREES: [u32; 2] = [5, 5];
 const APART_M: (f64, f64) = (7.0, 42.0);
 
-/// The scene: woods in rows, and a way between them from one end to the other, the eye on what lies ahead.
+/// The scene: woods in rows, and a path between them from one end to the other, with the eye looking ahead.
 fn text(levels: &str) -> String {
     let length_m = f64::from(WOODS[1]) * APART_M.1;
     let mut text = format!(
@@ -132,7 +132,7 @@ mod tests {
 
     #[test]
     fn the_woods_are_a_scene_and_their_groups_hold_all_of_it() {
-        // without groups: the meshes that stand for them take seconds to make in a debug build
+        // without groups: building the groups' meshes takes seconds in a debug build
         let source = Source::memory("woods", text("").as_bytes()).unwrap();
         let scene = load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
         assert_eq!(scene.scenery.len(), 2 * 900);

@@ -1,4 +1,4 @@
-//! A textured room in which the way of drawing is chosen as well (FS93, fig. 11): levels by flat, Gouraud and textured shading.
+//! A textured room in which the shading is chosen as well (FS93, fig. 11): levels with flat, Gouraud and textured shading.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -16,15 +16,15 @@ use metachron_budget::cost::stages::Stages;
 /// The experiment.
 pub(in super::super) struct Library;
 
-/// The paper's targets, seconds, and its polygons there; all of them take 0.60 s.
+/// The paper's targets, microseconds, and its numbers of polygons there; all of its polygons take 0.60 s.
 const TARGETS: [(&str, f64, f64); 2] = [("150 ms", 150e3, 4217.0), ("100 ms", 100e3, 1389.0)];
 const POLICIES: [Policy; 3] = [Policy::Full, Policy::Greedy, Policy::Adaptive];
 const FRAMES: usize = 60;
-/// Flat, Gouraud and textured drawing, microseconds: the room of 19,821 polygons takes 0.6 s textured.
+/// Costs of flat, Gouraud and textured drawing, microseconds: the room of 19,821 polygons takes 0.6 s textured.
 const STAGES: [Stages; 3] = [of(9.0, 0.03), of(13.0, 0.05), of(20.0, 0.12)];
-/// What each way shows of a surface, as a part of the best.
+/// Accuracy of each shading, as a share of the best.
 const SHOWS: [f64; 3] = [0.6, 0.8, 1.0];
-/// Chairs, tables, shelves, doors and walls, books: how many, polygons of each, radius, and whether a texture tells them.
+/// Chairs, tables, shelves, doors and walls, books: how many, polygons of each, radius, and whether they are textured.
 const FURNITURE: [(usize, f64, f64, bool); 5] = [
     (32, 186.0, 0.5, false),
     (8, 240.0, 0.9, false),
@@ -32,7 +32,7 @@ const FURNITURE: [(usize, f64, f64, bool); 5] = [
     (10, 60.0, 1.2, true),
     (96, 88.0, 0.35, true),
 ];
-/// The part of all polygons in each level.
+/// Share of all polygons in each level.
 const PARTS: [f64; 4] = [0.05, 0.2, 0.5, 1.0];
 
 const fn of(polygon: f64, pixel: f64) -> Stages {
@@ -62,14 +62,14 @@ fn things() -> Vec<Thing> {
     things
 }
 
-/// Every level by every way: what has no texture looks textured as it does with Gouraud shading.
+/// Every level with every shading; for an untextured thing Gouraud shading is as accurate as texture is for a textured one.
 fn forms(polygons: f64, textured: bool) -> Vec<Form> {
     let mut forms = Vec::new();
     for (algorithm, shows) in SHOWS.into_iter().enumerate().take(if textured { 3 } else { 2 }) {
         let shows = if textured { shows } else { shows / SHOWS[1] };
         forms.extend(PARTS.map(|part| {
             let polygons = (part * polygons).round().max(2.0);
-            // half of the error by the samples, as for flat polygons (FS93, §5)
+            // base error of one half, reduced by the samples, as for flat polygons (FS93, §5)
             Form { polygons, algorithm, worth: Worth::Part(shows * (1.0 - 0.5 / polygons.sqrt())) }
         }));
     }
@@ -137,7 +137,7 @@ impl Experiment for Library {
     }
 }
 
-/// How many things are drawn in which way, along the path.
+/// Number of things drawn with each shading, along the path.
 fn shares(title: &str, show: &Show) -> Panel {
     let mut counts: [Vec<(f64, f64)>; 3] = Default::default();
     show.watch(Policy::Adaptive, 1, &mut |frame, seen, choice| {

@@ -1,6 +1,6 @@
-//! The declared machine of these experiments: how far the time of a frame is from its table.
+//! The declared machine of these experiments: the ratio of a frame's time to that of its table.
 //!
-//! In: a seed, and what is wrong with the machine. Out: for every frame the factor between its time and the table's.
+//! In: a seed, and the machine's faults. Out: for every frame the factor between its time and the table's.
 //! Never here: a clock; the same seed gives the same bits. The noise is that of `docs/theory/budget.md`, section 10.
 
 use std::ops::Range;
@@ -28,27 +28,27 @@ impl Noise {
     }
 }
 
-/// What is wrong with a machine besides the noise that every machine has.
+/// Faults of a machine, in addition to the noise that every machine has.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Fault {
     /// The machine is this much slower than its table.
     pub(super) slow: f64,
     /// Frames in which everything takes this much longer.
     pub(super) load: (Range<usize>, f64),
-    /// How often a frame takes half as long again.
+    /// Probability that a frame takes half as long again.
     pub(super) spikes: f64,
-    /// Standard deviation of the table's error that wanders with the view, nine parts in ten of which stay from frame to frame.
+    /// Standard deviation of the table's error that wanders with the view; nine tenths of it persist from frame to frame.
     pub(super) wander: f64,
-    /// Standard deviation of the error that does not stay.
+    /// Standard deviation of the error that does not persist.
     pub(super) tremble: f64,
 }
 
 impl Fault {
-    /// The table is right, but for the noise.
+    /// The table is right, except for the noise.
     pub(super) const NONE: Self = Self { slow: 1.0, load: (0..0, 1.0), spikes: 0.0, wander: 0.05, tremble: 0.01 };
 }
 
-/// A machine on its way through a run.
+/// The state of a machine during a run.
 #[derive(Debug, Clone)]
 pub(super) struct Machine {
     noise: Noise,
@@ -56,9 +56,9 @@ pub(super) struct Machine {
     fault: Fault,
 }
 
-/// How much of the wandering error stays from frame to frame.
+/// Share of the wandering error that persists from frame to frame.
 const MEMORY: f64 = 0.9;
-/// What a spike takes.
+/// Factor of a spike.
 const SPIKE: f64 = 1.5;
 
 impl Machine {
@@ -66,7 +66,7 @@ impl Machine {
         Self { noise: Noise::new(seed), wander: 0.0, fault }
     }
 
-    /// What the next frame takes, over what the table says.
+    /// Time of the next frame over that of the table.
     pub(super) fn slower(&mut self, frame: usize) -> f64 {
         self.wander =
             MEMORY * self.wander + libm::sqrt(1.0 - MEMORY * MEMORY) * self.fault.wander * self.noise.normal();

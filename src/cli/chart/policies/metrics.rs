@@ -1,6 +1,6 @@
-//! What a policy's frames come to: the definitions by which every policy is compared.
+//! Metrics of a policy's frames: the definitions by which all policies are compared.
 //!
-//! In: frames. Out: a row of numbers. Never here: who chose. The definitions are those of a run's report.
+//! In: frames. Out: a row of numbers. Never here: policies. The definitions are those of a run's report.
 
 use super::super::experiment::worst;
 use super::closed_loop::Frame;
@@ -10,66 +10,66 @@ use serde::{Deserialize, Serialize};
 const BINDING: f64 = 1.15;
 /// A frame that takes more than this part of T is a miss.
 const MISS: f64 = 1.05;
-/// A choice within this of the best is as good as proven best.
+/// A choice whose certificate is within this of the best counts as proven best.
 const CERTIFIED: f64 = 0.01;
 
-/// Frames after a step in which what they take over T counts as overshoot.
+/// Frames after a step among which the excess over T counts as overshoot.
 const AFTER_STEP: usize = 60;
 
-/// A policy on a scene: times as parts of T; NaN where nothing was to be measured.
+/// A policy on a scene: times as parts of T; NaN where nothing could be measured.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super) struct Row {
-    /// Which scene, path or target.
+    /// The scene, path or target.
     pub(super) setting: String,
     pub(super) policy: String,
-    /// Who drew the pictures; empty where nothing was drawn.
+    /// The adapter that drew the pictures; empty where nothing was drawn.
     pub(super) adapter: String,
     pub(super) frames: usize,
-    /// T, milliseconds, where it is what full detail makes of it.
+    /// T, milliseconds, where full detail sets it.
     pub(super) target_ms: f64,
     pub(super) mean: f64,
     pub(super) min: f64,
     pub(super) max: f64,
     pub(super) stddev: f64,
-    /// What so many of a hundred frames take at most.
+    /// Percentiles of the frame times.
     pub(super) p50: f64,
     pub(super) p95: f64,
     pub(super) p99: f64,
-    /// The part of frames in which full detail takes more than 1.15 T, and the times of those.
+    /// Share of frames in which full detail takes more than 1.15 T, and mean and deviation of their times.
     pub(super) binding: f64,
     pub(super) binding_mean: f64,
     pub(super) binding_stddev: f64,
     /// Mean |t − T|/T of binding frames.
     pub(super) avg_err: f64,
-    /// The part of frames past T.
+    /// Share of frames past T.
     pub(super) late: f64,
-    /// The part of frames past 1.05 T, and the most of them in a row.
+    /// Share of frames past 1.05 T, and the most of them in a row.
     pub(super) misses: f64,
     pub(super) miss_run: usize,
-    /// The longest of the 60 frames from the sudden step on, less T.
+    /// The longest of the 60 frames after the sudden step, minus T.
     pub(super) overshoot: f64,
-    /// |predicted − measured| over measured: the mean, and what 19 of 20 frames are within.
+    /// |predicted − measured| over measured: the mean, and the bound that 19 of 20 frames keep.
     pub(super) model_error: f64,
     pub(super) model_error95: f64,
-    /// Levels that changed, and changed back within three frames, to an object and frame.
+    /// Levels that changed, and levels that changed back within three frames, per object and frame.
     pub(super) changes: f64,
     pub(super) reversals: f64,
-    /// Objects left out, to an object and frame.
+    /// Objects left out, per object and frame.
     pub(super) holes: f64,
-    /// Benefit over the bound at the true costs, and the part of frames whose own certificate is within 1 %.
+    /// Benefit over the bound at the true costs, and the share of frames whose own certificate is within 1 %.
     pub(super) value_over_bound: f64,
     pub(super) certified: f64,
-    /// Frames until times stay near their later mean after a step of load.
+    /// Frames until times stay close to their later mean after a step of load.
     pub(super) settled: f64,
-    /// Polygons to a frame.
+    /// Polygons per frame.
     pub(super) polygons: f64,
-    /// Choosing levels, as a part of T.
+    /// Time for choosing levels, as a part of T.
     pub(super) choosing: f64,
     /// Likeness to full detail: the mean and the least of the pictures compared.
     pub(super) ssim: f64,
     pub(super) ssim_least: f64,
     pub(super) psnr_db: f64,
-    /// The time of every frame as a part of T, with spaces between; empty where the figure plays again.
+    /// The time of every frame as a part of T, separated by spaces; empty where the figure plays the frames again.
     pub(super) times: String,
 }
 
@@ -124,7 +124,7 @@ impl Row {
     }
 }
 
-/// What the part `share` of some numbers, 0 … 1, is at most (the nearest rank); NaN of nothing.
+/// The value that a share `share` of some numbers, 0 … 1, does not exceed (the nearest rank); NaN for no numbers.
 fn within(x: &[f64], share: f64) -> f64 {
     let mut sorted = x.to_vec();
     sorted.sort_by(f64::total_cmp);
@@ -137,35 +137,35 @@ fn longest_run(run: &[Frame]) -> usize {
     run.split(|f| f.time <= MISS).map(<[Frame]>::len).max().unwrap_or(0)
 }
 
-/// The frame in which what full detail takes rises most from the frame before: the sudden turn, where a path has one.
+/// The frame with the greatest rise of full detail's time over the previous frame: the sudden turn, where a path has one.
 fn steepest(run: &[Frame]) -> usize {
     let rise = |k: &usize| run[*k].full - run[k - 1].full;
     (1..run.len()).max_by(|a, b| rise(a).total_cmp(&rise(b))).unwrap_or(0)
 }
 
-/// The longest of the 60 frames from `step` on as a part of T, less 1; NaN of nothing.
+/// The longest of the 60 frames from `step` on as a part of T, minus 1; NaN for no frames.
 pub(super) fn overshoot(run: &[Frame], step: usize) -> f64 {
     worst(run.iter().skip(step).take(AFTER_STEP).map(|f| f.time)) - 1.0
 }
 
-/// The mean; NaN of nothing.
+/// The mean; NaN for no numbers.
 pub(super) fn mean(x: &[f64]) -> f64 {
     x.iter().sum::<f64>() / x.len() as f64
 }
 
-/// The standard deviation; NaN of nothing.
+/// The standard deviation; NaN for no numbers.
 pub(super) fn stddev(x: &[f64]) -> f64 {
     let middle = mean(x);
     (x.iter().map(|x| (x - middle) * (x - middle)).sum::<f64>() / x.len() as f64).sqrt()
 }
 
-/// How far, in proportion, the median of nine frames may be from the mean of the later ones, and for how many frames it must
-/// stay so.
+/// Greatest relative deviation of the median of nine frames from the mean of the later ones, and the number of frames for which
+/// it must hold.
 const NEAR: f64 = 0.06;
 const STAYS: usize = 20;
 const MEDIAN_OF: usize = 9;
 
-/// Frames after `step` until the median of nine stays within 6 % of the mean of `later` for twenty; NaN where it never does.
+/// Frames after `step` until the median of nine stays within 6 % of the mean of `later` for twenty frames; NaN where it never does.
 pub(super) fn settled(times: &[f64], step: usize, later: std::ops::Range<usize>) -> f64 {
     let goal = mean(&times[later.clone()]);
     let median = |at: usize| {

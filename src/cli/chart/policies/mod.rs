@@ -1,4 +1,4 @@
-//! `chart policies`: the papers' experiments on frame budgets, in numbers on a declared machine, and live.
+//! `chart policies`: the papers' experiments on frame budgets, on numeric scenes with a declared machine, and live.
 
 pub(super) mod auditorium;
 pub(super) mod bound;

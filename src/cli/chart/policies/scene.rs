@@ -1,7 +1,7 @@
-//! A scene in numbers: things with places, sizes and levels, and what a camera sees of them.
+//! A scene in numbers: things with positions, sizes and levels, and the part of them that a camera sees.
 //!
-//! In: things and a camera. Out: for everything in view its pixels, its depth, and what each of its levels costs and gives.
-//! Never here: who chooses ([`super::chooser`]), how a frame's time strays from its table ([`super::machine`]).
+//! In: things and a camera. Out: for everything in view its pixels, its depth, and cost and gain of each of its levels.
+//! Never here: policies ([`super::chooser`]), the deviation of frame times from the table ([`super::machine`]).
 
 use crate::compositor::{Camera, Size};
 use glam::DVec3;
@@ -11,12 +11,12 @@ use metachron_budget::cost::stages::{Stages, Work};
 /// The screen of the papers' machines.
 pub(super) const SCREEN: Size = Size { width: 1280, height: 1024 };
 
-/// What a level shows of a thing, as a part of the best.
+/// The accuracy of a level, as a part of the best.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Worth {
-    /// By the samples that its shading takes (FS93, §5).
+    /// From the samples of its shading (FS93, §5).
     Shaded(Shading),
-    /// This part, 0 … 1, from wherever it is seen.
+    /// This part, 0 … 1, at any distance.
     Part(f64),
 }
 
@@ -25,19 +25,19 @@ pub(super) enum Worth {
 pub(super) struct Form {
     /// Polygons, lines or points.
     pub(super) polygons: f64,
-    /// Which of the scene's rendering algorithms draws it.
+    /// Index of the scene's rendering algorithm that draws it.
     pub(super) algorithm: usize,
     pub(super) worth: Worth,
 }
 
-/// Something that can be drawn at levels.
+/// A thing that can be drawn at several levels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Thing {
     pub(super) centre_m: DVec3,
     pub(super) radius_m: f64,
-    /// The part of the disc about it that it covers, 0 … 1.
+    /// Share of the disc around it that it covers, 0 … 1.
     pub(super) fill: f64,
-    /// Weight against the others, > 0.
+    /// Weight relative to the others, > 0.
     pub(super) importance: f64,
     /// Time of its best form at one fixed area, for the order of (RH05).
     pub(super) complexity: f64,
@@ -45,7 +45,7 @@ pub(super) struct Thing {
     pub(super) forms: Vec<Form>,
 }
 
-/// Things, and what it takes to draw them.
+/// Things, and the costs of drawing them.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Scene {
     pub(super) things: Vec<Thing>,
@@ -56,14 +56,14 @@ pub(super) struct Scene {
 /// A thing in view.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Seen {
-    /// Which of the scene's things.
+    /// Index among the scene's things.
     pub(super) thing: usize,
-    /// Pixels it covers, hidden parts included.
+    /// Pixels it covers, including hidden parts.
     pub(super) pixels: f64,
     /// Distance along the view and from the eye, metres.
     pub(super) depth_m: f64,
     pub(super) distance_m: f64,
-    /// What its levels cost, microseconds, and give for a pixel at importance 1, coarsest first.
+    /// Cost of each level, microseconds, and its gain per pixel at importance 1, coarsest first.
     pub(super) levels: Vec<(f64, f64)>,
 }
 
@@ -78,28 +78,28 @@ impl Scene {
     fn look(&self, camera: &Camera, thing: usize, of: &Thing) -> Seen {
         let from_eye = of.centre_m - camera.eye();
         let depth_m = from_eye.dot(camera.forward());
-        // an eye inside it sees it as from its skin
+        // from inside the thing it is seen as from its surface
         let radius_px = of.radius_m * camera.pixels_per_metre(depth_m.max(of.radius_m), SCREEN);
         let pixels = (std::f64::consts::PI * radius_px * radius_px * of.fill).min(SCREEN.pixels());
         let levels = of.forms.iter().map(|f| (self.cost(f, 1.0, pixels), f.gain(1.0, pixels))).collect();
         Seen { thing, pixels, depth_m, distance_m: from_eye.length(), levels }
     }
 
-    /// Microseconds of a part of a level.
+    /// Cost of a part of a level, microseconds.
     pub(super) fn cost(&self, form: &Form, part: f64, pixels: f64) -> f64 {
         let polygons = part * form.polygons;
         // a closed mesh has half as many vertices as triangles
         self.stages[form.algorithm].time(Work { polygons, vertices: 0.5 * polygons, pixels })
     }
 
-    /// Microseconds of everything in view at its finest.
+    /// Cost of everything in view at its finest level, microseconds.
     pub(super) fn full(seen: &[Seen]) -> f64 {
         seen.iter().filter_map(|s| s.levels.last()).map(|(cost, _)| cost).sum()
     }
 }
 
 impl Form {
-    /// What a part of the level gives for a pixel: the accuracy of a surface goes with the root of its samples (GB99).
+    /// Gain per pixel of a part of the level: the accuracy of a surface grows with the root of its samples (GB99).
     pub(super) fn gain(&self, part: f64, pixels: f64) -> f64 {
         match self.worth {
             Worth::Part(worth) => worth * libm::sqrt(part),

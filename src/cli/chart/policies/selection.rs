@@ -1,4 +1,4 @@
-//! How long a choice takes, from 100 objects to 100,000: the only experiment here that reads a clock.
+//! Wall time of a choice, from 100 objects to 100,000: the only experiment here that reads a clock.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -15,13 +15,13 @@ pub(in crate::cli) struct Selection;
 
 const OBJECTS: [usize; 7] = [100, 300, 1000, 3000, 10_000, 30_000, 100_000];
 const QUICK_OBJECTS: [usize; 2] = [100, 1000];
-/// Choices that are timed, a choice of every frame with new weights.
+/// Choices that are timed, one per frame with new weights.
 const FRAMES: usize = 51;
-/// A frame at 60 Hz, and the part of it that choosing among 10,000 objects may take.
+/// A frame at 60 Hz, and the greatest share of it for choosing among 10,000 objects.
 const FRAME_MS: f64 = 1e3 / 60.0;
 const SHARE: f64 = 0.01;
 const GOAL_OBJECTS: usize = 10_000;
-/// One choice at a time, for others would slow it down.
+/// One measurement at a time: others would slow it down.
 static ALONE: Mutex<()> = Mutex::new(());
 
 type Time1 = fn(usize) -> Vec<f64>;
@@ -35,7 +35,7 @@ const POLICIES: [(&str, Time1); 4] = [
     ("adaptive", ours),
 ];
 
-/// How many objects, and a policy.
+/// A number of objects, and a policy.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::cli) struct Case {
     objects: usize,
@@ -109,7 +109,7 @@ impl Experiment for Selection {
     }
 }
 
-/// Cost in ticks and gain of a level of an object.
+/// Cost in ticks and gain of an object's level.
 fn level(id: usize, part: f64) -> (f64, f64) {
     let polygons = part * (100.0 + (id * 7919 % 900) as f64);
     (20.0 + 13.5 * polygons, 1.0 - 0.5 / polygons.max(2.0))
@@ -117,7 +117,7 @@ fn level(id: usize, part: f64) -> (f64, f64) {
 
 const PARTS: [f64; 5] = [0.02, 0.06, 0.18, 0.45, 1.0];
 
-/// Half of what all would take at their finest, ticks.
+/// Half of the cost of all objects at their finest level, ticks.
 fn target(objects: usize) -> f64 {
     objects as f64 * 0.5 * 13.5 * 550.0
 }
@@ -161,6 +161,6 @@ fn papers(objects: usize, choose: fn(&Problem, &[Level]) -> Vec<Level>) -> Vec<f
         last = levels;
         took
     };
-    // the papers' forms take longer, and fewer of them tell as much
+    // the papers' algorithms take longer, and fewer frames suffice
     (0..FRAMES / 5).map(one).collect()
 }

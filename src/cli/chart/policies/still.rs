@@ -1,4 +1,4 @@
-//! A camera that stands still before a scene in which nothing moves: no level may change.
+//! A fixed camera in front of a scene in which nothing moves: no level may change.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::Figure;
@@ -17,11 +17,11 @@ pub(in super::super) struct Still;
 const POLICIES: [Policy; 3] = [Policy::Threshold, Policy::Greedy, Policy::Adaptive];
 const SEEDS: usize = 5;
 const FRAMES: usize = 300;
-/// While the machine is still being learnt, and for as long as first misses make the budget wary, levels may change; what is judged
-/// comes after.
+/// Frames in which levels may change, while the policy learns the machine's factor and first misses make its budget cautious; only
+/// later frames are judged.
 const LEARNT: usize = 60;
-/// What is wrong with the machine, and whether levels must stay. An error that wanders as with a moving view, though nothing
-/// moves, is no still picture any more: it is told, not judged.
+/// Faults of the machine, and whether levels must stay. An error that wanders as with a moving view, although nothing moves, no
+/// longer makes a still picture: it is reported, not judged.
 const SETTINGS: [(&str, Fault, bool); 3] = [
     ("exact", Fault { wander: 0.0, tremble: 0.0, ..Fault::NONE }, true),
     ("a quarter slow, trembles by 1 %", Fault { slow: 1.25, wander: 0.0, ..Fault::NONE }, true),

@@ -1,4 +1,4 @@
-//! What the value functions of (RH05) give to near and to far, side by side (fig. 1).
+//! Shares that the value functions of (RH05) give to near and far trees, side by side (fig. 1).
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -22,25 +22,25 @@ const VALUES: [(&str, Value); 5] = [
     ("√a/d² (eq. 11)", Value::FocusSteep),
 ];
 const TARGET: f64 = 50e3;
-/// The frame that is looked at: the middle of the path.
+/// The frame that is measured: the middle of the path.
 const FRAME: usize = 1;
 const FRAMES: usize = 2;
-/// Depths, metres, up to which trees are near, and beyond which they are far.
+/// Depth limits of near and of far trees, metres.
 const NEAR_FAR_M: [f64; 2] = [60.0, 180.0];
 
-/// What a function gives.
+/// The result of a value function.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     value: String,
-    /// The part of its triangles that a tree is drawn with: near, between, far.
+    /// Mean share of its triangles that a tree is drawn with: near, between, far.
     near: f64,
     between: f64,
     far: f64,
-    /// What the frame takes, as a part of T.
+    /// Time of the frame, as a part of T.
     spent: f64,
 }
 
-/// Depth in metres and part drawn of everything in view, and the part of the frame that was spent.
+/// Depth in metres and drawn part of everything in view, and the time of the frame as a part of T.
 fn drawn(value: Value) -> (Vec<(f64, f64)>, f64) {
     let mut show = forest::show(600, Way::Linear, TARGET, Forms::Whole, FRAMES);
     show.fault = Fault { wander: 0.0, tremble: 0.0, ..Fault::NONE };

@@ -1,4 +1,4 @@
-//! A walk among 200 meshes of any resolution with a sudden turn (GB99): is the prediction right, and is the choice proven?
+//! A walk among 200 meshes of any resolution with a sudden turn (GB99): accuracy of the prediction, and proof of the choice.
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::Figure;
@@ -34,7 +34,7 @@ fn show(frames: usize) -> Show {
     Show { scene, path, fault: Fault::NONE, target: TARGET, frames, lap: frames, delay: 1, logic: 0.0, overlap: 1.0 }
 }
 
-/// Meshes of log-normal triangle counts: 20 ahead of the walker, and the rest behind.
+/// Meshes of log-normal triangle counts: 20 in front of the camera, the rest behind it.
 fn things() -> Vec<Thing> {
     let mut noise = Noise::new(99);
     let counts: Vec<f64> = (0..MESHES).map(|_| libm::exp(noise.normal())).collect();
@@ -55,7 +55,7 @@ fn things() -> Vec<Thing> {
     counts.iter().enumerate().map(&mut thing).collect()
 }
 
-/// Towards the few, which leave the view one by one; at seven tenths half a turn in ten frames, and the many.
+/// Towards the few meshes, which leave the view one by one; at seven tenths half a turn in ten frames, towards the many.
 fn path(frames: usize) -> Path {
     let turn = frames * 7 / 10;
     let keys = vec![

@@ -1,4 +1,4 @@
-//! What a round of all agents costs by their number, on threads, in a pool and in lockstep, beside the bare steps.
+//! The cost of a round of all agents by their number, on threads, in a pool and in lockstep, compared with the bare steps.
 
 use super::super::super::bench::agents::{Case as Run, Executor, measure};
 use super::super::super::bench::cast::Model;
@@ -7,15 +7,15 @@ use super::growth::{Case, Cost, Growth, Row};
 use crate::runtime::Priority;
 use std::time::Duration;
 
-/// The question.
+/// The experiment.
 pub(in super::super) struct Agents;
 
 const EXECUTORS: [Executor; 3] = [Executor::Threads, Executor::Pool, Executor::Lockstep];
-/// Threads are a hundred at most: more of them are measured by `bench agents`.
+/// At most a hundred threads: `bench agents` measures more.
 const THREADS_MAX: u32 = 100;
-/// How long each case runs; its bare steps half as long.
+/// How long each case runs; its bare steps run half as long.
 const SPAN: Duration = Duration::from_millis(1500);
-/// A round of all agents, a second: what one core can carry.
+/// Steps of all agents per second: what one core can carry.
 const STEPS_PER_S: f64 = 1e5;
 const RATE_MAX_HZ: f64 = 198.0;
 

@@ -1,4 +1,4 @@
-//! What a step of a tube that lies folded on itself costs by its contacts, free and held by a tool.
+//! The cost of a step of a tube folded on itself by its contacts, free and held by a tool.
 
 use super::super::experiment::Finding;
 use super::super::timing::{floor_us, least_us};
@@ -7,17 +7,17 @@ use super::tubes::{folded, holding, step};
 use metachron_core::SimSpan;
 use std::time::Duration;
 
-/// The question.
+/// The experiment.
 pub(in super::super) struct Contacts;
 
 const FREE: &str = "free, steps of 4 ms";
 const HELD: &str = "held by a tool, steps of 1 ms";
 const DT: SimSpan = SimSpan::from_nanos(4_000_000);
 const DT_HELD: SimSpan = SimSpan::from_nanos(1_000_000);
-/// How long each case is measured, and steps of 4 ms until the tube lies on itself.
+/// How long each case is measured, and steps of 4 ms until the tube rests on itself.
 const SPAN: Duration = Duration::from_millis(500);
 const FALLS: u32 = 1500;
-/// Steps in the tool's grasp before that is measured.
+/// Steps in the tool's grasp before the measurement.
 const HOLDS: u32 = 200;
 
 impl Growth for Contacts {
@@ -27,7 +27,7 @@ impl Growth for Contacts {
     const COST: &'static str = "CPU µs a step";
     const FLOOR: &'static str = "the same memory once";
 
-    /// Sizes are segments, 14 a strand.
+    /// Sizes are segments, 14 per strand.
     fn cases(quick: bool) -> Vec<Case> {
         let sizes: &[u32] = if quick { &[28, 100] } else { &[28, 56, 100, 200, 400, 800] };
         let kinds = [FREE, HELD].into_iter();

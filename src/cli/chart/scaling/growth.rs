@@ -1,4 +1,4 @@
-//! Cost against number: what so many cost, what that is each, the floor beside it, and the power that cost grows by.
+//! Cost against number: total cost, cost each, the floor, and the power with which cost grows.
 //!
 //! In: a [`Growth`]. Out: an experiment whose cases are measured one at a time. Never here: what is counted.
 
@@ -10,29 +10,29 @@ use super::super::timing::{calibration_us, pace_for_goals};
 use serde::{Deserialize, Serialize};
 use std::marker::PhantomData;
 
-/// A question of how cost grows.
+/// A measurement of how cost grows with a number.
 pub(in super::super) trait Growth: Send + Sync + 'static {
     /// As [`Experiment::NAME`].
     const NAME: &'static str;
     /// As [`Experiment::TITLE`].
     const TITLE: &'static str;
-    /// What is counted, for the axis.
+    /// Label of the axis of counts.
     const COUNTED: &'static str;
-    /// What costs the time, for the axis.
+    /// Label of the cost axis.
     const COST: &'static str;
-    /// What the floor is.
+    /// Label of the floor.
     const FLOOR: &'static str;
 
-    /// What is asked.
+    /// The cases in the order of the rows.
     fn cases(quick: bool) -> Vec<Case>;
 
-    /// Measures a case; none where it could not be carried out.
+    /// Measures a case; `None` where it could not be carried out.
     fn measure(case: &Case) -> Option<Cost>;
 
-    /// What was claimed, and what came out.
+    /// The claims and their measured values.
     fn findings(rows: &[Row]) -> Vec<Finding>;
 
-    /// Points of others in the same terms: name, count, microseconds.
+    /// Points of other engines on the same axes: name, count, microseconds.
     fn peers() -> Vec<(String, f64, f64)> {
         Vec::new()
     }
@@ -41,36 +41,36 @@ pub(in super::super) trait Growth: Send + Sync + 'static {
 /// One size of one kind.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
-    /// Which kind.
+    /// The kind.
     pub(super) case: String,
-    /// The size asked for.
+    /// The requested size.
     pub(super) size: u32,
 }
 
-/// What a size costs.
+/// The cost of a size.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in super::super) struct Cost {
-    /// How many there are of what is counted.
+    /// The actual number of what is counted.
     pub(super) count: f64,
     pub(super) us: f64,
     pub(super) floor_us: f64,
 }
 
-/// A case with what was measured.
+/// A case with its measurements.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     pub(super) case: String,
     pub(super) size: u32,
-    /// Empty, as what follows, where the case could not be carried out.
+    /// Empty, like the numbers after it, where the case could not be carried out.
     pub(super) count: Option<f64>,
     pub(super) us: Option<f64>,
     pub(super) floor_us: Option<f64>,
-    /// The calibration measured beside it ([`calibration_us`]).
+    /// The calibration measured right after it ([`calibration_us`]).
     pub(super) calibration_us: Option<f64>,
 }
 
 impl Row {
-    /// Count and microseconds; no numbers where there are none.
+    /// Count and microseconds; NaN where there are none.
     pub(super) fn point(&self) -> (f64, f64) {
         (self.count.unwrap_or(f64::NAN), self.us.unwrap_or(f64::NAN))
     }
@@ -79,7 +79,7 @@ impl Row {
         (self.count.unwrap_or(f64::NAN), self.floor_us.unwrap_or(f64::NAN))
     }
 
-    /// How many times the floor it costs.
+    /// Ratio of the cost to the floor.
     pub(super) fn times_floor(&self) -> f64 {
         self.point().1 / self.floor().1
     }
@@ -91,12 +91,12 @@ impl Row {
     }
 }
 
-/// By what times are multiplied to be those of the machine for which goals were set.
+/// Factor that scales times to the machine for which goals were set.
 pub(super) fn pace(rows: &[Row]) -> f64 {
     pace_for_goals(rows.iter().map(|row| row.calibration_us))
 }
 
-/// The diagram of a question.
+/// The diagram of a [`Growth`].
 pub(in super::super) struct Scaling<G>(PhantomData<G>);
 
 impl<G: Growth> Experiment for Scaling<G> {
@@ -151,21 +151,21 @@ impl<G: Growth> Experiment for Scaling<G> {
     }
 }
 
-/// By which power of the count the cost of a case grows, between two counts.
+/// The power of the count with which the cost of a case grows, between two counts.
 pub(super) fn power(rows: &[Row], case: &str, (least, most): (f64, f64)) -> f64 {
     let inside = |row: &&Row| row.case == case && row.count.is_some_and(|n| (least..=most).contains(&n));
     let points: Vec<_> = rows.iter().filter(inside).map(Row::point).collect();
     exponent(&points).unwrap_or(f64::NAN)
 }
 
-/// The different cases, in the order of the rows.
+/// The distinct cases, in the order of the rows.
 fn names(rows: &[Row]) -> Vec<&str> {
     let mut list: Vec<&str> = rows.iter().map(|row| row.case.as_str()).collect();
     list.dedup();
     list
 }
 
-/// Cost against count, the floor as a broken line, others as dots.
+/// Cost against count, the floor as a dashed line, other engines as dots.
 fn whole<G: Growth>(rows: &[Row]) -> Panel {
     let of = |case: &str, y: fn(&Row) -> (f64, f64)| rows.iter().filter(|r| r.case == case).map(y).collect::<Vec<_>>();
     let mut layers = Vec::new();
@@ -189,7 +189,7 @@ fn whole<G: Growth>(rows: &[Row]) -> Panel {
     Panel { title: "all of them".to_owned(), x, y, layers }
 }
 
-/// Cost of each against count.
+/// Cost of each item against count.
 fn each<G: Growth>(rows: &[Row]) -> Panel {
     let of = |case: &str| rows.iter().filter(|r| r.case == case).map(|r| (r.point().0, r.ns_each())).collect();
     let lines = names(rows).into_iter().zip(Colour::LINES);

@@ -1,4 +1,4 @@
-//! `chart scaling`: how cost grows with segments, contacts, agents and what sleeps, and how far it is from what the machine could do.
+//! `chart scaling`: how cost grows with segments, contacts, agents and sleepers, and how far it is from the limit of the machine.
 
 pub(super) mod agents;
 pub(super) mod contacts;

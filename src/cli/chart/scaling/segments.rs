@@ -1,4 +1,4 @@
-//! What a step of a tube costs by its segments: alone, searching for contact with itself, and held by a tool besides.
+//! The cost of a step of a tube by its segments: alone, searching for self-contact, and also held by a tool.
 
 use super::super::accuracy::peers;
 use super::super::experiment::{Finding, worst};
@@ -8,19 +8,19 @@ use super::tubes::{holding, step, straight};
 use metachron_core::SimSpan;
 use std::time::Duration;
 
-/// The question.
+/// The experiment.
 pub(in super::super) struct Segments;
 
 const ALONE: &str = "alone";
 const WARY: &str = "may touch itself";
 const HELD: &str = "held by a tool";
-/// What was claimed for the whole step at [`CLAIMED`] segments.
+/// Claims for the whole step at numbers of segments in the range [`CLAIMED`].
 const CLAIMED_NS: f64 = 160.0;
 const CLAIMED_POWER: f64 = 1.05;
 const CLAIMED: (f64, f64) = (100.0, 4000.0);
 /// How long each case is measured.
 const SPAN: Duration = Duration::from_millis(200);
-/// Steps before that, so that all hang alike: the tube comes to rest in the first half of them.
+/// Steps before the measurement, so that all tubes hang alike: they come to rest in the first half of these.
 const WARM: u32 = 500;
 const DT: SimSpan = SimSpan::from_nanos(10_000_000);
 

@@ -1,5 +1,5 @@
-//! What objects at rest cost those that are not: ten tubes that swing, alone and beside up to a thousand boxes or tubes that have
-//! come to rest out of sight.
+//! The cost that objects at rest add for ten that move: ten swinging tubes, alone and together with up to a thousand boxes or tubes at
+//! rest out of sight.
 
 use super::super::experiment::Finding;
 use super::growth::{Case, Cost, Growth, Row};
@@ -10,22 +10,22 @@ use crate::scene::{Source, load};
 use cpu_time::ThreadTime;
 use std::time::Duration;
 
-/// The question.
+/// The experiment.
 pub(in super::super) struct Sleepers;
 
-/// Who sleeps, and whether a picture is chosen for every frame or agents make their turns alone.
+/// Kind of sleepers, and whether pictures are composed for every frame or only agents step.
 const CASES: [(&str, Sleeper, bool); 4] = [
     ("boxes, turns alone", Sleeper::Box, false),
     ("boxes, turns and pictures", Sleeper::Box, true),
     ("tubes, turns alone", Sleeper::Tube, false),
     ("tubes, turns and pictures", Sleeper::Tube, true),
 ];
-/// Together they may cost so many times what the ten cost alone.
+/// Greatest cost of all together, as a multiple of the cost of the ten alone.
 const LIMIT: f64 = 1.1;
-/// Both runs are measured in turn, so many frames each, so often.
+/// Both runs are measured in turn: this many frames each, this many times.
 const FRAMES: u32 = 30;
 const ROUNDS: usize = 9;
-/// Simulated seconds until all sleep at the latest.
+/// Simulated seconds after which all must be asleep.
 const SETTLED_S: f64 = 30.0;
 const SIZE: Size = Size { width: 1280, height: 720 };
 
@@ -88,7 +88,7 @@ impl Play {
         Some(Self { session, pictures, due: Duration::ZERO })
     }
 
-    /// Goes on until all but the ten sleep, a second at least.
+    /// Goes on until all but the ten sleep, for at least a second.
     fn settle(&mut self) -> Option<()> {
         self.frames_us(60);
         while self.session.agents()[AWAKE..].iter().any(|agent| agent.state() != AgentState::Resting) {
@@ -98,7 +98,7 @@ impl Play {
         Some(())
     }
 
-    /// CPU time of a frame, the mean of so many, microseconds.
+    /// CPU time of a frame, mean of this many, microseconds.
     fn frames_us(&mut self, frames: u32) -> f64 {
         let start = ThreadTime::now();
         for _ in 0..frames {
@@ -126,7 +126,7 @@ fn median(mut times_us: Vec<f64>) -> f64 {
 
 const AWAKE: usize = 10;
 
-/// Ten tubes that hang by an end before a camera, and behind it so many of another kind, ten in a row.
+/// Ten tubes that hang from one end in front of a camera, and behind it so many sleepers, ten in a row.
 fn scene(sleeper: Sleeper, count: u32) -> String {
     let mut text = format!(
         "format = 1\nexecutor = \"lockstep\"\n[camera]\neye_m = [1, -2, 0.3]\nlook_at_m = [1, 0, 0.2]\n\

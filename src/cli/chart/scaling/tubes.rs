@@ -1,6 +1,6 @@
-//! The tubes whose cost is measured.
+//! The tubes of the cost measurements.
 //!
-//! In: segments. Out: tubes as they lie when they have come to rest, and the tool that holds them. Never here: time.
+//! In: segments. Out: tubes close to their rest shapes, and the tool that grasps them. Never here: time.
 
 use super::super::stability::common::{GRAVITY, plain_tube};
 use glam::{DQuat, DVec3};
@@ -15,9 +15,9 @@ use std::sync::Arc;
 const STRAND_SEGMENTS: u32 = 14;
 const STRAND_M: f64 = 0.2;
 const RADIUS_M: f64 = 0.016;
-/// From one strand's axis to the next one's: they fall by a few millimetres.
+/// Distance between the axes of adjacent strands: they fall by a few millimetres.
 const PITCH_M: f64 = 0.034;
-/// Strands lie in so many layers.
+/// Number of layers of strands.
 const LAYERS: u32 = 2;
 
 /// A soft tube of a metre, clamped at its start, under gravity.
@@ -33,14 +33,14 @@ pub(super) fn straight(segments: u32, self_contact: bool) -> Option<Tube> {
     Tube::new(spec).ok()
 }
 
-/// A very soft tube that lies folded on the ground and on itself, in two layers of strands side by side.
+/// A very soft tube folded on the ground and on itself, in two layers of strands side by side.
 pub(super) fn folded(segments: u32) -> Option<Tube> {
     let strands = segments.div_ceil(STRAND_SEGMENTS).max(2);
     let wide = strands.div_ceil(LAYERS);
     let mut path_m = vec![];
     for k in 0..strands {
         let (layer, column) = (k / wide, k % wide);
-        // the second layer is laid on the first from where that ends
+        // the second layer starts on the first where that ends
         let row = if layer.is_multiple_of(2) { column } else { wide - 1 - column };
         let at = |x: f64| DVec3::new(x, f64::from(row) * PITCH_M, 0.02 + f64::from(layer) * PITCH_M);
         let (near, far) = if k.is_multiple_of(2) { (0.0, STRAND_M) } else { (STRAND_M, 0.0) };
@@ -72,7 +72,7 @@ pub(super) fn folded(segments: u32) -> Option<Tube> {
     Tube::new(spec).ok()
 }
 
-/// A tool that holds the middle of `tube` where it now is, as it was published once.
+/// A tool that grasps the middle of `tube` at its present place, as a neighbour with one fixed state.
 pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
     let mut seen = Snapshot::default();
     tube.write_snapshot(&mut seen);
@@ -93,7 +93,7 @@ pub(super) fn holding(tube: &Tube) -> Option<Vec<Neighbour>> {
     Some(vec![Neighbour { owned: true, ..Neighbour::seen(AgentId(1), tool) }])
 }
 
-/// One step among `neighbours`; none where it is refused.
+/// One step among `neighbours`; `None` where it fails.
 pub(super) fn step(tube: &mut Tube, dt: SimSpan, neighbours: &[Neighbour]) -> Option<()> {
     let around = Surroundings { neighbours, ..Surroundings::alone(AgentId(0), SimTime::ZERO) };
     tube.step(dt, &around).ok().map(drop)

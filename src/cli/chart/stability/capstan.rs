@@ -1,8 +1,8 @@
-//! Capstan: how hard a tube around a fixed cylinder must be pulled before it slips.
+//! Capstan: the load at which a tube around a fixed cylinder slips.
 //!
 //! Both ends are pulled by dead loads; one is raised slowly until the other end moves. Euler and Eytelwein: T₂/T₁ = exp(μφ).
-//! The tube is thin beside the cylinder, so that it makes no difference that its tension works at its axis and friction at its
-//! skin (docs/theory/contact.md, eq. 24, says what difference it makes otherwise).
+//! The tube is thin compared with the cylinder, so that it does not matter that its tension acts at its axis and friction at its
+//! surface (docs/theory/contact.md, eq. 24, gives the difference for thicker tubes).
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -23,7 +23,7 @@ pub(in super::super) struct Capstan;
 /// Angles of wrap, radians, and coefficients of friction.
 const WRAPS: [f64; 5] = [FRAC_PI_2, PI, 1.5 * PI, TAU, 1.25 * TAU];
 const FRICTIONS: [f64; 3] = [0.1, 0.3, 0.5];
-/// The claim's.
+/// Values of the claim.
 const CLAIMED_WRAPS: [f64; 3] = [FRAC_PI_2, PI, TAU];
 const CLAIMED_FRICTION: f64 = 0.3;
 const TOLERANCE: f64 = 0.05;
@@ -32,16 +32,16 @@ const DRUM_M: f64 = 0.1;
 const TUBE_M: f64 = 0.001;
 /// Straight part at each end, metres.
 const TAIL_M: f64 = 0.05;
-/// Segments an angle of wrap of one radian is divided into: 2.4° each.
+/// Segments per radian of wrap: 2.4° each.
 const SEGMENTS_A_RADIAN: f64 = 24.0;
-/// The load at the end that follows, newtons.
+/// The load at the end that is not raised, newtons.
 const LOAD_N: f64 = 2.0;
-/// The other load begins at this share of what theory gives, and rises by the second share every second up to the third.
+/// The other load starts at the first share of the theoretical one and rises by the second share per second up to the third.
 const RAMP: [f64; 3] = [0.7, 0.1, 1.4];
 const DT_S: f64 = 0.002;
-/// Seconds in which both loads come on.
+/// Seconds for both loads to come on and the tube to settle.
 const SETTLE_S: f64 = 0.5;
-/// The end that follows has slipped when it moved so far, metres.
+/// The end that is not raised has slipped when it moved so far, metres.
 const SLIP_M: f64 = 5e-4;
 
 /// An angle and a coefficient.
@@ -51,7 +51,7 @@ pub(in super::super) struct Case {
     friction: f64,
 }
 
-/// What was measured.
+/// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     friction: f64,
@@ -136,7 +136,7 @@ impl Experiment for Capstan {
     }
 }
 
-/// The path: a tail along the tangent, the wrap, another tail. The cylinder stands along y.
+/// The path: a tail along the tangent, the wrap, another tail. The cylinder's axis is y.
 fn path(wrap_rad: f64) -> Vec<DVec3> {
     let reach = DRUM_M + TUBE_M;
     let on = |phi: f64| DVec3::new(libm::sin(phi), 0.0, libm::cos(phi)) * reach;
@@ -164,14 +164,14 @@ fn tube(case: &Case) -> Option<Tube> {
         damping_per_s: 5.0,
         ..plain_tube(path(case.wrap_rad), TUBE_M, segments)
     };
-    // curved as the drum by itself, so that bending takes no force; limper still, and a taut tube chatters and creeps
+    // its rest shape follows the drum, so bending takes no force; with even less stiffness a taut tube chatters and creeps
     (spec.section.ea_n, spec.section.ga_n) = (2e3, 1e3);
     (spec.section.ei_n_m2, spec.section.gj_n_m2) = (1e-3, 1e-3);
     spec.mass_per_length_kg_m = 0.05;
     Tube::new(spec).ok()
 }
 
-/// Raises the load at the end until the start has moved; the ratio of the loads then.
+/// Raises the load at the end until the start has moved; returns the ratio of the loads then.
 fn slips_at(case: &Case) -> Option<f64> {
     let mut tube = tube(case)?;
     let dt = SimSpan::from_secs_f64(DT_S)?;

@@ -1,9 +1,9 @@
 //! A closed system of three rigid bodies and two tubes, five clocks, no gravity, a minute.
 //!
 //! `plates`: two heavy plates close in on a ball and two tubes. The tubes take the ball's energy within seconds; from then on
-//! there is no blow until the plates reach the tubes, after three quarters of the run. `ring`: three balls and two tubes, each on a spring to the next.
-//! Nothing pulls from outside, so momentum stays, and energy may only fall. Both are taken when all five clocks show the same
-//! time, every impulse that was given delivered; and as they are told, to see what was on its way.
+//! there is no impact until the plates reach the tubes, after three quarters of the run. `ring`: three balls and two tubes, each on
+//! a spring to the next. Without external forces momentum is constant and energy may only fall. Both are sampled when all five
+//! clocks show the same time, with every given impulse delivered; and also as published, to measure what is in flight.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -19,21 +19,21 @@ use std::collections::BTreeMap;
 /// The experiment.
 pub(in super::super) struct Closed;
 
-/// Which way the five are set up, so that each clock drives each kind once.
+/// Cyclic shifts of the rates, so that each clock drives each kind of agent once.
 const TURNS: [usize; 5] = [0, 1, 2, 3, 4];
 /// Seeds of the starting velocities.
 const SEEDS: [u64; 2] = [1, 2];
 const SECONDS: f64 = 60.0;
 const QUICK_SECONDS: f64 = 2.0;
-/// Clocks agree to within this, seconds: sixtieths are not whole nanoseconds.
+/// Clocks agree within this, seconds: sixtieths are not whole nanoseconds.
 const SAME_S: f64 = 1e-5;
 const ENERGY_MAX: f64 = 1.01;
-/// Momentum with everything delivered may round by so much, as a share of the momenta exchanged.
+/// Rounding allowed for the momentum with everything delivered, as a share of the momenta exchanged.
 const ROUNDING: f64 = 1e-9;
-/// They meet: so many looks at least find that two have struck each other since the one before.
+/// Least number of samples that find an impact since the previous sample: the bodies really collide.
 const BLOWS_MIN: u32 = 5;
 
-/// Which way it is set up, and for how long it runs.
+/// A system, the shift of its rates, its seed and its length.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     system: String,
@@ -42,34 +42,34 @@ pub(in super::super) struct Case {
     seconds: f64,
 }
 
-/// What it came to.
+/// The results of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     system: String,
-    /// The rates are handed on by so many places.
+    /// The rates are shifted cyclically by so many places.
     turn: usize,
     seed: u64,
     seconds: f64,
-    /// Peak of the energy at a common time, in that of the start.
+    /// Peak of the energy at a common time, as a multiple of that of the start.
     energy_peak: f64,
     energy_end: f64,
-    /// Peak of the energies as they are told.
+    /// Peak of the energies as published.
     raw_peak: f64,
-    /// The greatest change of momentum, everything delivered, as a share of the momenta at the start added.
+    /// The greatest change of momentum, everything delivered, as a share of the sum of the momenta's magnitudes at the start.
     drift: f64,
-    /// The same of the angular momentum, as a share of the angular momenta that the momenta would have at the plates.
+    /// The same for the angular momentum, as a share of the angular momenta that these momenta would have at the plates.
     angular_drift: f64,
-    /// The same of the momentum without delivery; the greatest impulse on its way; the most by which the one passed the other.
+    /// The same for the momentum without delivery; the greatest impulse in flight; the greatest excess of the first over the second.
     raw_drift: f64,
     in_flight: f64,
     beyond: f64,
-    /// How often all clocks agreed, and since when they did two of them had struck each other.
+    /// Number of samples at which all clocks agreed, and number of those with an impact since the previous one.
     looks: u32,
     blows: u32,
-    /// The longest time without a blow, seconds.
+    /// The longest time without an impact, seconds.
     pause_s: f64,
-    /// Second by second, with spaces between: the highest energy, the greatest change of momentum as told, the greatest
-    /// impulse on its way; shares as above.
+    /// Second by second, separated by spaces: the highest energy, the greatest change of momentum as published, the greatest
+    /// impulse in flight; shares as above.
     energy_of_second: String,
     told_of_second: String,
     in_flight_of_second: String,
@@ -223,16 +223,16 @@ impl Experiment for Closed {
     }
 }
 
-/// The least that the figure of momentum shows.
+/// The least value that the figure of momentum shows.
 const FLOOR: f64 = 1e-16;
 
-/// Numbers of a row, second by second.
+/// The numbers of a row, second by second.
 fn read(numbers: &str) -> Vec<(f64, f64)> {
     let values = numbers.split(' ').filter_map(|v| v.parse().ok());
     values.enumerate().map(|(second, v)| (second as f64 + 0.5, v)).collect()
 }
 
-/// What is summed up over a run; momenta are shares of those at the start.
+/// Extremes and counts over a run; momenta are shares of those at the start.
 #[derive(Debug, Clone, Default)]
 struct Sums {
     energy: [f64; 3],
@@ -258,7 +258,7 @@ impl Sums {
         numbers.join(" ")
     }
 
-    /// Takes in a look at `at_s`: energies, changes of momenta, what is on its way.
+    /// Takes in a sample at `at_s`: energies, changes of momenta, impulse in flight.
     fn add(&mut self, at_s: f64, [energy, raw]: [f64; 2], drift: [f64; 2], [told, flying]: [f64; 2]) {
         self.energy = [worst([self.energy[0], energy]), energy, worst([self.energy[2], raw])];
         self.drift = [0, 1].map(|k| worst([self.drift[k], drift[k]]));
@@ -272,7 +272,7 @@ impl Sums {
         self.looks += 1;
     }
 
-    /// Looks for pairs whose impulse has changed since the last look.
+    /// Counts an impact if the impulse of a pair has changed since the last sample.
     fn strike(&mut self, at_s: f64, play: &Play, ids: [AgentId; 5]) {
         let mut struck = false;
         for id in ids {
@@ -288,7 +288,7 @@ impl Sums {
     }
 }
 
-/// Plays the case; and whether it came to its end.
+/// Plays the case; returns its results and whether it reached its end.
 fn play(case: &Case) -> Option<(Sums, bool)> {
     let (play, ids) = system(&case.system, case.turn, case.seed)?;
     let start = play.common(SimTime::ZERO);
@@ -316,7 +316,7 @@ fn play(case: &Case) -> Option<(Sums, bool)> {
     Some((sums, ended.time().as_secs_f64() >= case.seconds - 1e-3))
 }
 
-/// Magnitudes of all momenta added, kg·m/s.
+/// Sum of the magnitudes of all momenta, kg·m/s.
 fn momenta(play: &Play, ids: [AgentId; 5]) -> f64 {
     let members = play.stage.members();
     let one = |id: AgentId| audit(&members[id.0 as usize..=id.0 as usize], SimTime::ZERO, &mut |_, _| 0.0);
@@ -328,7 +328,7 @@ fn on_its_way(play: &Play, ids: [AgentId; 5]) -> DVec3 {
     ids.iter().map(|id| play.in_flight(*id)).sum()
 }
 
-/// Momentum as the agents tell it, nothing delivered, kg·m/s.
+/// Momentum as the agents publish it, nothing delivered, kg·m/s.
 fn told(play: &Play) -> DVec3 {
     let members = play.stage.members();
     let one = |k: usize| audit(&members[k..=k], members[k].snapshot.time, &mut |_, _| 0.0).momentum;

@@ -1,4 +1,4 @@
-//! What the experiments of this room share: bodies without surprises, and loads.
+//! Shared parts of the stability experiments: plain bodies and tubes, and loads.
 
 use glam::DVec3;
 use metachron_contact::Pull;
@@ -7,7 +7,7 @@ use metachron_geometry::Solid;
 use metachron_models::rigid::RigidSpec;
 use metachron_models::rod::{Material, Section, TubeSpec};
 
-/// The pull of the Earth, m/s².
+/// Gravity of the Earth, m/s².
 pub(in super::super) const GRAVITY: f64 = 9.81;
 
 /// A free tube of 1 MPa with a wall of an eighth of its radius, no weight, no damping, no friction.
@@ -21,7 +21,7 @@ pub(in super::super) fn plain_body(solid: Solid, position: DVec3, mass_kg: f64) 
     RigidSpec { friction: 0.0, ..RigidSpec::free(solid, position, mass_kg) }
 }
 
-/// A constant force on the point of a tube at a rest arc length: a spring so soft and long that it does not notice motion.
+/// A constant force on the point of a tube at a rest arc length: a spring so soft and long that motion does not change its force.
 pub(in super::super) fn dead_load(arc_m: f64, force_n: DVec3) -> Pull {
     const STIFFNESS_N_M: f64 = 1e-9;
     Pull {

@@ -1,7 +1,7 @@
-//! A body falls on a spring-mounted one whose clock is faster: what every law of contact makes of the energy.
+//! A body falls on a spring-mounted one with a faster clock: the energy under every contact law.
 //!
-//! 50 g fall 5 cm onto 100 g on springs of 500 N/m. The mounted body keeps 1 kHz; the other is slow, its steps tremble, some of
-//! its states are lost. In one dimension two balls; in three a tilted box that turns and slides lands on a plate with friction.
+//! 50 g fall 5 cm onto 100 g on springs of 500 N/m. The mounted body keeps 1 kHz; the other is slow, its steps have jitter, and
+//! some of its states are lost. In 1d two balls; in 3d a tilted box that turns and slides lands on a plate with friction.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -41,27 +41,27 @@ const QUICK_SEEDS: u64 = 2;
 pub(super) const MOUNTED_KG: f64 = 0.1;
 pub(super) const FALLING_KG: f64 = 0.05;
 const MOUNTED_HZ: f64 = 1000.0;
-/// Stiffness and damping of what the mounted body stands on, all springs together.
+/// Stiffness and damping of the mount, all springs together.
 const MOUNT_N_M: f64 = 500.0;
 const MOUNT_N_S_M: f64 = 0.5;
-/// Damping of the laws that have one, as a share of the critical.
+/// Damping of the laws that have one, as a share of critical damping.
 const DAMPING_RATIO: f64 = 0.1;
 const FALL_M: f64 = 0.05;
-/// A blow without rebound: the sum over two clocks then shows 1 + m₁ m₂/(m₁ + m₂)² = 1.22 at least, what the mounted body has
-/// felt already and the other has not; and more where a second blow comes before the other has heard of the first.
+/// An impact without rebound: the sum over two clocks then peaks at 1 + m₁ m₂/(m₁ + m₂)² = 1.22 at least, because the mounted
+/// body has already taken the impulse and the other has not; it is higher where a second impact precedes the delivery of the first.
 const RESTITUTION: f64 = 0.0;
 const SECONDS: f64 = 3.0;
 /// From here on the two are at rest.
 const REST_S: f64 = 2.5;
-/// Past this many times the energy of the start nothing more is to be learnt.
+/// A run ends past this multiple of its starting energy: it shows nothing more.
 const BLOWN_UP: f64 = 1e6;
-/// What is wanted.
+/// Bounds of the findings.
 const RAW_MAX: f64 = 1.3;
 const COMMON_MAX: f64 = 1.01;
 const MOMENTUM_MAX: f64 = 0.005;
 const DEPTH_MAX_M: f64 = 0.002;
 
-/// A law, in how many dimensions, how slow, how lossy.
+/// A law, the number of dimensions, the slow rate, the share of lost states.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     law: String,
@@ -82,11 +82,11 @@ pub(in super::super) struct Row {
     jitter: f64,
     loss: f64,
     seeds: u64,
-    /// Peak of the energies added over two clocks, in those of the start.
+    /// Peak of the energies added over two clocks, as a multiple of that of the start.
     raw_peak: f64,
-    /// Peak at a common time, all impulses delivered.
+    /// The same at a common time, with all impulses delivered.
     common_peak: f64,
-    /// What the two contact impulses differ by, all delivered, as a share of what was exchanged.
+    /// Difference of the two contact impulses, all delivered, as a share of the impulse exchanged.
     momentum_error: f64,
     /// The deepest overlap at rest, at a common time.
     depth_m: f64,
@@ -146,7 +146,7 @@ impl Experiment for Drop {
 
     fn figure(rows: &[Row]) -> Figure {
         let peak = |space| panel(space, rows, ("peak energy / start, at a common time", 0.5, 1e4), |r| r.common_peak);
-        // who has been thrown away overlaps nothing
+        // a body that was thrown off overlaps nothing
         let rests = |r: &Row| if r.common_peak < 2.0 { r.depth_m } else { f64::NAN };
         let depth = |space| panel(space, rows, ("overlap at rest, m", 1e-7, 0.1), rests);
         let panels = SPACES.into_iter().flat_map(|space| [peak(space), depth(space)]).collect();
@@ -198,7 +198,7 @@ impl Experiment for Drop {
     }
 }
 
-/// What one fall was like.
+/// The results of one fall.
 struct Fall {
     raw: f64,
     common: f64,
@@ -210,7 +210,7 @@ impl Fall {
     const BROKEN: Self = Self { raw: f64::NAN, common: f64::NAN, momentum_error: f64::NAN, depth_m: f64::NAN };
 }
 
-/// The law of that name.
+/// The law with a name.
 pub(super) fn law(name: &str, stiffness_n_m: f64, damping_ratio: f64) -> Law {
     let reduced_kg = MOUNTED_KG * FALLING_KG / (MOUNTED_KG + FALLING_KG);
     let damping_n_s_m = 2.0 * damping_ratio * (stiffness_n_m * reduced_kg).sqrt();
@@ -222,12 +222,12 @@ pub(super) fn law(name: &str, stiffness_n_m: f64, damping_ratio: f64) -> Law {
     }
 }
 
-/// Two bodies over each other, and the energy that counts as none.
+/// Two bodies, one above the other, and their zero of energy.
 pub(super) struct Pair {
     pub(super) play: Play,
     pub(super) mounted: AgentId,
     pub(super) falling: AgentId,
-    /// Energy where the falling body lies on the mounted one before its springs give, joules.
+    /// Energy where the falling body rests on the mounted one before its springs give, joules.
     pub(super) zero_j: f64,
 }
 
@@ -244,7 +244,7 @@ fn mount(at: DVec3, count: f64) -> Pull {
     }
 }
 
-/// Sets the two up, the one `fall_m` above the other.
+/// Builds the two bodies, one `fall_m` above the other.
 pub(super) fn pair(space: &str, law: Law, rate_hz: f64, (faults, fall_m): (Faults, f64)) -> Option<Pair> {
     let mut play = Play::new(law, faults);
     let gravity = DVec3::NEG_Z * GRAVITY;
@@ -307,7 +307,7 @@ fn fall(case: &Case, seed: u64) -> Option<Fall> {
     Some(out)
 }
 
-/// Over the slow body's rate, a line a law.
+/// A quantity over the slow body's rate, one line per law.
 fn panel(space: &str, rows: &[Row], (label, low, high): (&'static str, f64, f64), get: fn(&Row) -> f64) -> Panel {
     let mut layers: Vec<Layer> = LAWS
         .into_iter()

@@ -1,6 +1,6 @@
-//! The closed systems: three rigid bodies and two tubes with five clocks, nothing from outside.
+//! The closed systems: three rigid bodies and two tubes with five clocks, without external forces.
 //!
-//! In: which of the two, how the clocks are handed out, a seed. Out: the agents. Never here: what is measured.
+//! In: the system, the shift of its rates, a seed. Out: the agents. Never here: measurements.
 
 use super::super::play::Play;
 use super::super::stage::Faults;
@@ -18,14 +18,14 @@ pub(super) const SYSTEMS: [&str; 2] = ["plates", "ring"];
 pub(super) const ROOM_M: f64 = 0.4;
 /// The five rates, Hz: all show the same time every 50 ms.
 const RATES_HZ: [f64; 5] = [1000.0, 500.0, 240.0, 120.0, 60.0];
-/// The plates: mass, half of their edges, and how fast each comes.
+/// The plates: mass, half of their edges, and the speed of each.
 const PLATE_KG: f64 = 200.0;
 const PLATE_HALF_M: DVec3 = DVec3::new(0.1, 3.0, 3.0);
 const PLATE_M_S: f64 = 0.004;
 const BALL_KG: f64 = 0.1;
 const BALL_M: f64 = 0.05;
 const BALL_M_S: f64 = 0.4;
-/// How far the starting velocities are from straight along, in each direction, m/s.
+/// Amplitude of the deviation of the ball's starting velocity in each direction, m/s.
 const SWAY_M_S: f64 = 0.01;
 const TUBE_M: f64 = 0.3;
 const TUBE_RADIUS_M: f64 = 0.015;
@@ -37,12 +37,12 @@ const RING_TUBE_M: f64 = 0.4;
 const SPRING_N_M: f64 = 4.0;
 const SPRING_REST_M: f64 = 0.05;
 
-/// The system of that name; clocks are handed on by `turn` places.
+/// The system with a name; the rates are shifted cyclically by `turn` places.
 pub(super) fn system(name: &str, turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     if name == SYSTEMS[0] { company(turn, seed) } else { ring(turn, seed) }
 }
 
-/// Plate, tube, ball, tube, plate along x; the ball flies, the plates come, the tubes are hit.
+/// Plate, tube, ball, tube, plate along x; the ball flies, the plates approach, the tubes are hit.
 fn company(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let mut play = Play::new(Law::Ledger, Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];
@@ -72,7 +72,7 @@ fn company(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     Some((play, ids))
 }
 
-/// Five in a ring, each on a spring to the next: ball, tube, ball, tube, ball; the balls fly inwards.
+/// Five agents in a ring, each on a spring to the next: ball, tube, ball, tube, ball; the balls fly inwards.
 fn ring(turn: usize, seed: u64) -> Option<(Play, [AgentId; 5])> {
     let mut play = Play::new(Law::Ledger, Faults::default());
     let rate = |i: usize| RATES_HZ[(i + turn) % RATES_HZ.len()];

@@ -1,9 +1,9 @@
-//! The rest shape of a clamped tube under its own weight, by shooting: nothing of the tube's own code is used.
+//! The rest shape of a clamped tube under its own weight, by shooting; independent of the tube's own code.
 //!
-//! In: length, weight per length, stiffnesses. Out: where the tip hangs. The tube starts along +x, clamped at the origin, and
+//! In: length, weight per length, stiffnesses. Out: the position of the tip. The tube starts along +x, clamped at the origin, and
 //! bends and stretches in a plane (Simo and Reissner's law, as docs/theory/rod.md, eq. 1–6).
 
-/// What the shape depends on.
+/// The parameters of the shape.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Hanging {
     /// Length at rest, metres.
@@ -20,16 +20,16 @@ pub(in super::super) struct Hanging {
 
 /// Steps of the integration along the tube: the shape's error is below 1e-9 of the length.
 const STEPS: u32 = 4000;
-/// Halvings of the bracket: to the last digit.
+/// Halvings of the bracket: enough for the last digit.
 const HALVINGS: u32 = 80;
 
-/// φ (the angle to the vertical), dφ/ds, and the way made from the tip: to the side and up.
+/// φ (the angle to the vertical), dφ/ds, and the displacement from the tip: sideways and up.
 type State = [f64; 4];
 
 impl Hanging {
-    /// The tip: how far to the side, and how far down, metres.
+    /// The position of the tip: sideways and down, metres.
     pub(in super::super) fn tip_m(&self) -> (f64, f64) {
-        // the angle at the tip is tiny for a soft tube: its logarithm is sought
+        // the angle at the tip is tiny for a soft tube: the bisection is over its logarithm
         let (mut low, mut high) = (-200.0_f64, libm::log(std::f64::consts::FRAC_PI_2));
         for _ in 0..HALVINGS {
             let middle = 0.5 * (low + high);
@@ -39,7 +39,7 @@ impl Hanging {
         (side, down)
     }
 
-    /// The state at the clamp of a tube whose tip stands at `phi` to the vertical.
+    /// The state at the clamp of a tube whose tip has the angle `phi` to the vertical.
     fn shot(&self, phi: f64) -> State {
         let h = self.length_m / f64::from(STEPS);
         let mut at: State = [phi, 0.0, 0.0, 0.0];

@@ -1,7 +1,7 @@
-//! Heavy on light: stacks and chains whose far end weighs a hundred or a thousand times as much, beside what other engines do.
+//! Heavy on light: stacks and chains whose far end weighs a hundred or a thousand times as much, compared with other engines.
 //!
-//! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. What was measured of the others, once, is in
-//! `docs/reference/peers_w4.json`: of every engine the best of its variants at this mass ratio and step.
+//! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. Measurements of the other engines, made once, are in
+//! `docs/reference/peers_w4.json`: for each engine the best of its variants at this mass ratio and step.
 
 use super::super::company::Company;
 use super::super::experiment::{Experiment, Finding, worst};
@@ -25,14 +25,14 @@ const PEERS: &str = include_str!("../../../../docs/reference/peers_w4.json");
 const TESTS: [&str; 4] = ["stack2", "stack10", "chain20-hang", "chain20-swing"];
 const RATIOS: [f64; 3] = [1.0, 100.0, 1000.0];
 const RATES_HZ: [f64; 2] = [60.0, 240.0];
-/// How long each runs, seconds, and how often it is looked at.
+/// Length of each run, seconds, and the interval of samples.
 const SECONDS: f64 = 5.0;
 const LOOK_S: f64 = 1.0 / 60.0;
-/// A stack holds whose top has sunk less than this, metres, and none of whose boxes has gone so far aside.
+/// A stack holds whose top has sunk less than this, metres, and none of whose boxes has moved sideways by more than this.
 const SINK_MAX_M: f64 = 0.1;
 const ASIDE_MAX_M: f64 = 0.25;
-/// A chain holds that is never stretched by more than this share of its length, and never has so much more energy than at the
-/// start, as a share of what its fall can give.
+/// A chain holds that is never stretched by more than this share of its length, and whose energy never exceeds that of the start
+/// by more than this share of what its fall can give.
 const STRETCH_MAX: f64 = 1e-3;
 const GAIN_MAX: f64 = 0.01;
 /// Half the length of a link, metres.
@@ -47,27 +47,27 @@ pub(in super::super) struct Case {
     rate_hz: f64,
 }
 
-/// How it went.
+/// The results of a test.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     test: String,
     ratio: f64,
     rate_hz: f64,
-    /// How far the top sank, metres, or how far the chain stretched at most, as a share of its length.
+    /// Sink of the top, metres, or greatest stretch of the chain as a share of its length.
     value: f64,
-    /// How far a box went aside, metres.
+    /// Greatest sideways displacement of a box, metres.
     aside_m: f64,
-    /// Energy above that of the start, as a share of what the fall can give.
+    /// Greatest energy above that of the start, as a share of what the fall can give.
     gain: f64,
     holds: bool,
-    /// How many steps in one world.
+    /// Number of agents led by another one, in an island.
     led: usize,
-    /// The best of the others that holds at this mass ratio and step: its value.
+    /// The least value of another engine that holds at this mass ratio and step.
     best_peer_value: Option<f64>,
     best_peer: String,
 }
 
-/// One line of what was measured of others.
+/// One measurement of another engine.
 #[derive(Debug, Clone, Deserialize)]
 struct Peer {
     test: String,
@@ -84,12 +84,12 @@ struct Peers {
     rows: Vec<Peer>,
 }
 
-/// All that was measured of others; empty if the file were none, which a test excludes.
+/// All measurements of other engines; empty if the file were invalid, which a test excludes.
 fn peers() -> Vec<Peer> {
     serde_json::from_str::<Peers>(PEERS).map_or_else(|_| Vec::new(), |peers| peers.rows)
 }
 
-/// The best of the others that holds.
+/// The best of the other engines that hold.
 fn best_peer(case: &Case) -> Option<Peer> {
     let same =
         |p: &Peer| p.test == case.test && p.ratio == case.ratio && p.inv_dt == case.rate_hz && p.status == "holds";
@@ -178,7 +178,7 @@ impl Experiment for Heavy {
     }
 }
 
-/// What became of a stack or a chain.
+/// The results of a stack or a chain.
 struct Went {
     value: f64,
     aside_m: f64,
@@ -193,7 +193,7 @@ fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
     }
 }
 
-/// Stacks cubes a millimetre apart, the top one heavier.
+/// Stacks cubes a millimetre apart; the top one is heavier.
 fn stacked(case: &Case) -> Option<Went> {
     let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
     let ground = Obstacle {
@@ -225,7 +225,7 @@ fn stacked(case: &Case) -> Option<Went> {
     })
 }
 
-/// Hangs a chain from the origin, straight down or level, the last link heavier.
+/// Hangs a chain from the origin, straight down or horizontal; the last link is heavier.
 fn hung(case: &Case) -> Option<Went> {
     let along = if case.test.ends_with("swing") { DVec3::X } else { DVec3::NEG_Z };
     let joint = |i: u32| Joint {
@@ -265,7 +265,7 @@ fn hung(case: &Case) -> Option<Went> {
     Some(went)
 }
 
-/// The gaps of all joints together, metres.
+/// Sum of the gaps of all joints, metres.
 fn gaps_m(snapshots: &[Arc<Snapshot>]) -> Option<f64> {
     let (mut sum, mut end) = (0.0, DVec3::ZERO);
     for snapshot in snapshots {
@@ -277,7 +277,7 @@ fn gaps_m(snapshots: &[Arc<Snapshot>]) -> Option<f64> {
     Some(sum)
 }
 
-/// Sink or stretch over the mass ratio: ours as lines, the others that hold as dots.
+/// Sink or stretch over the mass ratio: our own as lines, other engines that hold as dots.
 fn panel(test: &str, rows: &[Row]) -> Panel {
     const FLOOR: f64 = 1e-9;
     let mut layers = Vec::new();

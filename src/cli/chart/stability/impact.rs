@@ -1,4 +1,4 @@
-//! Two balls of different clocks meet once: against the closed form, by the ledger and not by one world.
+//! Two balls with different clocks collide once: against the closed form, through the impulse ledger and not in one island.
 
 use super::super::company::{Company, members};
 use super::super::experiment::{Experiment, Finding, worst};
@@ -23,7 +23,7 @@ const MASS_RATIOS: [f64; 6] = [1e-3, 0.1, 1.0, 10.0, 100.0, 1000.0];
 const RATES_HZ: [[f64; 2]; 6] =
     [[240.0, 240.0], [1000.0, 240.0], [1000.0, 60.0], [60.0, 1000.0], [1000.0, 10.0], [10.0, 1000.0]];
 const RADIUS_M: f64 = 0.05;
-/// Distance of the skins at the start, metres, and how fast they close, m/s.
+/// Distance of the surfaces at the start, metres, and closing speed, m/s.
 const GAP_M: f64 = 0.2;
 const CLOSING_M_S: f64 = 1.0;
 const SECONDS: f64 = 0.6;
@@ -37,7 +37,7 @@ pub(in super::super) struct Case {
     rates_hz: [f64; 2],
 }
 
-/// How it went.
+/// The results of a pair.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     restitution: f64,
@@ -45,15 +45,15 @@ pub(in super::super) struct Row {
     mass_ratio: f64,
     rate_hitting_hz: f64,
     rate_hit_hz: f64,
-    /// The greater error of the two velocities after the blow, as a share of the closing speed.
+    /// The greater error of the two velocities after the impact, as a share of the closing speed.
     error: f64,
-    /// What the momentum changed, as a share of it.
+    /// Change of the total momentum, as a share of it.
     momentum_error: f64,
-    /// By which law they met; empty where they did not.
+    /// The law of their contact; empty where they did not meet.
     kind: String,
     steps_hitting: u64,
     steps_hit: u64,
-    /// Whether one of them was led by the other at the end.
+    /// Whether one of them was led by the other, in an island, at the end.
     led: bool,
 }
 
@@ -157,7 +157,7 @@ impl Experiment for Impact {
     }
 }
 
-/// What became of a pair.
+/// The results of a pair.
 struct Met {
     error: f64,
     momentum_error: f64,

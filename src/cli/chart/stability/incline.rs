@@ -1,4 +1,4 @@
-//! Incline: a box and a tube on a slope stick below tan(angle) = μ and slide above, as far as Coulomb says.
+//! Incline: a box and a tube on a slope stick below tan(angle) = μ and slide above, as far as Coulomb's law predicts.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -24,7 +24,7 @@ const SLOPES: [f64; 13] = [0.9, 0.94, 0.96, 0.97, 0.98, 0.99, 1.0, 1.01, 1.02, 1
 const QUICK_SLOPES: [f64; 2] = [0.98, 1.02];
 /// The claim's tolerance on tan(angle).
 const TOLERANCE: f64 = 0.02;
-/// What moves less than this in a second sticks, metres: a thirtieth of the way it slides 2 % above the angle.
+/// A body that moves less than this in a second sticks, metres: a thirtieth of its distance at 2 % above the angle.
 const STICKS_M: f64 = 1e-3;
 const SECONDS: f64 = 1.0;
 const DT_S: f64 = 0.004;
@@ -36,15 +36,15 @@ pub(in super::super) struct Case {
     slope: f64,
 }
 
-/// What it did.
+/// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     body: String,
     /// tan(angle)/μ.
     slope: f64,
-    /// How far it slid in a second, metres.
+    /// Distance slid in a second, metres.
     slid_m: Option<f64>,
-    /// How far Coulomb says it slides.
+    /// Distance by Coulomb's law.
     theory_m: f64,
 }
 
@@ -112,7 +112,7 @@ impl Experiment for Incline {
     }
 }
 
-/// The way that the body makes down the slope.
+/// The distance that the body slides down the slope.
 fn slid(case: &Case, angle: f64) -> Option<f64> {
     let rotation = DQuat::from_rotation_y(angle);
     let ground = Obstacle {
@@ -145,7 +145,7 @@ fn slid(case: &Case, angle: f64) -> Option<f64> {
     Some((middle(&*agent)? - before).dot(down))
 }
 
-/// The centre of mass; of a tube, of its nodes by length.
+/// The centre of mass; for a tube, the mean of its nodes weighted by length.
 fn middle(agent: &dyn Agent) -> Option<DVec3> {
     let mut snapshot = Snapshot::default();
     agent.write_snapshot(&mut snapshot);

@@ -1,4 +1,4 @@
-//! Tubes between two clocks: across a bar, between two fingers, across another tube, rates 1:1 to 1:100 both ways.
+//! Tubes in contact across two clocks: on a bar, between two fingers, across another tube, rates 1:1 to 1:100 in both directions.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -15,12 +15,12 @@ pub(in super::super) struct Pairs;
 const RATIOS: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
 const FAST_HZ: f64 = 1000.0;
 const SECONDS: f64 = 2.5;
-/// From here on everything lies.
+/// From here on everything is at rest.
 const REST_S: f64 = 2.0;
 const COMMON_MAX: f64 = 1.01;
 const DEPTH_MAX_M: f64 = 0.005;
 
-/// A scene, by how much the second clock is slower, and which is which.
+/// A scene, the ratio of its clocks, and which agent has the fast one.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super) struct Case {
     scene: String,
@@ -28,19 +28,19 @@ pub(in super::super) struct Case {
     first_is_fast: bool,
 }
 
-/// How it went.
+/// The results of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     scene: String,
     ratio: f64,
-    /// Whether the tube (of two tubes the held one) keeps the fast clock.
+    /// Whether the tube (of two tubes the one clamped at both ends) has the fast clock.
     first_is_fast: bool,
     slow_hz: f64,
-    /// Peak of the energy at a common time above that of lying, in that of the start.
+    /// Peak of the energy at a common time above that at rest, as a multiple of the start's.
     peak: f64,
-    /// The deepest overlap that an owner saw at rest, metres.
+    /// The deepest overlap that a contact owner reports at rest, metres.
     depth_m: f64,
-    /// How fast the fastest point that is followed still moves on average, m/s.
+    /// Mean speed at rest of the fastest followed point, m/s.
     creep_m_s: f64,
     contacts: u32,
 }

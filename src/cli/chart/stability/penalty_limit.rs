@@ -1,11 +1,11 @@
-//! How stiff a penalty contact from stale states may be, beside the formula k < 0.55 μ/τ².
+//! The greatest stiffness of a penalty contact from stale states, compared with the formula k < 0.55 μ/τ².
 //!
-//! A ball is let fall a centimetre on a spring-mounted one. Contact damping is 0.64 of the critical, where the formula allows
-//! the most. A state is seen when its time has come: so the slow body's is H/2 old on average when it is used, and the force
-//! that it finds from a fresh one lasts for H, which is as old. (Where turns cost nothing a state of the end of a step is seen
-//! at its beginning; that is early by as much, and at 240 Hz unstable from a ninth of the formula on.) The stiffness at which
-//! the motion no longer dies away is found by halving. A linear model of both clocks, sampled as they are, has 0.67 of the
-//! formula at 240 to 60 Hz; below, the springs that the lower body stands on take part.
+//! A ball falls a centimetre onto a spring-mounted one. Contact damping is 0.64 of critical, where the formula allows the most.
+//! A state becomes visible when its time has come: the slow body's is H/2 old on average when it is used, and the force that the
+//! slow body computes from a fresh one is held for H, which is as old. (Where steps cost nothing, the state of the end of a step is
+//! visible at its beginning; that is early by as much, and at 240 Hz unstable from a ninth of the formula on.) Bisection finds the
+//! stiffness at which the motion no longer decays. A linear model of both clocks, sampled in the same way, has 0.67 of the
+//! formula at 240 to 60 Hz; at lower rates the springs of the mounted body take part.
 
 use super::super::experiment::{Experiment, Finding, worst};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -19,18 +19,18 @@ pub(in super::super) struct PenaltyLimit;
 
 const LAWS: [&str; 2] = ["penalty", "penalty-extrapolated"];
 const RATES_HZ: [f64; 6] = [240.0, 120.0, 60.0, 30.0, 20.0, 10.0];
-/// The damping at which most stiffness is allowed, as a share of the critical.
+/// The damping ratio at which the formula allows the greatest stiffness.
 const DAMPING_RATIO: f64 = 0.64;
 /// k τ²/μ at the limit there (docs/theory/coupling.md).
 const LIMIT: f64 = 0.55;
 const FALL_M: f64 = 0.01;
 const SECONDS: f64 = 3.0;
-/// What of the energy is left from here on must be below this share of the start's.
+/// From this time on the remaining energy must be below this share of the start's.
 const LATE_S: f64 = 2.0;
 const LEFT: f64 = 0.5;
 const STIFFNESS_N_M: [f64; 2] = [1.0, 1e7];
 const HALVINGS: u32 = 18;
-/// The measured limit and the formula are apart by less than this factor.
+/// The measured limit and the formula must differ by less than this factor.
 const APART_MAX: f64 = 2.0;
 
 /// A law and a rate.
@@ -41,13 +41,13 @@ pub(in super::super) struct Case {
     halvings: u32,
 }
 
-/// The limit.
+/// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     law: String,
     rate_hz: f64,
     halvings: u32,
-    /// The stiffest contact that dies away, N/m.
+    /// The greatest stiffness at which the motion decays, N/m.
     measured_n_m: f64,
     /// 0.55 μ/τ² with τ = H/2, half a step of the slow body.
     theory_n_m: f64,
@@ -116,13 +116,13 @@ impl Experiment for PenaltyLimit {
     }
 }
 
-/// Whether the motion dies away at this stiffness.
+/// Whether the motion decays at this stiffness.
 fn dies_away(case: &Case, stiffness_n_m: f64) -> bool {
     let law = law(&case.law, stiffness_n_m, DAMPING_RATIO);
     let set = pair("1d", law, case.rate_hz, (Faults { seed: 1, due: true, ..Faults::default() }, FALL_M));
     let Some(Pair { play, zero_j, .. }) = set else { return false };
     let start_j = play.raw_j() - zero_j;
-    // where springs and contact have given under the weight there is less energy than none: what is left is kinetic
+    // under the weight springs and contact sag below the zero of energy: energy above it is kinetic
     let mut calm = true;
     let ended = play.run(SECONDS, |play, _| {
         let left = (play.raw_j() - zero_j) / start_j;

@@ -1,8 +1,8 @@
 //! dt × stiffness: where each integrator of the tube is stable, bounded but wrong, or blown up.
 //!
-//! A tube of 1 m, 15 mm radius, 2 mm wall is clamped at one end, let go from the horizontal and left to come to rest. A step
-//! that is too long may end in numbers that are none; it may also end at a wrong place, so the tip is held against the rest
-//! shape that an independent computation gives ([`super::hanging`]).
+//! A tube of 1 m, 15 mm radius, 2 mm wall is clamped at one end, released from the horizontal and left to come to rest. A step
+//! that is too long may end in non-finite numbers; it may also end at a wrong place, so the tip is compared with the rest
+//! shape of an independent computation ([`super::hanging`]).
 
 use super::super::experiment::{Experiment, Finding};
 use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
@@ -17,7 +17,7 @@ use metachron_models::rod::Tube;
 use metachron_models::rod::{Material, Section, TubeSpec};
 use serde::{Deserialize, Serialize};
 
-/// The map.
+/// The experiment.
 pub(in super::super) struct TubeMap;
 
 const YOUNG_PA: [f64; 14] = [5e4, 1e5, 2e5, 5e5, 1e6, 2e6, 5e6, 1e7, 2e7, 5e7, 1e8, 2e8, 5e8, 1e9];
@@ -27,12 +27,12 @@ const QUICK_DT_MS: [f64; 3] = [1.0, 10.0, 50.0];
 const LENGTH_M: f64 = 1.0;
 /// Segments: their own error at rest is below 1 % of the length for every stiffness here.
 const SEGMENTS: usize = 32;
-/// Mass-proportional damping, 1/s, and how long the tube has to come to rest.
+/// Mass-proportional damping, 1/s, and the time in which the tube comes to rest.
 const DAMPING_PER_S: f64 = 6.0;
 const SECONDS: f64 = 6.0;
-/// A tip farther off than this share of the length is wrong.
+/// A tip farther off than this share of the length counts as wrong.
 const WRONG: f64 = 0.05;
-/// Energy, or speed, past which a motion has blown up: this many times what the fall can give.
+/// A motion has blown up past this rise of energy, in multiples of what the fall can give.
 const BLOWN_UP: f64 = 10.0;
 /// Past this stretch the sections of a soft tube tilt (docs/theory/rod.md).
 const TILT: f64 = 1.5;
@@ -45,14 +45,14 @@ pub(in super::super) struct Case {
     dt_ms: f64,
 }
 
-/// What became of it.
+/// The result of a case.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 pub(in super::super) struct Row {
     integrator: String,
     young_pa: f64,
     dt_ms: f64,
     verdict: Verdict,
-    /// How far the tip is from where it should rest, as a share of the length; empty where it blew up.
+    /// Distance of the tip from its rest position, as a share of the length; empty where it blew up.
     tip_error: Option<f64>,
     /// The greatest rise of the mechanical energy above that of the start, as a share of what the fall can give.
     energy_rise: f64,
@@ -61,14 +61,14 @@ pub(in super::super) struct Row {
     substeps_per_step: f64,
 }
 
-/// The ways it can end.
+/// The verdicts on a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 enum Verdict {
     Stable,
     Wrong,
     BlownUp,
-    /// The integrator said beforehand that it cannot carry such a step.
+    /// The integrator refused such a step beforehand.
     Refused,
 }
 
@@ -178,7 +178,7 @@ fn spec(young_pa: f64) -> TubeSpec {
     }
 }
 
-/// Where the tip should come to rest.
+/// The rest position of the tip.
 fn rest_of(young_pa: f64) -> DVec3 {
     let spec = spec(young_pa);
     let Section { ea_n, ga_n, ei_n_m2, .. } = spec.section;
@@ -187,7 +187,7 @@ fn rest_of(young_pa: f64) -> DVec3 {
     DVec3::new(side, 0.0, -down)
 }
 
-/// What a fall was like.
+/// The result of a fall.
 struct Fall {
     tip: Option<DVec3>,
     energy_rise: f64,
@@ -196,7 +196,7 @@ struct Fall {
     refused: bool,
 }
 
-/// Lets the tube go; the tip is `None` where the motion blew up.
+/// Releases the tube; the tip is `None` where the motion blew up.
 fn fall(case: &Case) -> Fall {
     let integrator = Integrator::ALL.into_iter().find(|i| i.name() == case.integrator).unwrap_or_default();
     let spec = TubeSpec { integrator, ..spec(case.young_pa) };
@@ -262,7 +262,7 @@ fn panel(integrator: &str, rows: &[Row]) -> Panel {
     Panel { title: integrator.to_owned(), x: axis("Young's modulus, Pa", &young), y: axis("dt, ms", &dt), layers }
 }
 
-/// From where to where the square of a value goes: half way to its neighbours, in ratios.
+/// The range of a value's square: half way to its neighbours, in ratios.
 fn around(values: &[f64], value: f64) -> [f64; 2] {
     let k = values.iter().position(|v| *v == value).unwrap_or(0);
     let up = values.get(k + 1).map(|next| (next / value).sqrt());

@@ -1,4 +1,4 @@
-//! The default policy on a scene in numbers: what comes and goes is put on its menu and taken off.
+//! The default policy on a scene in numbers: things that come into view are added to it, things that leave are removed.
 //!
 //! In: things in view, measured times. Out: levels with a prediction and a certificate. Never here: its arithmetic.
 
@@ -6,14 +6,14 @@ use super::{Choice, Chooser, Pick, Time};
 use crate::cli::chart::policies::scene::{Scene, Seen};
 use metachron_budget::adaptive::{self, Adaptive, Offer, Settings};
 
-/// The policy, and whom it knows.
+/// The policy, and the things that it holds.
 pub(super) struct Ours {
     adaptive: Adaptive,
     present: Vec<usize>,
     offers: Vec<Offer>,
 }
 
-/// Ticks to a microsecond.
+/// Ticks per microsecond.
 const TICKS: f64 = 100.0;
 
 impl Default for Ours {

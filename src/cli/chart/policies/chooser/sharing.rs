@@ -1,4 +1,4 @@
-//! Policies that share time out: Robin Hood by value, the convex form by what more detail is worth.
+//! Policies that divide time among things: Robin Hood by value, the convex form by the benefit of more detail.
 //!
 //! In: things in view. Out: levels, or parts of the finest. Never here: learning.
 
@@ -9,7 +9,7 @@ use metachron_budget::cost::value::Value;
 use metachron_budget::select::gobbetti::{Mesh, closed_form};
 use metachron_budget::select::robin_hood::{Distribution, Instance, TooLittle, distribute};
 
-/// (RH05) with one of its value functions, the printed share of logic, and a cheapest form drawn in part where time is short.
+/// (RH05) with one of its value functions, the printed share of logic, and the cheapest form drawn in part where time is short.
 pub(super) struct RobinHood(pub(super) Value);
 
 /// C of (RH05, eq. 7): a balanced frame takes 0.953 of both times.
@@ -20,7 +20,7 @@ impl Chooser for RobinHood {
         let instances: Vec<_> = seen.iter().map(|s| instance(self.0, scene, s)).collect();
         let drawing = Overlap::Printed(PRINTED_C).drawing(time.target, time.logic);
         let shared = distribute(drawing, &instances, TooLittle::Part);
-        // forms are given best first there, and last here
+        // `distribute` takes forms best first; levels are ordered best last
         let pick = |(i, s): (usize, &Seen)| match shared.form[i] {
             Some(form) => part_of(&shared, i, s.levels.len() as u32 - 1 - form, scene, s),
             None => Pick::whole(None),
@@ -41,7 +41,7 @@ fn instance(value: Value, scene: &Scene, s: &Seen) -> Instance {
     }
 }
 
-/// As many polygons as the part of the form's time pays for: the setup is paid whole.
+/// Draws as many polygons as the form's share of time pays for, after its setup, which is paid whole.
 fn part_of(shared: &Distribution, i: usize, level: u32, scene: &Scene, s: &Seen) -> Pick {
     let form = &scene.things[s.thing].forms[level as usize];
     let (whole, setup) = (s.levels[level as usize].0, scene.cost(form, 0.0, 0.0));
@@ -72,7 +72,7 @@ impl Chooser for Convex {
                 let stages = scene.stages[form.algorithm];
                 fixed += stages.setup;
                 let triangles = scene.cost(form, 1.0, 0.0) - stages.setup;
-                // fewer triangles than its pixels take the time of save none (GB99, §3)
+                // below the number of triangles that take as long as the pixels, fewer triangles save no time (GB99, §3)
                 let least = (stages.pixel * s.pixels / triangles).clamp(LEAST, 1.0);
                 Mesh { weight: s.pixels * thing.importance, time: triangles, least, most: 1.0 }
             })

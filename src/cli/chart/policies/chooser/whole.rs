@@ -1,13 +1,13 @@
-//! Policies that give every thing one of its levels whole: by size, or by benefit and cost.
+//! Policies that draw every thing at one whole level: by size, or by benefit and cost.
 //!
-//! In: things in view. Out: levels. Never here: parts of a level, anything learnt but a threshold.
+//! In: things in view. Out: levels. Never here: parts of a level, any state but a threshold.
 
 use super::{Choice, Chooser, MARGIN, Pick, Time};
 use crate::cli::chart::policies::scene::{Scene, Seen};
 use metachron_budget::select::threshold::{self, Feedback};
 use metachron_budget::select::{Entry, Mode, Problem, Selection, funkhouser, marginal};
 
-/// Units of benefit to a pixel: benefits are whole numbers.
+/// Units of benefit per pixel: benefits are whole numbers.
 const BENEFIT: f64 = 1000.0;
 
 /// The knapsack of a frame: `budget` in microseconds, costs in nanoseconds.
@@ -21,7 +21,7 @@ pub(in super::super) fn problem(scene: &Scene, seen: &[Seen], budget: f64) -> Pr
     problem
 }
 
-/// What a choice is worth in the unit of [`problem`].
+/// The benefit of a choice, in the unit of [`problem`].
 pub(in super::super) fn worth(scene: &Scene, seen: &[Seen], picks: &[Pick]) -> f64 {
     let of = |(s, p): (&Seen, &Pick)| {
         let thing = &scene.things[s.thing];
@@ -31,7 +31,7 @@ pub(in super::super) fn worth(scene: &Scene, seen: &[Seen], picks: &[Pick]) -> f
     seen.iter().zip(picks).map(of).sum()
 }
 
-/// The finest of everything.
+/// The finest level of everything.
 pub(super) struct Full;
 
 impl Chooser for Full {
@@ -51,7 +51,7 @@ impl Chooser for Static {
     }
 }
 
-/// The same by a threshold that follows the time of the frame before.
+/// The same with a threshold that follows the time of the previous frame.
 #[derive(Default)]
 pub(super) struct Threshold(Feedback);
 
@@ -85,7 +85,7 @@ impl Chooser for Greedy {
     }
 }
 
-/// Steps of hulls in falling gain per cost, and then whatever fits.
+/// Hull steps in falling gain per cost, then whatever still fits.
 pub(super) struct Marginal;
 
 impl Chooser for Marginal {

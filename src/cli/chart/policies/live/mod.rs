@@ -1,4 +1,4 @@
-//! The papers' scenes drawn by the adapter that is present, under every policy, through the program's own frame loop.
+//! The papers' scenes drawn by the present adapter, under every policy, through the program's own frame loop.
 //!
 //! In: a scene's number among the plays. Out: an experiment. Never here: how frames are drawn ([`super::played`]), a declared machine.
 
@@ -15,7 +15,7 @@ use super::played::{Case, PLAYS, Times, curves, table};
 /// The experiment on play number `P`.
 pub(in super::super) struct Live<const P: usize>;
 
-/// The policies as figures show them together.
+/// The policies, grouped as in the figure's panels.
 const KINDS: [(&str, &[&str]); 4] = [
     ("full detail", &["full"]),
     ("by size, by feedback", &["static", "threshold", "feedback", "robin-hood"]),

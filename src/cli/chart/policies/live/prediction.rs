@@ -1,8 +1,8 @@
-//! How well prices foretell what pictures take that they were not fitted to (FS93, fig. 3).
+//! Accuracy of an adapter's prices (its cost model) on pictures to which they were not fitted (FS93, fig. 3).
 //!
-//! In: a scene, which prices. Out: predicted and measured times of pictures at chance places of its path, under chance targets. The prices
-//! are those of the adapter's benchmark, which draws none of these objects; nothing is learnt on the way.
-//! Each picture is drawn several times: what these times differ by among each other no prices can foretell.
+//! In: a scene, a set of prices. Out: predicted and measured times of pictures at random places of its path, under random targets. The
+//! prices are those of the adapter's benchmark, which draws none of these objects; nothing is learnt during the run.
+//! Each picture is drawn several times: no prices can predict the scatter of these times.
 
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -16,19 +16,19 @@ use serde::{Deserialize, Serialize};
 /// The experiment.
 pub(in super::super::super) struct Prediction;
 
-/// Pictures of a scene, and of the quick run.
+/// Pictures per scene, in full and in the quick run.
 const PICTURES: [usize; 2] = [60, 8];
-/// Targets go from one that nothing fits to one that everything does, seconds, by equal factors.
+/// Range of targets, from one that nothing fits to one that everything does, seconds; drawn log-uniformly.
 const TARGETS_S: (f64, f64) = (4e-3, 0.3);
-/// How often each is drawn.
+/// How often each picture is drawn.
 const TIMES: usize = 5;
-/// Prices by two stages and by areas, and a policy that foretells by them and learns nothing.
+/// Prices by two stages and by areas, each with a policy that predicts by them and learns nothing.
 const PRICES: [(&str, Policy); 2] = [("lines", Policy::MarginalFill), ("areas", Policy::RobinHood)];
-/// Predictions are to be within this at 19 of 20 pictures (FS93, §4).
+/// Bound of the prediction error for 19 of 20 pictures (FS93, §4).
 const WANTED: f64 = 0.1;
 const SEED: u64 = 3;
 
-/// A scene, the prices by which it is foretold, and how many pictures of it.
+/// A scene, the prices that predict it, and the number of pictures.
 #[derive(Debug, Clone, PartialEq)]
 pub(in super::super::super) struct Case {
     scene: String,
@@ -36,20 +36,20 @@ pub(in super::super::super) struct Case {
     pictures: usize,
 }
 
-/// What the pictures of a scene took, and were to take.
+/// Measured and predicted times of a scene's pictures.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super::super) struct Row {
     scene: String,
     prices: String,
     adapter: String,
     pictures: usize,
-    /// |predicted − measured| over measured, of pictures drawn once: the mean, and what 19 of 20 pictures are within.
+    /// |predicted − measured| over measured, for the first drawing of each picture: the mean, and the bound that 19 of 20 keep.
     error: f64,
     error95: f64,
-    /// The same, had all predictions been multiplied by the factor that fits them best: what a κ that is learnt leaves.
+    /// The same with all predictions multiplied by `factor`, the median of measured over predicted: the error that a learnt κ leaves.
     scaled_error95: f64,
     factor: f64,
-    /// What 19 of 20 times of one and the same picture are within, about their median: no prices can be nearer.
+    /// Deviation from their median that 19 of 20 times of the same picture keep: no prices can predict better.
     scatter95: f64,
     /// Predicted and measured, milliseconds, with a colon between the two and spaces between pictures.
     pairs: String,
@@ -81,7 +81,7 @@ impl Row {
     }
 }
 
-/// What 19 of 20 times of the same picture are within, about their median.
+/// Deviation from their median that 19 of 20 times of the same picture keep.
 fn scatter95(pictures: &[Foretold]) -> f64 {
     let about = |picture: &Foretold| {
         let middle = quantile(picture.took_ms.clone(), 0.5);

@@ -1,7 +1,7 @@
-//! How fast meshes of any resolution are gone through, by resolution (GB99): the indices of a cut are found in time that goes with its
+//! Speed of traversal of meshes of any resolution, by resolution (GB99): the indices of a cut are found in time proportional to its
 //! triangles.
 //!
-//! In: a mesh of 100,000 triangles. Out: triangles a second at every part of them. Never here: drawing.
+//! In: a mesh of 100,000 triangles. Out: triangles per second at each resolution. Never here: drawing.
 
 use super::super::super::experiment::{Experiment, Finding, worst};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
@@ -15,9 +15,9 @@ use std::time::Instant;
 pub(in super::super::super) struct Traversal;
 
 const TRIANGLES: u32 = 100_000;
-/// Resolutions are halved so often.
+/// Number of halvings of the resolution.
 const HALVINGS: u32 = 10;
-/// Each cut is gone through so often; the least time counts.
+/// Traversals of each cut; the least time counts.
 const ROUNDS: usize = 15;
 
 /// Triangles of a cut.
@@ -31,7 +31,7 @@ pub(in super::super::super) struct Row {
     triangles: u32,
     /// The least time of some rounds, microseconds.
     micros: f64,
-    /// Millions of triangles a second.
+    /// Millions of triangles per second.
     rate: f64,
 }
 
@@ -91,7 +91,7 @@ impl Experiment for Traversal {
     }
 
     fn findings(rows: &[Row]) -> Vec<Finding> {
-        // of the full mesh nothing has to be followed to a substitute
+        // in the full mesh no vertex is replaced by a substitute
         let cuts = || rows.iter().filter(|row| row.asked < TRIANGLES).map(|row| row.rate);
         let spread = worst(cuts()) / cuts().reduce(f64::min).unwrap_or(f64::NAN);
         vec![Finding::at_most(

@@ -1,8 +1,8 @@
-//! What policies make of one view: its triangles, its likeness to full detail, and the pictures themselves (FS93, fig. 10 and 11).
+//! Results of policies in one view: triangles, likeness to full detail, and the pictures themselves (FS93, fig. 10 and 11).
 //!
-//! In: a view and a policy. Out: a row; a sheet of pictures a view. Never here: paths.
-//! Full detail is drawn once a view: its time gives the target of all policies there, its picture what theirs are held against. The
-//! pictures of the sheets are those of the rows.
+//! In: a view and a policy. Out: a row; a sheet of pictures per view. Never here: paths.
+//! Full detail is drawn once per view: its time sets the target of all policies there, and its picture is the reference for theirs.
+//! The pictures of the sheets are those of the rows.
 
 use super::super::super::experiment::{Experiment, Finding};
 use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, headings};
@@ -16,7 +16,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 /// The experiment.
 pub(in super::super::super) struct Views;
 
-/// A place on a scene's path, and how many targets full detail takes there.
+/// A place on a scene's path, and the ratio of full detail's time to the target there.
 struct View {
     name: &'static str,
     paper: Paper,
@@ -26,7 +26,7 @@ struct View {
 }
 
 const VIEWS: [View; 3] = [
-    // FS93, fig. 10: view A, 0.98 s in full, 0.1 s wanted
+    // FS93, fig. 10: view A, 0.98 s in full, target 0.1 s
     View {
         name: "auditorium-a",
         paper: Paper::Auditorium,
@@ -34,7 +34,7 @@ const VIEWS: [View; 3] = [
         times_over: 5.0,
         policies: &["full", "static", "threshold", "greedy", "adaptive"],
     },
-    // FS93, fig. 11: 0.60 s in full, 0.15 s and 0.10 s wanted
+    // FS93, fig. 11: 0.60 s in full, targets 0.15 s and 0.10 s
     View {
         name: "library-looser",
         paper: Paper::Library,
@@ -50,11 +50,11 @@ const VIEWS: [View; 3] = [
         policies: &["full", "greedy", "adaptive"],
     },
 ];
-/// Differences are shown so many times as bright.
+/// Factor by which differences are brightened.
 const BRIGHTER: u16 = 4;
-/// Frames that are drawn of a view, and of the quick run; the last half of them counts.
+/// Frames drawn of a view, in full and in the quick run; the last half of them counts.
 const FRAMES: [usize; 2] = [40, 8];
-/// How high the names above the columns of a sheet stand, pixels.
+/// Height of the names above the columns of a sheet, pixels.
 const HEADING: u32 = 32;
 
 /// A view and a policy.
@@ -65,10 +65,10 @@ pub(in super::super::super) struct Case {
     frames: usize,
 }
 
-/// What was drawn in this run of the program.
+/// The pictures drawn in this run of the program.
 static DRAWN: Mutex<Vec<(Case, Arc<Still>)>> = Mutex::new(Vec::new());
 
-/// What a policy made of a view.
+/// The result of a policy in a view.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub(in super::super::super) struct Row {
     view: String,
@@ -83,7 +83,7 @@ pub(in super::super::super) struct Row {
     psnr_db: f64,
 }
 
-/// A case as it was drawn in this run of the program; drawn now where it was not yet.
+/// The picture of a case in this run of the program; drawn now if it was not yet.
 fn drawn(case: &Case, target_s: f64) -> Option<Arc<Still>> {
     let known = || DRAWN.lock().unwrap_or_else(PoisonError::into_inner);
     if let Some((_, still)) = known().iter().find(|(drawn, _)| drawn == case) {
@@ -96,12 +96,12 @@ fn drawn(case: &Case, target_s: f64) -> Option<Arc<Still>> {
     Some(still)
 }
 
-/// Full detail of a view, which has no target to miss.
+/// Full detail of a view; its target does not matter.
 fn full(case: &Case) -> Option<Arc<Still>> {
     drawn(&Case { policy: "full".to_owned(), ..case.clone() }, 1.0)
 }
 
-/// Full detail of a view, what a policy makes of it, and the target that full detail sets, milliseconds.
+/// Full detail of a view, the result of a policy, and the target that full detail sets, milliseconds.
 fn pair(case: &Case) -> Option<(Arc<Still>, Arc<Still>, f64)> {
     let view = VIEWS.iter().find(|view| view.name == case.view)?;
     let full = full(case)?;
@@ -170,7 +170,7 @@ impl Experiment for Views {
     fn pictures(rows: &[Row]) -> anyhow::Result<Vec<(String, PictureFile)>> {
         let sheet_of = |view: &View| {
             let here = || rows.iter().filter(|row| row.view == view.name);
-            // a row that was taken up from a run before is drawn again, under the target that it tells of
+            // a row reused from an earlier run is drawn again, under the target stored in it
             let pairs = here().filter_map(|row| {
                 let case = Self::case_of(row);
                 Some((row.policy.as_str(), full(&case)?, drawn(&case, 1e-3 * row.target_ms)?))
@@ -206,7 +206,7 @@ impl Experiment for Views {
     }
 }
 
-/// Pictures side by side under the names of their policies, and below each how it differs from full detail, brightened.
+/// Pictures side by side under the names of their policies, and below each its difference from full detail, brightened.
 fn sheet(stills: &[(&str, Arc<Still>, Arc<Still>)]) -> anyhow::Result<PictureFile> {
     let Some((_, first, _)) = stills.first() else { return Ok(PictureFile::new(1, 1)) };
     let (width, height) = first.picture.dimensions();

@@ -1,6 +1,6 @@
-//! The papers' scenes as they are, played through the program's own frame loop: every policy on every scene, the same frames for all.
+//! The papers' actual scenes, played through the program's own frame loop: every policy on every scene, the same frames for all.
 //!
-//! In: a scene, a policy, who gives the times. Out: a row of [`Row`]. Never here: a model of a scene.
+//! In: a scene, a policy, the source of times. Out: a row of [`Row`]. Never here: a model of a scene.
 
 mod row;
 pub(super) mod walk;
@@ -12,17 +12,17 @@ use crate::control::Policy;
 use crate::scene::papers::{Choices, Paper};
 pub(super) use walk::{Shown, Times};
 
-/// A scene, its frames, and how little time there is.
+/// A scene, its frames, and the ratio of full detail's time to the target.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Play {
     pub(super) paper: Paper,
-    /// Frames along the path, and of the quick run.
+    /// Frames along the path, in full and in the quick run.
     frames: [usize; 2],
-    /// How many targets full detail takes in the mean.
+    /// Mean time of full detail over the target.
     times_over: f64,
 }
 
-/// In (FS93, table 1) full detail takes 4.3 targets in the mean and 9.9 at most.
+/// In (FS93, table 1) full detail takes 4.3 targets on average and 9.9 at most.
 pub(super) const PLAYS: [Play; 5] = [
     Play { paper: Paper::Auditorium, frames: [250, 25], times_over: 4.3 },
     Play { paper: Paper::Grove, frames: [250, 25], times_over: 20.0 },
@@ -45,7 +45,7 @@ impl Case {
         Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
     }
 
-    /// Its row; one of no frames where it could not be played.
+    /// Measures the row; one without frames where the case could not be played.
     pub(super) fn measure(&self, times: Times) -> Row {
         let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
         let measure = |play: &Play| {
@@ -61,7 +61,7 @@ impl Play {
         Shown { name: self.paper.name(), text, times_over: self.times_over }
     }
 
-    /// Every policy that the program knows.
+    /// One case for every policy of the program.
     pub(super) fn cases(&self, quick: bool) -> impl Iterator<Item = Case> {
         let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
         let case = move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames };
@@ -69,12 +69,12 @@ impl Play {
     }
 }
 
-/// Every number of every row.
+/// The table of all numbers of all rows.
 pub(super) fn table(rows: &[Row]) -> Table {
     row::table(rows)
 }
 
-/// The time of every frame of some of a scene's rows.
+/// The time of every frame, for some of a scene's rows.
 pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clone) -> Panel {
     let frames = rows.clone().map(|row| row.frames).max().unwrap_or(1) as f64;
     let greatest = rows.clone().map(|row| row.max).fold(1.5, f64::max);
@@ -102,14 +102,14 @@ mod tests {
         let policies = ["robin-hood", "adaptive"];
         let rows = policies.map(|policy| row("library", policy));
         for (row, again) in rows.iter().zip(policies.map(|policy| self::row("library", policy))) {
-            // NaN is unlike itself, so the rows are compared as they are written
+            // NaN is not equal to itself, so the rows are compared as text
             assert_eq!(format!("{row:?}"), format!("{again:?}"));
             assert_eq!((row.frames, row::times(row).len(), row.setting.as_str()), (6, 6, "library"));
         }
         let drawn = Gpu::headless().is_ok();
         for row in &rows {
             let unknown: Vec<_> = row::COLUMNS.iter().filter(|(_, of, _)| of(row).is_nan()).map(|c| c.0).collect();
-            // a promise is made by who predicts, and a bound known by who has one
+            // only a policy with a bound has `value` and `proven`
             let mut expected: Vec<&str> = match row.policy.as_str() {
                 "robin-hood" => vec!["value", "proven"],
                 _ => Vec::new(),

@@ -1,20 +1,20 @@
-//! What a policy's frames in a session come to.
+//! The metrics of a policy's frames in a session.
 //!
-//! In: records of frames, what full detail took, likenesses. Out: a row, by the definitions of [`super::super::metrics`].
+//! In: records of frames, times of full detail, likenesses. Out: a row, by the definitions of [`super::super::metrics`].
 
 use super::super::super::table::{Cell, Table};
 use super::super::closed_loop::Frame;
 use super::super::metrics::{Row, mean};
 use crate::frame::FrameRecord;
 
-/// What a row is made of.
+/// The data of a row.
 pub(super) struct Played<'a> {
     pub(super) scene: &'a str,
     pub(super) policy: &'a str,
     pub(super) adapter: &'a str,
     pub(super) target_ms: f64,
     pub(super) frames: &'a [FrameRecord],
-    /// What full detail took at the same places, milliseconds.
+    /// Times of full detail at the same places, milliseconds.
     pub(super) full_ms: &'a [f64],
     /// SSIM and PSNR of the frames that were compared.
     pub(super) likeness: &'a [(f64, f64)],
@@ -44,7 +44,7 @@ pub(super) fn times(row: &Row) -> Vec<f64> {
     row.times.split(' ').filter_map(|time| time.parse().ok()).collect()
 }
 
-/// A record in the words of the metrics.
+/// Converts a record to a frame of the metrics.
 fn frame(row: &FrameRecord, full: f64, target_ms: f64) -> Frame {
     Frame {
         time: row.frame_ms / target_ms,
@@ -61,10 +61,10 @@ fn frame(row: &FrameRecord, full: f64, target_ms: f64) -> Frame {
     }
 }
 
-/// A column: its name, its number, and the digits after the point that people see.
+/// A column: its name, its number, and its digits after the point in the table.
 pub(super) type Column = (&'static str, fn(&Row) -> f64, usize);
 
-/// Every number of a row that compares policies.
+/// The numbers of a row that compare policies.
 pub(super) const COLUMNS: [Column; 28] = [
     ("T_ms", |r| r.target_ms, 2),
     ("mean", |r| r.mean, 3),
@@ -96,7 +96,7 @@ pub(super) const COLUMNS: [Column; 28] = [
     ("frames", |r| r.frames as f64, 0),
 ];
 
-/// Every number of every row.
+/// The table of all numbers of all rows.
 pub(super) fn table(rows: &[Row]) -> Table {
     let names: Vec<_> = ["scene", "policy"].into_iter().chain(COLUMNS.map(|column| column.0)).collect();
     let mut table = Table::new(&names);

@@ -1,8 +1,8 @@
 //! One walk through a scene under one policy, compared with full detail.
 //!
-//! In: a scene, a case, whether times are measured or declared. Out: a row; where times are measured and there is no adapter that draws,
-//! one without frames. Never here: figures.
-//! Full detail is played once for all policies of a scene: its times give the target, its pictures what the others are held against.
+//! In: a scene, a case, whether times are measured or declared. Out: a row; without frames where times are measured but no adapter can
+//! draw. Never here: figures.
+//! Full detail is played once for all policies of a scene: its times set the target, and its pictures are the reference for the others.
 
 use super::super::metrics::Row;
 use super::Case;
@@ -16,17 +16,17 @@ use anyhow::Context;
 use std::sync::{Arc, Mutex, PoisonError};
 
 const SIZE: Size = Size { width: 640, height: 480 };
-/// Where the times of frames come from.
+/// The source of frame times.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in super::super) enum Times {
-    /// The adapter that is present draws every frame.
+    /// The present adapter draws every frame.
     Measured,
-    /// Lockstep on [`DECLARED`]: the same bits on every computer. An adapter, where there is one, draws only the pictures compared.
+    /// Lockstep on [`DECLARED`]: the same bits on every computer. An adapter, if present, draws only the pictures that are compared.
     Declared,
 }
 
-/// A machine whose frames take what their objects take, by the way they are shaded, with the noise of `docs/theory/budget.md`, section
-/// 10. Choosing is declared as one core was measured to take it with the default policy (`chart policies`, selection).
+/// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
+/// for choosing is what one core was measured to take with the default policy (`chart policies`, selection).
 const DECLARED: [(&str, &str); 12] = [
     ("executor", "lockstep"),
     ("machine.draw_setup_ms", "0.1"),
@@ -42,16 +42,16 @@ const DECLARED: [(&str, &str); 12] = [
     ("machine.wander", "0.05"),
 ];
 
-/// Pictures of a path, evenly along it, that are kept and compared at most, and frames between two at least: a comparison takes as long
-/// as dozens of frames.
+/// Greatest number of pictures compared, evenly along a path, and least number of frames between two: a comparison takes as long as
+/// dozens of frames.
 const PICTURES: usize = 5;
 const APART: usize = 10;
-/// Frames at the first place before the first that counts: pipelines, caches and prices are warm then, as after any start.
+/// Frames at the first place before the first that counts: they warm up pipelines, caches and prices.
 const LEAD_IN: usize = 20;
-/// Where pictures are alike to the bit there is no noise to speak of, dB.
+/// PSNR reported for pictures that are alike to the bit, and its upper limit, dB.
 pub(in super::super) const ALIKE_DB: f64 = 99.0;
 
-/// A walk that has been drawn.
+/// A walk that has been played.
 struct Walked {
     adapter: String,
     frames: Vec<FrameRecord>,
@@ -66,14 +66,14 @@ static REFERENCES: Mutex<Vec<Reference>> = Mutex::new(Vec::new());
 /// A scene that policies are played on.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Shown<'a> {
-    /// What full detail of it is remembered by: scenes that look the same in full may share a name.
+    /// The key under which full detail is stored: scenes that look the same in full detail may share a name.
     pub(in super::super) name: &'static str,
     pub(in super::super) text: &'a str,
-    /// How many targets full detail takes in the mean.
+    /// Mean time of full detail over the target.
     pub(in super::super) times_over: f64,
 }
 
-/// The row of a case.
+/// Measures the row of a case.
 pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) -> Row {
     let measured = reference(shown, case.frames, times).and_then(|full| {
         let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
@@ -105,7 +105,7 @@ fn mean_ms(walked: &Walked) -> f64 {
     walked.frames.iter().map(|row| row.frame_ms).sum::<f64>() / walked.frames.len() as f64
 }
 
-/// Full detail of a scene, played where it was not yet.
+/// Full detail of a scene, played if it was not yet.
 fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
     let mut known = REFERENCES.lock().unwrap_or_else(PoisonError::into_inner);
     let here = |r: &&Reference| (r.0, r.1, r.2) == (shown.name, frames, times);
@@ -113,7 +113,7 @@ fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<A
         return Ok(Arc::clone(walked));
     }
     let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
-    // no target: full detail has none to miss
+    // the target has no effect on full detail
     let full = Arc::new(walked(shown, &case, (1.0, times))?);
     known.push((shown.name, frames, times, Arc::clone(&full)));
     Ok(full)
@@ -137,20 +137,20 @@ fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> an
     Ok(walked)
 }
 
-/// What was foretold of one picture, and what it took each time it was drawn, milliseconds.
+/// Predicted time of one picture, and its time at each drawing, milliseconds.
 pub(in super::super) struct Foretold {
     pub(in super::super) told_ms: f64,
     pub(in super::super) took_ms: Vec<f64>,
 }
 
-/// Frames until a picture is itself: meshes of levels that were never drawn are made, and all are at the end of their way.
+/// Frames until a picture is final: meshes of levels drawn for the first time are built, and all transitions have ended.
 const SETTLED: usize = 8;
 
-/// Pictures at places of a scene's path under targets in seconds, as `policy` foretells and chooses them, each drawn several times; and
+/// Pictures at places of a scene's path under targets in seconds, predicted and chosen by `policy` and each drawn several times; and
 /// the adapter.
 ///
 /// # Errors
-/// Of the scene, of the adapter.
+/// Errors of the scene and of the adapter.
 pub(in super::super) fn predicted(
     paper: Paper,
     policy: Policy,
@@ -178,7 +178,7 @@ pub(in super::super) fn predicted(
     Ok((adapter, pictures))
 }
 
-/// A scene by its name and text before the first frame, and the adapter that draws it.
+/// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
 fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, Walk)> {
     let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
     let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
@@ -200,16 +200,16 @@ fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, W
     Ok((adapter, Walk::open(scene, drawing, SIZE)?))
 }
 
-/// One view of a scene after a policy has come to rest on it.
+/// One view of a scene after a policy has settled.
 pub(in super::super) struct Still {
     pub(in super::super) adapter: String,
-    /// The median of the last frames.
+    /// Median of the last frames.
     pub(in super::super) frame_ms: f64,
     pub(in super::super) triangles: u64,
     pub(in super::super) picture: PictureFile,
 }
 
-/// A place on a scene's path, the wanted time of a frame, and how many frames are drawn there; the last half of them counts.
+/// A place on a scene's path, the target time of a frame, and the number of frames drawn there; the last half of them counts.
 #[derive(Debug, Clone, Copy)]
 pub(in super::super) struct Stood {
     pub(in super::super) part: f64,
@@ -217,10 +217,10 @@ pub(in super::super) struct Stood {
     pub(in super::super) frames: usize,
 }
 
-/// Stands still on a scene's path.
+/// Draws frames at one place of a scene's path.
 ///
 /// # Errors
-/// Of the scene, of the adapter.
+/// Errors of the scene and of the adapter.
 pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
     let Stood { part, target_s, frames } = stood;
     let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
