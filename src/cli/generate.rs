@@ -5,7 +5,7 @@
 use super::Exit;
 use super::args::GenerateArgs;
 use super::output::{BadInput, data, message};
-use super::tune::gains::check_place;
+use super::gains::check_place;
 use crate::scene::papers::{Choices, Paper};
 use anyhow::Context;
 

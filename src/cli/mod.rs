@@ -4,50 +4,28 @@
 //! Never here: physics, drawing, the format of scenes.
 
 mod args;
-mod assignment;
 mod bench;
 mod chart;
 mod check;
 mod describe;
+mod exit;
 mod fit;
+mod gains;
 mod generate;
+mod lab_args;
 mod output;
 mod play;
 mod progress;
 pub mod report;
 pub mod run;
 mod tune;
+mod values;
+
+pub use exit::Exit;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
 use std::process::ExitCode;
-
-/// How a command ends: the exit codes that scripts can rely on.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Exit {
-    /// Success.
-    Ok,
-    /// The run failed.
-    Failed,
-    /// The input or the usage was wrong.
-    BadInput,
-    /// A goal given with `--fail-on` was missed.
-    GoalMissed,
-    /// Ctrl-C; the results so far have been written.
-    Interrupted,
-}
-
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        Self::from(match exit {
-            Exit::Ok => 0,
-            Exit::Failed => 1,
-            Exit::BadInput => 2,
-            Exit::GoalMissed => 4,
-            Exit::Interrupted => 130,
-        })
-    }
-}
 
 /// Runs the command given by the arguments.
 #[must_use]

@@ -8,7 +8,7 @@ use crate::scene::{SceneError};
 use std::io::{ErrorKind, Write};
 
 /// Writes data to standard output. A reader that has closed the pipe (`| head`) is no error.
-pub(super) fn data(text: &str) -> anyhow::Result<()> {
+pub fn data(text: &str) -> anyhow::Result<()> {
     let mut out = std::io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() == ErrorKind::BrokenPipe => Ok(()),
@@ -17,7 +17,7 @@ pub(super) fn data(text: &str) -> anyhow::Result<()> {
 }
 
 /// Writes a message for people to standard error; a failure to write it is ignored.
-pub(super) fn message(text: &str) {
+pub fn message(text: &str) {
     let _ = writeln!(std::io::stderr().lock(), "{text}");
 }
 
@@ -26,7 +26,7 @@ const OVERLAPS_TOLD: usize = 10;
 
 /// Reports agents that start inside each other or inside fixed solids, which is no error: deformables are moved to start elsewhere,
 /// other agents separate without a jump.
-pub(super) fn tell_overlaps(scene: &Scene) {
+pub fn tell_overlaps(scene: &Scene) {
     let overlaps = &scene.overlaps;
     for overlap in overlaps.iter().take(OVERLAPS_TOLD) {
         let Overlap { a, b, depth_m } = overlap;
@@ -45,7 +45,7 @@ pub(super) fn tell_overlaps(scene: &Scene) {
 }
 
 /// Reports that the system refuses the priority that a scene requests; the run goes on without it.
-pub(super) fn tell_priority(scene: &Scene) {
+pub fn tell_priority(scene: &Scene) {
     let asked = scene.priority == PriorityKind::Realtime && scene.executor != ExecutorKind::Lockstep;
     if asked && let Err(refused) = Priority::Realtime.ask() {
         message(&format!("note: {refused}"));
@@ -53,7 +53,7 @@ pub(super) fn tell_priority(scene: &Scene) {
 }
 
 /// Reports an error; returns how the program ends.
-pub(super) fn tell(error: &anyhow::Error) -> Exit {
+pub fn tell(error: &anyhow::Error) -> Exit {
     if let Some(bad) = error.downcast_ref::<SceneError>() {
         message(&pictured(bad));
         return Exit::BadInput;
@@ -63,7 +63,7 @@ pub(super) fn tell(error: &anyhow::Error) -> Exit {
 }
 
 /// The problems of a scene, with the lines underlined; colours and width follow the terminal.
-pub(super) fn pictured(error: &SceneError) -> String {
+pub fn pictured(error: &SceneError) -> String {
     let handler = miette::MietteHandlerOpts::new().build();
     format!("{:?}", Shown { error, handler: &handler })
 }
@@ -82,4 +82,4 @@ impl std::fmt::Debug for Shown<'_> {
 /// An input that cannot be used, found after the arguments were read.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
-pub(super) struct BadInput(pub(super) String);
+pub struct BadInput(pub String);

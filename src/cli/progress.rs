@@ -6,11 +6,11 @@ use indicatif::{ProgressBar, ProgressStyle};
 const STEPS: u64 = 1000;
 
 /// A progress bar, which may be hidden.
-pub(super) struct Bar(ProgressBar);
+pub struct Bar(ProgressBar);
 
 impl Bar {
     /// A bar for the scene `name`, drawn once there is progress; nothing is shown where `quiet`.
-    pub(super) fn new(name: &str, quiet: bool) -> Self {
+    pub fn new(name: &str, quiet: bool) -> Self {
         let bar = if quiet { ProgressBar::hidden() } else { ProgressBar::new(STEPS).with_prefix(name.to_owned()) };
         if let Ok(style) = ProgressStyle::with_template("{prefix} {bar:30} {percent:>3} %  {msg}") {
             bar.set_style(style);
@@ -19,12 +19,12 @@ impl Bar {
     }
 
     /// Shows the progress of the run: the share that is done, and the last frame.
-    pub(super) fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
+    pub fn show(&self, done: f64, sim_s: f64, frame_ms: f64) {
         self.tell(done, format!("{sim_s:.1} s  {frame_ms:.1} ms a frame"));
     }
 
     /// Shows the share that is done, and words next to it.
-    pub(super) fn tell(&self, done: f64, words: String) {
+    pub fn tell(&self, done: f64, words: String) {
         self.0.set_position((done.clamp(0.0, 1.0) * STEPS as f64) as u64);
         self.0.set_message(words);
     }

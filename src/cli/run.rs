@@ -141,7 +141,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         let of_this_kind = flags.iter().filter(move |(id, ..)| from_environment(id) == environment);
         of_this_kind.filter_map(|(_, key, value)| Some(((*key).to_owned(), value.clone()?)))
     };
-    let gains = args.gains.as_deref().map(super::tune::gains::overrides).transpose()?.unwrap_or_default();
+    let gains = args.gains.as_deref().map(super::gains::overrides).transpose()?.unwrap_or_default();
     let overrides: Vec<_> = given(true).chain(gains).chain(args.set.iter().cloned()).chain(given(false)).collect();
     let source = Source::open(&args.scene)?;
     let scene = load(&source, &overrides)?;

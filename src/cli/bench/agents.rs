@@ -14,7 +14,7 @@ use std::time::{Duration, Instant};
 /// The executor of the agents.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(in crate::cli) enum Executor {
+pub enum Executor {
     Threads,
     Pool,
     Lockstep,
@@ -22,7 +22,7 @@ pub(in crate::cli) enum Executor {
 
 /// One case to measure.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(in crate::cli) struct Case {
+pub struct Case {
     pub executor: Executor,
     pub model: Model,
     pub agents: usize,
@@ -33,7 +33,7 @@ pub(in crate::cli) struct Case {
 
 /// The measurements of one case. Times are those of the agent at which half, or 99 in 100, of the agents are better.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub(in crate::cli) struct Row {
+pub struct Row {
     pub executor: Executor,
     pub model: Model,
     pub realtime: bool,
@@ -114,7 +114,7 @@ pub(super) fn cases(quick: bool) -> Vec<Case> {
 }
 
 /// Measures one case: about `span` for the bare loops and about `span` for the run.
-pub(in crate::cli) fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
+pub fn measure(case: &Case, span: Duration) -> anyhow::Result<Row> {
     let bare = bare::measure(case.model, case.agents, case.rate_hz, span / 2)?;
     let on_threads = || bare::on_threads(case.model, case.agents, case.rate_hz, span / 2);
     let thread_us_per_step = (case.executor == Executor::Threads).then(on_threads).transpose()?;

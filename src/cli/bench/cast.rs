@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 /// The kind of an agent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub(in crate::cli) enum Model {
+pub enum Model {
     /// Half a microsecond of arithmetic per step: as cheap as agents get.
     Synthetic,
     /// As synthetic, but at rest after its first step.

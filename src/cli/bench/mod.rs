@@ -14,7 +14,7 @@ mod shown;
 mod subject;
 
 use super::Exit;
-use super::args::{BenchArgs, BenchSubject};
+use super::lab_args::{BenchArgs, BenchSubject};
 
 /// Runs a benchmark.
 pub(super) fn command(args: &BenchArgs) -> anyhow::Result<Exit> {

@@ -6,7 +6,7 @@
 //! The plain world runs with rapier3d's own settings and with those of an island. Published results for a thousand boxes follow.
 //! Never here: how agents form islands.
 
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
 use super::super::chart::table::Table;
 use super::machine::{others_cpu, own_cpu};

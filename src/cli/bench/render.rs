@@ -2,7 +2,7 @@
 //!
 //! In: an adapter. Out: rows of wall time per picture, the least of a few drawings. Never here: a fit of costs to them.
 
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::table::Table;
 use super::subject::{Subject, Watch};

@@ -2,7 +2,7 @@
 //!
 //! In: numbers of segments. Out: rows of CPU time per step. Never here: agents, threads.
 
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;

@@ -2,7 +2,7 @@
 //!
 //! In: the experiment of `chart policies --only selection`. Out: its rows in the form of a benchmark. Never here: a policy.
 
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::Figure;
 use super::super::chart::table::Table;
 use super::super::chart::{Experiment, Selection};

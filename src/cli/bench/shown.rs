@@ -2,7 +2,7 @@
 //!
 //! In: the arguments. Out: rows, a table, a figure. Never here: what a case measures ([`super::agents`]).
 
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
 use super::super::chart::power::exponent;
 use super::super::chart::table::Table;

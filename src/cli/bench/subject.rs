@@ -3,7 +3,7 @@
 //! In: a subject. Out: CSV, JSON, SVG and PNG in a folder, a table on standard output. Never here: what is measured.
 
 use super::super::Exit;
-use super::super::args::BenchArgs;
+use super::super::lab_args::BenchArgs;
 use super::super::chart::figure::{self, Figure};
 use super::super::chart::table::Table;
 use super::super::chart::{prepared, stopper};

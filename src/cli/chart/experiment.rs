@@ -9,7 +9,7 @@ use serde::Serialize;
 use serde::de::DeserializeOwned;
 
 /// One measurement, made for many cases.
-pub(in crate::cli) trait Experiment: Sync {
+pub trait Experiment: Sync {
     /// Identifies a row: rows of the same case are the same measurement.
     type Case: PartialEq + Sync;
     /// A case with its measurements; its fields are the columns of the CSV file.
@@ -52,7 +52,7 @@ pub(in crate::cli) trait Experiment: Sync {
 
 /// A claim compared with the rows.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub(in crate::cli) struct Finding {
+pub struct Finding {
     /// The claim, as a sentence with its limit.
     pub(super) claim: String,
     /// What was measured.

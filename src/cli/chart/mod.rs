@@ -20,7 +20,7 @@ pub(super) mod table;
 mod timing;
 
 use super::Exit;
-use super::args::{ChartArgs, Subject};
+use super::lab_args::{ChartArgs, Subject};
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
 use crate::compositor::{Gpu, PictureFile};

@@ -4,7 +4,7 @@
 
 /// The exponent of the power law y ~ xᵖ closest to the points, by least squares in logarithms; pairs that are not finite and
 /// above zero are left out; `None` for fewer than two different x.
-pub(in crate::cli) fn exponent(points: &[(f64, f64)]) -> Option<f64> {
+pub fn exponent(points: &[(f64, f64)]) -> Option<f64> {
     let logs: Vec<(f64, f64)> = points
         .iter()
         .filter(|(x, y)| *x > 0.0 && *y > 0.0 && (x + y).is_finite())

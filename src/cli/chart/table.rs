@@ -6,7 +6,7 @@ use serde::ser::{Serialize, SerializeMap, SerializeSeq, Serializer};
 
 /// The content of a cell.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::cli) enum Cell {
+pub enum Cell {
     /// Text.
     Text(String),
     /// A number, and its digits after the point in text.
@@ -15,21 +15,21 @@ pub(in crate::cli) enum Cell {
 
 /// Rows of cells under column names.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::cli) struct Table {
+pub struct Table {
     /// The names of the columns; keys in JSON.
-    pub(in crate::cli) columns: Vec<String>,
+    pub columns: Vec<String>,
     /// Each row has as many cells as there are columns.
-    pub(in crate::cli) rows: Vec<Vec<Cell>>,
+    pub rows: Vec<Vec<Cell>>,
 }
 
 impl Table {
     /// An empty table.
-    pub(in crate::cli) fn new(columns: &[&str]) -> Self {
+    pub fn new(columns: &[&str]) -> Self {
         Self { columns: columns.iter().map(|&c| c.to_owned()).collect(), rows: Vec::new() }
     }
 
     /// The table as lines, columns two spaces apart.
-    pub(in crate::cli) fn text(&self) -> String {
+    pub fn text(&self) -> String {
         let cells = |row: &Vec<Cell>| row.iter().map(Cell::text).collect::<Vec<_>>();
         let lines: Vec<Vec<String>> =
             std::iter::once(self.columns.clone()).chain(self.rows.iter().map(cells)).collect();

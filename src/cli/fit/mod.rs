@@ -12,7 +12,7 @@ mod told;
 mod written;
 
 use super::Exit;
-use super::args::FitArgs;
+use super::lab_args::FitArgs;
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
 use crate::fit::{Converged, Found, Search, Setting, Trial, converge};

@@ -3,7 +3,7 @@
 //! In: settings for every object. Out: the distance of its points from the converged answer's, and the costs. Never here: which
 //! settings are tried.
 
-use super::super::args::FitArgs;
+use super::super::lab_args::FitArgs;
 use super::super::output::BadInput;
 use super::super::progress::Bar;
 use super::names;

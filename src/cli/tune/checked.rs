@@ -2,7 +2,7 @@
 //!
 //! In: a plant and the gains found on it. Out: settling times, predicted and measured. Never here: a judgement of them.
 
-use super::super::args::TuneArgs;
+use super::super::lab_args::TuneArgs;
 use super::super::progress::Bar;
 use super::{Identified, Tuned, live};
 use crate::control::Law;

@@ -5,11 +5,12 @@
 
 mod checked;
 mod figures;
-pub(super) mod gains;
 mod told;
 
 use super::Exit;
-use super::args::TuneArgs;
+use super::gains;
+use super::gains::NORMALISED;
+use super::lab_args::TuneArgs;
 use super::output::{BadInput, data, message};
 use super::progress::Bar;
 use crate::compositor::{Gpu, Offscreen, RendererOptions, Size};
@@ -28,8 +29,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Frames of the experiment, in full and with `--quick`.
 const FRAMES: [u64; 2] = [360, 150];
-/// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
-const NORMALISED: f64 = 0.046;
 
 /// A plant, and the scene and machine on which it was identified.
 struct Identified {

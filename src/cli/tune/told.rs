@@ -4,7 +4,8 @@
 
 use super::super::chart::table::{Cell, Table};
 use super::checked::Checked;
-use super::{Identified, Tuned, gains};
+use super::super::gains;
+use super::{Identified, Tuned};
 use crate::control::Law;
 use crate::tune::{Contender, Explanation, Margins, Verdict};
 use serde_json::{Value, json};

@@ -31,7 +31,7 @@ const SHARP: u32 = 2;
 ///
 /// # Errors
 /// A figure that cannot be drawn: an axis that ends where it begins.
-pub(in crate::cli) fn svg(figure: &Figure) -> anyhow::Result<String> {
+pub fn svg(figure: &Figure) -> anyhow::Result<String> {
     let mut text = String::new();
     let [width, height] = size(figure);
     draw(SVGBackend::with_string(&mut text, (width, height)).into_drawing_area(), figure, Pen(1))?;
@@ -42,7 +42,7 @@ pub(in crate::cli) fn svg(figure: &Figure) -> anyhow::Result<String> {
 ///
 /// # Errors
 /// A figure that cannot be drawn.
-pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
+pub fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
     let [width, height] = size(figure);
     let fine = (width * FINE, height * FINE);
     let mut pixels = vec![0; fine.0 as usize * fine.1 as usize * 3];
@@ -58,7 +58,7 @@ pub(in crate::cli) fn png(figure: &Figure) -> anyhow::Result<Vec<u8>> {
 ///
 /// # Errors
 /// Names that cannot be drawn.
-pub(in crate::cli) fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<RgbImage> {
+pub fn headings(names: &[&str], [width, height]: [u32; 2]) -> anyhow::Result<RgbImage> {
     bring_font(FONT)?;
     let all = (width * names.len() as u32, height);
     let mut pixels = vec![255; all.0 as usize * all.1 as usize * 3];

@@ -6,11 +6,11 @@ mod draw;
 mod font;
 mod scale;
 
-pub(in crate::cli) use draw::{headings, png, svg};
+pub use draw::{headings, png, svg};
 
 /// Some panels under one title.
 #[derive(Debug, Clone, Default)]
-pub(in crate::cli) struct Figure {
+pub struct Figure {
     /// The heading.
     pub title: String,
     /// The panels, row by row.
@@ -21,7 +21,7 @@ pub(in crate::cli) struct Figure {
 
 /// A pair of axes with the layers drawn in it.
 #[derive(Debug, Clone)]
-pub(in crate::cli) struct Panel {
+pub struct Panel {
     /// The heading.
     pub title: String,
     /// To the right.
@@ -34,7 +34,7 @@ pub(in crate::cli) struct Panel {
 
 /// An axis.
 #[derive(Debug, Clone)]
-pub(in crate::cli) struct Axis {
+pub struct Axis {
     /// The quantity, with its unit.
     pub label: &'static str,
     /// Its least value; above 0 where `log`.
@@ -65,7 +65,7 @@ impl Axis {
 
 /// A mark of one colour, with a label of its own in the legend (none where it is empty).
 #[derive(Debug, Clone)]
-pub(in crate::cli) struct Layer {
+pub struct Layer {
     /// Its name.
     pub label: String,
     /// Its colour.
@@ -76,7 +76,7 @@ pub(in crate::cli) struct Layer {
 
 /// The shape of a layer. Values outside the axes are drawn at the border, with an arrow; values that are not finite are left out.
 #[derive(Debug, Clone)]
-pub(in crate::cli) enum Mark {
+pub enum Mark {
     /// A line through points: measurements. A single point is drawn as a dot.
     Line(Vec<(f64, f64)>),
     /// A dashed line through points: theory, or a limit.
@@ -89,7 +89,7 @@ pub(in crate::cli) enum Mark {
 
 /// Colours that are distinct for colour-blind readers and in grey print (Okabe and Ito's; the first two are those of the other figures).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(in crate::cli) enum Colour {
+pub enum Colour {
     /// Blue: our own results.
     Blue,
     /// Red: the comparison.
@@ -120,7 +120,7 @@ impl Colour {
 }
 
 /// The range that contains all numbers, with a small margin; (0, 1) where there are none.
-pub(in crate::cli) fn span(numbers: impl IntoIterator<Item = f64>, log: bool) -> (f64, f64) {
+pub fn span(numbers: impl IntoIterator<Item = f64>, log: bool) -> (f64, f64) {
     let good = |v: &f64| v.is_finite() && (!log || *v > 0.0);
     let (low, high) = numbers
         .into_iter()

@@ -11,7 +11,7 @@ use std::sync::{Mutex, PoisonError};
 use std::time::Instant;
 
 /// The experiment.
-pub(in crate::cli) struct Selection;
+pub struct Selection;
 
 const OBJECTS: [usize; 7] = [100, 300, 1000, 3000, 10_000, 30_000, 100_000];
 const QUICK_OBJECTS: [usize; 2] = [100, 1000];
@@ -37,14 +37,14 @@ const POLICIES: [(&str, Time1); 4] = [
 
 /// A number of objects, and a policy.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::cli) struct Case {
+pub struct Case {
     objects: usize,
     policy: String,
 }
 
 /// Wall time of a choice.
 #[derive(Debug, Clone, Serialize, Deserialize)]
-pub(in crate::cli) struct Row {
+pub struct Row {
     objects: usize,
     policy: String,
     median_ms: f64,

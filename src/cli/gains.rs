@@ -2,12 +2,14 @@
 //!
 //! In: text. Out: a contender with its gains, or overrides of a scene. Never here: which gains are good.
 
-use super::super::output::BadInput;
-use super::NORMALISED;
+use super::output::BadInput;
 use crate::control::Law;
 use crate::tune::Contender;
 use anyhow::Context;
 use std::path::Path;
+
+/// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
+pub const NORMALISED: f64 = 0.046;
 
 /// The keys of `[target]` that a fragment may have.
 const KEYS: [&str; 6] = ["policy", "law", "alpha", "beta", "kappa", "lead"];
@@ -35,7 +37,7 @@ const LAWS: [(&str, &[&str]); 5] = [
 ];
 
 /// The contender given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
-pub(super) fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
+pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
     let (mut law, mut given) = (None, Vec::new());
     for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
         let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain is NAME=NUMBER"))?;
@@ -115,7 +117,7 @@ fn refused(text: &str, why: &str) -> anyhow::Error {
 }
 
 /// The gains in one line.
-pub(super) fn told(contender: Contender) -> String {
+pub fn told(contender: Contender) -> String {
     match contender {
         Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
         Contender::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
@@ -134,7 +136,7 @@ fn digits(value: f64) -> String {
 }
 
 /// The scene fragment that selects `law`, with `comment` above it.
-pub(super) fn fragment(law: Law, comment: &str) -> String {
+pub fn fragment(law: Law, comment: &str) -> String {
     let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
     let gains = match law {
         Law::Printed { alpha, beta } => format!("law = \"printed\"\nalpha = {alpha:e}\nbeta = {beta:e}\n"),
@@ -146,7 +148,7 @@ pub(super) fn fragment(law: Law, comment: &str) -> String {
 }
 
 /// Refuses a path that is already taken, or in a folder that does not exist.
-pub(in crate::cli) fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
+pub fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
     if folder.is_some_and(|f| !f.is_dir()) {
         return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
@@ -165,7 +167,7 @@ pub(in crate::cli) fn check_place(path: &Path, flag: &str, force: bool) -> anyho
 ///
 /// # Errors
 /// [`BadInput`] where it cannot be read, or contains more than gains.
-pub(in crate::cli) fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
+pub fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
     let bad = |why: String| BadInput(format!("the gains {}: {why}", path.display()));
     let size = std::fs::metadata(path).map_err(|e| bad(format!("cannot be read: {e}")))?.len();
     if size > BYTES_MAX {
@@ -184,7 +186,7 @@ pub(in crate::cli) fn overrides(path: &Path) -> anyhow::Result<Vec<(String, Stri
 }
 
 /// Writes the fragment.
-pub(super) fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
+pub fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
     std::fs::write(path, fragment).with_context(|| format!("the gains {} cannot be written", path.display()))
 }
 

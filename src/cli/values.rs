@@ -1,0 +1,117 @@
+//! Values of arguments that several commands share, and the arguments common to the commands that judge scenes.
+//!
+//! In: text. Out: numbers, sizes, keys and values. Never here: whether a scene has such a key.
+
+use clap::Args;
+
+/// The arguments common to the commands that judge scenes: `check`, `tune`, `fit`.
+#[derive(Debug, Args)]
+pub struct CommonArgs {
+    /// Change a key of the scene; may be repeated
+    #[arg(long = "set", value_name = "KEY=VALUE", value_parser = assignment)]
+    pub set: Vec<(String, String)>,
+    /// Print the result as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress, and no output for scenes without problems
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// Splits KEY=VALUE; white space around key and value is dropped.
+///
+/// # Errors
+/// A sentence for text without a key or without the `=` sign.
+pub fn assignment(text: &str) -> Result<(String, String), String> {
+    match equals_sign(text).map(|at| (&text[..at], &text[at + 1..])) {
+        Some((key, value)) if !key.trim().is_empty() => Ok((key.trim().to_owned(), value.trim().to_owned())),
+        _ => Err("expected KEY=VALUE, such as target.frame_hz=60".to_owned()),
+    }
+}
+
+/// The position of the `=` between key and value; parts of the key in quotes may contain others.
+fn equals_sign(text: &str) -> Option<usize> {
+    let (mut open, mut before) = (None, '.');
+    for (at, c) in text.char_indices() {
+        match (open, c) {
+            (None, '=') => return Some(at),
+            (None, '"' | '\'') if before == '.' => open = Some(c),
+            (Some(quote), c) if c == quote && before != '\\' => open = None,
+            _ => {}
+        }
+        before = c;
+    }
+    None
+}
+
+/// Parses a span of seconds, 0.001 … 1e7.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn seconds(text: &str) -> Result<f64, String> {
+    bounded(text, 1e-3, 1e7, "seconds")
+}
+
+/// Parses frames a second, 1 … 1000.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn target_fps(text: &str) -> Result<f64, String> {
+    bounded(text, 1.0, 1000.0, "frames a second")
+}
+
+/// Parses a number from `least` to `greatest`.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn bounded(text: &str, least: f64, greatest: f64, unit: &str) -> Result<f64, String> {
+    let value = text.parse().ok().filter(|v| (least..=greatest).contains(v));
+    value.ok_or_else(|| format!("expected {least} to {greatest} {unit}"))
+}
+
+/// Parses `WIDTHxHEIGHT` in pixels, each 1 … 8192.
+///
+/// # Errors
+/// A sentence that says what was expected.
+pub fn size(text: &str) -> Result<[u32; 2], String> {
+    let expected = || "expected WIDTHxHEIGHT, each 1 to 8192, such as 1280x720".to_owned();
+    let (width, height) = text.split_once(['x', 'X', '×']).ok_or_else(expected)?;
+    let side = |s: &str| s.parse().ok().filter(|n| (1..=8192).contains(n)).ok_or_else(expected);
+    Ok([side(width)?, side(height)?])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn keys_in_quotes_may_hold_the_sign_that_ends_a_key() {
+        let pair = |key: &str, value: &str| Ok((key.to_owned(), value.to_owned()));
+        assert_eq!(assignment("target.frame_hz = 60"), pair("target.frame_hz", "60"));
+        assert_eq!(assignment("object.\"a=b.c\".look='x=y'"), pair("object.\"a=b.c\".look", "'x=y'"));
+        assert_eq!(assignment("object.six\"inch.n=2"), pair("object.six\"inch.n", "2"));
+        assert!(assignment("=2").is_err() && assignment("'a=2").is_err());
+    }
+
+    #[test]
+    fn an_assignment_keeps_what_follows_the_first_equals_sign() {
+        assert_eq!(assignment("a.b=c=d"), Ok(("a.b".to_owned(), "c=d".to_owned())));
+        assert!(assignment("a.b").is_err());
+        assert!(assignment("=1").is_err());
+    }
+
+    #[test]
+    fn sizes_are_two_numbers_of_pixels() {
+        assert_eq!(size("640x360"), Ok([640, 360]));
+        for bad in ["640", "0x360", "640x", "640x9000", "-1x2", "axb", "1x2x3"] {
+            assert!(size(bad).is_err(), "{bad}");
+        }
+    }
+
+    #[test]
+    fn numbers_of_seconds_are_finite_and_above_zero() {
+        for bad in ["nan", "inf", "-1", "0", "1e300", "", "x"] {
+            assert!(seconds(bad).is_err(), "{bad}");
+        }
+    }
+}
