@@ -6,7 +6,7 @@
 mod stage;
 
 use cpu_time::ProcessTime;
-use metachron::compositor::{Colouring, Gpu, GpuError, Offscreen, RendererOptions, Size, Style};
+use metachron_render::{Colouring, Gpu, GpuError, Offscreen, RendererOptions, Size, Style};
 use std::path::Path;
 use std::time::Instant;
 

@@ -3,8 +3,8 @@
 //! `cargo run --example settling` prints a table; with `-- --write` it also writes `docs/figures/settling.{csv,svg}`.
 //! Nothing is measured: a frame takes setup + fill + c · triangles, so every run gives the same numbers on any computer.
 
-use metachron::control::{FrameWork, Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Status};
 use metachron_core::{AgentId, ResolutionRange};
+use metachron_lod::control::{FrameWork, Kind, Law, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Status};
 use plotters::prelude::*;
 use plotters::style::register_font;
 use std::error::Error;

@@ -5,14 +5,16 @@
 //! window is not tested, which METACHRON_REQUIRE_ADAPTER=1 turns into a failure.
 
 use glam::DVec3;
-use metachron::compositor::viewer::{
+use metachron_core::AgentId;
+use metachron_render::{Camera, Gpu, Hit, Picture, Ray};
+use metachron_runtime::AgentState;
+use metachron_scene;
+use metachron_scene::Source;
+use metachron_session::Session;
+use metachron_viewer::ui::{
     Action, Bounds, FrameTimes, Show, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions, run_window,
 };
-use metachron::compositor::{Camera, Gpu, Hit, Picture, Ray};
-use metachron::frame::{Session, WindowFailure, WindowPlan, play_in_window};
-use metachron::runtime::AgentState;
-use metachron::scene::{self, Source};
-use metachron_core::AgentId;
+use metachron_viewer::window::{WindowFailure, WindowPlan, play_in_window};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -115,7 +117,7 @@ const FRAMES: u64 = 8;
 
 fn the_tube_plays_in_a_window() {
     let source = Source::open("tube").unwrap();
-    let session = Session::open(scene::load(&source, &[]).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();
     let size = Some([800.0, 500.0]);
     let plan = WindowPlan { source, overrides: Vec::new(), size, screenshots, seconds: None, frames: Some(FRAMES) };
@@ -133,7 +135,7 @@ fn the_tube_plays_in_a_window() {
 
 fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
     let source = Source::open("pendulum").unwrap();
-    let session = Session::open(scene::load(&source, &[]).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();
     let plan =
         WindowPlan { source, overrides: Vec::new(), size: None, screenshots, seconds: None, frames: Some(10_000) };

@@ -1,12 +1,15 @@
 //! The command-line arguments and their help texts.
 
-use super::values::{CommonArgs, assignment, seconds, size, target_fps};
-use super::report::Goal;
-use crate::world::kinds::{PolicyKind};
-use crate::scene::papers::Paper;
 use clap::builder::PossibleValuesParser;
-use super::lab_args::{BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, FIT_EXAMPLES, FitArgs, TUNE_EXAMPLES, TuneArgs};
 use clap::{Args, Parser, Subcommand, ValueHint};
+use metachron_console::values::{CommonArgs, assignment, seconds, size, target_fps};
+#[cfg(feature = "lab")]
+use metachron_lab::args::{
+    BENCH_EXAMPLES, BenchArgs, CHART_EXAMPLES, ChartArgs, FIT_EXAMPLES, FitArgs, TUNE_EXAMPLES, TuneArgs,
+};
+use metachron_scene::papers::Paper;
+use metachron_session::report::Goal;
+use metachron_world::kinds::PolicyKind;
 use std::path::PathBuf;
 
 const EXAMPLES: &str = "\
@@ -66,15 +69,19 @@ pub enum Command {
     #[command(after_help = CHECK_EXAMPLES)]
     Check(CheckArgs),
     /// Find feedback gains for a scene, or explain given ones
+    #[cfg(feature = "lab")]
     #[command(after_help = TUNE_EXAMPLES)]
     Tune(TuneArgs),
     /// Find the cheapest steps, segments and integrators that keep a scene's probes within a tolerance of its converged answer
+    #[cfg(feature = "lab")]
     #[command(after_help = FIT_EXAMPLES, allow_negative_numbers = true)]
     Fit(FitArgs),
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
+    #[cfg(feature = "lab")]
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
     /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
+    #[cfg(feature = "lab")]
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
     /// Write a scene of the papers' experiments as a scene file, with a seed and options
@@ -221,7 +228,7 @@ pub struct ListArgs {
 }
 
 fn goal(text: &str) -> Result<Goal, String> {
-    text.parse().map_err(|e: super::report::GoalError| e.to_string())
+    text.parse().map_err(|e: metachron_session::report::GoalError| e.to_string())
 }
 
 #[cfg(test)]

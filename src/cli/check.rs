@@ -1,11 +1,11 @@
 //! `check`: validates scenes.
 
-use super::Exit;
 use super::args::CheckArgs;
-use super::output::{data, message, pictured, tell_overlaps};
-use super::report::{MovedReport, OverlapReport};
-use crate::world::{Scene};
-use crate::scene::{SceneError, SceneProblem, Source, load};
+use metachron_console::exit::Exit;
+use metachron_console::output::{data, message, pictured, tell_overlaps};
+use metachron_scene::{SceneError, SceneProblem, Source, load};
+use metachron_session::report::{MovedReport, OverlapReport};
+use metachron_world::Scene;
 use serde::Serialize;
 
 #[derive(Serialize)]

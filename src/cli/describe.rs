@@ -1,10 +1,10 @@
 //! `schema`, `list`, `completions`, `man`: descriptions of the program.
 
-use super::Exit;
 use super::args::{Cli, ListArgs};
-use super::output::{BadInput, data};
-use crate::scene::{builtin, json_schema, load};
 use clap::CommandFactory;
+use metachron_console::exit::Exit;
+use metachron_console::output::{BadInput, data};
+use metachron_scene::{builtin, json_schema, load};
 use serde::Serialize;
 
 /// The JSON Schema of scene files.
@@ -28,7 +28,7 @@ pub(super) fn list(args: &ListArgs) -> anyhow::Result<Exit> {
         let (agents, frame_hz) = (scene.agents.len(), scene.target.frame_hz);
         anyhow::Ok(Row { name: built_in.name, description: scene.description, agents, frame_hz })
     };
-    let rows = builtin::ALL.iter().map(row).collect::<Result<Vec<_>, _>>()?;
+    let rows = builtin::all().iter().map(row).collect::<Result<Vec<_>, _>>()?;
     let text = if args.json {
         serde_json::to_string_pretty(&rows)? + "\n"
     } else {

@@ -2,12 +2,12 @@
 //!
 //! In: the scene's name and options. Out: TOML on standard output or in a file. Never here: the content of a scene.
 
-use super::Exit;
 use super::args::GenerateArgs;
-use super::output::{BadInput, data, message};
-use super::gains::check_place;
-use crate::scene::papers::{Choices, Paper};
 use anyhow::Context;
+use metachron_console::exit::Exit;
+use metachron_console::gains::check_place;
+use metachron_console::output::{BadInput, data, message};
+use metachron_scene::papers::{Choices, Paper};
 
 /// Writes the scene.
 pub(super) fn command(args: &GenerateArgs) -> anyhow::Result<Exit> {

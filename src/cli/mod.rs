@@ -2,34 +2,22 @@
 //!
 //! In: arguments and environment. Out: data on standard output, messages on standard error, requested files.
 //! Never here: physics, drawing, the format of scenes.
-
 mod args;
-mod bench;
-mod chart;
 mod check;
 mod describe;
-mod exit;
-mod fit;
-mod gains;
 mod generate;
-mod lab_args;
-mod output;
 mod play;
-mod progress;
-pub mod report;
 pub mod run;
-mod tune;
-mod values;
-
-pub use exit::Exit;
 
 use args::{Cli, Command};
 use clap::{CommandFactory, FromArgMatches};
+use metachron_console::exit::Exit;
 use std::process::ExitCode;
 
 /// Runs the command given by the arguments.
 #[must_use]
 pub fn main() -> ExitCode {
+    crate::scenes::provide();
     let mut arguments: Vec<_> = std::env::args_os().collect();
     if arguments.len() < 2 {
         arguments.truncate(1);
@@ -40,17 +28,21 @@ pub fn main() -> ExitCode {
         Ok(cli) => dispatch(cli, &matches),
         Err(error) => error.exit(),
     };
-    done.unwrap_or_else(|error| output::tell(&error)).into()
+    done.unwrap_or_else(|error| metachron_console::output::tell(&error)).into()
 }
 
 fn dispatch(cli: Cli, matches: &clap::ArgMatches) -> anyhow::Result<Exit> {
     match cli.command {
         Command::Run(args) => run::command(&args, matches.subcommand_matches("run")),
         Command::Check(args) => check::command(&args),
-        Command::Chart(args) => chart::command(&args),
-        Command::Bench(args) => bench::command(&args),
-        Command::Tune(args) => tune::command(&args),
-        Command::Fit(args) => fit::command(&args),
+        #[cfg(feature = "lab")]
+        Command::Chart(args) => metachron_lab::chart(&args),
+        #[cfg(feature = "lab")]
+        Command::Bench(args) => metachron_lab::bench(&args),
+        #[cfg(feature = "lab")]
+        Command::Tune(args) => metachron_lab::tune(&args),
+        #[cfg(feature = "lab")]
+        Command::Fit(args) => metachron_lab::fit(&args),
         Command::Generate(args) => generate::command(&args),
         Command::Schema => describe::schema(),
         Command::List(args) => describe::list(&args),

@@ -2,22 +2,27 @@
 //!
 //! In: a [`Request`]. Out: [`Played`]. This is where the command line meets the frame loop; never here: the loop itself.
 
-use super::report::{
+use super::run::{Played, Request, RunLength, Step};
+use metachron_core::AgentId;
+use metachron_lod::Bound;
+use metachron_render::Size;
+#[cfg(feature = "render")]
+use metachron_render::{Gpu, GpuError, Offscreen, RendererOptions};
+use metachron_runtime::{AgentState, Spread};
+use metachron_session::report::{
     AgentReport, BudgetReport, CouplingError, CouplingReport, MovedReport, OracleReport, OverlapReport, ProbeReport,
     Quantiles, Report, summarise, summarise_choices, summarise_undrawn,
 };
-use super::run::{Played, Request, RunLength, Step};
-use crate::compositor::viewer::WindowError;
-use crate::compositor::{Gpu, GpuError, Offscreen, RendererOptions, Size};
-use crate::frame::{
+use metachron_session::{
     AgentOutcome, Coupling, Drawing, End, FrameRecord, Headless, Oracle, Outcome, PairError, ProbeOutcome, Session,
-    WindowFailure, WindowPlan, consult_oracle, play_headless, play_in_window,
+    consult_oracle, play_headless,
 };
-use crate::runtime::{AgentState, Spread};
-use crate::world::{Scene};
-use crate::world::kinds::{ExecutorKind};
-use metachron_budget::Bound;
-use metachron_core::AgentId;
+#[cfg(feature = "viewer")]
+use metachron_viewer::ui::WindowError;
+#[cfg(feature = "viewer")]
+use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
+use metachron_world::Scene;
+use metachron_world::kinds::ExecutorKind;
 use std::path::PathBuf;
 
 /// Called for every frame; returns whether to go on.
@@ -33,7 +38,7 @@ const PICTURE_SIZE: [u32; 2] = [1280, 720];
 pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let mut session = Session::open(request.scene.clone())?;
     if !request.quiet {
-        session.tell_by(super::output::message);
+        session.tell_by(metachron_console::output::message);
     }
     if request.oracle {
         session.keep_trace();
@@ -41,6 +46,19 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     if !request.window {
         return headless(session, request, request.png.clone(), go_on);
     }
+    in_window(session, request, go_on)
+}
+
+#[cfg(not(feature = "viewer"))]
+fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
+    let png = cfg!(feature = "render").then(|| request.png_without_window.clone());
+    let mut played = headless(session, request, request.png.clone().or(png), go_on)?;
+    played.no_window = Some("this build has no window (feature `viewer`)".to_owned());
+    Ok(played)
+}
+
+#[cfg(feature = "viewer")]
+fn in_window(session: Session, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     match play_in_window(session, window_plan(request), &mut |record, done| go_on(step(record, done))) {
         Ok(outcome) => Ok(played(&request.scene, outcome, None)),
         Err(WindowFailure::NoWindow(session, why)) => without_window(*session, &why, request, go_on),
@@ -51,6 +69,7 @@ pub(super) fn play(request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played>
     }
 }
 
+#[cfg(feature = "viewer")]
 fn window_plan(request: &Request) -> WindowPlan {
     let (frames, seconds) = match request.end {
         Some(RunLength::Frames(frames)) => (Some(frames), None),
@@ -68,6 +87,7 @@ fn window_plan(request: &Request) -> WindowPlan {
 }
 
 /// A window was requested and cannot be opened: the run goes on without it, and leaves a picture.
+#[cfg(feature = "viewer")]
 fn without_window(session: Session, why: &WindowError, request: &Request, go_on: GoOn<'_>) -> anyhow::Result<Played> {
     let png = request.png.clone().unwrap_or_else(|| request.png_without_window.clone());
     let mut played = headless(session, request, Some(png), go_on)?;
@@ -99,8 +119,20 @@ fn headless(session: Session, request: &Request, png: Option<PathBuf>, go_on: Go
     Ok(played)
 }
 
+/// Without the feature `render` nothing is drawn, and a picture that the user asked for cannot be.
+#[cfg(not(feature = "render"))]
+fn drawing(_: &Session, _: &Request, picture: bool, _: Size) -> anyhow::Result<Drawing> {
+    if picture {
+        return Err(
+            metachron_console::output::BadInput("this build draws no pictures (feature `render`)".to_owned()).into()
+        );
+    }
+    Ok(Drawing::Nothing)
+}
+
 /// How frames are drawn: in virtual time only a requested picture, in real time every frame if there is an adapter. Without an
 /// adapter the run fails where the user named a file for the picture.
+#[cfg(feature = "render")]
 fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> anyhow::Result<Drawing> {
     if session.is_virtual() && !picture {
         return Ok(Drawing::Nothing);
@@ -109,7 +141,7 @@ fn drawing(session: &Session, request: &Request, picture: bool, size: Size) -> a
         Ok(gpu) => gpu,
         Err(error @ GpuError::NoAdapter { .. }) if request.png.is_none() => {
             if !request.quiet {
-                super::output::message(&format!("nothing is drawn: {error}"));
+                metachron_console::output::message(&format!("nothing is drawn: {error}"));
             }
             return Ok(Drawing::Nothing);
         }

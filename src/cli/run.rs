@@ -3,19 +3,19 @@
 //! In: arguments. Out: a picture, a report, rows of frames, verdicts on goals.
 //! Never here: the loop itself.
 
-use super::Exit;
 use super::args::{RunArgs, StyleWord};
-use super::output::{BadInput, data, message, tell_overlaps, tell_priority};
 use super::play::play;
-use super::progress::Bar;
-use super::report::{Report, Verdict};
-use crate::compositor::{Colouring, Style};
-use crate::frame::FrameRecord;
-use crate::world::{Scene};
-use crate::scene::{Source, load};
 use anyhow::Context;
 use clap::ArgMatches;
 use clap::parser::ValueSource;
+use metachron_console::exit::Exit;
+use metachron_console::output::{BadInput, data, message, tell_overlaps, tell_priority};
+use metachron_console::progress::Bar;
+use metachron_render::{Colouring, Style};
+use metachron_scene::{Source, load};
+use metachron_session::FrameRecord;
+use metachron_session::report::{Report, Verdict};
+use metachron_world::Scene;
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -141,7 +141,7 @@ fn request(args: &RunArgs, matches: Option<&ArgMatches>) -> anyhow::Result<Reque
         let of_this_kind = flags.iter().filter(move |(id, ..)| from_environment(id) == environment);
         of_this_kind.filter_map(|(_, key, value)| Some(((*key).to_owned(), value.clone()?)))
     };
-    let gains = args.gains.as_deref().map(super::gains::overrides).transpose()?.unwrap_or_default();
+    let gains = args.gains.as_deref().map(metachron_console::gains::overrides).transpose()?.unwrap_or_default();
     let overrides: Vec<_> = given(true).chain(gains).chain(args.set.iter().cloned()).chain(given(false)).collect();
     let source = Source::open(&args.scene)?;
     let scene = load(&source, &overrides)?;

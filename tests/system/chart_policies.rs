@@ -39,7 +39,7 @@ fn every_limit_of_the_closed_loop_is_kept() {
 
 #[test]
 fn live_policies_are_drawn_and_held_against_full_detail() {
-    if let Err(error) = metachron::compositor::Gpu::headless() {
+    if let Err(error) = metachron_render::Gpu::headless() {
         assert!(std::env::var("METACHRON_REQUIRE_ADAPTER").is_err(), "{error}");
         return eprintln!("live chart skipped: {error}");
     }

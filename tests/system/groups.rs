@@ -1,10 +1,11 @@
 //! Groups with levels of their own, from the scene file to the picture.
 
 use crate::picture::gpu;
-use metachron::compositor::{Offscreen, PictureFile, RendererOptions, Size};
-use metachron::control::{LevelDemand, Policy};
-use metachron::frame::{Drawing, Walk};
-use metachron::scene::{self, Source};
+use metachron_lod::control::{LevelDemand, Policy};
+use metachron_render::{Offscreen, PictureFile, RendererOptions, Size};
+use metachron_scene;
+use metachron_scene::Source;
+use metachron_session::{Drawing, Walk};
 
 const SIZE: Size = Size { width: 320, height: 240 };
 const OPTIONS: RendererOptions = RendererOptions { samples: 1, shadow_px: 512, shadow_taps: 1, lean: false };
@@ -54,7 +55,7 @@ fn drawn(levels: &[LevelDemand]) -> Vec<Wood> {
 
 fn walk(drawing: Drawing) -> Walk {
     let source = Source::memory("woods", woods().as_bytes()).expect("short and UTF-8");
-    let scene = scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
+    let scene = metachron_scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
     Walk::open(scene, drawing, SIZE).expect("scenery alone")
 }
 

@@ -4,14 +4,14 @@
 #[cfg(all(target_os = "linux", target_env = "gnu"))]
 use crate::play::{Folder, program};
 use glam::DVec3;
-use metachron::runtime::{
-    AgentHandle, AgentSpawn, AgentState, Command, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock,
-    Threads, state_hash,
-};
 use metachron_core::AgentId;
 use metachron_geometry::Solid;
 use metachron_models::rigid::RigidBody;
 use metachron_models::rigid::RigidSpec;
+use metachron_runtime::{
+    AgentHandle, AgentSpawn, AgentState, Command, Drive, Lockstep, Machine, Pool, Priority, Reader, Run, SystemClock,
+    Threads, state_hash,
+};
 use std::sync::Arc;
 use std::time::Duration;
 

@@ -3,14 +3,15 @@
 use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::{ImageFormat, Rgba, RgbaImage};
-use metachron::compositor::{
-    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, Style,
-};
-use metachron::world::kinds::{ShadingKind};
-use metachron::world::{Scene};
-use metachron::scene::{self, Source};
 use metachron_core::{AgentId, Resolution};
 use metachron_geometry::{Generator, Model, Pattern, Placement, Texture, Tom, Wrap, generate};
+use metachron_render::{
+    Actor, Camera, Form, Gpu, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, Style,
+};
+use metachron_scene;
+use metachron_scene::Source;
+use metachron_world::Scene;
+use metachron_world::kinds::ShadingKind;
 use std::io::Cursor;
 use std::path::Path;
 use std::sync::Arc;
@@ -100,7 +101,7 @@ fn load(folder: &Path, object: &str) -> Result<Scene, String> {
     let text = format!("format = 1\n[[object]]\nname = \"a\"\nmodel = \"mesh\"\n{object}\n");
     std::fs::write(&path, text).expect("a folder of our own");
     let source = Source::open(&path.to_string_lossy()).expect("the file just written");
-    scene::load(&source, &[]).map_err(|error| {
+    metachron_scene::load(&source, &[]).map_err(|error| {
         let told = error.problems.iter().map(|p| format!("{}; {}", p.message, p.expected));
         told.collect::<Vec<_>>().join("\n")
     })

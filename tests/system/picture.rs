@@ -8,10 +8,10 @@ mod stage;
 
 use glam::DVec3;
 use image::RgbaImage;
-use metachron::compositor::{
+use metachron_core::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
+use metachron_render::{
     Camera, Colouring, DrawError, Gpu, GpuError, Hand, Level, Offscreen, RendererOptions, Size, Stage, States, Style,
 };
-use metachron_core::{AgentId, Anchor, Body, CurveState, SimTime, Snapshot};
 use std::path::Path;
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! Scenes as users write them: what loads, and what an error shows.
 
-use metachron::world::{Scene};
+use metachron_world::Scene;
 
-use metachron::scene::{SceneError, Source, builtin, json_schema, load};
+use metachron_scene::{SceneError, Source, builtin, json_schema, load};
 use proptest::prelude::*;
 
 /// The least scene with a tube, for the tests to change.
@@ -449,7 +449,7 @@ fn the_schema_explains_every_key() {
     let schema = json_schema();
     let objects = schema["properties"]["object"]["description"].as_str().unwrap();
     assert!(objects.contains("at most 10000"), "{objects}");
-    for model in metachron::scene::format::MODELS {
+    for model in metachron_scene::format::MODELS {
         for (key, inner) in schema["$defs"][model]["properties"].as_object().unwrap() {
             assert!(key == "model" || inner["description"].is_string(), "{model}.{key}");
         }
@@ -491,11 +491,11 @@ proptest! {
 
 #[test]
 fn the_machines_and_models_that_scenes_can_name_are_those_that_exist() {
-    for preset in metachron::runtime::PRESETS {
+    for preset in metachron_runtime::PRESETS {
         assert!(read(&format!("{TUBE}\n[machine]\npreset = \"{preset}\"\n")).is_ok(), "{preset}");
     }
     let said = problem(&format!("{TUBE}\n[machine]\npreset = \"laptop\"\n")).3;
-    assert!(metachron::runtime::PRESETS.iter().all(|p| said.contains(p)), "{said}");
+    assert!(metachron_runtime::PRESETS.iter().all(|p| said.contains(p)), "{said}");
     let said = problem(&format!("{TUBE}\n[machine.step.tub]\nunit_us = 0.1\n")).3;
     assert!(said.contains("did you mean `tube`?"), "{said}");
 }

@@ -1,12 +1,12 @@
 //! Joints, couplings, grids and faults as users write them: what loads, and what an error shows.
 
 use glam::DVec3;
-use metachron::world::couplings::CouplingKind;
-use metachron::world::{Scene, Spec};
-use metachron::scene::{SceneError, Source, load};
 use metachron_contact::Law;
 use metachron_core::Anchor;
 use metachron_models::rigid::JointKind;
+use metachron_scene::{SceneError, Source, load};
+use metachron_world::couplings::CouplingKind;
+use metachron_world::{Scene, Spec};
 
 /// Two boxes side by side, a tube, two tools, an agent without matter and a post; the tests add ties.
 const YARD: &str = r#"format = 1

@@ -3,13 +3,14 @@
 use crate::picture::gpu;
 use glam::{DQuat, DVec3};
 use image::RgbaImage;
-use metachron::compositor::{
-    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
-};
-use metachron::world::{Scene};
-use metachron::scene::{self, Source};
 use metachron_core::{AgentId, Body, CurveState, Resolution, SimTime, Snapshot};
 use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, tree};
+use metachron_render::{
+    Actor, Camera, Form, Level, Look, Material, Offscreen, RendererOptions, Shading, Size, Stage, States, Style,
+};
+use metachron_scene;
+use metachron_scene::Source;
+use metachron_world::Scene;
 use std::collections::BTreeSet;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -20,7 +21,7 @@ const FOV_RAD: f64 = 0.6;
 
 fn load(text: &str) -> Result<Scene, String> {
     let source = Source::memory("test", text.as_bytes()).expect("short and UTF-8");
-    scene::load(&source, &[]).map_err(|error| {
+    metachron_scene::load(&source, &[]).map_err(|error| {
         let told = error.problems.iter().map(|p| format!("{}; {}; {}", p.message, p.expected, p.text));
         told.collect::<Vec<_>>().join("\n")
     })

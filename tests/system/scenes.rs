@@ -2,9 +2,8 @@
 //!
 //! Agents are stepped in turn here, each seeing the others' states of the step before: no runtime, no picture.
 
-use metachron::world::{Scene, Spec};
+use metachron_world::{Scene, Spec};
 
-use metachron::scene::{builtin, load};
 use metachron_contact::{Agent, Neighbour, Surroundings};
 use metachron_core::{AgentId, Body, SimSpan, SimTime, Snapshot};
 use metachron_models::rigid::RigidBody;
@@ -12,6 +11,7 @@ use metachron_models::rod::Tube;
 use metachron_models::soft::SoftBody;
 use metachron_models::synthetic::Synthetic;
 use metachron_models::tool::Instrument;
+use metachron_scene::{builtin, load};
 use std::sync::Arc;
 
 fn scene(name: &str) -> Scene {
@@ -82,7 +82,7 @@ fn millis(ms: f64) -> SimSpan {
 #[test]
 fn every_agent_of_every_built_in_scene_can_be_built_and_stays_finite() {
     for built_in in &builtin::ALL {
-        let mut play = Play::of(&scene(built_in.name), &metachron::scene::format::MODELS);
+        let mut play = Play::of(&scene(built_in.name), &metachron_scene::format::MODELS);
         for _ in 0..20 {
             play.step(millis(5.0));
         }

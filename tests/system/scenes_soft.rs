@@ -1,10 +1,10 @@
 //! Sheets, solids and ropes as users write them: what loads, what an error shows, and what the scenes with them do.
 
 use crate::play::{Folder, agent, lockstep, number, point};
-use metachron::world::{Scene, Spec};
-use metachron::scene::{SceneError, Source, load};
 use metachron_models::soft::Side;
 use metachron_models::soft::SoftShape;
+use metachron_scene::{SceneError, Source, load};
+use metachron_world::{Scene, Spec};
 
 fn read(text: &str) -> Result<Scene, SceneError> {
     load(&Source::memory("test.toml", format!("format = 1\n{text}").as_bytes())?, &[])

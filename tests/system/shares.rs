@@ -1,9 +1,10 @@
 //! What the time of a frame is shared among: steps and levels at one price, a bounded lag, quality beyond the finest.
 
 use crate::play::Folder;
-use metachron::compositor::{Camera, Size, Style};
-use metachron::frame::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
-use metachron::scene::{self, Source};
+use metachron_render::{Camera, Size, Style};
+use metachron_scene;
+use metachron_scene::Source;
+use metachron_session::{Drawing, End, Finished, Headless, Outcome, Session, play_headless};
 use std::fmt::Write;
 
 const SIZE: Size = Size { width: 640, height: 360 };
@@ -11,7 +12,7 @@ const SIZE: Size = Size { width: 640, height: 360 };
 fn session(text: &str) -> Session {
     let folder = Folder::with(&format!("executor = \"lockstep\"\n{text}"));
     let source = Source::open(folder.scene()).expect("the file just written");
-    let scene = scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
+    let scene = metachron_scene::load(&source, &[]).unwrap_or_else(|why| panic!("{:?}", why.problems));
     Session::open(scene).expect("agents that can run")
 }
 

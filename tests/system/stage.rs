@@ -1,9 +1,9 @@
 //! A still life for pictures: a folded tube in a tray, three rigid bodies, two tools. No physics runs.
 
 use glam::{DQuat, DVec3};
-use metachron::compositor::{Actor, Camera, Form, Level, Look, Material, Prop, Stage, States};
 use metachron_core::{AgentId, Anchor, Body, CurveState, Grasp, Resolution, RigidState, SimTime, Snapshot, ToolState};
 use metachron_geometry::{Obstacle, Solid, ToolShape};
+use metachron_render::{Actor, Camera, Form, Level, Look, Material, Prop, Stage, States};
 use std::f64::consts::{PI, TAU};
 use std::sync::Arc;
 

@@ -1,8 +1,8 @@
 //! What a pool of workers promises of thousands of agents: counts and ratios, whatever the machine does meanwhile.
 
-use metachron::runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Priority, Run, SystemClock};
 use metachron_core::{N_MAX, Resolution, ResolutionRange, SimSpan};
 use metachron_models::synthetic::{Synthetic, SyntheticSpec};
+use metachron_runtime::{AgentSpawn, AgentState, Command, Drive, Pool, Priority, Run, SystemClock};
 use std::sync::Arc;
 use std::time::Duration;
 

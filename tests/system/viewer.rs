@@ -7,11 +7,9 @@ use egui::{Key, Modifiers, pos2};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use fake::{BALL, Fake, World, asked, last_view, middle, press, window, window_of};
-use metachron::compositor::viewer::{
-    Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Show, Weight, keys_text,
-};
-use metachron::compositor::{Colouring, Hit};
 use metachron_core::AgentId;
+use metachron_render::{Colouring, Hit};
+use metachron_viewer::ui::{Action, AgentRow, FrameTimes, Law, MOUSE, Message, SHORTCUTS, Show, Weight, keys_text};
 use std::time::Duration;
 
 #[test]
@@ -325,8 +323,8 @@ fn the_layout_comes_back_from_its_stored_form() {
     press(&mut harness, Key::C);
     let layout = harness.state().viewer.layout;
     let stored = serde_json::to_string(&layout).unwrap();
-    assert_eq!(serde_json::from_str::<metachron::compositor::viewer::Layout>(&stored).unwrap(), layout);
-    let older: metachron::compositor::viewer::Layout = serde_json::from_str("{}").unwrap();
+    assert_eq!(serde_json::from_str::<metachron_viewer::ui::Layout>(&stored).unwrap(), layout);
+    let older: metachron_viewer::ui::Layout = serde_json::from_str("{}").unwrap();
     assert!(older.panels);
 }
 

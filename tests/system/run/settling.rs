@@ -1,10 +1,10 @@
 //! The picture's controller in a whole session: it settles, stays, rests on its clamps and leaves them.
 
 use crate::play::{agent, lockstep, number};
-use metachron::compositor::{Size, Style};
-use metachron::control::Status;
-use metachron::frame::{Finished, Session};
-use metachron::scene::{builtin, load};
+use metachron_lod::control::Status;
+use metachron_render::{Size, Style};
+use metachron_scene::{builtin, load};
+use metachron_session::{Finished, Session};
 use std::time::Duration;
 
 /// Of this size all three targets are within reach: one triangle a pixel, the most there is, takes longer than 1/20 s.

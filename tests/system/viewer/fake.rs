@@ -4,12 +4,12 @@ use egui::{Key, Pos2, Rect, Shape};
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
 use glam::DVec3;
-use metachron::compositor::viewer::{
+use metachron_core::{AgentId, Anchor, Resolution, SimTime};
+use metachron_render::{Camera, Hit, Picture, Ray, Size};
+use metachron_viewer::ui::{
     Action, AgentRow, AgentState, Bounds, FrameTimes, Held, Law, Screen, Show, Status, Tuning, ViewRequest, Viewer,
     Wishes,
 };
-use metachron::compositor::{Camera, Hit, Picture, Ray, Size};
-use metachron_core::{AgentId, Anchor, Resolution, SimTime};
 
 /// A show of three agents around the origin that writes down what it is asked for.
 pub struct Fake {

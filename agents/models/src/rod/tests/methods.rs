@@ -6,7 +6,7 @@ use super::step::{Setting, Stepper};
 use super::*;
 use glam::DVec3;
 
-const SWING: &str = include_str!("../../../../../tests/reference/swing_cable.json");
+const SWING: &str = include_str!("../../../../../crates/lab/src/chart/accuracy/swing_cable.json");
 
 /// The cable of the reference: inextensible but for a thousandth, pinned at the origin, horizontal at first.
 fn swinging(integrator: Integrator, segments: usize, substeps: u32) -> Tube {

@@ -1,0 +1,246 @@
+//! Gains as text: as typed after `--analyse`, and as the TOML fragment that `run --gains` and a scene take.
+//!
+//! In: text. Out: a contender with its gains, or overrides of a scene. Never here: which gains are good.
+
+use super::output::BadInput;
+use anyhow::Context;
+use metachron_lod::control::Law;
+use metachron_lod::tune::Contender;
+use std::path::Path;
+
+/// The gain of the normalised law, α = k/f₀: the same loop gain at any rate.
+pub const NORMALISED: f64 = 0.046;
+
+/// The keys of `[target]` that a fragment may have.
+const KEYS: [&str; 6] = ["policy", "law", "alpha", "beta", "kappa", "lead"];
+const MARGIN: &str = "margin";
+/// Longest fragment, bytes.
+const BYTES_MAX: u64 = 1 << 16;
+
+/// The names of each gain, and its key.
+const GAINS: [(&[&str], &str); 7] = [
+    (&["α", "alpha"], "alpha"),
+    (&["β", "beta"], "beta"),
+    (&["k"], "k"),
+    (&["κ", "kappa"], "kappa"),
+    (&["λ", "lead"], "lead"),
+    (&["margin"], MARGIN),
+    (&["law"], "law"),
+];
+/// Laws by name, each with its gains.
+const LAWS: [(&str, &[&str]); 5] = [
+    ("printed", &["alpha", "beta"]),
+    ("normalised", &["k", "beta"]),
+    ("corrected", &["kappa", "lead", MARGIN]),
+    ("pi", &["kappa", "lead", MARGIN]),
+    ("adaptive", &[MARGIN]),
+];
+
+/// The contender given by `α=1e-4,β=5`, `kappa=0.5,margin=0.1` or `law=adaptive` at a target rate; other gains have the law's defaults.
+pub fn parsed(text: &str, target_hz: f64) -> anyhow::Result<Contender> {
+    let (mut law, mut given) = (None, Vec::new());
+    for part in text.split(',').map(str::trim).filter(|p| !p.is_empty()) {
+        let (name, value) = part.split_once('=').ok_or_else(|| refused(text, "each gain is NAME=NUMBER"))?;
+        let (name, value) = (canonical(name.trim()).ok_or_else(|| unknown(name.trim()))?, value.trim());
+        if name == "law" {
+            law = Some(LAWS.iter().find(|(known, _)| *known == value).ok_or_else(|| no_law(value))?);
+            continue;
+        }
+        let value: f64 = value.parse().map_err(|_| refused(text, "each gain is NAME=NUMBER"))?;
+        given.push((name, value));
+    }
+    if law.is_none() && given.is_empty() {
+        return Err(refused(text, "no gain is given"));
+    }
+    let has = |law: &&(&str, &[&str])| given.iter().all(|(name, _)| law.1.contains(name));
+    let law = match law {
+        Some(law) => Some(law).filter(has),
+        None => LAWS.iter().find(has),
+    };
+    let (law, _) = law.ok_or_else(|| {
+        refused(
+            text,
+            "α and β are of the printed law, k of the normalised, κ, λ and margin of the corrected: give one law's",
+        )
+    })?;
+    contender(law, &|name| given.iter().rev().find(|(n, _)| *n == name).map(|(_, v)| *v), target_hz)
+}
+
+fn contender(law: &str, value: &dyn Fn(&str) -> Option<f64>, target_hz: f64) -> anyhow::Result<Contender> {
+    let gain = |shown: &str, name: &str, own: f64, range: (f64, f64)| {
+        let gain = value(name).unwrap_or(own);
+        inside(shown, gain, range).map(|()| gain)
+    };
+    let beta = || gain("β", "beta", 5.0, (1e-6, 1e3));
+    let lead = if law == "pi" { 0.2 } else { 0.0 };
+    Ok(match law {
+        "printed" => Law::Printed { alpha: gain("α", "alpha", 1e-4, (1e-9, 1.0))?, beta: beta()? }.into(),
+        "normalised" => {
+            let k = gain("k", "k", NORMALISED, (1e-6, 10.0))?;
+            Law::Printed { alpha: k / target_hz, beta: beta()? }.into()
+        }
+        "adaptive" => Contender::Adaptive { margin: gain(MARGIN, MARGIN, 0.02, (0.0, 0.5))? },
+        _ => Law::Corrected {
+            kappa: gain("κ", "kappa", 0.5, Law::KAPPA)?,
+            lead: gain("λ", "lead", lead, Law::LEAD)?,
+            margin: gain(MARGIN, MARGIN, 0.1, (0.0, 0.9))?,
+        }
+        .into(),
+    })
+}
+
+fn canonical(name: &str) -> Option<&'static str> {
+    GAINS.iter().find(|(names, _)| names.contains(&name)).map(|(_, name)| *name)
+}
+
+fn no_law(name: &str) -> anyhow::Error {
+    let laws = LAWS.map(|(name, _)| name).join(", ");
+    BadInput(format!("there is no law `{name}` (there are: {laws})")).into()
+}
+
+fn inside(name: &str, value: f64, (low, high): (f64, f64)) -> anyhow::Result<()> {
+    if (low..=high).contains(&value) {
+        return Ok(());
+    }
+    Err(BadInput(format!("the gain {name} = {value} is none: expected {low} to {high}")).into())
+}
+
+fn unknown(name: &str) -> anyhow::Error {
+    BadInput(format!(
+        "there is no gain `{name}` (there are: α or alpha, β or beta, k, κ or kappa, λ or lead, margin, law)"
+    ))
+    .into()
+}
+
+fn refused(text: &str, why: &str) -> anyhow::Error {
+    BadInput(format!("`{text}` gives no gains: {why}; expected such as α=1e-4,β=5 or kappa=0.5,margin=0.1")).into()
+}
+
+/// The gains in one line.
+pub fn told(contender: Contender) -> String {
+    match contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) => format!("α = {alpha:.3e}, β = {}", digits(beta)),
+        Contender::Feedback(Law::Corrected { kappa, lead: 0.0, margin }) => {
+            format!("κ = {kappa:.3}, margin = {margin:.3}")
+        }
+        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+            format!("κ = {kappa:.3}, λ = {lead:.3}, margin = {margin:.3}")
+        }
+        Contender::Adaptive { margin } => format!("margin = {margin:.3}"),
+    }
+}
+
+/// A number that may be small, in a form that can be typed again.
+fn digits(value: f64) -> String {
+    if value < 0.01 { format!("{value:.3e}") } else { format!("{value:.3}") }
+}
+
+/// The scene fragment that selects `law`, with `comment` above it.
+pub fn fragment(law: Law, comment: &str) -> String {
+    let comment: String = comment.lines().map(|line| format!("# {line}\n")).collect();
+    let gains = match law {
+        Law::Printed { alpha, beta } => format!("law = \"printed\"\nalpha = {alpha:e}\nbeta = {beta:e}\n"),
+        Law::Corrected { kappa, lead, margin } => {
+            format!("law = \"corrected\"\nkappa = {kappa}\nlead = {lead}\nmargin = {margin}\n")
+        }
+    };
+    format!("{comment}[target]\npolicy = \"feedback\"\n{gains}")
+}
+
+/// Refuses a path that is already taken, or in a folder that does not exist.
+pub fn check_place(path: &Path, flag: &str, force: bool) -> anyhow::Result<()> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty());
+    if folder.is_some_and(|f| !f.is_dir()) {
+        return Err(BadInput(format!("the folder of {} does not exist", path.display())).into());
+    }
+    if path.is_dir() {
+        return Err(BadInput(format!("{} is a folder; expected a file", path.display())).into());
+    }
+    if path.exists() && !force {
+        let why = format!("{} is there already; --force overwrites it, {flag} FILE names another", path.display());
+        return Err(BadInput(why).into());
+    }
+    Ok(())
+}
+
+/// The scene overrides in the fragment at `path`.
+///
+/// # Errors
+/// [`BadInput`] where it cannot be read, or contains more than gains.
+pub fn overrides(path: &Path) -> anyhow::Result<Vec<(String, String)>> {
+    let bad = |why: String| BadInput(format!("the gains {}: {why}", path.display()));
+    let size = std::fs::metadata(path).map_err(|e| bad(format!("cannot be read: {e}")))?.len();
+    if size > BYTES_MAX {
+        return Err(bad(format!("has {size} bytes, a fragment at most {BYTES_MAX}")).into());
+    }
+    let text = std::fs::read_to_string(path).map_err(|e| bad(format!("cannot be read: {e}")))?;
+    let table: toml::Table = text.parse().map_err(|e: toml::de::Error| bad(format!("is no TOML: {}", e.message())))?;
+    let target = match (table.len(), table.get("target").and_then(toml::Value::as_table)) {
+        (1, Some(target)) => target,
+        _ => return Err(bad("expected the table `[target]` and nothing else".to_owned()).into()),
+    };
+    if let Some(key) = target.keys().find(|key| !KEYS.contains(&key.as_str()) && *key != MARGIN) {
+        return Err(bad(format!("`{key}` is no gain; expected {}, {MARGIN}", KEYS.join(", "))).into());
+    }
+    Ok(target.iter().map(|(key, value)| (format!("target.{key}"), value.to_string())).collect())
+}
+
+/// Writes the fragment.
+pub fn write(path: &Path, fragment: &str) -> anyhow::Result<()> {
+    std::fs::write(path, fragment).with_context(|| format!("the gains {} cannot be written", path.display()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gains_are_read_by_greek_and_by_name() {
+        let read = |text: &str| parsed(text, 30.0).unwrap();
+        assert_eq!(read("α=1e-3,β=2"), Law::Printed { alpha: 1e-3, beta: 2.0 }.into());
+        assert_eq!(read("k=0.06"), Law::Printed { alpha: 0.002, beta: 5.0 }.into());
+        assert_eq!(read("kappa=0.25"), Law::Corrected { kappa: 0.25, lead: 0.0, margin: 0.1 }.into());
+        assert_eq!(read("law=pi,κ=0.25"), Law::Corrected { kappa: 0.25, lead: 0.2, margin: 0.1 }.into());
+        assert_eq!(read("law=adaptive,margin=0.05"), Contender::Adaptive { margin: 0.05 });
+        assert_eq!(read("law=printed"), Law::PRINTED.into());
+        assert_eq!(read("law=corrected"), Law::CORRECTED.into());
+    }
+
+    #[test]
+    fn gains_that_are_none_are_refused_with_what_is_expected() {
+        for bad in [
+            "",
+            "α",
+            "α=x",
+            "gamma=1",
+            "α=1e-4,κ=0.5",
+            "α=0",
+            "α=-1e-4",
+            "kappa=2",
+            "kappa=nan",
+            "margin=inf",
+            "law=magic",
+            "law=adaptive,κ=0.5",
+            "k=0",
+        ] {
+            let error = parsed(bad, 30.0).unwrap_err().to_string();
+            assert!(error.contains("expected") || error.contains("there are"), "{bad}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_fragment_means_the_gains_it_was_made_of() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("gains.toml");
+        let law = Law::Corrected { kappa: 0.375, lead: 0.125, margin: 0.0625 };
+        write(&path, &fragment(law, "one\ntwo")).unwrap();
+        let over = overrides(&path).unwrap();
+        let value = |key: &str| over.iter().find(|(k, _)| k == key).map(|(_, v)| v.as_str());
+        assert_eq!(value("target.kappa"), Some("0.375"));
+        assert_eq!(value("target.law"), Some("\"corrected\""));
+        std::fs::write(&path, "[target]\nframe_hz = 3.0\n").unwrap();
+        assert!(overrides(&path).unwrap_err().to_string().contains("frame_hz"));
+        std::fs::write(&path, "[[object]]\n").unwrap();
+        assert!(overrides(&path).is_err());
+    }
+}

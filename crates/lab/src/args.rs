@@ -1,0 +1,202 @@
+//! The arguments of `chart`, `bench`, `tune` and `fit`.
+
+use clap::builder::PossibleValuesParser;
+use clap::{Args, ValueHint};
+use metachron_console::values::{CommonArgs, bounded, seconds, size, target_fps};
+use std::path::PathBuf;
+
+/// Examples for the help of the command.
+pub const BENCH_EXAMPLES: &str = "\
+Examples:
+  metachron bench agents --quick                       a minute, into the folder bench/
+  metachron bench agents --executor pool --agents 1000
+  metachron bench pile --quick
+  metachron bench agents --json -q | jq '.rows[] | [.agents, .cpu_us_per_step]'
+
+CPU times are the measure: on a machine that does other things too, wall times tell of those.";
+
+/// Examples for the help of the command.
+pub const TUNE_EXAMPLES: &str = "\
+Examples:
+  metachron tune tube                                  finds gains on the declared machine; writes tube.gains.toml and charts/
+  metachron run tube --gains tube.gains.toml           and with them
+  metachron tune yard --target-fps 120 --quick
+  metachron tune tube --analyse α=1e-4,β=5             why given gains are slow, swing, or are fine
+  metachron tune tube --live --size 640x360            on the machine and the adapter present
+
+Ctrl-C keeps the best gains so far.";
+
+/// Examples for the help of the command.
+pub const FIT_EXAMPLES: &str = "\
+Examples:
+  metachron fit my.toml --tolerance 1e-3               what every object pays, and what a millimetre needs
+  metachron fit my.toml --tolerance 1e-3 --write       and the scene with that
+  metachron fit tube --tolerance 5e-3 --probe intestine --seconds 1
+  metachron fit my.toml --tolerance 1e-4 --json -q | jq '.objects[].needs'
+
+Ctrl-C keeps the best found so far.";
+
+/// Examples for the help of the command.
+pub const CHART_EXAMPLES: &str = "\
+Examples:
+  metachron chart stability                            every experiment, into the folder charts/
+  metachron chart stability --quick --only tube-map --out /tmp/charts
+  metachron chart coupling --quick
+  metachron chart policies --live --only auditorium    the paper's walk on this adapter
+  metachron chart stability --json -q | jq '.experiments[].findings'
+
+Ctrl-C ends a sweep after the rows in hand; the same command takes the finished rows up.";
+
+/// `tune`.
+#[derive(Debug, Args)]
+pub struct TuneArgs {
+    /// A built-in scene or the path of a scene file
+    #[arg(default_value = "tube", value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// Explain these gains instead of looking for better ones, such as α=1e-4,β=5 or kappa=0.5,margin=0.1
+    #[arg(long, value_name = "GAINS")]
+    pub analyse: Option<String>,
+    /// Write the gains here (TOML); SCENE.gains.toml where not given
+    #[arg(long, value_name = "FILE", value_hint = ValueHint::FilePath)]
+    pub gains: Option<PathBuf>,
+    /// Overwrite an existing gains file
+    #[arg(long)]
+    pub force: bool,
+    /// Write the figure here; the folder is created where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Run the experiment on this machine and its graphics adapter instead of the declared machine
+    #[arg(long)]
+    pub live: bool,
+    /// Frames a second to hold, 1 to 1000
+    #[arg(long, value_name = "F", value_parser = target_fps)]
+    pub target_fps: Option<f64>,
+    /// Size of the picture in pixels, each 1 to 8192; 1280x720 where not given
+    #[arg(long, value_name = "WxH", value_parser = size)]
+    pub size: Option<[u32; 2]>,
+    /// Seed of the declared machine's noise
+    #[arg(long, value_name = "N")]
+    pub seed: Option<u32>,
+    /// Fewer frames and fewer seeds: seconds instead of a minute
+    #[arg(long)]
+    pub quick: bool,
+    /// The arguments common to `check`, `tune` and `fit`.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// `fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// A built-in scene or the path of a scene file
+    #[arg(value_hint = ValueHint::FilePath)]
+    pub scene: String,
+    /// Greatest distance of a probe from its place in the converged answer, metres
+    #[arg(long, value_name = "METRES", allow_hyphen_values = true)]
+    pub tolerance: f64,
+    /// Compare only the probes of this object; its ends and its middle where it has none
+    #[arg(long, value_name = "NAME")]
+    pub probe: Option<String>,
+    /// Simulated seconds that are compared, 0.01 to 1000
+    #[arg(long, value_name = "S", default_value_t = 2.0, value_parser = fit_seconds)]
+    pub seconds: f64,
+    /// Greatest number of runs of the scene, of all kinds together
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub runs: u32,
+    /// Write the settings found into the scene file; every other line stays as it is
+    #[arg(long)]
+    pub write: bool,
+    /// The arguments common to `check`, `tune` and `fit`.
+    #[command(flatten)]
+    pub common: CommonArgs,
+}
+
+/// `chart`.
+#[derive(Debug, Args)]
+pub struct ChartArgs {
+    /// What to chart
+    pub subject: Subject,
+    /// Write the files here; the folder is created where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// A small part of the cases, or shorter runs: minutes become seconds
+    #[arg(long)]
+    pub quick: bool,
+    /// For policies: run on the graphics adapter present, through the renderer, instead of on a declared machine
+    #[arg(long)]
+    pub live: bool,
+    /// Only this experiment; may be repeated
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+    /// Print the tables as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no tables
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// `bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// What to measure
+    pub subject: BenchSubject,
+    /// Write the files here; the folder is created where it does not exist
+    #[arg(long, value_name = "FOLDER", default_value = "bench", value_hint = ValueHint::DirPath)]
+    pub out: PathBuf,
+    /// Fewer cases, each for a second
+    #[arg(long)]
+    pub quick: bool,
+    /// For agents: only this executor; may be repeated
+    #[arg(long, value_parser = PossibleValuesParser::new(["threads", "pool", "lockstep"]))]
+    pub executor: Vec<String>,
+    /// For agents: only this model; may be repeated
+    #[arg(long, value_parser = PossibleValuesParser::new(["synthetic", "asleep", "rod", "rigid"]))]
+    pub model: Vec<String>,
+    /// For agents: only cases of at most this many agents
+    #[arg(long, value_name = "N")]
+    pub agents: Option<usize>,
+    /// How long each case runs; for pile: simulated seconds
+    #[arg(long, value_name = "S", value_parser = seconds)]
+    pub seconds: Option<f64>,
+    /// Print the rows as JSON on standard output and nothing else there
+    #[arg(long)]
+    pub json: bool,
+    /// No progress and no table
+    #[arg(short, long)]
+    pub quiet: bool,
+}
+
+/// A subject of `bench`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum BenchSubject {
+    /// Agents on threads, in a pool and in lockstep: CPU per step against the bare loop, lateness, ages, memory
+    Agents,
+    /// Cost of a tube's step by number of segments, with and without the search for self-contact
+    Rod,
+    /// Time to choose a level of detail for every object, by policy and number of objects
+    Select,
+    /// A thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes
+    Pile,
+    /// Pictures on this machine's adapter, by triangles, pixels and shading
+    Render,
+}
+
+/// A subject of `chart`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+pub enum Subject {
+    /// Error of each method against an independent answer, and its cost, next to the points of other engines
+    Accuracy,
+    /// How cost grows with segments, contacts and agents, and how far it is from what the machine could do
+    Scaling,
+    /// Where integrators and couplings blow up, and where they are bounded but wrong
+    Stability,
+    /// How far a scene with separate clocks is from the same scene under one very fine common clock
+    Coupling,
+    /// How well each frame-budget policy keeps its time, on the scenes of the papers
+    Policies,
+}
+
+fn fit_seconds(text: &str) -> Result<f64, String> {
+    bounded(text, 0.01, 1000.0, "seconds")
+}

@@ -1,0 +1,31 @@
+//! `bench`: how much load one machine carries, as CSV, JSON, SVG and PNG in a folder and a table on standard output.
+//!
+//! In: what to measure, which folder. Out: files, a table. Never here: what is measured (each subject is a file).
+
+pub(super) mod agents;
+mod bare;
+pub(super) mod cast;
+mod machine;
+mod pile;
+mod render;
+mod rod;
+mod select;
+mod shown;
+mod subject;
+
+use super::args::{BenchArgs, BenchSubject};
+use metachron_console::exit::Exit;
+
+/// Runs a benchmark.
+///
+/// # Errors
+/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+pub fn command(args: &BenchArgs) -> anyhow::Result<Exit> {
+    match args.subject {
+        BenchSubject::Agents => subject::run::<shown::Agents>(args),
+        BenchSubject::Rod => subject::run::<rod::Rod>(args),
+        BenchSubject::Select => subject::run::<select::Select>(args),
+        BenchSubject::Pile => subject::run::<pile::Pile>(args),
+        BenchSubject::Render => subject::run::<render::Render>(args),
+    }
+}

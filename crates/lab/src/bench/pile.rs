@@ -1,0 +1,275 @@
+//! `bench pile`: a thousand boxes as agents that share islands while they touch, compared with one rapier3d world of the same boxes.
+//!
+//! In: the built-in scene `pile`. Out: rows of whole steps (every box by 1/240 s) per second of CPU time, each over the same
+//! simulated seconds: boxes fall into a bin and come to rest. Only steps really made count, and no box sleeps. Agents that gave
+//! up time are compared with as many first steps of the plain world, because boxes that fall cost less than a heap.
+//! The plain world runs with rapier3d's own settings and with those of an island. Published results for a thousand boxes follow.
+//! Never here: how agents form islands.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::chart::table::Table;
+use super::machine::{others_cpu, own_cpu};
+use super::subject::{Subject, Watch};
+use anyhow::{Context, bail};
+use glam::{DQuat, DVec3};
+use metachron_geometry::Solid;
+use metachron_models::rigid::RigidSpec;
+use metachron_render::{Size, Style};
+use metachron_runtime::AgentStats;
+use metachron_scene::{Source, load};
+use metachron_session::{Drawing, End, Headless, Session, play_headless};
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Scene, Spec};
+use rapier3d::dynamics::{FrictionModel, IntegrationParameters, RigidBodyBuilder, SpringCoefficients};
+use rapier3d::geometry::{ColliderBuilder, SharedShape};
+use rapier3d::parry::math::{Pose, Rotation, Vec3};
+use rapier3d::pipeline::PhysicsWorld;
+use serde::{Deserialize, Serialize};
+
+/// The subject.
+pub(super) struct Pile;
+
+/// Simulated seconds, in full and with `--quick`: the boxes rest after two.
+const SECONDS: [f64; 2] = [5.0, 2.0];
+
+/// Steps per simulated second, of the scene and of the plain world.
+const STEP_HZ: f64 = 240.0;
+
+/// Other engines with 1000 boxes in columns at 240 Hz: whole steps per second of CPU time on a core of an AMD EPYC.
+const OTHERS: [(&str, f64); 3] =
+    [("MuJoCo 4.0.0, Newton", 277.6), ("MuJoCo 4.0.0, CG", 216.8), ("PyBullet 3.2.7, 50 iterations", 74.0)];
+
+/// The step rate of one engine or executor.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Row {
+    pub who: String,
+    /// Whether it was measured in this run; otherwise it was measured elsewhere, with boxes in columns.
+    pub here: bool,
+    pub boxes: usize,
+    pub sim_s: f64,
+    /// Simulated time given up, mean over the boxes.
+    pub dropped_s: f64,
+    pub cpu_s: f64,
+    pub steps_per_cpu_s: f64,
+    /// Ratio to the plain world's rate over as many steps.
+    pub share: f64,
+}
+
+/// CPU seconds that the plain world has used after each of its steps.
+type Spent = Vec<f64>;
+
+impl Subject for Pile {
+    type Row = Row;
+    const NAME: &'static str = "pile";
+
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+        let sim_s = args.seconds.unwrap_or(SECONDS[usize::from(args.quick)]);
+        let scene = load(&Source::open("pile")?, &[])?;
+        let mut spent = Spent::new();
+        let cases: [(&str, &mut dyn FnMut() -> anyhow::Result<Row>); 4] = [
+            ("one rapier3d world", &mut || plain(&scene, sim_s, Settings::Own, &mut spent)),
+            ("one rapier3d world, settings of an island", &mut || {
+                plain(&scene, sim_s, Settings::Island, &mut Spent::new())
+            }),
+            ("agents in virtual time", &mut || agents(&scene, ExecutorKind::Lockstep, sim_s)),
+            ("agents in a pool", &mut || agents(&scene, ExecutorKind::Pool, sim_s)),
+        ];
+        let told = cases.into_iter().zip(0_u32..);
+        let wanted = told.take_while(|((words, _), at)| watch.goes_on(0.2 * f64::from(*at), (*words).to_owned()));
+        let rows = wanted.map(|((_, measured), _)| measured()).collect::<anyhow::Result<Vec<_>>>()?;
+        let Some(plain) = rows.first().cloned() else { return Ok(rows) };
+        let others = OTHERS.map(|(who, steps)| Row {
+            who: who.to_owned(),
+            here: false,
+            steps_per_cpu_s: steps,
+            ..plain.clone()
+        });
+        let held = |row: Row, steps| Row { share: row.steps_per_cpu_s / first_steps_per_s(&spent, steps), ..row };
+        let here =
+            rows.into_iter().map(|row| (row.steps_per_cpu_s * row.cpu_s, row)).map(|(made, row)| held(row, made));
+        Ok(here.chain(others.map(|row| held(row, f64::INFINITY))).collect())
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table =
+            Table::new(&["who", "here", "boxes", "sim_s", "dropped_s", "cpu_s", "steps_per_cpu_s", "share"]);
+        table.rows.extend(rows.iter().map(|row| {
+            let number = |value: f64, digits| if row.here { (value, digits) } else { (f64::NAN, digits) };
+            vec![
+                row.who.clone().into(),
+                if row.here { "yes" } else { "no" }.into(),
+                (row.boxes as f64, 0).into(),
+                number(row.sim_s, 1).into(),
+                number(row.dropped_s, 2).into(),
+                number(row.cpu_s, 2).into(),
+                (row.steps_per_cpu_s, 1).into(),
+                (row.share, 2).into(),
+            ]
+        }));
+        table
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let most = rows.iter().map(|row| row.steps_per_cpu_s).fold(1.0, f64::max);
+        let bar = |(at, row): (usize, &Row)| Layer {
+            label: row.who.clone(),
+            colour: if row.here { Colour::LINES[at % Colour::LINES.len()] } else { Colour::Grey },
+            mark: Mark::Cells(vec![[at as f64 + 0.1, at as f64 + 0.9, 0.0, row.steps_per_cpu_s]]),
+        };
+        let panel = Panel {
+            title: String::new(),
+            x: Axis::linear("", 0.0, rows.len().max(1) as f64),
+            y: Axis::linear("whole steps a second of CPU time", 0.0, 1.1 * most),
+            layers: rows.iter().enumerate().map(bar).collect(),
+        };
+        Figure { title: "A thousand boxes".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+/// Steps per second of CPU time over the first `steps` entries of `spent`, or over all of them where there are fewer.
+fn first_steps_per_s(spent: &[f64], steps: f64) -> f64 {
+    let steps = (steps.round() as usize).clamp(1, spent.len().max(1));
+    spent.get(steps - 1).map_or(f64::NAN, |cpu_s| steps as f64 / cpu_s)
+}
+
+/// Measures the scene's boxes as agents.
+fn agents(scene: &Scene, executor: ExecutorKind, seconds: f64) -> anyhow::Result<Row> {
+    let session = Session::open(Scene { executor, ..scene.clone() })?;
+    let plan = Headless {
+        end: End::Seconds(seconds),
+        size: Size { width: 640, height: 360 },
+        style: Style::default(),
+        drawing: Drawing::Nothing,
+        png: None,
+    };
+    let from = own_cpu() + others_cpu();
+    let outcome = play_headless(session, plan, &mut |_, _| true)?;
+    let cpu_s = (own_cpu() + others_cpu()).saturating_sub(from).as_secs_f64();
+    let boxes = outcome.agents.len();
+    let dropped_s = outcome.agents.iter().map(|a| a.stats.dropped.as_secs_f64()).sum::<f64>() / boxes.max(1) as f64;
+    let who = format!("agents, {}", executor.name());
+    // the simulated time of the steps made, however long they were: time that agents lag behind is not counted
+    let made_s = |s: &AgentStats| {
+        let lived_s = if s.steps == 0 { 0.0 } else { s.steps as f64 / s.mean_hz };
+        (lived_s - s.dropped.as_secs_f64() - s.late.p50_s).max(0.0)
+    };
+    let made_s = outcome.agents.iter().map(|a| made_s(&a.stats)).sum::<f64>() / boxes.max(1) as f64;
+    let steps_per_cpu_s = made_s * STEP_HZ / cpu_s;
+    Ok(Row { who, here: true, boxes, sim_s: outcome.sim_s, dropped_s, cpu_s, steps_per_cpu_s, share: f64::NAN })
+}
+
+/// Solver settings of the plain world.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Settings {
+    /// rapier3d's defaults; only the size of the bodies is set.
+    Own,
+    /// Those of an island of rigid agents (`agents/src/rigid/island/pile.rs`).
+    Island,
+}
+
+impl Settings {
+    fn parameters(self) -> IntegrationParameters {
+        let length_unit = 2.0 * BOX_RADIUS_M as f32;
+        if self == Self::Own {
+            return IntegrationParameters { length_unit, ..IntegrationParameters::default() };
+        }
+        let stiff = SpringCoefficients::new(300.0, 10.0);
+        IntegrationParameters {
+            length_unit,
+            num_solver_iterations: 4,
+            num_internal_stabilization_iterations: 2,
+            contact_softness: stiff,
+            static_contact_softness: stiff,
+            friction_model: FrictionModel::Simplified,
+            normalized_max_linear_velocity: f32::MAX,
+            ..IntegrationParameters::default()
+        }
+    }
+}
+
+/// Half the diagonal of a box of the scene, metres.
+const BOX_RADIUS_M: f64 = 0.034_64;
+
+/// Measures the same boxes in one world; `spent` receives the CPU time used after each step.
+fn plain(scene: &Scene, seconds: f64, settings: Settings, spent: &mut Spent) -> anyhow::Result<Row> {
+    let mut world = PhysicsWorld { gravity: scene.gravity.as_vec3(), ..PhysicsWorld::default() };
+    world.integration_parameters = settings.parameters();
+    world.integration_parameters.dt = (1.0 / STEP_HZ) as f32;
+    for solid in scene.obstacles.iter() {
+        let shape = shape(&solid.solid)?.friction(solid.friction as f32).restitution(solid.restitution as f32);
+        world.colliders.insert(shape.position(pose(solid.position, solid.rotation)));
+    }
+    let mut boxes = 0;
+    for member in &scene.agents {
+        let Spec::Rigid(spec) = &member.spec else { bail!("`{}` is no rigid body", member.name) };
+        insert(&mut world, spec, settings)?;
+        boxes += 1;
+    }
+    let steps = (seconds * STEP_HZ).round();
+    let from = own_cpu();
+    for _ in 0..steps as u64 {
+        world.step();
+        spent.push((own_cpu() - from).as_secs_f64());
+    }
+    let cpu_s = spent.last().copied().unwrap_or_default();
+    let (sim_s, steps_per_cpu_s) = (steps / STEP_HZ, steps / cpu_s);
+    let who = match settings {
+        Settings::Own => "one rapier3d world".to_owned(),
+        Settings::Island => "one rapier3d world, settings of an island".to_owned(),
+    };
+    Ok(Row { who, here: true, boxes, sim_s, dropped_s: 0.0, cpu_s, steps_per_cpu_s, share: f64::NAN })
+}
+
+fn insert(world: &mut PhysicsWorld, spec: &RigidSpec, settings: Settings) -> anyhow::Result<()> {
+    let mut body = RigidBodyBuilder::dynamic()
+        .pose(pose(spec.position, spec.rotation))
+        .linvel(spec.velocity.as_vec3())
+        .angvel(spec.spin.as_vec3())
+        .can_sleep(false);
+    if settings == Settings::Island {
+        let foreseen = body.soft_ccd_prediction(2.0 * BOX_RADIUS_M as f32);
+        body = foreseen.allow_fast_rotation(true).gyroscopic_forces_enabled(true);
+    }
+    let shape = shape(&spec.solid)?.mass(spec.mass_kg as f32);
+    world.insert(body, shape.friction(spec.friction as f32).restitution(spec.restitution as f32));
+    Ok(())
+}
+
+fn shape(solid: &Solid) -> anyhow::Result<ColliderBuilder> {
+    match solid {
+        Solid::Box { half_extents_m: half } => Ok(ColliderBuilder::cuboid(half.x as f32, half.y as f32, half.z as f32)),
+        Solid::Plane => Ok(ColliderBuilder::new(SharedShape::halfspace(Vec3::Z))),
+        _ => None.context("the plain world knows boxes and planes alone"),
+    }
+}
+
+fn pose(position: DVec3, rotation: DQuat) -> Pose {
+    let turned = rotation.as_quat();
+    Pose::from_parts(position.as_vec3(), Rotation::from_xyzw(turned.x, turned.y, turned.z, turned.w))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_plain_world_holds_the_boxes_of_the_scene_and_they_fall() {
+        let scene = load(&Source::open("pile").unwrap(), &[]).unwrap();
+        for settings in [Settings::Own, Settings::Island] {
+            let mut spent = Spent::new();
+            let row = plain(&scene, 0.02, settings, &mut spent).unwrap();
+            assert!(spent.len() == 5 && spent.is_sorted());
+            assert_eq!((row.boxes, row.here), (1000, true));
+            assert!(row.steps_per_cpu_s > 0.0 && (row.sim_s - 5.0 / STEP_HZ).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn who_made_fewer_steps_is_held_against_as_many_first_ones() {
+        let spent = [1.0, 2.0, 4.0, 8.0];
+        let shares = [0.0, 1.0, 2.2, 4.0, 9.0, f64::INFINITY].map(|steps| first_steps_per_s(&spent, steps));
+        assert_eq!(shares, [1.0, 1.0, 1.0, 0.5, 0.5, 0.5]);
+        assert!(first_steps_per_s(&[], 1.0).is_nan());
+    }
+}

@@ -1,0 +1,103 @@
+//! `bench render`: the time of a picture on this machine's adapter, by triangles, pixels and shading.
+//!
+//! In: an adapter. Out: rows of wall time per picture, the least of a few drawings. Never here: a fit of costs to them.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::table::Table;
+use super::subject::{Subject, Watch};
+use anyhow::Context;
+use metachron_lod::control::AREAS_PX;
+use metachron_render::{Drawn, Gpu, RendererOptions, Shading, benchmark};
+use serde::{Deserialize, Serialize};
+
+/// The subject.
+pub(super) struct Render;
+
+/// One picture of equal balls.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Row {
+    pub adapter: String,
+    pub picture_px: f64,
+    pub objects: u32,
+    pub shading: String,
+    /// In the whole picture.
+    pub triangles: f64,
+    /// Covered by objects.
+    pub pixels: f64,
+    pub picture_ms: f64,
+    pub ns_per_triangle: f64,
+}
+
+impl Subject for Render {
+    type Row = Row;
+    const NAME: &'static str = "render";
+
+    fn measure(_args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+        let gpu = Gpu::headless().context("there is no adapter to measure")?;
+        if !watch.goes_on(0.0, gpu.describe()) {
+            return Ok(Vec::new());
+        }
+        let drawn = benchmark(&gpu, RendererOptions::for_adapter(&gpu.info), &AREAS_PX, 0)?;
+        Ok(drawn.iter().map(|drawn| row(&gpu.describe(), drawn)).collect())
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let columns = ["picture_px", "objects", "shading", "triangles", "pixels", "picture_ms", "ns_per_triangle"];
+        let mut table = Table::new(&columns);
+        table.rows.extend(rows.iter().map(|row| {
+            vec![
+                (row.picture_px, 0).into(),
+                (f64::from(row.objects), 0).into(),
+                row.shading.clone().into(),
+                (row.triangles, 0).into(),
+                (row.pixels, 0).into(),
+                (row.picture_ms, 3).into(),
+                (row.ns_per_triangle, 1).into(),
+            ]
+        }));
+        table
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let drawn: Vec<&Row> = rows.iter().filter(|row| row.objects > 0).collect();
+        let (low, high) = span(drawn.iter().map(|row| row.triangles), true);
+        let (least, most) = span(drawn.iter().map(|row| row.picture_ms), true);
+        let layers = SHADINGS.into_iter().zip(Colour::LINES).map(|(shading, colour)| {
+            let here = drawn.iter().filter(|row| row.shading == name(shading));
+            let points = here.map(|row| (row.triangles, row.picture_ms)).collect();
+            Layer { label: name(shading).to_owned(), colour, mark: Mark::Dots(points) }
+        });
+        let (x, y) = (Axis::log("triangles", low, high), Axis::log("ms a picture", least, most));
+        let title = rows.first().map_or_else(String::new, |row| row.adapter.clone());
+        let panel = Panel { title, x, y, layers: layers.collect() };
+        Figure { title: "What pictures take".to_owned(), panels: vec![panel], columns: 1 }
+    }
+}
+
+const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
+
+const fn name(shading: Shading) -> &'static str {
+    match shading {
+        Shading::Flat => "flat",
+        Shading::Gouraud => "gouraud",
+        Shading::PerPixel => "per-pixel",
+        Shading::Textured => "textured",
+        Shading::Shadowed => "shadowed",
+    }
+}
+
+fn row(adapter: &str, drawn: &Drawn) -> Row {
+    let objects = f64::from(drawn.objects);
+    let triangles = objects * drawn.polygons;
+    Row {
+        adapter: adapter.to_owned(),
+        picture_px: drawn.picture_px,
+        objects: drawn.objects,
+        shading: name(drawn.shading).to_owned(),
+        triangles,
+        pixels: objects * drawn.pixels,
+        picture_ms: 1e3 * drawn.seconds,
+        ns_per_triangle: if triangles > 0.0 { 1e9 * drawn.seconds / triangles } else { f64::NAN },
+    }
+}

@@ -1,0 +1,214 @@
+//! `bench agents`: which cases are measured, and how their rows are shown.
+//!
+//! In: the arguments. Out: rows, a table, a figure. Never here: what a case measures ([`super::agents`]).
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::chart::power::exponent;
+use super::super::chart::table::Table;
+use super::agents::{Case, Executor, Row, TENTH_HZ, UNPACED_HZ, cases, measure};
+use super::cast::Model;
+use super::subject::{Subject, Watch};
+use metachron_console::output::{BadInput, message};
+use metachron_runtime::Priority;
+use std::time::Duration;
+
+/// The subject.
+pub(super) struct Agents;
+
+/// How long each case runs: long enough for a few hundred frames, or, with `--quick`, only to see that it works.
+const SPANS: [Duration; 2] = [Duration::from_secs(4), Duration::from_secs(1)];
+
+impl Subject for Agents {
+    type Row = Row;
+    const NAME: &'static str = "agents";
+
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Row>> {
+        let granted = Priority::Realtime.ask();
+        let possible = |case: &Case| case.priority == Priority::Normal || granted.is_ok();
+        let all = cases(args.quick).into_iter();
+        let chosen: Vec<_> = all.filter(|case| wanted(args, case) && possible(case)).collect();
+        if chosen.is_empty() {
+            let why =
+                "no case is of that executor, that model and so few agents: the least have 1 agent, with --quick 10";
+            return Err(BadInput(why.to_owned()).into());
+        }
+        let span = args.seconds.map_or(SPANS[usize::from(args.quick)], Duration::from_secs_f64);
+        let mut rows = Vec::with_capacity(chosen.len());
+        for (at, case) in chosen.iter().enumerate() {
+            let words = format!("{} {} {}", case.agents, case.model.name(), case.executor.name());
+            if !watch.goes_on(at as f64 / chosen.len() as f64, words) {
+                break;
+            }
+            rows.push(measure(case, span)?);
+        }
+        if let Err(refused) = granted
+            && !args.quiet
+        {
+            message(&format!("note: {refused}; nothing was measured of it"));
+        }
+        Ok(rows)
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        table(rows)
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        drawn(rows)
+    }
+}
+
+fn wanted(args: &BenchArgs, case: &Case) -> bool {
+    let named = |names: &[String], name: &str| names.is_empty() || names.iter().any(|n| n == name);
+    named(&args.executor, case.executor.name())
+        && named(&args.model, case.model.name())
+        && args.agents.is_none_or(|agents| case.agents <= agents)
+}
+
+fn table(rows: &[Row]) -> Table {
+    let mut table = Table::new(&[
+        "executor",
+        "model",
+        "priority",
+        "agents",
+        "rate_hz",
+        "cpu_us",
+        "cores",
+        "bare_us",
+        "sleeping_us",
+        "thread_us",
+        "over_thread",
+        "steps_per_s",
+        "age_p99_ms",
+        "late_p50_ms",
+        "late_p99_ms",
+        "dropped_ms",
+        "bytes",
+        "switches",
+        "frame_p99_ms",
+        "read_ns",
+        "start_ms",
+        "end_ms",
+    ]);
+    for row in rows {
+        let or_nan = |number: Option<f64>| number.unwrap_or(f64::NAN);
+        table.rows.push(vec![
+            row.executor.name().into(),
+            row.model.name().into(),
+            if row.realtime { "realtime" } else { "normal" }.into(),
+            (row.agents as f64, 0).into(),
+            (row.rate_hz, 1).into(),
+            (row.cpu_us_per_step, 2).into(),
+            (row.cores, 3).into(),
+            (row.bare_us_per_step, 2).into(),
+            (row.sleeping_us_per_step, 2).into(),
+            (or_nan(row.thread_us_per_step), 2).into(),
+            (or_nan(row.over_thread), 2).into(),
+            (row.steps_per_s, 0).into(),
+            (row.age_ms_p99, 2).into(),
+            (row.late_ms_p50, 2).into(),
+            (row.late_ms_p99, 2).into(),
+            (row.dropped_ms, 1).into(),
+            (or_nan(row.bytes_per_agent), 0).into(),
+            (or_nan(row.switches_per_step), 2).into(),
+            (row.frame_late_ms_p99, 2).into(),
+            (row.read_ns_per_agent, 0).into(),
+            (row.start_ms, 1).into(),
+            (row.shutdown_ms, 1).into(),
+        ]);
+    }
+    table
+}
+
+/// CPU per step and lateness over the number of agents, and the cost of a round where agents are unpaced.
+fn drawn(all: &[Row]) -> Figure {
+    let of_a_kind = |row: &&Row| row.model == Model::Synthetic && ![1000.0, TENTH_HZ].contains(&row.rate_hz);
+    let (free, rows): (Vec<&Row>, Vec<&Row>) = all.iter().filter(of_a_kind).partition(|row| row.rate_hz == UNPACED_HZ);
+    let of = |executor: Executor, y: fn(&Row) -> f64| -> Vec<(f64, f64)> {
+        rows.iter().filter(|row| row.executor == executor).map(|row| (row.agents as f64, y(row))).collect()
+    };
+    let panel = |title: &str, label: &'static str, y: fn(&Row) -> f64, bare: Option<fn(&Row) -> f64>| {
+        let executors = [Executor::Threads, Executor::Pool, Executor::Lockstep];
+        let mut layers: Vec<Layer> = executors
+            .into_iter()
+            .zip(Colour::LINES)
+            .map(|(executor, colour)| Layer {
+                label: executor.name().to_owned(),
+                colour,
+                mark: Mark::Line(of(executor, y)),
+            })
+            .collect();
+        layers.extend(bare.map(|bare| Layer {
+            label: "bare loop".to_owned(),
+            colour: Colour::Grey,
+            mark: Mark::Dashed(of(Executor::Pool, bare)),
+        }));
+        let (low, high) = span(rows.iter().map(|row| row.agents as f64), true);
+        let (least, most) = span(rows.iter().flat_map(|row| [Some(y(row)), bare.map(|b| b(row))]).flatten(), true);
+        Panel { title: title.to_owned(), x: Axis::log("agents", low, high), y: Axis::log(label, least, most), layers }
+    };
+    let mut panels = vec![
+        panel("CPU a step", "µs", |row| row.cpu_us_per_step, Some(|row| row.bare_us_per_step)),
+        panel("lateness, 99 in 100", "ms", |row| row.late_ms_p99.max(1e-3), None),
+    ];
+    panels.extend((free.len() > 1).then(|| growth(&free)));
+    Figure { title: "What being an agent costs".to_owned(), panels, columns: 2 }
+}
+
+/// CPU time of a round (one step of every agent), where agents step as fast as they can.
+fn growth(rows: &[&Row]) -> Panel {
+    let line = |y: fn(&Row) -> f64| rows.iter().map(|row| (row.agents as f64, y(row) * row.agents as f64)).collect();
+    let (ours, bare): (Vec<_>, Vec<_>) = (line(|row| row.cpu_us_per_step), line(|row| row.bare_us_per_step));
+    let (low, high) = span(ours.iter().map(|(x, _)| *x), true);
+    let (least, most) = span(ours.iter().chain(&bare).map(|(_, y)| *y), true);
+    let title = format!("as fast as they can: a round costs agents^{:.2}", exponent(&ours).unwrap_or(f64::NAN));
+    let layers = vec![
+        Layer { label: "pool".to_owned(), colour: Colour::LINES[1], mark: Mark::Line(ours) },
+        Layer { label: "bare loop".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(bare) },
+    ];
+    Panel { title, x: Axis::log("agents", low, high), y: Axis::log("µs a round", least, most), layers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::subject::write;
+    use super::*;
+
+    fn row(executor: Executor, agents: usize) -> Row {
+        let case = Case { executor, model: Model::Synthetic, priority: Priority::Normal, agents, rate_hz: 500.0 };
+        measure(&case, Duration::from_millis(40)).unwrap()
+    }
+
+    #[test]
+    fn a_row_says_what_was_measured_and_the_files_hold_it() {
+        let rows: Vec<_> = [Executor::Threads, Executor::Pool, Executor::Lockstep].map(|e| row(e, 3)).into();
+        assert!(rows.iter().all(|row| row.steps_per_s > 0.0 && row.bare_us_per_step > 0.0), "{rows:?}");
+        let floors: Vec<_> = rows.iter().map(|row| row.thread_us_per_step.is_some_and(|floor| floor > 0.0)).collect();
+        assert_eq!(floors, [true, false, false], "a plain thread each stands beside threads alone");
+        let folder = tempfile::tempdir().unwrap();
+        write::<Agents>(folder.path(), &rows).unwrap();
+        let read: Result<Vec<Row>, _> =
+            csv::Reader::from_path(folder.path().join("agents.csv")).unwrap().deserialize().collect();
+        assert_eq!(read.unwrap().len(), 3);
+        let json: serde_json::Value =
+            serde_json::from_slice(&std::fs::read(folder.path().join("agents.json")).unwrap()).unwrap();
+        assert_eq!(json["rows"][1]["executor"], "pool");
+        assert!(json["rows"][1]["late_ms"]["p99"].is_number() && json["rows"][1]["late_ms_p99"].is_null());
+        assert!(std::fs::read(folder.path().join("agents.png")).unwrap().len() > 1000);
+    }
+
+    #[test]
+    fn every_executor_and_model_has_its_cases() {
+        for quick in [true, false] {
+            let cases = cases(quick);
+            for executor in [Executor::Threads, Executor::Pool, Executor::Lockstep] {
+                for model in [Model::Synthetic, Model::Rod, Model::Rigid] {
+                    assert!(cases.iter().any(|case| case.executor == executor && case.model == model));
+                }
+            }
+            assert!(cases.iter().all(|case| case.executor != Executor::Threads || case.agents <= 1000));
+            assert!(cases.iter().any(|case| case.agents == 100_000));
+        }
+    }
+}

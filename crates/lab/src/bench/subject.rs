@@ -1,0 +1,107 @@
+//! What every benchmark has in common: rows, the table and the figure of them, and the files they are written to.
+//!
+//! In: a subject. Out: CSV, JSON, SVG and PNG in a folder, a table on standard output. Never here: what is measured.
+
+use super::super::args::BenchArgs;
+use super::super::chart::figure;
+use super::super::chart::figure::Figure;
+use super::super::chart::table::Table;
+use super::super::chart::{prepared, stopper};
+use anyhow::Context;
+use metachron_console::exit::Exit;
+use metachron_console::output::{data, message};
+use metachron_console::progress::Bar;
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Something that can be measured.
+pub(super) trait Subject {
+    /// One line of the CSV file; a pair of fields that end in `_p50` and `_p99` is one field of two in JSON.
+    type Row: Serialize;
+    /// Its name on the command line; the files are called after it.
+    const NAME: &'static str;
+
+    /// Measures what is asked for, case by case as long as `watch` says to go on: the rows that are finished.
+    fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Self::Row>>;
+
+    /// The table that is printed.
+    fn table(rows: &[Self::Row]) -> Table;
+
+    /// The picture of the rows.
+    fn figure(rows: &[Self::Row]) -> Figure;
+}
+
+/// Follows a benchmark: receives its progress and says whether to go on.
+pub(super) struct Watch {
+    bar: Bar,
+    stopped: Arc<AtomicBool>,
+}
+
+impl Watch {
+    /// Reports a case that is about to be measured: the share that is done, and its description. `false`: measure no more.
+    pub(super) fn goes_on(&self, done: f64, words: String) -> bool {
+        self.bar.tell(done, words);
+        !self.stopped.load(Ordering::Relaxed)
+    }
+}
+
+/// Measures a subject, writes its files and prints its rows.
+pub(super) fn run<S: Subject>(args: &BenchArgs) -> anyhow::Result<Exit> {
+    let stopped = stopper()?;
+    let folder = prepared(&args.out)?;
+    let watch = Watch { bar: Bar::new(S::NAME, args.quiet), stopped: Arc::clone(&stopped) };
+    let rows = S::measure(args, &watch)?;
+    drop(watch);
+    let interrupted = stopped.load(Ordering::Relaxed);
+    if interrupted && rows.is_empty() {
+        message("interrupted before a row was finished: nothing was written");
+        return Ok(Exit::Interrupted);
+    }
+    write::<S>(folder, &rows)?;
+    if args.json {
+        data(&format!("{}\n", json::<S>(&rows)?))?;
+    } else if !args.quiet {
+        data(&S::table(&rows).text())?;
+    }
+    if interrupted {
+        message("interrupted: the finished rows are written");
+    }
+    Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
+}
+
+/// Writes the files of `rows`.
+pub(super) fn write<S: Subject>(folder: &Path, rows: &[S::Row]) -> anyhow::Result<()> {
+    let mut csv = csv::Writer::from_writer(Vec::new());
+    rows.iter().try_for_each(|row| csv.serialize(row))?;
+    let figure = S::figure(rows);
+    let files = [
+        ("csv", csv.into_inner()?),
+        ("json", json::<S>(rows)?.into_bytes()),
+        ("svg", figure::svg(&figure)?.into_bytes()),
+        ("png", figure::png(&figure)?),
+    ];
+    for (kind, bytes) in files {
+        let path = folder.join(format!("{}.{kind}", S::NAME));
+        std::fs::write(&path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(())
+}
+
+fn json<S: Subject>(rows: &[S::Row]) -> anyhow::Result<String> {
+    let rows = rows.iter().map(|row| Ok(paired(serde_json::to_value(row)?))).collect::<anyhow::Result<Vec<_>>>()?;
+    Ok(serde_json::to_string_pretty(&serde_json::json!({ "bench": S::NAME, "rows": rows }))?)
+}
+
+/// The row with each pair of percentiles under one name.
+fn paired(mut row: serde_json::Value) -> serde_json::Value {
+    let Some(fields) = row.as_object_mut() else { return row };
+    let names: Vec<String> = fields.keys().filter_map(|key| Some(key.strip_suffix("_p50")?.to_owned())).collect();
+    for name in names {
+        let mut part = |end: &str| fields.remove(&format!("{name}_{end}"));
+        let pair = serde_json::json!({ "p50": part("p50"), "p99": part("p99") });
+        fields.insert(name, pair);
+    }
+    row
+}

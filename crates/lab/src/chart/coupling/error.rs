@@ -1,0 +1,238 @@
+//! The coupling error: the same scene with separate clocks, and under one very fine common clock.
+//!
+//! Both runs are compared whenever the slower and the faster clock show the same time, with every given impulse delivered: this
+//! measures the effect of the clocks, not the age of published states. The error of each agent's own longer step is included;
+//! at a ratio of 1 there is little else.
+
+use super::super::bench::Faults;
+use super::super::energy_bench::Play;
+use super::super::experiment::{Experiment, Finding, worst};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::scenes::{Scene, scene};
+use super::super::table::Table;
+use glam::DVec3;
+use metachron_contact::audit::{Member, on_their_way, settled};
+use metachron_core::Site;
+use metachron_core::{AgentId, Anchor, Body, SimTime};
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(in super::super) struct CouplingError;
+
+const SCENES: [&str; 4] = ["oblique-blow", "ball-on-box", "tube-on-bar", "crossing"];
+const RATIOS: [u32; 5] = [1, 3, 10, 30, 100];
+const QUICK_RATIOS: [u32; 2] = [1, 10];
+/// A step of the faster clock, and of the common clock of the other run, a quarter of it, nanoseconds.
+const FAST_NS: u64 = 1_000_000;
+const ORACLE_NS: u64 = FAST_NS / 4;
+/// Clocks that differ by less show the same time, seconds: a sixth of a tenth of a second is no whole number of nanoseconds.
+const SAME_S: f64 = 1e-6;
+const SECONDS: f64 = 1.0;
+const QUICK_SECONDS: f64 = 0.4;
+/// Bounds for two balls: of the impulse, as close as against the closed form, and of the momentum, closer.
+const BLOW_MAX: f64 = 0.01;
+const MOMENTUM_MAX: f64 = 0.005;
+/// How far a body that rests on another may be from its place under one clock, metres.
+const REST_MAX_M: f64 = 2e-3;
+
+/// A scene, the ratio of the clocks, and which agent has the fast one.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    scene: String,
+    ratio: u32,
+    first_is_fast: bool,
+    seconds: f64,
+}
+
+/// The difference of the two runs.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    scene: String,
+    ratio: u32,
+    first_is_fast: bool,
+    seconds: f64,
+    /// The number of comparisons of both runs.
+    looks: usize,
+    /// Positions of the followed points: root mean square and greatest distance, metres.
+    position_rms_m: f64,
+    position_max_m: f64,
+    /// Difference of the total momenta at the last comparison, as a share of the impulse exchanged under one clock.
+    momentum: f64,
+    /// Difference of the impulses exchanged up to there, as the same share.
+    impulse: f64,
+}
+
+impl Experiment for CouplingError {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "error";
+    const TITLE: &'static str = "the same scene with clocks apart and under one tiny clock: the coupling error";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let (ratios, seconds) = if quick { (&QUICK_RATIOS[..], QUICK_SECONDS) } else { (&RATIOS[..], SECONDS) };
+        let mut cases = Vec::new();
+        for name in SCENES {
+            for &ratio in ratios {
+                let ways = if ratio == 1 { &[true][..] } else { &[true, false][..] };
+                let of = |&first_is_fast: &bool| Case { scene: name.to_owned(), ratio, first_is_fast, seconds };
+                cases.extend(ways.iter().map(of));
+            }
+        }
+        cases
+    }
+
+    fn measure(case: &Case) -> Row {
+        let Case { scene, ratio, first_is_fast, seconds } = case.clone();
+        let Apart { looks, position_rms_m, position_max_m, momentum, impulse } = apart(case).unwrap_or_default();
+        Row { scene, ratio, first_is_fast, seconds, looks, position_rms_m, position_max_m, momentum, impulse }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { scene: row.scene.clone(), ratio: row.ratio, first_is_fast: row.first_is_fast, seconds: row.seconds }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let panels = vec![
+            panel(rows, "position", "position, rms over the run, mm", |r| 1e3 * r.position_rms_m),
+            panel(rows, "impulse", "impulse, share of that under one clock", |r| r.impulse),
+        ];
+        Figure { title: "What clocks apart change, against one clock of 4 kHz".to_owned(), panels, columns: 2 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table =
+            Table::new(&["scene", "ratio", "first", "looks", "rms_mm", "max_mm", "momentum_error", "impulse_error"]);
+        table.rows.extend(rows.iter().map(|r| {
+            vec![
+                r.scene.clone().into(),
+                (f64::from(r.ratio), 0).into(),
+                if r.first_is_fast { "fast" } else { "slow" }.into(),
+                (r.looks as f64, 0).into(),
+                (1e3 * r.position_rms_m, 4).into(),
+                (1e3 * r.position_max_m, 4).into(),
+                (r.momentum, 6).into(),
+                (r.impulse, 6).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let lost = rows.iter().filter(|r| !r.position_rms_m.is_finite()).count() as f64;
+        let of = |scene: &str, get: fn(&Row) -> f64| worst(rows.iter().filter(|r| r.scene == scene).map(get));
+        vec![
+            Finding::at_most("runs that did not come to their end", lost, 0.0),
+            Finding::at_most("two balls: impulse against that under one clock", of(SCENES[0], |r| r.impulse), BLOW_MAX),
+            Finding::at_most("two balls: momentum over the impulse", of(SCENES[0], |r| r.momentum), MOMENTUM_MAX),
+            Finding::at_most("ball on box: position, m", of(SCENES[1], |r| r.position_max_m), REST_MAX_M),
+        ]
+    }
+}
+
+/// One quantity of all scenes over the ratio.
+fn panel(rows: &[Row], title: &str, label: &'static str, get: fn(&Row) -> f64) -> Panel {
+    let least = |v: f64| if v < 1e-9 { 1e-9 } else { v };
+    let mut layers = Vec::new();
+    for (name, colour) in SCENES.into_iter().zip(Colour::LINES) {
+        for way in [true, false] {
+            let here = rows.iter().filter(|r| r.scene == name && (r.first_is_fast == way || r.ratio == 1));
+            let points: Vec<_> = here.map(|r| (f64::from(r.ratio), least(get(r)))).collect();
+            let mark = if way { Mark::Line(points) } else { Mark::Dashed(points) };
+            let label = if way { name.to_owned() } else { format!("{name}, first slow") };
+            layers.push(Layer { label, colour, mark });
+        }
+    }
+    let (low, high) = span(rows.iter().map(|r| least(get(r))), true);
+    let x = Axis::log("ratio of the clocks", 0.8, 125.0);
+    Panel { title: title.to_owned(), x, y: Axis::log(label, low, 30.0 * high), layers }
+}
+
+/// The difference of two runs.
+struct Apart {
+    looks: usize,
+    position_rms_m: f64,
+    position_max_m: f64,
+    momentum: f64,
+    impulse: f64,
+}
+
+impl Default for Apart {
+    fn default() -> Self {
+        let none = f64::NAN;
+        Self { looks: 0, position_rms_m: none, position_max_m: none, momentum: none, impulse: none }
+    }
+}
+
+/// The record of one run: positions at every comparison, momentum and impulse at the last one.
+#[derive(Default)]
+struct Trail {
+    looks: Vec<Vec<DVec3>>,
+    momentum: DVec3,
+    impulse_n_s: f64,
+}
+
+fn apart(case: &Case) -> Option<Apart> {
+    let slow_ns = FAST_NS * u64::from(case.ratio);
+    let steps_ns = if case.first_is_fast { [FAST_NS, slow_ns] } else { [slow_ns, FAST_NS] };
+    let coupled = trail(case, slow_ns, steps_ns)?;
+    let oracle = trail(case, slow_ns, [ORACLE_NS; 2])?;
+    let pairs = coupled.looks.iter().flatten().zip(oracle.looks.iter().flatten());
+    let squares: Vec<f64> = pairs.map(|(a, b)| a.distance_squared(*b)).collect();
+    let mean = squares.iter().sum::<f64>() / squares.len() as f64;
+    Some(Apart {
+        looks: coupled.looks.len(),
+        position_rms_m: mean.sqrt(),
+        position_max_m: worst(squares).sqrt(),
+        momentum: coupled.momentum.distance(oracle.momentum) / oracle.impulse_n_s,
+        impulse: (coupled.impulse_n_s - oracle.impulse_n_s).abs() / oracle.impulse_n_s,
+    })
+}
+
+/// Plays the scene and records it at every whole multiple of `every_ns`, up to the case's length; `None` where it broke off.
+fn trail(case: &Case, every_ns: u64, steps_ns: [u64; 2]) -> Option<Trail> {
+    let Scene { play, points, .. } = scene(&case.scene, steps_ns.map(|ns| 1e9 / ns as f64), Faults::default())?;
+    let looks = libm::round(case.seconds * 1e9) as u64 / every_ns;
+    let ids: Vec<AgentId> = (0..play.stage.members().len() as u32).map(AgentId).collect();
+    let mut trail = Trail::default();
+    play.run(2.0 * case.seconds, |play, _| {
+        let due = SimTime::from_nanos((trail.looks.len() as u64 + 1) * every_ns);
+        if ids.iter().all(|id| play.stage.own(*id).time.secs_after(due).abs() < SAME_S) {
+            trail.looks.push(points.iter().map(|point| place(play, *point)).collect());
+            trail.momentum = play.common(due).momentum;
+            let pairs = ids.iter().flat_map(|id| &play.stage.own(*id).pairs);
+            trail.impulse_n_s = pairs.map(|pair| pair.impulse_n_s).sum();
+        }
+        (trail.looks.len() as u64) < looks
+    });
+    (trail.looks.len() as u64 == looks).then_some(trail)
+}
+
+/// The position of a point, with every impulse on its way to its agent delivered.
+fn place(play: &Play, (id, anchor): (AgentId, Anchor)) -> DVec3 {
+    let members = play.stage.members();
+    let Some(member) = members.get(id.0 as usize) else { return DVec3::NAN };
+    let body = match settled(member, &members, member.snapshot.time) {
+        Some(state) => Body::Rigid(state),
+        None => delivered(member, &members),
+    };
+    body.point(anchor).map_or(DVec3::NAN, |(x, _)| x)
+}
+
+/// A tube moved by the impulses that other agents gave it since its last step.
+fn delivered(member: &Member<'_>, members: &[Member<'_>]) -> Body {
+    let mut body = member.snapshot.body.clone();
+    let (Body::Curve(state), Some(inertia)) = (&mut body, member.snapshot.inertia.response()) else { return body };
+    let mut carried = vec![DVec3::ZERO; 2 * state.positions.len() - 1];
+    on_their_way(member, members, |_, site, _, moved| {
+        let Site::Arc(arc_m) = site else { return };
+        let Some((segment, share)) = state.locate(arc_m) else { return };
+        carried[2 * segment] += moved.linear * (1.0 - share);
+        carried[2 * segment + 2] += moved.linear * share;
+        carried[2 * segment + 1] += moved.angular;
+    });
+    if inertia.slots() == carried.len() {
+        inertia.respond(&mut carried, false);
+        state.positions.iter_mut().zip(carried.iter().step_by(2)).for_each(|(x, by)| *x += *by);
+    }
+    body
+}

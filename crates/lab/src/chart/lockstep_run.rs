@@ -1,0 +1,54 @@
+//! Agents in a run of their own in virtual time, by the program's own runtime, islands included.
+//!
+//! In: agents with rates. Out: a run whose steps cost nothing, and its agents' newest states. Never here: measurements.
+
+use metachron_contact::audit::Member;
+use metachron_core::{AgentId, Snapshot};
+use metachron_runtime::{AgentSpawn, DrawPrice, Lockstep, Machine, Run, RunError, StepPrice};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A run.
+pub(super) struct Company(Lockstep);
+
+/// A machine on which every step takes no time.
+fn tireless() -> Machine {
+    let free = |model: &'static str| StepPrice { model: model.into(), base_us: 0.0, unit_us: 0.0 };
+    Machine {
+        cores: 64,
+        steps: ["tube", "rigid", "instrument", "synthetic"].map(free).to_vec(),
+        draw: DrawPrice { setup_ms: 0.0, pixel_ns: 0.0, objects: Default::default() },
+        ..Machine::default()
+    }
+}
+
+impl Company {
+    /// Begins a run.
+    ///
+    /// # Errors
+    /// The runtime's refusal.
+    pub(super) fn start(spawns: Vec<AgentSpawn>) -> Result<Self, RunError> {
+        Ok(Self(Lockstep::start(spawns, tireless())?))
+    }
+
+    /// Goes on until all agents have reached `seconds`.
+    pub(super) fn run_to(&mut self, seconds: f64) {
+        self.0.wait_until(Duration::from_secs_f64(seconds));
+    }
+
+    /// The newest states.
+    pub(super) fn snapshots(&self) -> Vec<Arc<Snapshot>> {
+        self.0.agents().iter().map(|agent| agent.latest()).collect()
+    }
+
+    /// The number of steps of each agent, and the leader of its island.
+    pub(super) fn steps(&self) -> Vec<(u64, Option<AgentId>)> {
+        self.0.agents().iter().map(|agent| agent.stats()).map(|stats| (stats.steps, stats.led_by)).collect()
+    }
+}
+
+/// Rigid bodies for an audit.
+pub(super) fn members(snapshots: &[Arc<Snapshot>]) -> Vec<Member<'_>> {
+    let all = (0..).map(AgentId).zip(snapshots);
+    all.map(|(id, snapshot)| Member { id, snapshot, mass_per_length_kg_m: 0.0, rotary_kg_m: 0.0 }).collect()
+}

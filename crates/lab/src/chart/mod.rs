@@ -1,0 +1,293 @@
+//! `chart`: experiments that show where methods fail, as CSV, SVG and PNG in a folder and a table on standard output.
+//!
+//! In: which subject, which folder. Out: files, a table, findings. Never here: what is measured (each experiment is a file).
+
+mod accuracy;
+mod bench;
+mod coupling;
+mod energy_bench;
+mod experiment;
+pub(super) mod figure;
+mod lockstep_run;
+mod policies;
+pub(super) mod power;
+mod rows;
+mod scaling;
+mod scenes;
+mod stability;
+mod sweep;
+pub(super) mod table;
+mod timing;
+
+use super::args::{ChartArgs, Subject};
+use accuracy::diagram::Diagram;
+use anyhow::Context;
+use experiment::Finding;
+use metachron_console::exit::Exit;
+use metachron_console::output::{BadInput, data, message};
+use metachron_console::progress::Bar;
+use metachron_render::{Gpu, PictureFile};
+use policies::live::Live;
+use rows::RowFile;
+use scaling::growth::Scaling;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
+use table::{Cell, Table};
+
+pub(super) use experiment::Experiment;
+pub(super) use policies::selection::Selection;
+
+/// Settings that the experiments of a command share.
+struct Setting<'a> {
+    subject: &'static str,
+    folder: &'a Path,
+    quick: bool,
+    quiet: bool,
+    stopped: &'a AtomicBool,
+}
+
+/// The result of an experiment.
+#[derive(Serialize)]
+struct Done {
+    name: &'static str,
+    title: &'static str,
+    complete: bool,
+    rows: usize,
+    files: Vec<PathBuf>,
+    table: Table,
+    findings: Vec<Finding>,
+}
+
+/// An experiment that can be run by its name.
+struct Entry {
+    name: &'static str,
+    run: fn(&Setting<'_>) -> anyhow::Result<Done>,
+}
+
+const fn entry<E: Experiment>() -> Entry {
+    Entry { name: E::NAME, run: run::<E> }
+}
+
+const STABILITY: &[Entry] = &[
+    entry::<stability::drop::Drop>(),
+    entry::<stability::penalty_limit::PenaltyLimit>(),
+    entry::<stability::pairs::Pairs>(),
+    entry::<stability::heavy::Heavy>(),
+    entry::<stability::closed::Closed>(),
+    entry::<stability::tube_map::TubeMap>(),
+    entry::<stability::capstan::Capstan>(),
+    entry::<stability::incline::Incline>(),
+    entry::<stability::impact::Impact>(),
+];
+
+const ACCURACY: &[Entry] = &[
+    entry::<Diagram<accuracy::cantilever::Cantilever>>(),
+    entry::<Diagram<accuracy::elastica::Elastica>>(),
+    entry::<Diagram<accuracy::catenary::Catenary>>(),
+    entry::<Diagram<accuracy::four_point::FourPoint>>(),
+    entry::<Diagram<accuracy::end_moment::EndMoment>>(),
+    entry::<Diagram<accuracy::helix::Helix>>(),
+    entry::<Diagram<accuracy::frequencies::Frequencies>>(),
+    entry::<Diagram<accuracy::swing::Swing>>(),
+    entry::<Diagram<accuracy::buckling::TwistBuckling>>(),
+    entry::<Diagram<accuracy::buckling::MichellRing>>(),
+    entry::<Diagram<accuracy::inflation::Inflation>>(),
+    entry::<Diagram<accuracy::sheet::Sheet>>(),
+    entry::<Diagram<accuracy::beam::SolidBeam>>(),
+];
+
+const SCALING: &[Entry] = &[
+    entry::<Scaling<scaling::segments::Segments>>(),
+    entry::<Scaling<scaling::contacts::Contacts>>(),
+    entry::<Scaling<scaling::agents::Agents>>(),
+    entry::<Scaling<scaling::sleepers::Sleepers>>(),
+];
+
+const COUPLING: &[Entry] = &[entry::<coupling::error::CouplingError>()];
+
+const POLICIES: &[Entry] = &[
+    entry::<policies::auditorium::Auditorium>(),
+    entry::<policies::grove::Grove>(),
+    entry::<policies::values::Values>(),
+    entry::<policies::domes::Domes>(),
+    entry::<policies::library::Library>(),
+    entry::<policies::walkthrough::Walkthrough>(),
+    entry::<policies::disturbed::Disturbed>(),
+    entry::<policies::levels::Levels>(),
+    entry::<policies::still::Still>(),
+    entry::<policies::selection::Selection>(),
+    entry::<policies::bound::Bound>(),
+    entry::<policies::every::Every>(),
+];
+
+const POLICIES_LIVE: &[Entry] = &[
+    entry::<Live<0>>(),
+    entry::<Live<1>>(),
+    entry::<Live<2>>(),
+    entry::<Live<3>>(),
+    entry::<Live<4>>(),
+    entry::<policies::live::views::Views>(),
+    entry::<policies::live::prediction::Prediction>(),
+    entry::<policies::live::traversal::Traversal>(),
+];
+
+/// Runs the experiments of a subject.
+///
+/// # Errors
+/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+pub fn command(args: &ChartArgs) -> anyhow::Result<Exit> {
+    let (subject, all) = match (args.subject, args.live) {
+        (Subject::Accuracy, false) => ("accuracy", ACCURACY),
+        (Subject::Scaling, false) => ("scaling", SCALING),
+        (Subject::Stability, false) => ("stability", STABILITY),
+        (Subject::Coupling, false) => ("coupling", COUPLING),
+        (Subject::Policies, false) => ("policies", POLICIES),
+        (Subject::Policies, true) => ("policies-live", POLICIES_LIVE),
+        _ => return Err(BadInput("--live is for policies: nothing else is drawn".to_owned()).into()),
+    };
+    if args.live {
+        // fails here rather than in the rows of the first experiment
+        Gpu::headless()?;
+    }
+    let chosen = chosen(all, &args.only)?;
+    let folder = prepared(&args.out)?;
+    let stopped = stopper()?;
+    let quiet = args.quiet || args.json;
+    let setting = Setting { subject, folder, quick: args.quick, quiet: args.quiet, stopped: &stopped };
+    let mut done = Vec::new();
+    for entry in chosen {
+        let one = (entry.run)(&setting)?;
+        if !quiet {
+            data(&told(&one))?;
+        }
+        done.push(one);
+        if stopped.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let interrupted = stopped.load(Ordering::Relaxed);
+    if args.json {
+        let whole = serde_json::json!({ "chart": subject, "quick": args.quick, "interrupted": interrupted, "experiments": done });
+        data(&format!("{}\n", serde_json::to_string_pretty(&whole)?))?;
+    }
+    if interrupted {
+        message("interrupted: the finished rows are kept, and the same command takes them up");
+    }
+    Ok(if interrupted { Exit::Interrupted } else { Exit::Ok })
+}
+
+/// The experiments that were named, or all of them.
+fn chosen<'a>(all: &'a [Entry], only: &[String]) -> anyhow::Result<Vec<&'a Entry>> {
+    let find = |name: &String| all.iter().find(|e| e.name == name).ok_or_else(|| unknown(all, name));
+    if only.is_empty() { Ok(all.iter().collect()) } else { only.iter().map(find).collect() }
+}
+
+fn unknown(all: &[Entry], name: &str) -> anyhow::Error {
+    const NEAR_ENOUGH: f64 = 0.75;
+    let near = all.iter().map(|e| (strsim::jaro_winkler(name, e.name), e.name)).max_by(|a, b| a.0.total_cmp(&b.0));
+    let hint = near.filter(|n| n.0 > NEAR_ENOUGH).map_or_else(String::new, |n| format!("; did you mean `{}`?", n.1));
+    let names: Vec<_> = all.iter().map(|e| e.name).collect();
+    BadInput(format!("there is no experiment `{name}`{hint} (there are: {})", names.join(", "))).into()
+}
+
+/// Creates the folder and checks that it can be written: before an hour's work rather than after.
+pub(super) fn prepared(folder: &Path) -> anyhow::Result<&Path> {
+    let refused = |why: std::io::Error| BadInput(format!("the folder {} cannot be written: {why}", folder.display()));
+    std::fs::create_dir_all(folder).map_err(refused)?;
+    let trial = folder.join(".metachron-trial");
+    std::fs::write(&trial, b"").and_then(|()| std::fs::remove_file(&trial)).map_err(refused)?;
+    Ok(folder)
+}
+
+/// A flag that Ctrl-C sets; pressed again, it ends the program immediately.
+pub(super) fn stopper() -> anyhow::Result<Arc<AtomicBool>> {
+    let (stopped, presses) = (Arc::new(AtomicBool::new(false)), AtomicU32::new(0));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || {
+        flag.store(true, Ordering::Relaxed);
+        if presses.fetch_add(1, Ordering::Relaxed) > 0 {
+            std::process::exit(130);
+        }
+    })
+    .context("Ctrl-C cannot be caught")?;
+    Ok(stopped)
+}
+
+/// Measures, draws and writes one experiment.
+fn run<E: Experiment>(setting: &Setting<'_>) -> anyhow::Result<Done> {
+    let stem = format!("{}-{}", setting.subject, E::NAME);
+    let cases = E::cases(setting.quick);
+    let file = RowFile::open::<E>(setting.folder, &stem, &settings::<E>(setting.quick), &cases)?;
+    let bar = Bar::new(E::NAME, setting.quiet);
+    let swept = sweep::sweep::<E>(&cases, file, setting.stopped, &mut |done, all| {
+        bar.tell(done as f64 / all.max(1) as f64, format!("{done} of {all} rows"));
+    })?;
+    drop(bar);
+    let mut files = vec![setting.folder.join(format!("{stem}.csv"))];
+    if swept.complete {
+        files.extend(drawn::<E>(setting.folder, &stem, &swept.rows)?);
+        files.extend(pictured::<E>(setting.folder, &stem, &swept.rows)?);
+    }
+    let findings = E::findings(&swept.rows);
+    let judged = |one: Finding| if swept.complete { one } else { one.unfinished(swept.rows.len()) };
+    Ok(Done {
+        name: E::NAME,
+        title: E::TITLE,
+        complete: swept.complete,
+        rows: swept.rows.len(),
+        files,
+        table: E::table(&swept.rows),
+        findings: findings.into_iter().map(judged).collect(),
+    })
+}
+
+/// Identifies rows that may be reused: the experiment, its extent, and the program that measured them.
+fn settings<E: Experiment>(quick: bool) -> String {
+    let built = std::env::current_exe().and_then(std::fs::metadata).and_then(|m| Ok((m.len(), m.modified()?)));
+    format!("{} quick={quick} version={} built={:?}\n", E::NAME, env!("CARGO_PKG_VERSION"), built.ok())
+}
+
+/// Writes the figure as SVG and as PNG.
+fn drawn<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<[PathBuf; 2]> {
+    let figure = E::figure(rows);
+    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
+    let paths = ["svg", "png"].map(|kind| folder.join(format!("{stem}.{kind}")));
+    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(paths)
+}
+
+/// Writes the pictures next to the figure.
+fn pictured<E: Experiment>(folder: &Path, stem: &str, rows: &[E::Row]) -> anyhow::Result<Vec<PathBuf>> {
+    let write = |(name, picture): (String, PictureFile)| {
+        let path = folder.join(format!("{stem}-{name}.png"));
+        let written = picture.save(&path).with_context(|| format!("{} cannot be written", path.display()));
+        written.map(|()| path)
+    };
+    E::pictures(rows)?.into_iter().map(write).collect()
+}
+
+/// An experiment's table, findings and files as text.
+fn told(done: &Done) -> String {
+    let mut findings = Table::new(&["", "claim", "measured", "limit"]);
+    let (so_far, state) = if done.complete { ("", "") } else { (" so far", " (unfinished)") };
+    for Finding { claim, measured, limit, holds } in &done.findings {
+        let word = match holds {
+            Some(true) => format!("holds{so_far}"),
+            Some(false) => format!("FAILS{so_far}"),
+            None => "not measured".to_owned(),
+        };
+        findings.rows.push(vec![
+            word.into(),
+            claim.clone().into(),
+            Cell::Number(*measured, 4),
+            Cell::Number(*limit, 4),
+        ]);
+    }
+    let files: Vec<_> = done.files.iter().map(|f| f.display().to_string()).collect();
+    let Done { name, title, table, .. } = done;
+    format!("{name}: {title}{state}\n\n{}\n{}\nfiles: {}\n\n", table.text(), findings.text(), files.join(", "))
+}

@@ -1,0 +1,196 @@
+//! Accuracy of an adapter's prices (its cost model) on pictures to which they were not fitted (FS93, fig. 3).
+//!
+//! In: a scene, a set of prices. Out: predicted and measured times of pictures at random places of its path, under random targets. The
+//! prices are those of the adapter's benchmark, which draws none of these objects; nothing is learnt during the run.
+//! Each picture is drawn several times: no prices can predict the scatter of these times.
+
+use super::super::super::experiment::{Experiment, Finding, worst};
+use super::super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::super::super::table::Table;
+use super::super::machine::Noise;
+use super::super::played::walk;
+use super::super::played::walk::Foretold;
+use metachron_lod::control::Policy;
+use metachron_scene::papers::Paper;
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(in super::super::super) struct Prediction;
+
+/// Pictures per scene, in full and in the quick run.
+const PICTURES: [usize; 2] = [60, 8];
+/// Range of targets, from one that nothing fits to one that everything does, seconds; drawn log-uniformly.
+const TARGETS_S: (f64, f64) = (4e-3, 0.3);
+/// How often each picture is drawn.
+const TIMES: usize = 5;
+/// Prices by two stages and by areas, each with a policy that predicts by them and learns nothing.
+const PRICES: [(&str, Policy); 2] = [("lines", Policy::MarginalFill), ("areas", Policy::RobinHood)];
+/// Bound of the prediction error for 19 of 20 pictures (FS93, §4).
+const WANTED: f64 = 0.1;
+const SEED: u64 = 3;
+
+/// A scene, the prices that predict it, and the number of pictures.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super::super) struct Case {
+    scene: String,
+    prices: String,
+    pictures: usize,
+}
+
+/// Measured and predicted times of a scene's pictures.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(in super::super::super) struct Row {
+    scene: String,
+    prices: String,
+    adapter: String,
+    pictures: usize,
+    /// |predicted − measured| over measured, for the first drawing of each picture: the mean, and the bound that 19 of 20 keep.
+    error: f64,
+    error95: f64,
+    /// The same with all predictions multiplied by `factor`, the median of measured over predicted: the error that a learnt κ leaves.
+    scaled_error95: f64,
+    factor: f64,
+    /// Deviation from their median that 19 of 20 times of the same picture keep: no prices can predict better.
+    scatter95: f64,
+    /// Predicted and measured, milliseconds, with a colon between the two and spaces between pictures.
+    pairs: String,
+}
+
+impl Row {
+    fn of(case: &Case, adapter: String, pictures: &[Foretold]) -> Self {
+        let pairs: Vec<_> = pictures.iter().filter_map(|p| Some((p.told_ms, *p.took_ms.first()?))).collect();
+        let factor = quantile(pairs.iter().map(|(told, took)| took / told).collect(), 0.5);
+        let errors = |by: f64| pairs.iter().map(|(told, took)| (by * told / took - 1.0).abs()).collect::<Vec<_>>();
+        let plain = errors(1.0);
+        Self {
+            scene: case.scene.clone(),
+            prices: case.prices.clone(),
+            adapter,
+            pictures: case.pictures,
+            error: plain.iter().sum::<f64>() / plain.len() as f64,
+            error95: quantile(plain, 0.95),
+            scaled_error95: quantile(errors(factor), 0.95),
+            factor,
+            scatter95: scatter95(pictures),
+            pairs: pairs.iter().map(|(told, took)| format!("{told:.3}:{took:.3}")).collect::<Vec<_>>().join(" "),
+        }
+    }
+
+    fn pairs(&self) -> Vec<(f64, f64)> {
+        let pair = |text: &str| text.split_once(':').and_then(|(a, b)| Some((a.parse().ok()?, b.parse().ok()?)));
+        self.pairs.split(' ').filter_map(pair).collect()
+    }
+}
+
+/// Deviation from their median that 19 of 20 times of the same picture keep.
+fn scatter95(pictures: &[Foretold]) -> f64 {
+    let about = |picture: &Foretold| {
+        let middle = quantile(picture.took_ms.clone(), 0.5);
+        picture.took_ms.iter().map(|took| (took / middle - 1.0).abs()).collect::<Vec<_>>()
+    };
+    quantile(pictures.iter().flat_map(about).collect(), 0.95)
+}
+
+fn quantile(mut all: Vec<f64>, part: f64) -> f64 {
+    all.sort_by(f64::total_cmp);
+    all.get((part * all.len() as f64) as usize).copied().unwrap_or(f64::NAN)
+}
+
+impl Experiment for Prediction {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "prediction";
+    const TITLE: &'static str = "what pictures were to take by the adapter's prices, and took";
+    const ALONE: bool = true;
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let pictures = PICTURES[usize::from(quick)];
+        let case = |paper: Paper| {
+            let scene = paper.name().to_owned();
+            PRICES.map(|(prices, _)| Case { scene: scene.clone(), prices: prices.to_owned(), pictures })
+        };
+        Paper::ALL.into_iter().flat_map(case).collect()
+    }
+
+    fn measure(case: &Case) -> Row {
+        let mut noise = Noise::new(SEED);
+        let (low, high) = TARGETS_S;
+        let mut places = || (noise.uniform(), low * libm::pow(high / low, noise.uniform()));
+        let asked: Vec<_> = (0..case.pictures).map(|_| places()).collect();
+        let paper = Paper::ALL.into_iter().find(|paper| paper.name() == case.scene);
+        let policy = PRICES.into_iter().find(|(name, _)| *name == case.prices).map(|(_, policy)| policy);
+        let told = paper.zip(policy).and_then(|(paper, by)| walk::predicted(paper, by, (&asked, TIMES)).ok());
+        let (adapter, pictures) = told.unwrap_or_default();
+        Row::of(case, adapter, &pictures)
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { scene: row.scene.clone(), prices: row.prices.clone(), pictures: row.pictures }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let adapter = rows.first().map_or("", |row| &row.adapter);
+        let (low, high) = span(rows.iter().flat_map(Row::pairs).flat_map(|(told, took)| [told, took]), true);
+        let line = |by: f64| Mark::Dashed(vec![(low, by * low), (high, by * high)]);
+        let grey = |label: &str, by| Layer { label: label.to_owned(), colour: Colour::Grey, mark: line(by) };
+        let panel = |prices: &str| {
+            let mut layers =
+                vec![grey("as told, and ten per cent off", 1.0), grey("", 1.0 - WANTED), grey("", 1.0 + WANTED)];
+            let here = rows.iter().filter(|row| row.prices == prices);
+            layers.extend(here.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| Layer {
+                label: row.scene.clone(),
+                colour,
+                mark: Mark::Dots(row.pairs()),
+            }));
+            let (x, y) = (Axis::log("predicted, ms", low, high), Axis::log("measured, ms", low, high));
+            Panel { title: format!("prices by {prices}"), x, y, layers }
+        };
+        let title = format!("Predicted and measured on {adapter} (FS93, fig. 3)");
+        Figure { title, panels: PRICES.map(|(prices, _)| panel(prices)).to_vec(), columns: 2 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table =
+            Table::new(&["scene", "prices", "pictures", "error", "error95", "factor", "scaled95", "scatter95"]);
+        table.rows.extend(rows.iter().map(|r| {
+            vec![
+                r.scene.clone().into(),
+                r.prices.clone().into(),
+                (r.pictures as f64, 0).into(),
+                (r.error, 3).into(),
+                (r.error95, 3).into(),
+                (r.factor, 3).into(),
+                (r.scaled_error95, 3).into(),
+                (r.scatter95, 3).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let by_areas = || rows.iter().filter(|row| row.prices == "areas");
+        let all = |of: fn(&Row) -> f64| worst(by_areas().map(of));
+        vec![
+            Finding::at_most("19 of 20 pictures of every scene: error of the prediction", all(|r| r.error95), WANTED),
+            Finding::at_most("the same with one factor a scene", all(|r| r.scaled_error95), WANTED),
+            Finding::at_most("19 of 20 times of one and the same picture: scatter", all(|r| r.scatter95), WANTED),
+        ]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_machine_that_is_a_third_slower_than_its_prices_is_told_from_one_that_errs() {
+        let case = Case { scene: String::new(), prices: String::new(), pictures: 40 };
+        let took = |k: u32| f64::from(k) * if k == 7 { 2.0 } else { 1.5 };
+        let picture =
+            |k: u32| Foretold { told_ms: f64::from(k), took_ms: vec![took(k), 0.98 * took(k), 1.01 * took(k)] };
+        let row = Row::of(&case, String::new(), &(1..=40).map(picture).collect::<Vec<_>>());
+        assert!((row.error95 - 1.0 / 3.0).abs() < 1e-12 && (row.factor - 1.5).abs() < 1e-12);
+        assert!(row.scaled_error95 < 1e-12, "one of forty is past the 95th of a hundred");
+        assert!((row.scatter95 - 0.02).abs() < 1e-12 && row.pairs().len() == 40);
+    }
+}

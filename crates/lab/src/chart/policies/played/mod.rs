@@ -1,0 +1,130 @@
+//! The papers' actual scenes, played through the program's own frame loop: every policy on every scene, the same frames for all.
+//!
+//! In: a scene, a policy, the source of times. Out: a row of [`Row`]. Never here: a model of a scene.
+
+mod row;
+pub(super) mod walk;
+
+use super::super::figure::{Axis, Colour, Layer, Mark, Panel};
+use super::super::table::Table;
+use super::metrics::Row;
+use metachron_lod::control::Policy;
+use metachron_scene::papers::{Choices, Paper};
+pub(super) use walk::{Shown, Times};
+
+/// A scene, its frames, and the ratio of full detail's time to the target.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Play {
+    pub(super) paper: Paper,
+    /// Frames along the path, in full and in the quick run.
+    frames: [usize; 2],
+    /// Mean time of full detail over the target.
+    times_over: f64,
+}
+
+/// In (FS93, table 1) full detail takes 4.3 targets on average and 9.9 at most.
+pub(super) const PLAYS: [Play; 5] = [
+    Play { paper: Paper::Auditorium, frames: [250, 25], times_over: 4.3 },
+    Play { paper: Paper::Grove, frames: [250, 25], times_over: 20.0 },
+    Play { paper: Paper::Domes, frames: [240, 24], times_over: 2.5 },
+    Play { paper: Paper::Walkthrough, frames: [200, 20], times_over: 4.0 },
+    Play { paper: Paper::Library, frames: [60, 10], times_over: 2.5 },
+];
+
+/// A policy on a scene, of so many frames.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    pub(super) scene: String,
+    pub(super) policy: String,
+    pub(super) frames: usize,
+}
+
+impl Case {
+    /// The case of a row.
+    pub(super) fn of(row: &Row) -> Self {
+        Self { scene: row.setting.clone(), policy: row.policy.clone(), frames: row.frames }
+    }
+
+    /// Measures the row; one without frames where the case could not be played.
+    pub(super) fn measure(&self, times: Times) -> Row {
+        let play = PLAYS.iter().find(|play| play.paper.name() == self.scene);
+        let measure = |play: &Play| {
+            let text = play.paper.text(&Choices::default());
+            walk::measure(&play.shown(&text), self, times)
+        };
+        play.map_or_else(|| Row::of(&self.scene, &self.policy, &[]), measure)
+    }
+}
+
+impl Play {
+    fn shown<'a>(&self, text: &'a str) -> Shown<'a> {
+        Shown { name: self.paper.name(), text, times_over: self.times_over }
+    }
+
+    /// One case for every policy of the program.
+    pub(super) fn cases(&self, quick: bool) -> impl Iterator<Item = Case> {
+        let (scene, frames) = (self.paper.name(), self.frames[usize::from(quick)]);
+        let case = move |policy: Policy| Case { scene: scene.to_owned(), policy: policy.name().to_owned(), frames };
+        Policy::ALL.into_iter().map(case)
+    }
+}
+
+/// The table of all numbers of all rows.
+pub(super) fn table(rows: &[Row]) -> Table {
+    row::table(rows)
+}
+
+/// The time of every frame, for some of a scene's rows.
+pub(super) fn curves<'a>(title: &str, rows: impl Iterator<Item = &'a Row> + Clone) -> Panel {
+    let frames = rows.clone().map(|row| row.frames).max().unwrap_or(1) as f64;
+    let greatest = rows.clone().map(|row| row.max).fold(1.5, f64::max);
+    let target = Mark::Dashed(vec![(0.0, 1.0), (frames, 1.0)]);
+    let mut layers = vec![Layer { label: "target".to_owned(), colour: Colour::Grey, mark: target }];
+    layers.extend(rows.zip(Colour::LINES.into_iter().cycle()).map(|(row, colour)| {
+        let line = row::times(row).into_iter().enumerate().map(|(k, time)| (k as f64, time)).collect();
+        Layer { label: row.policy.clone(), colour, mark: Mark::Line(line) }
+    }));
+    let (x, y) = (Axis::linear("frame", 0.0, frames), Axis::linear("time of a frame / target", 0.0, 1.05 * greatest));
+    Panel { title: title.to_owned(), x, y, layers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_render::Gpu;
+
+    fn row(scene: &str, policy: &str) -> Row {
+        Case { scene: scene.to_owned(), policy: policy.to_owned(), frames: 6 }.measure(Times::Declared)
+    }
+
+    #[test]
+    fn a_policy_plays_a_scene_to_the_bit_and_every_number_is_there() {
+        let policies = ["robin-hood", "adaptive"];
+        let rows = policies.map(|policy| row("library", policy));
+        for (row, again) in
+            rows.iter().zip(policies.map(|policy| crate::chart::policies::played::row("library", policy)))
+        {
+            // NaN is not equal to itself, so the rows are compared as text
+            assert_eq!(format!("{row:?}"), format!("{again:?}"));
+            assert_eq!((row.frames, row::times(row).len(), row.setting.as_str()), (6, 6, "library"));
+        }
+        let drawn = Gpu::headless().is_ok();
+        for row in &rows {
+            let unknown: Vec<_> = row::COLUMNS.iter().filter(|(_, of, _)| of(row).is_nan()).map(|c| c.0).collect();
+            // only a policy with a bound has `value` and `proven`
+            let mut expected: Vec<&str> = match row.policy.as_str() {
+                "robin-hood" => vec!["value", "proven"],
+                _ => Vec::new(),
+            };
+            expected.extend(["ssim", "ssim_least", "psnr_db"].iter().filter(|_| !drawn));
+            assert_eq!(unknown, expected, "{}", row.policy);
+        }
+    }
+
+    #[test]
+    fn full_detail_takes_the_target_so_many_times_and_is_like_itself() {
+        let full = row("library", "full");
+        assert!((full.mean - 2.5).abs() < 1e-9 && full.holes == 0.0 && full.changes == 0.0, "{full:?}");
+        assert!(full.adapter.is_empty() || (full.ssim - 1.0).abs() < 1e-12, "{}", full.ssim);
+    }
+}

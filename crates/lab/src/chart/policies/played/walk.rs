@@ -1,0 +1,235 @@
+//! One walk through a scene under one policy, compared with full detail.
+//!
+//! In: a scene, a case, whether times are measured or declared. Out: a row; without frames where times are measured but no adapter can
+//! draw. Never here: figures.
+//! Full detail is played once for all policies of a scene: its times set the target, and its pictures are the reference for the others.
+
+use super::super::metrics::Row;
+use super::Case;
+use super::row::Played;
+use anyhow::Context;
+use metachron_lod::control::Policy;
+use metachron_render::{Gpu, Offscreen, PictureFile, RendererOptions, Size, psnr_db, ssim};
+use metachron_scene::papers::{Choices, Paper};
+use metachron_scene::{Source, load};
+use metachron_session::{Drawing, FrameRecord, Walk};
+use std::sync::{Arc, Mutex, PoisonError};
+
+const SIZE: Size = Size { width: 640, height: 480 };
+/// The source of frame times.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(in super::super) enum Times {
+    /// The present adapter draws every frame.
+    Measured,
+    /// Lockstep on [`DECLARED`]: the same bits on every computer. An adapter, if present, draws only the pictures that are compared.
+    Declared,
+}
+
+/// A machine whose frame times follow the objects and their shading, with the noise of `docs/theory/budget.md`, section 10. The time
+/// for choosing is what one core was measured to take with the default policy (`chart policies`, selection).
+const DECLARED: [(&str, &str); 12] = [
+    ("executor", "lockstep"),
+    ("machine.draw_setup_ms", "0.1"),
+    ("machine.draw_pixel_ns", "0.2"),
+    ("machine.draw_object_us", "0.5"),
+    ("machine.draw_triangle_us", "0.22"),
+    ("machine.shading.flat.triangle_us", "0.1"),
+    ("machine.shading.gouraud.triangle_us", "0.14"),
+    ("machine.shading.flat.pixel_ns", "0.3"),
+    ("machine.shading.gouraud.pixel_ns", "0.5"),
+    ("machine.choose_object_ns", "50"),
+    ("machine.noise", "0.01"),
+    ("machine.wander", "0.05"),
+];
+
+/// Greatest number of pictures compared, evenly along a path, and least number of frames between two: a comparison takes as long as
+/// dozens of frames.
+const PICTURES: usize = 5;
+const APART: usize = 10;
+/// Frames at the first place before the first that counts: they warm up pipelines, caches and prices.
+const LEAD_IN: usize = 20;
+/// PSNR reported for pictures that are alike to the bit, and its upper limit, dB.
+pub(in super::super) const ALIKE_DB: f64 = 99.0;
+
+/// A walk that has been played.
+struct Walked {
+    adapter: String,
+    frames: Vec<FrameRecord>,
+    pictures: Vec<PictureFile>,
+}
+
+/// Full detail of a scene in so many frames.
+type Reference = (&'static str, usize, Times, Arc<Walked>);
+
+static REFERENCES: Mutex<Vec<Reference>> = Mutex::new(Vec::new());
+
+/// A scene that policies are played on.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Shown<'a> {
+    /// The key under which full detail is stored: scenes that look the same in full detail may share a name.
+    pub(in super::super) name: &'static str,
+    pub(in super::super) text: &'a str,
+    /// Mean time of full detail over the target.
+    pub(in super::super) times_over: f64,
+}
+
+/// Measures the row of a case.
+pub(in super::super) fn measure(shown: &Shown<'_>, case: &Case, times: Times) -> Row {
+    let measured = reference(shown, case.frames, times).and_then(|full| {
+        let target_s = 1e-3 * mean_ms(&full) / shown.times_over;
+        let full_itself = case.policy == "full";
+        let own = if full_itself { Arc::clone(&full) } else { Arc::new(walked(shown, case, (target_s, times))?) };
+        Ok((full, own, target_s))
+    });
+    let (full, own, target_s) = measured.unwrap_or_else(|_| (nothing(), nothing(), f64::NAN));
+    let pairs = own.pictures.iter().zip(&full.pictures);
+    let likeness: Vec<_> = pairs.filter_map(|(a, b)| Some((ssim(a, b)?, psnr_db(a, b)?.min(ALIKE_DB)))).collect();
+    let full_ms: Vec<f64> = full.frames.iter().map(|row| row.frame_ms).collect();
+    let played = Played {
+        scene: &case.scene,
+        policy: &case.policy,
+        adapter: &own.adapter,
+        target_ms: 1e3 * target_s,
+        frames: &own.frames,
+        full_ms: &full_ms,
+        likeness: &likeness,
+    };
+    played.row()
+}
+
+fn nothing() -> Arc<Walked> {
+    Arc::new(Walked { adapter: String::new(), frames: Vec::new(), pictures: Vec::new() })
+}
+
+fn mean_ms(walked: &Walked) -> f64 {
+    walked.frames.iter().map(|row| row.frame_ms).sum::<f64>() / walked.frames.len() as f64
+}
+
+/// Full detail of a scene, played if it was not yet.
+fn reference(shown: &Shown<'_>, frames: usize, times: Times) -> anyhow::Result<Arc<Walked>> {
+    let mut known = REFERENCES.lock().unwrap_or_else(PoisonError::into_inner);
+    let here = |r: &&Reference| (r.0, r.1, r.2) == (shown.name, frames, times);
+    if let Some((.., walked)) = known.iter().find(here) {
+        return Ok(Arc::clone(walked));
+    }
+    let case = Case { scene: shown.name.to_owned(), policy: "full".to_owned(), frames };
+    // the target has no effect on full detail
+    let full = Arc::new(walked(shown, &case, (1.0, times))?);
+    known.push((shown.name, frames, times, Arc::clone(&full)));
+    Ok(full)
+}
+
+fn walked(shown: &Shown<'_>, case: &Case, (target_s, times): (f64, Times)) -> anyhow::Result<Walked> {
+    let (adapter, mut walk) = opened((shown.name, shown.text), times)?;
+    let control = walk.session().control();
+    control.set_target_hz(1.0 / target_s);
+    control.set_policy(Policy::named(&case.policy).context("no such policy")?);
+    for _ in 0..LEAD_IN {
+        walk.step(0.0)?;
+    }
+    let mut walked = Walked { adapter, frames: Vec::with_capacity(case.frames), pictures: Vec::new() };
+    for frame in 0..case.frames {
+        walked.frames.push(walk.step(frame as f64 / case.frames as f64)?);
+        if frame % case.frames.div_ceil(PICTURES).max(APART) == 0 {
+            walked.pictures.extend(walk.picture()?);
+        }
+    }
+    Ok(walked)
+}
+
+/// Predicted time of one picture, and its time at each drawing, milliseconds.
+pub(in super::super) struct Foretold {
+    pub(in super::super) told_ms: f64,
+    pub(in super::super) took_ms: Vec<f64>,
+}
+
+/// Frames until a picture is final: meshes of levels drawn for the first time are built, and all transitions have ended.
+const SETTLED: usize = 8;
+
+/// Pictures at places of a scene's path under targets in seconds, predicted and chosen by `policy` and each drawn several times; and
+/// the adapter.
+///
+/// # Errors
+/// Errors of the scene and of the adapter.
+pub(in super::super) fn predicted(
+    paper: Paper,
+    policy: Policy,
+    (asked, times): (&[(f64, f64)], usize),
+) -> anyhow::Result<(String, Vec<Foretold>)> {
+    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
+    walk.session().control().set_policy(policy);
+    for _ in 0..LEAD_IN {
+        walk.step(0.0)?;
+    }
+    let mut pictures = Vec::with_capacity(asked.len());
+    for (part, target_s) in asked {
+        walk.session().control().set_target_hz(1.0 / target_s);
+        walk.step(*part)?;
+        let told = walk.step(*part)?.predicted_ms;
+        walk.session().control().freeze(true);
+        for _ in 2..SETTLED {
+            walk.step(*part)?;
+        }
+        let took: Result<Vec<_>, _> = (0..times).map(|_| walk.step(*part)).collect();
+        walk.session().control().freeze(false);
+        let took_ms = took?.iter().map(|record| record.frame_ms).collect();
+        pictures.extend(told.map(|told_ms| Foretold { told_ms, took_ms }));
+    }
+    Ok((adapter, pictures))
+}
+
+/// Opens a scene by its name and text, before the first frame; also names the adapter that draws it.
+fn opened((name, text): (&str, &str), times: Times) -> anyhow::Result<(String, Walk)> {
+    let declared = DECLARED.map(|(key, value)| (key.to_owned(), value.to_owned()));
+    let overrides = if times == Times::Declared { declared.as_slice() } else { &[] };
+    let scene = load(&Source::memory(name, text.as_bytes())?, overrides)?;
+    let gpu = match times {
+        Times::Measured => Some(Gpu::headless()?),
+        Times::Declared => Gpu::headless().ok(),
+    };
+    let adapter = gpu.as_ref().map(Gpu::describe).unwrap_or_default();
+    let screen = |gpu: Gpu| {
+        let options = RendererOptions::for_adapter(&gpu.info);
+        Offscreen::new(gpu, SIZE, options).map(Box::new)
+    };
+    let drawing = match (gpu.map(screen).transpose()?, times) {
+        (Some(screen), Times::Measured) => Drawing::Every(screen),
+        (Some(screen), Times::Declared) => Drawing::Last(screen),
+        (None, _) => Drawing::Nothing,
+    };
+    Ok((adapter, Walk::open(scene, drawing, SIZE)?))
+}
+
+/// One view of a scene after a policy has settled.
+pub(in super::super) struct Still {
+    pub(in super::super) adapter: String,
+    /// Median of the last frames.
+    pub(in super::super) frame_ms: f64,
+    pub(in super::super) triangles: u64,
+    pub(in super::super) picture: PictureFile,
+}
+
+/// A place on a scene's path, the target time of a frame, and the number of frames drawn there; the last half of them counts.
+#[derive(Debug, Clone, Copy)]
+pub(in super::super) struct Stood {
+    pub(in super::super) part: f64,
+    pub(in super::super) target_s: f64,
+    pub(in super::super) frames: usize,
+}
+
+/// Draws frames at one place of a scene's path.
+///
+/// # Errors
+/// Errors of the scene and of the adapter.
+pub(in super::super) fn still(paper: Paper, policy: &str, stood: Stood) -> anyhow::Result<Still> {
+    let Stood { part, target_s, frames } = stood;
+    let (adapter, mut walk) = opened((paper.name(), &paper.text(&Choices::default())), Times::Measured)?;
+    let control = walk.session().control();
+    control.set_target_hz(1.0 / target_s);
+    control.set_policy(Policy::named(policy).context("no such policy")?);
+    let mut records = (0..frames).map(|_| walk.step(part)).collect::<Result<Vec<_>, _>>()?.split_off(frames / 2);
+    let triangles = records.last().map_or(0, |row| row.triangles);
+    records.sort_by(|a, b| a.frame_ms.total_cmp(&b.frame_ms));
+    let frame_ms = records.get(records.len() / 2).context("no frames")?.frame_ms;
+    Ok(Still { adapter, frame_ms, triangles, picture: walk.picture()?.context("nothing draws")? })
+}

@@ -1,0 +1,313 @@
+//! Heavy on light: stacks and chains whose far end weighs a hundred or a thousand times as much, compared with other engines.
+//!
+//! Cubes of 1 m on a floor, each an agent; twenty links on ball joints. Measurements of the other engines, made once, are in
+//! `docs/reference/peers_w4.json`: for each engine the best of its variants at this mass ratio and step.
+
+use super::super::experiment::{Experiment, Finding, worst};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::lockstep_run::Company;
+use super::super::table::Table;
+use super::common::{GRAVITY, plain_body};
+use glam::{DQuat, DVec3};
+use metachron_core::{AgentId, Body, RigidState, Snapshot};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidBody;
+use metachron_models::rigid::RigidSpec;
+use metachron_models::rigid::{Joint, JointKind};
+use metachron_runtime::AgentSpawn;
+use serde::{Deserialize, Serialize};
+use std::sync::Arc;
+
+/// The experiment.
+pub(in super::super) struct Heavy;
+
+const PEERS: &str = include_str!("peers_w4.json");
+const TESTS: [&str; 4] = ["stack2", "stack10", "chain20-hang", "chain20-swing"];
+const RATIOS: [f64; 3] = [1.0, 100.0, 1000.0];
+const RATES_HZ: [f64; 2] = [60.0, 240.0];
+/// Length of each run, seconds, and the interval of samples.
+const SECONDS: f64 = 5.0;
+const LOOK_S: f64 = 1.0 / 60.0;
+/// A stack holds whose top has sunk less than this, metres, and none of whose boxes has moved sideways by more than this.
+const SINK_MAX_M: f64 = 0.1;
+const ASIDE_MAX_M: f64 = 0.25;
+/// A chain holds that is never stretched by more than this share of its length, and whose energy never exceeds that of the start
+/// by more than this share of what its fall can give.
+const STRETCH_MAX: f64 = 1e-3;
+const GAIN_MAX: f64 = 0.01;
+/// Half the length of a link, metres.
+const HALF_LINK_M: f64 = 0.1;
+const LINKS: u32 = 20;
+
+/// A test.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    test: String,
+    ratio: f64,
+    rate_hz: f64,
+}
+
+/// The results of a test.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    test: String,
+    ratio: f64,
+    rate_hz: f64,
+    /// Sink of the top, metres, or greatest stretch of the chain as a share of its length.
+    value: f64,
+    /// Greatest sideways displacement of a box, metres.
+    aside_m: f64,
+    /// Greatest energy above that of the start, as a share of what the fall can give.
+    gain: f64,
+    holds: bool,
+    /// Number of agents led by another one, in an island.
+    led: usize,
+    /// The least value of another engine that holds at this mass ratio and step.
+    best_peer_value: Option<f64>,
+    best_peer: String,
+}
+
+/// One measurement of another engine.
+#[derive(Debug, Clone, Deserialize)]
+struct Peer {
+    test: String,
+    ratio: f64,
+    inv_dt: f64,
+    peer: String,
+    variant: String,
+    value: Option<f64>,
+    status: String,
+}
+
+#[derive(Deserialize)]
+struct Peers {
+    rows: Vec<Peer>,
+}
+
+/// All measurements of other engines; empty if the file were invalid, which a test excludes.
+fn peers() -> Vec<Peer> {
+    serde_json::from_str::<Peers>(PEERS).map_or_else(|_| Vec::new(), |peers| peers.rows)
+}
+
+/// The best of the other engines that hold.
+fn best_peer(case: &Case) -> Option<Peer> {
+    let same =
+        |p: &Peer| p.test == case.test && p.ratio == case.ratio && p.inv_dt == case.rate_hz && p.status == "holds";
+    let value = |p: &Peer| p.value.unwrap_or(f64::INFINITY);
+    peers().into_iter().filter(same).min_by(|a, b| value(a).total_cmp(&value(b)))
+}
+
+impl Experiment for Heavy {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "heavy-on-light";
+    const TITLE: &'static str = "stacks and chains with a heavy end: sink and stretch, beside other engines";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let (tests, ratios) = if quick { (&TESTS[..], &RATIOS[2..]) } else { (&TESTS[..], &RATIOS[..]) };
+        let rates = if quick { &RATES_HZ[..1] } else { &RATES_HZ[..] };
+        let mut cases = Vec::new();
+        for test in tests {
+            for &ratio in ratios {
+                cases.extend(rates.iter().map(|&rate_hz| Case { test: (*test).to_owned(), ratio, rate_hz }));
+            }
+        }
+        cases
+    }
+
+    fn measure(case: &Case) -> Row {
+        let Case { test, ratio, rate_hz } = case.clone();
+        let went = if test.starts_with("stack") { stacked(case) } else { hung(case) };
+        let Went { value, aside_m, gain, led } =
+            went.unwrap_or(Went { value: f64::NAN, aside_m: 0.0, gain: 0.0, led: 0 });
+        let holds = if test.starts_with("stack") {
+            value.abs() <= SINK_MAX_M && aside_m <= ASIDE_MAX_M
+        } else {
+            value <= STRETCH_MAX && gain <= GAIN_MAX
+        };
+        let peer = best_peer(case);
+        let best_peer_value = peer.as_ref().and_then(|p| p.value);
+        let best_peer = peer.map_or_else(String::new, |p| format!("{} {}", p.peer, p.variant));
+        Row { test, ratio, rate_hz, value, aside_m, gain, holds, led, best_peer_value, best_peer }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { test: row.test.clone(), ratio: row.ratio, rate_hz: row.rate_hz }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let panels = TESTS.into_iter().map(|test| panel(test, rows)).collect();
+        Figure { title: "Heavy on light, steps of 1/60 s (large) and 1/240 s".to_owned(), panels, columns: 2 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table =
+            Table::new(&["test", "ratio", "rate_hz", "value", "aside_m", "gain", "verdict", "best peer", "peer"]);
+        table.rows.extend(rows.iter().map(|r| {
+            vec![
+                r.test.clone().into(),
+                (r.ratio, 0).into(),
+                (r.rate_hz, 0).into(),
+                (r.value, 6).into(),
+                (r.aside_m, 6).into(),
+                (r.gain, 6).into(),
+                if r.holds { "holds" } else { "FAILS" }.into(),
+                (r.best_peer_value.unwrap_or(f64::NAN), 6).into(),
+                if r.best_peer.is_empty() { "none holds" } else { &r.best_peer }.into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let fails = |r: &&Row| !r.holds && !r.best_peer.is_empty();
+        let worse = |r: &&Row| r.best_peer_value.is_some_and(|best| r.value.abs() > best.max(STRETCH_MAX));
+        vec![
+            Finding::at_most(
+                "cases that fail where another engine holds",
+                rows.iter().filter(fails).count() as f64,
+                0.0,
+            ),
+            Finding::at_most("cases that fail at all", rows.iter().filter(|r| !r.holds).count() as f64, 0.0),
+            Finding::at_most(
+                "cases that sink or stretch by more than 0.001 and more than the best",
+                rows.iter().filter(worse).count() as f64,
+                0.0,
+            ),
+        ]
+    }
+}
+
+/// The results of a stack or a chain.
+struct Went {
+    value: f64,
+    aside_m: f64,
+    gain: f64,
+    led: usize,
+}
+
+fn rigid(snapshot: &Snapshot) -> Option<RigidState> {
+    match snapshot.body {
+        Body::Rigid(state) => Some(state),
+        _ => None,
+    }
+}
+
+/// Stacks cubes a millimetre apart; the top one is heavier.
+fn stacked(case: &Case) -> Option<Went> {
+    let count: u32 = case.test.strip_prefix("stack")?.parse().ok()?;
+    let ground = Obstacle {
+        name: "floor".to_owned(),
+        solid: Solid::Plane,
+        position: DVec3::ZERO,
+        rotation: DQuat::IDENTITY,
+        friction: 0.5,
+        restitution: 0.0,
+    };
+    let mut spawns = Vec::new();
+    for i in 0..count {
+        let mass = if i + 1 == count { 1000.0 * case.ratio } else { 1000.0 };
+        let half_extents_m = DVec3::splat(0.5);
+        let plain = plain_body(Solid::Box { half_extents_m }, DVec3::Z * (0.5 + 1.001 * f64::from(i)), mass);
+        let gravity = DVec3::NEG_Z * GRAVITY;
+        let spec = RigidSpec { friction: 0.5, gravity, obstacles: [ground.clone()].into(), ..plain };
+        spawns.push(AgentSpawn::alone(format!("box-{i}"), Box::new(RigidBody::new(spec).ok()?), case.rate_hz));
+    }
+    let mut company = Company::start(spawns).ok()?;
+    company.run_to(SECONDS);
+    let states: Vec<RigidState> = company.snapshots().iter().filter_map(|s| rigid(s)).collect();
+    let top = states.last()?.position.z;
+    Some(Went {
+        value: f64::from(count) - 0.5 - top,
+        aside_m: worst(states.iter().map(|s| s.position.truncate().length())),
+        gain: 0.0,
+        led: company.steps().iter().filter(|(_, leader)| leader.is_some()).count(),
+    })
+}
+
+/// Hangs a chain from the origin, straight down or horizontal; the last link is heavier.
+fn hung(case: &Case) -> Option<Went> {
+    let along = if case.test.ends_with("swing") { DVec3::X } else { DVec3::NEG_Z };
+    let joint = |i: u32| Joint {
+        anchor_a_m: DVec3::Z * HALF_LINK_M,
+        anchor_b_m: if i == 0 { DVec3::ZERO } else { DVec3::NEG_Z * HALF_LINK_M },
+        ..Joint::new(AgentId(i), i.checked_sub(1).map(AgentId), JointKind::Spherical)
+    };
+    let joints: Arc<[Joint]> = (0..LINKS).map(joint).collect();
+    let mut spawns = Vec::new();
+    for i in 0..LINKS {
+        let mass = if i + 1 == LINKS { case.ratio } else { 1.0 };
+        let solid = Solid::Capsule { radius_m: 0.03, half_height_m: 0.06 };
+        let plain = plain_body(solid, along * (HALF_LINK_M * (1.0 + 2.0 * f64::from(i))), mass);
+        let rotation = DQuat::from_rotation_arc(DVec3::NEG_Z, along);
+        let spec = RigidSpec { rotation, gravity: DVec3::NEG_Z * GRAVITY, joints: Arc::clone(&joints), ..plain };
+        let body = Box::new(RigidBody::new(spec).ok()?);
+        let mut one = AgentSpawn::alone(format!("link-{i}"), body, case.rate_hz);
+        one.together = (i > 0).then_some(AgentId(0));
+        spawns.push(one);
+    }
+    let mut company = Company::start(spawns).ok()?;
+    let mut went = Went { value: 0.0, aside_m: 0.0, gain: 0.0, led: 0 };
+    let length = 2.0 * HALF_LINK_M * f64::from(LINKS);
+    let scale = GRAVITY * length * (case.ratio + 0.5 * f64::from(LINKS - 1));
+    let (mut start_j, mut t) = (None, 0.0);
+    while t < SECONDS {
+        let snapshots = company.snapshots();
+        let gap = gaps_m(&snapshots)?;
+        let energy_j: f64 = snapshots.iter().map(|s| s.energy_j).sum();
+        let start_j = *start_j.get_or_insert(energy_j);
+        went.value = worst([went.value, gap / length]);
+        went.gain = worst([went.gain, (energy_j - start_j) / scale]);
+        t += LOOK_S;
+        company.run_to(t);
+    }
+    went.led = company.steps().iter().filter(|(_, leader)| leader.is_some()).count();
+    Some(went)
+}
+
+/// Sum of the gaps of all joints, metres.
+fn gaps_m(snapshots: &[Arc<Snapshot>]) -> Option<f64> {
+    let (mut sum, mut end) = (0.0, DVec3::ZERO);
+    for snapshot in snapshots {
+        let RigidState { position, rotation, .. } = rigid(snapshot)?;
+        let half = rotation * DVec3::Z * HALF_LINK_M;
+        sum += (position + half).distance(end);
+        end = position - half;
+    }
+    Some(sum)
+}
+
+/// Sink or stretch over the mass ratio: our own as lines, other engines that hold as dots.
+fn panel(test: &str, rows: &[Row]) -> Panel {
+    const FLOOR: f64 = 1e-9;
+    let mut layers = Vec::new();
+    for (rate_hz, colour) in RATES_HZ.into_iter().zip([Colour::Blue, Colour::Sky]) {
+        let here = rows.iter().filter(|r| r.test == test && r.rate_hz == rate_hz);
+        let points = here.map(|r| (r.ratio, r.value.abs().max(FLOOR))).collect();
+        layers.push(Layer { label: format!("metachron, {rate_hz} Hz"), colour, mark: Mark::Line(points) });
+    }
+    let others = [("mujoco 4.0.0", Colour::Red), ("pybullet 3.2.7", Colour::Orange), ("rapier3d 0.36", Colour::Green)];
+    let all = peers();
+    for (name, colour) in others {
+        let here = all.iter().filter(|p| p.test == test && p.peer == name && p.status == "holds");
+        let points: Vec<_> = here.filter_map(|p| Some((p.ratio, p.value?.max(FLOOR)))).collect();
+        if !points.is_empty() {
+            layers.push(Layer { label: name.to_owned(), colour, mark: Mark::Dots(points) });
+        }
+    }
+    let what = if test.starts_with("stack") { "sink, m" } else { "stretch / length" };
+    Panel { title: test.to_owned(), x: Axis::log("mass ratio", 0.7, 1500.0), y: Axis::log(what, FLOOR, 100.0), layers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_case_has_the_others_beside_it() {
+        for case in Heavy::cases(false) {
+            let here = |p: &&Peer| p.test == case.test && p.ratio == case.ratio && p.inv_dt == case.rate_hz;
+            assert!(peers().iter().filter(here).count() >= 2, "{case:?}");
+        }
+    }
+}

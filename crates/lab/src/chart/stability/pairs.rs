@@ -1,0 +1,166 @@
+//! Tubes in contact across two clocks: on a bar, between two fingers, across another tube, rates 1:1 to 1:100 in both directions.
+
+use super::super::bench::Faults;
+use super::super::experiment::{Experiment, Finding, worst};
+use super::super::figure::{Axis, Colour, Figure, Layer, Mark, Panel};
+use super::super::scenes::{Scene, WITH_TUBES, scene};
+use super::super::table::Table;
+use glam::DVec3;
+use metachron_core::{AgentId, Anchor};
+use serde::{Deserialize, Serialize};
+
+/// The experiment.
+pub(in super::super) struct Pairs;
+
+const RATIOS: [f64; 7] = [1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0];
+const FAST_HZ: f64 = 1000.0;
+const SECONDS: f64 = 2.5;
+/// From here on everything is at rest.
+const REST_S: f64 = 2.0;
+const COMMON_MAX: f64 = 1.01;
+const DEPTH_MAX_M: f64 = 0.005;
+
+/// A scene, the ratio of its clocks, and which agent has the fast one.
+#[derive(Debug, Clone, PartialEq)]
+pub(in super::super) struct Case {
+    scene: String,
+    ratio: f64,
+    first_is_fast: bool,
+}
+
+/// The results of a case.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+pub(in super::super) struct Row {
+    scene: String,
+    ratio: f64,
+    /// Whether the tube (of two tubes the one clamped at both ends) has the fast clock.
+    first_is_fast: bool,
+    slow_hz: f64,
+    /// Peak of the energy at a common time above that at rest, as a multiple of the start's.
+    peak: f64,
+    /// The deepest overlap that a contact owner reports at rest, metres.
+    depth_m: f64,
+    /// Mean speed at rest of the fastest followed point, m/s.
+    creep_m_s: f64,
+    contacts: u32,
+}
+
+impl Experiment for Pairs {
+    type Case = Case;
+    type Row = Row;
+    const NAME: &'static str = "tubes";
+    const TITLE: &'static str = "tubes on a bar, in a gripper and across each other, clocks 1:1 to 1:100";
+
+    fn cases(quick: bool) -> Vec<Case> {
+        let ratios = if quick { &RATIOS[3..4] } else { &RATIOS[..] };
+        let mut cases = Vec::new();
+        for name in WITH_TUBES {
+            for &ratio in ratios {
+                let ways = if ratio == 1.0 { &[true][..] } else { &[true, false][..] };
+                let of = |&first_is_fast: &bool| Case { scene: name.to_owned(), ratio, first_is_fast };
+                cases.extend(ways.iter().map(of));
+            }
+        }
+        cases
+    }
+
+    fn measure(case: &Case) -> Row {
+        let Case { scene, ratio, first_is_fast } = case.clone();
+        let slow_hz = FAST_HZ / ratio;
+        let [peak, depth_m, creep_m_s, contacts] = lie(case, slow_hz).unwrap_or([f64::NAN; 4]);
+        Row { scene, ratio, first_is_fast, slow_hz, peak, depth_m, creep_m_s, contacts: contacts as u32 }
+    }
+
+    fn case_of(row: &Row) -> Case {
+        Case { scene: row.scene.clone(), ratio: row.ratio, first_is_fast: row.first_is_fast }
+    }
+
+    fn figure(rows: &[Row]) -> Figure {
+        let panel = |label, (low, high), limit: f64, get: fn(&Row) -> f64| {
+            let mut layers = Vec::new();
+            for (name, colour) in WITH_TUBES.into_iter().zip(Colour::LINES) {
+                for way in [true, false] {
+                    let here = rows.iter().filter(|r| r.scene == name && r.first_is_fast == way);
+                    let points: Vec<_> = here.map(|r| (r.ratio, get(r).max(low))).collect();
+                    let mark = if way { Mark::Line(points) } else { Mark::Dots(points) };
+                    let label = if way { format!("{name}, tube fast") } else { format!("{name}, tube slow") };
+                    layers.push(Layer { label, colour, mark });
+                }
+            }
+            let ends = vec![(0.8, limit), (125.0, limit)];
+            layers.push(Layer { label: "limit".to_owned(), colour: Colour::Grey, mark: Mark::Dashed(ends) });
+            Panel {
+                title: String::new(),
+                x: Axis::log("ratio of the clocks", 0.8, 125.0),
+                y: Axis::log(label, low, high),
+                layers,
+            }
+        };
+        let panels = vec![
+            panel("peak energy / start, at a common time", (0.5, 100.0), COMMON_MAX, |r| r.peak),
+            panel("overlap at rest, m", (1e-7, 0.1), DEPTH_MAX_M, |r| r.depth_m),
+            panel("creep at rest, m/s", (1e-7, 1.0), 1e-3, |r| r.creep_m_s),
+        ];
+        Figure { title: "Tubes between two clocks, the faster at 1 kHz".to_owned(), panels, columns: 3 }
+    }
+
+    fn table(rows: &[Row]) -> Table {
+        let mut table = Table::new(&["scene", "ratio", "tube", "peak", "depth_mm", "creep_mm_s", "contacts"]);
+        table.rows.extend(rows.iter().map(|r| {
+            vec![
+                r.scene.clone().into(),
+                (r.ratio, 0).into(),
+                if r.first_is_fast { "fast" } else { "slow" }.into(),
+                (r.peak, 4).into(),
+                (1e3 * r.depth_m, 4).into(),
+                (1e3 * r.creep_m_s, 4).into(),
+                (f64::from(r.contacts), 0).into(),
+            ]
+        }));
+        table
+    }
+
+    fn findings(rows: &[Row]) -> Vec<Finding> {
+        let at_60 = rows.iter().filter(|r| r.slow_hz >= 50.0).map(|r| r.depth_m);
+        let apart = rows.iter().filter(|r| r.contacts == 0).count() as f64;
+        vec![
+            Finding::at_most(
+                "peak energy at a common time, in that of the start",
+                worst(rows.iter().map(|r| r.peak)),
+                COMMON_MAX,
+            ),
+            Finding::at_most("overlap at rest at 50 Hz and more, m", worst(at_60), DEPTH_MAX_M),
+            Finding::at_most("pairs that do not touch at the end", apart, 0.0),
+        ]
+    }
+}
+
+/// Peak, depth, creep, contacts.
+fn lie(case: &Case, slow_hz: f64) -> Option<[f64; 4]> {
+    let rates_hz = if case.first_is_fast { [FAST_HZ, slow_hz] } else { [slow_hz, FAST_HZ] };
+    let Scene { play, points, zero_j } = scene(&case.scene, rates_hz, Faults::default())?;
+    let start_j = play.raw_j() - zero_j;
+    let agents = play.stage.members().len() as u32;
+    let (mut peak, mut depth_m, mut contacts) = (1.0, 0.0_f64, 0_u32);
+    let mut since: Option<(f64, Vec<DVec3>)> = None;
+    let places = |play: &crate::chart::energy_bench::Play| -> Vec<DVec3> {
+        let place = |(id, anchor): &(AgentId, Anchor)| play.stage.own(*id).body.point(*anchor).map(|(x, _)| x);
+        points.iter().filter_map(place).collect()
+    };
+    let ended = play.run(SECONDS, |play, _| {
+        let at = play.time();
+        peak = worst([peak, (play.common(at).energy_j - zero_j) / start_j]);
+        if at.as_secs_f64() > REST_S {
+            since.get_or_insert_with(|| (at.as_secs_f64(), places(play)));
+            let pairs = (0..agents).flat_map(|id| &play.stage.own(AgentId(id)).pairs);
+            for pair in pairs {
+                (depth_m, contacts) = (depth_m.max(pair.penetration_m), contacts.max(pair.contacts));
+            }
+        }
+        peak < 1e3
+    });
+    let (from_s, before) = since?;
+    let span_s = ended.time().as_secs_f64() - from_s;
+    let creep = before.iter().zip(places(&ended)).map(|(a, b)| a.distance(b) / span_s);
+    Some([peak, depth_m, worst(creep), f64::from(contacts)])
+}

@@ -1,0 +1,136 @@
+//! Formats the result of `fit`, as text for people and as JSON for programs.
+//!
+//! In: settings and costs, present and needed. Out: text. Never here: where it is printed.
+
+use super::super::args::FitArgs;
+use super::super::chart::table::{Cell, Table};
+use super::task::Task;
+use super::{Fitted, Simpler, length};
+use metachron_models::rod::Integrator;
+use metachron_session::fit::Setting;
+use serde_json::{Value, json};
+
+/// The table, and the basis of its results.
+pub(super) fn text(args: &FitArgs, task: &Task<'_>, fitted: &Fitted) -> String {
+    let columns = ["object", "model", "", "integrator", "dt_ms", "segments", "ms_per_s", "cpu_ms_per_s", "simpler"];
+    let mut table = Table::new(&columns);
+    for object in 0..task.objects.len() {
+        let name = task.objects[object].name.as_str();
+        let [pays, needs] = models(task, object);
+        table.rows.push(row(task, fitted, (object, 0), [name, pays, "pays"]));
+        table.rows.push(row(task, fitted, (object, 1), ["", if needs == pays { "" } else { needs }, "needs"]));
+    }
+    let Fitted { now, need, known_m, .. } = fitted;
+    let held = if now.1.error_m + known_m <= args.tolerance { "holds" } else { "does not hold" };
+    let mut out = format!(
+        "{}: {} points within {} over {} s, against an answer known to {}\n  as it is it {held} it: {} off, {:.3} ms a simulated second\n  needed are {:.3} ms: {} off ({} runs)\n\n{}",
+        args.scene,
+        task.held,
+        length(args.tolerance),
+        args.seconds,
+        length(*known_m),
+        length(now.1.error_m),
+        now.1.cost_s() * 1e3,
+        need.trial.cost_s() * 1e3,
+        length(need.trial.error_m),
+        task.runs.get(),
+        table.text()
+    );
+    out.push_str("ms_per_s: by the declared machine, milliseconds of one core a simulated second; cpu_ms_per_s: as measured here\n");
+    out.push_str(&format!("a solve as measured here, beside one of implicit-euler: {}\n", prices(task)));
+    notes(fitted).for_each(|note| out.push_str(&format!("note  {note}\n")));
+    if need.cut_short {
+        out.push_str("note  the search ended before its end: there may be something cheaper\n");
+    }
+    out
+}
+
+fn row(task: &Task<'_>, fitted: &Fitted, (object, which): (usize, usize), head: [&str; 3]) -> Vec<Cell> {
+    let (setting, cost_s) = picked(fitted, object, which);
+    let pieces: Cell = if setting.pieces > 0 { Cell::Number(f64::from(setting.pieces), 0) } else { "-".into() };
+    let mut cells: Vec<Cell> = head.iter().map(|text| (*text).into()).collect();
+    cells.extend([
+        method(models(task, object)[which], setting).unwrap_or("-").into(),
+        Cell::Number(setting.dt_s * 1e3, 3),
+        pieces,
+        Cell::Number(cost_s * 1e3, 4),
+        Cell::Number(fitted.cpu_s[which][object] * 1e3, 3),
+        simpler(fitted, object).filter(|_| which == 1).map_or("", |told| told.word).into(),
+    ]);
+    cells
+}
+
+/// The present model of an object, and the needed one.
+fn models(task: &Task<'_>, object: usize) -> [&'static str; 2] {
+    [task.first_member(object), task.member(object)].map(|member| member.spec.model())
+}
+
+fn simpler(fitted: &Fitted, object: usize) -> Option<&Simpler> {
+    fitted.simpler.get(object)?.as_ref()
+}
+
+fn notes(fitted: &Fitted) -> impl Iterator<Item = &str> {
+    fitted.simpler.iter().flatten().map(|told| told.note.as_str())
+}
+
+/// The cost of a solve by every integrator.
+fn prices(task: &Task<'_>) -> String {
+    let price = |(integrator, price): (Integrator, &f64)| format!("{} {price:.2}", integrator.name());
+    Integrator::ALL.into_iter().zip(&task.prices).map(price).collect::<Vec<_>>().join(", ")
+}
+
+/// An object's setting and cost: present or needed.
+fn picked(fitted: &Fitted, object: usize, which: usize) -> (Setting, f64) {
+    match which {
+        0 => (fitted.now.0[object], fitted.now.1.costs_s[object]),
+        _ => (fitted.need.settings[object], fitted.need.trial.costs_s[object]),
+    }
+}
+
+fn method(model: &str, setting: Setting) -> Option<&'static str> {
+    (model == "tube").then(|| Integrator::ALL[setting.method].name())
+}
+
+/// The same as JSON.
+pub(super) fn json(args: &FitArgs, task: &Task<'_>, fitted: &Fitted, written: bool) -> anyhow::Result<String> {
+    let side = |object: usize, which: usize| -> Value {
+        let (setting, cost_s) = picked(fitted, object, which);
+        let cpu = fitted.cpu_s[which][object];
+        let model = models(task, object)[which];
+        json!({
+            "model": model,
+            "integrator": method(model, setting),
+            "dt_ms": setting.dt_s * 1e3,
+            "segments": (setting.pieces > 0).then_some(setting.pieces),
+            "ms_per_s": cost_s * 1e3,
+            "cpu_ms_per_s": cpu.is_finite().then_some(cpu * 1e3),
+        })
+    };
+    let object = |at: usize| {
+        let (name, [model, _]) = (&task.objects[at].name, models(task, at));
+        let simpler = simpler(fitted, at).map(|told| told.word);
+        json!({ "name": name, "model": model, "pays": side(at, 0), "needs": side(at, 1), "simpler": simpler })
+    };
+    let price = |(integrator, price): (Integrator, &f64)| (integrator.name().to_owned(), json!(finite(*price)));
+    let solves: serde_json::Map<_, _> = Integrator::ALL.into_iter().zip(&task.prices).map(price).collect();
+    let told = json!({
+        "scene": args.scene,
+        "tolerance_m": args.tolerance,
+        "seconds": args.seconds,
+        "points": task.held,
+        "known_m": fitted.known_m,
+        "runs": task.runs.get(),
+        "pays": { "error_m": finite(fitted.now.1.error_m), "ms_per_s": fitted.now.1.cost_s() * 1e3 },
+        "needs": { "error_m": fitted.need.trial.error_m, "ms_per_s": fitted.need.trial.cost_s() * 1e3 },
+        "objects": (0..task.objects.len()).map(object).collect::<Vec<_>>(),
+        "solves": solves,
+        "notes": notes(fitted).collect::<Vec<_>>(),
+        "complete": !fitted.need.cut_short,
+        "written": written,
+    });
+    Ok(format!("{}\n", serde_json::to_string_pretty(&told)?))
+}
+
+fn finite(number: f64) -> Option<f64> {
+    number.is_finite().then_some(number)
+}

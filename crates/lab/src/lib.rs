@@ -1,0 +1,15 @@
+//! The laboratory: charts of error, stability and cost, benchmarks, and the commands that tune gains and fit scenes.
+//!
+//! In: arguments. Out: CSV, SVG, PNG and JSON files, tables on standard output.
+//! Never here: anything that a running scene needs.
+
+pub mod args;
+mod bench;
+mod chart;
+mod fit;
+mod tune;
+
+pub use bench::command as bench;
+pub use chart::command as chart;
+pub use fit::command as fit;
+pub use tune::command as tune;

@@ -1,0 +1,190 @@
+//! The figure of a tuning: the plant, step responses, the map of gains, and late frames over the speed of the machine.
+//!
+//! In: a plant and the gains found. Out: SVG and PNG in a folder. Never here: numbers neither in the table nor played for the figure.
+
+use super::super::chart::figure;
+use super::super::chart::figure::{Axis, Colour, Figure, Layer, Mark, Panel, span};
+use super::{Identified, Tuned};
+use anyhow::Context;
+use metachron_lod::control::Law;
+use metachron_lod::tune::{Contender, Disturbance, Measures, Plant, Start, Trial, measure, play};
+use std::path::{Path, PathBuf};
+
+/// Starting rates shown, in parts of the target rate.
+const STARTS: [f64; 2] = [0.4, 2.5];
+/// Seconds shown of a step response.
+const SHOWN_S: f64 = 2.0;
+/// Cells of the map along α and along β.
+const CELLS: [usize; 2] = [24, 12];
+/// The map's ranges of α and β, unless the gains found need more room.
+const ALPHA: (f64, f64) = (1e-6, 1e-1);
+const BETA: (f64, f64) = (0.05, 50.0);
+/// Seconds of a map cell's trial.
+const MAP_S: f64 = 3.0;
+/// Speeds of the machine in the chart.
+const SPEEDS: [f64; 9] = [0.25, 0.35, 0.5, 0.71, 1.0, 1.41, 2.0, 2.83, 4.0];
+
+/// Draws and writes the figure.
+pub(super) fn write(folder: &Path, stem: &str, on: &Identified, tuned: &Tuned) -> anyhow::Result<[PathBuf; 2]> {
+    let panels = vec![fit(&on.plant), responses(on, tuned), map(on, tuned), misses(on, tuned)];
+    let title = format!("{} at {} Hz on {}", on.scene.name, on.target_hz, on.machine);
+    let figure = Figure { title, panels, columns: 2 };
+    let (svg, png) = (figure::svg(&figure)?, figure::png(&figure)?);
+    let paths = ["svg", "png"].map(|kind| folder.join(format!("tune-{stem}.{kind}")));
+    for (path, bytes) in paths.iter().zip([svg.as_bytes(), &png]) {
+        std::fs::write(path, bytes).with_context(|| format!("{} cannot be written", path.display()))?;
+    }
+    Ok(paths)
+}
+
+fn layer(label: impl Into<String>, colour: Colour, mark: Mark) -> Layer {
+    Layer { label: label.into(), colour, mark }
+}
+
+/// The measured points and the fitted line.
+fn fit(plant: &Plant) -> Panel {
+    let points: Vec<_> = plant.points.iter().map(|&(x, y)| (1e-3 * x, 1e3 * y)).collect();
+    let x = span(points.iter().map(|p| p.0).chain([0.0]), false);
+    let y = span(points.iter().map(|p| p.1).chain([0.0]), false);
+    let at = |thousands: f64| (thousands, 1e3 * plant.line.at(1e3 * thousands));
+    Panel {
+        title: "the plant: measured, and the fitted line".to_owned(),
+        x: Axis::linear("polygons, thousands", x.0.max(0.0), x.1),
+        y: Axis::linear("time of a frame, ms", y.0.max(0.0), y.1),
+        layers: vec![
+            layer("frames", Colour::Sky, Mark::Dots(points)),
+            layer("fit", Colour::Grey, Mark::Dashed(vec![at(x.0.max(0.0)), at(x.1)])),
+        ],
+    }
+}
+
+fn calm(on: &Identified, contender: impl Into<Contender>, rate: f64, seconds: f64) -> Trial {
+    Trial { start: Start::Rate(rate), seconds, ..Trial::calm(contender, on.target_hz) }
+}
+
+/// How a law's points are drawn.
+type Drawn = fn(Vec<(f64, f64)>) -> Mark;
+
+/// A colour for every law of the table: laws that were found as lines, laws for comparison dashed.
+fn styles(tuned: &Tuned) -> impl Iterator<Item = (Colour, Drawn)> {
+    let found = tuned.found.len();
+    let mark = move |k: usize| if k < found { Mark::Line } else { Mark::Dashed };
+    Colour::LINES.into_iter().cycle().enumerate().map(move |(k, colour)| (colour, mark(k) as Drawn))
+}
+
+/// Step responses from 0.4 and from 2.5 times the target rate.
+fn responses(on: &Identified, tuned: &Tuned) -> Panel {
+    let plant = judged_on(on, tuned);
+    let mut layers = vec![layer("", Colour::Grey, Mark::Dashed(vec![(0.0, 1.0), (SHOWN_S, 1.0)]))];
+    for (row, (colour, mark)) in tuned.rows.iter().zip(styles(tuned)) {
+        for (k, rate) in STARTS.into_iter().enumerate() {
+            let beats = play(&plant, &calm(on, row.verdict.contender, rate, SHOWN_S));
+            let line = beats.iter().map(|b| (b.time_s, b.ratio)).collect();
+            layers.push(layer(if k == 0 { row.name } else { "" }, colour, mark(line)));
+        }
+    }
+    Panel {
+        title: "from 0.4 and from 2.5 times the rate".to_owned(),
+        x: Axis::linear("time, s", 0.0, SHOWN_S),
+        y: Axis::log("time of a frame over the wanted one", 0.2, 4.0),
+        layers,
+    }
+}
+
+/// The plant on the machine on which the gains were judged.
+fn judged_on(on: &Identified, tuned: &Tuned) -> Plant {
+    on.plant.on(tuned.verdict().map_or(1.0, |v| v.at_speed))
+}
+
+/// The printed law over (α, β): where it settles, is slow, or swings; the chosen gains as a dot.
+fn map(on: &Identified, tuned: &Tuned) -> Panel {
+    let ([columns, rows], plant) = (CELLS, judged_on(on, tuned));
+    let step = |(low, high): (f64, f64), count: usize, at: usize| low * (high / low).powf(at as f64 / count as f64);
+    let found = tuned.rows.iter().filter_map(|row| match row.verdict.contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) if row.name.ends_with("found") => Some((alpha, beta)),
+        _ => None,
+    });
+    let found: Vec<_> = found.collect();
+    let (alphas, betas) = (around(ALPHA, found.iter().map(|at| at.0)), around(BETA, found.iter().map(|at| at.1)));
+    let corners = (0..columns).flat_map(|column| (0..rows).map(move |row| (column, row)));
+    let cells: Vec<[f64; 4]> = corners
+        .map(|(column, row)| {
+            let (a, b) = (step(alphas, columns, column), step(betas, rows, row));
+            [a, step(alphas, columns, column + 1), b, step(betas, rows, row + 1)]
+        })
+        .collect();
+    let starts = cells.iter().flat_map(|[a, a_end, b, b_end]| {
+        let law = Law::Printed { alpha: (a * a_end).sqrt(), beta: (b * b_end).sqrt() };
+        STARTS.map(|rate| calm(on, law, rate, MAP_S))
+    });
+    let measured = measure(&plant, &starts.collect::<Vec<_>>(), None);
+    let kinds: Vec<usize> = measured.chunks(STARTS.len()).map(kind).collect();
+    let of = |kind: usize| cells.iter().zip(&kinds).filter(|(_, k)| **k == kind).map(|(cell, _)| *cell).collect();
+    let [good, slow, swings] = [0, 1, 2].map(of);
+    Panel {
+        title: "the printed law over its gains".to_owned(),
+        x: Axis::log("α", alphas.0, alphas.1),
+        y: Axis::log("β", betas.0, betas.1),
+        layers: vec![
+            layer("settles within 1 s", Colour::Green, Mark::Cells(good)),
+            layer("slower, or elsewhere", Colour::Sky, Mark::Cells(slow)),
+            layer("swings for ever", Colour::Red, Mark::Cells(swings)),
+            layer("chosen", Colour::Blue, Mark::Dots(found)),
+        ],
+    }
+}
+
+/// A range extended to contain these values, with half a decade of room around each.
+fn around(range: (f64, f64), values: impl Iterator<Item = f64>) -> (f64, f64) {
+    const ROOM: f64 = 3.2;
+    values.fold(range, |(low, high), value| (low.min(value / ROOM), high.max(value * ROOM)))
+}
+
+/// 0: settles within a second from both starts; 1: later, or not; 2: swings.
+fn kind(measured: &[Measures]) -> usize {
+    if measured.iter().any(|m| m.cycle.is_some()) {
+        2
+    } else {
+        usize::from(!measured.iter().all(|m| m.settle_s.is_some_and(|s| s <= 1.0)))
+    }
+}
+
+/// Late frames over the speed of the machine, with 40 % more load for a third of the time.
+fn misses(on: &Identified, tuned: &Tuned) -> Panel {
+    let trial = |contender: Contender, speed: f64| Trial {
+        speed,
+        disturbance: Disturbance::Load(1.4),
+        noise: on.plant.line.scatter,
+        seed: 1,
+        start: Start::Rate(speed),
+        ..calm(on, contender, 1.0, 4.0)
+    };
+    let trials = tuned.rows.iter().flat_map(|row| SPEEDS.map(|speed| trial(row.verdict.contender, speed)));
+    let measured = measure(&on.plant, &trials.collect::<Vec<_>>(), None);
+    let lines = tuned.rows.iter().zip(styles(tuned)).zip(measured.chunks(SPEEDS.len()));
+    let lines = lines.map(|((row, (colour, mark)), measured)| {
+        let points = SPEEDS.iter().zip(measured).map(|(speed, m)| (*speed, 100.0 * m.miss_share)).collect();
+        layer(row.name, colour, mark(points))
+    });
+    let layers: Vec<_> = lines.collect();
+    let high = 100.0 * measured.iter().map(|m| m.miss_share).fold(0.01, f64::max);
+    Panel {
+        title: "tuned at 1, run on a machine of another speed, load + 40 %".to_owned(),
+        x: Axis::log("speed of the machine", SPEEDS[0], SPEEDS[SPEEDS.len() - 1]),
+        y: Axis::linear("late frames, %", 0.0, 1.05 * high),
+        layers,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_found_stands_inside_the_map() {
+        assert_eq!(around(BETA, [1.0].into_iter()), BETA);
+        let (low, high) = around(BETA, [50.0, 0.01].into_iter());
+        assert!(low < 0.004 && high > 150.0, "{low} {high}");
+        assert_eq!(around(ALPHA, std::iter::empty()), ALPHA);
+    }
+}

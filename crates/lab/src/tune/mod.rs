@@ -1,0 +1,240 @@
+//! `tune`: finds feedback gains for a scene, explains them and writes them to a file.
+//!
+//! In: a scene, a machine (declared, or the one present with `--live`). Out: a table, a fragment of TOML that `run --gains` and a scene
+//! take, a figure. Never here: how gains are judged ([`metachron_lod::tune`] does), the experiment's frames ([`metachron_session`] draws them).
+
+mod checked;
+mod figures;
+mod report;
+
+use super::args::TuneArgs;
+use anyhow::Context;
+use metachron_console::exit::Exit;
+use metachron_console::gains;
+use metachron_console::gains::NORMALISED;
+use metachron_console::output::{BadInput, data, message};
+use metachron_console::progress::Bar;
+use metachron_lod::control::Law;
+use metachron_lod::tune::{
+    Contender, Extent, Family, Found, Plant, Search, Verdict, explain, judge, refusal, relay_gains, search,
+};
+use metachron_render::{Gpu, Offscreen, RendererOptions, Size};
+use metachron_scene::{Source, load};
+use metachron_session::{Drawing, Experiment, Session, experiment};
+use metachron_world::Scene;
+use metachron_world::kinds::ExecutorKind;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Frames of the experiment, in full and with `--quick`.
+const FRAMES: [u64; 2] = [360, 150];
+
+/// A plant, and the scene and machine on which it was identified.
+struct Identified {
+    scene: Scene,
+    plant: Plant,
+    /// Size of its pictures, and whether they were drawn.
+    size: Size,
+    live: bool,
+    target_hz: f64,
+    machine: String,
+}
+
+/// A law's name in the table, and its verdict.
+struct Row {
+    name: &'static str,
+    verdict: Verdict,
+}
+
+/// The result of a search over all families.
+struct Tuned {
+    rows: Vec<Row>,
+    found: Vec<(Family, Found)>,
+    /// The best of the feedback laws, which the fragment contains.
+    best: Law,
+    interrupted: bool,
+}
+
+impl Tuned {
+    /// The verdict on the best law.
+    fn verdict(&self) -> Option<&Verdict> {
+        self.rows.iter().map(|row| &row.verdict).find(|v| v.contender == self.best.into())
+    }
+}
+
+/// Tunes a scene, or explains given gains.
+///
+/// # Errors
+/// What kept it from ending: bad input, a file that cannot be written, an adapter that failed.
+pub fn command(args: &TuneArgs) -> anyhow::Result<Exit> {
+    let scene = scene(args)?;
+    let given = args.analyse.as_deref().map(|text| gains::parsed(text, scene.target.frame_hz)).transpose()?;
+    let fragment = args.gains.clone().unwrap_or_else(|| PathBuf::from(format!("{}.gains.toml", stem(&args.scene))));
+    if given.is_none() {
+        gains::check_place(&fragment, "--gains", args.force)?;
+    }
+    let stopped = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stopped);
+    ctrlc::set_handler(move || flag.store(true, Ordering::Relaxed)).context("Ctrl-C cannot be caught")?;
+    let Some(identified) = identify(args, scene, &stopped)? else { return Ok(Exit::Interrupted) };
+    match given {
+        Some(contender) => analyse(args, &identified, contender),
+        None => tune(args, &identified, &fragment, &stopped),
+    }
+}
+
+/// The scene's name as a part of a file's name.
+fn stem(name: &str) -> String {
+    Path::new(name).file_stem().map_or_else(|| "scene".to_owned(), |s| s.to_string_lossy().into_owned())
+}
+
+/// Draws the experiment and fits the plant; `None` where it was stopped.
+fn identify(args: &TuneArgs, scene: Scene, stopped: &AtomicBool) -> anyhow::Result<Option<Identified>> {
+    let target_hz = scene.target.frame_hz;
+    let [width, height] = args.size.unwrap_or([1280, 720]);
+    let size = Size { width, height };
+    let session = Session::open(scene.clone())?;
+    let drawing = if args.live { live(size)? } else { Drawing::Nothing };
+    let plan = Experiment { frames: FRAMES[usize::from(args.quick)], size, drawing };
+    let bar = Bar::new("experiment", args.common.quiet || args.common.json);
+    let done = experiment(session, plan, &mut |share| {
+        bar.tell(share, "drawing at many resolutions".to_owned());
+        !stopped.load(Ordering::Relaxed)
+    })?;
+    drop(bar);
+    if done.interrupted {
+        message("interrupted before the experiment was over: nothing is known yet, and nothing was written");
+        return Ok(None);
+    }
+    let plant = Plant::identify(&done.observed).map_err(|why| BadInput(format!("{}: {why}", scene.name)))?;
+    let machine = done.adapter.unwrap_or_else(|| format!("the declared machine `{}`", scene.machine.preset));
+    Ok(Some(Identified { scene, plant, size, live: args.live, target_hz, machine }))
+}
+
+/// The scene with the changes by the arguments; in virtual time except with `--live`.
+fn scene(args: &TuneArgs) -> anyhow::Result<Scene> {
+    let executor = if args.live { ExecutorKind::Threads } else { ExecutorKind::Lockstep };
+    let flags = [
+        ("executor", Some(format!("\"{}\"", executor.name()))),
+        ("target.frame_hz", args.target_fps.map(|f| f.to_string())),
+        ("machine.seed", args.seed.map(|n| n.to_string())),
+    ];
+    let flags = flags.into_iter().filter_map(|(key, value)| Some((key.to_owned(), value?)));
+    let overrides: Vec<_> = args.common.set.iter().cloned().chain(flags).collect();
+    Ok(load(&Source::open(&args.scene)?, &overrides)?)
+}
+
+fn live(size: Size) -> anyhow::Result<Drawing> {
+    let gpu = Gpu::headless()?;
+    let options = RendererOptions::for_adapter(&gpu.info);
+    Ok(Drawing::Every(Box::new(Offscreen::new(gpu, size, options)?)))
+}
+
+fn extent(args: &TuneArgs) -> Extent {
+    if args.quick { Extent::QUICK } else { Extent::FULL }
+}
+
+/// Explains given gains.
+fn analyse(args: &TuneArgs, on: &Identified, contender: Contender) -> anyhow::Result<Exit> {
+    let explanation = explain(&on.plant, contender, on.target_hz);
+    let verdict = judge(&on.plant, contender, on.target_hz, extent(args));
+    data(&if args.common.json {
+        report::analysis_json(on, &explanation, &verdict)?
+    } else {
+        report::analysis(on, &explanation, &verdict)
+    })?;
+    Ok(Exit::Ok)
+}
+
+/// Finds gains, reports them and writes them to files.
+fn tune(args: &TuneArgs, on: &Identified, fragment: &Path, stopped: &AtomicBool) -> anyhow::Result<Exit> {
+    refuse_out_of_reach(on)?;
+    let folder = &args.out;
+    std::fs::create_dir_all(folder)
+        .map_err(|why| BadInput(format!("the folder {} cannot be written: {why}", folder.display())))?;
+    let tuned = look_for_gains(args, on, stopped)?;
+    gains::write(fragment, &gains::fragment(tuned.best, &report::comment(on, &tuned)))?;
+    let mut files = vec![fragment.to_owned()];
+    let mut checked = Vec::new();
+    // after an interrupt the user does not wait for figures
+    if !tuned.interrupted {
+        files.extend(figures::write(folder, &stem(&on.scene.name), on, &tuned)?);
+        checked = checked::check(args, on, &tuned, stopped)?;
+    }
+    data(&if args.common.json {
+        report::json(on, &tuned, &checked, &files)?
+    } else {
+        report::text(on, &tuned, &checked, &files)
+    })?;
+    if tuned.interrupted {
+        message("interrupted: the best gains so far were written");
+        return Ok(Exit::Interrupted);
+    }
+    Ok(Exit::Ok)
+}
+
+/// Refuses a target that no resolution can reach: it has no gains.
+fn refuse_out_of_reach(on: &Identified) -> anyhow::Result<()> {
+    refusal(&on.plant, on.target_hz).map_or(Ok(()), |why| Err(BadInput(format!("{}: {why}", on.scene.name)).into()))
+}
+
+/// Searches every family, and judges the laws for comparison.
+fn look_for_gains(args: &TuneArgs, on: &Identified, stopped: &AtomicBool) -> anyhow::Result<Tuned> {
+    let extent = extent(args);
+    let mut found = Vec::new();
+    for family in Family::ALL {
+        let bar = Bar::new(family_name(family), args.common.quiet || args.common.json);
+        let mut go_on = |share: f64, best: &Verdict| {
+            bar.tell(share, format!("best so far {}: {:.3}", gains::told(best.contender), best.objective));
+            !stopped.load(Ordering::Relaxed)
+        };
+        let mut setting = Search { plant: &on.plant, target_hz: on.target_hz, extent, go_on: &mut go_on };
+        found.extend(search(&mut setting, family).map(|f| (family, f)));
+        if stopped.load(Ordering::Relaxed) {
+            break;
+        }
+    }
+    let best = best_law(&found).context("not one candidate could be judged")?;
+    let interrupted = found.iter().any(|(_, f)| f.interrupted) || stopped.load(Ordering::Relaxed);
+    let mut rows: Vec<_> =
+        found.iter().map(|(family, f)| Row { name: family_name(*family), verdict: f.best.clone() }).collect();
+    let verdict = rows.iter().map(|row| &row.verdict).find(|v| v.contender == best.into()).cloned();
+    rows.extend(verdict.iter().flat_map(|verdict| rivals(on, verdict, extent)));
+    Ok(Tuned { rows, found, best, interrupted })
+}
+
+/// The best of the laws whose gain is the same at every rate. The printed law's gain is not, and the predicting policy has no gains to
+/// write to the fragment: both are only shown in the table.
+fn best_law(found: &[(Family, Found)]) -> Option<Law> {
+    let law = |(_, f): &(Family, Found)| match f.best.contender {
+        Contender::Feedback(law @ Law::Corrected { .. }) => Some((law, f.best.objective)),
+        _ => None,
+    };
+    found.iter().filter_map(law).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(law, _)| law)
+}
+
+/// The laws for comparison with the gains found; the relay's law has the same margin.
+fn rivals(on: &Identified, best: &Verdict, extent: Extent) -> Vec<Row> {
+    let normalised = Law::Printed { alpha: NORMALISED / on.target_hz, beta: 5.0 };
+    let margin = 1.0 - best.contender.set_share();
+    let rivals = [
+        ("corrected, its own", Some(Law::CORRECTED)),
+        ("printed, α = 1e-4", Some(Law::PRINTED)),
+        ("normalised, α = k/f₀", Some(normalised)),
+        ("relay (Ziegler-Nichols)", relay_gains(&on.plant.on(best.at_speed), on.target_hz, margin)),
+    ];
+    let judged = |(name, law): (&'static str, Option<Law>)| {
+        Some(Row { name, verdict: judge(&on.plant, law?, on.target_hz, extent) })
+    };
+    rivals.into_iter().filter_map(judged).collect()
+}
+
+const fn family_name(family: Family) -> &'static str {
+    match family {
+        Family::Corrected => "corrected, found",
+        Family::Pi => "PI, found",
+        Family::Printed => "printed, found",
+        Family::Adaptive => "adaptive, found",
+    }
+}

@@ -1,0 +1,232 @@
+//! Formats the result of `tune`, as text for people and as JSON for programs.
+//!
+//! In: a plant, verdicts, an explanation. Out: text. Never here: where it is printed.
+
+use super::super::chart::table::{Cell, Table};
+use super::checked::Checked;
+use super::{Identified, Tuned};
+use metachron_console::gains;
+use metachron_lod::control::Law;
+use metachron_lod::tune::{Contender, Explanation, Margins, Verdict};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// The table of a tuning, the plant, the files.
+pub(super) fn text(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> String {
+    let mut table = Table::new(&[
+        "law",
+        "gains",
+        "settle_s",
+        "overshoot",
+        "miss_share",
+        "gain_margin",
+        "delay_margin",
+        "reversals",
+        "quality",
+        "robust_to",
+        "objective",
+    ]);
+    for row in &tuned.rows {
+        let v = &row.verdict;
+        let settle: Cell = v.settle_s.map_or_else(|| "never".into(), |s| Cell::Number(s, 2));
+        table.rows.push(vec![
+            row.name.into(),
+            gains::told(v.contender).into(),
+            settle,
+            Cell::Number(v.overshoot, 3),
+            Cell::Number(v.miss_share, 4),
+            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.gain, 1)),
+            v.margins.map_or_else(|| "–".into(), |m| Cell::Number(m.delay as f64, 0)),
+            Cell::Number(v.reversals, 4),
+            Cell::Number(v.quality, 3),
+            robust(v).into(),
+            Cell::Number(v.objective, 4),
+        ]);
+    }
+    let files: Vec<_> = files.iter().map(|f| f.display().to_string()).collect();
+    format!(
+        "{}{}\n{}\nbest: {}\n{}files: {}\n",
+        plant(on),
+        elsewhere(tuned),
+        table.text(),
+        gains::told(tuned.best.into()),
+        checked.iter().map(Checked::told).collect::<String>(),
+        files.join(", ")
+    )
+}
+
+/// A note where the gains were judged on another machine, because the view leaves nothing to control on this one.
+fn elsewhere(tuned: &Tuned) -> String {
+    let speed = tuned.verdict().map_or(1.0, |v| v.at_speed);
+    if speed == 1.0 {
+        return String::new();
+    }
+    format!(
+        "  on this machine it rests at its finest and takes less than it may: judged on one {speed} times as fast\n"
+    )
+}
+
+/// The plant, in a few lines.
+fn plant(on: &Identified) -> String {
+    let line = &on.plant.line;
+    let reach = on.plant.reach(1.0);
+    format!(
+        "{} at {} Hz on {}\n  a frame takes {:.2} ms + {:.1} ns a polygon (95 %: {:.1} to {:.1}), scatter {:.1} %, dead time {} frames\n  \
+         what is in view can take {:.2} to {:.2} ms\n",
+        on.scene.name,
+        on.target_hz,
+        on.machine,
+        1e3 * line.intercept,
+        1e9 * line.slope,
+        1e9 * line.slope_95.0,
+        1e9 * line.slope_95.1,
+        100.0 * line.scatter,
+        on.plant.dead_time,
+        1e3 * reach.least_s,
+        1e3 * reach.most_s,
+    )
+}
+
+/// The speeds of the machine at which a law still works.
+fn robust(v: &Verdict) -> String {
+    match (&v.robust_to[..], v.asked.len()) {
+        (_, 0) => "out of reach".to_owned(),
+        ([], _) => "none".to_owned(),
+        (all, _) => all.iter().map(|s| format!("{s}x")).collect::<Vec<_>>().join(" "),
+    }
+}
+
+/// The stability margins of a law.
+fn margins(Margins { gain, delay }: Margins) -> String {
+    format!("gain margin {gain:.2}, delay margin {delay} frames")
+}
+
+/// The comment above the fragment.
+pub(super) fn comment(on: &Identified, tuned: &Tuned) -> String {
+    let worth = tuned.verdict().map_or_else(String::new, |v| {
+        let settle = v.settle_s.map_or_else(|| "does not settle".to_owned(), |s| format!("settles in {s:.2} s"));
+        format!(
+            "\n{settle}, {:.2} % of frames late{}",
+            100.0 * v.miss_share,
+            v.margins.map_or_else(String::new, |m| format!(", {}", margins(m)))
+        )
+    });
+    format!("found by metachron tune for {} at {} Hz on {}{worth}", on.scene.name, on.target_hz, on.machine)
+}
+
+/// The same as JSON: the best law at the top level, together with everything else.
+pub(super) fn json(on: &Identified, tuned: &Tuned, checked: &[Checked], files: &[PathBuf]) -> anyhow::Result<String> {
+    let rows: Vec<_> = tuned.rows.iter().map(|row| row_json(row.name, &row.verdict)).collect();
+    let tried: Vec<_> = tuned
+        .found
+        .iter()
+        .flat_map(|(_, f)| {
+            f.tried.iter().map(|(contender, objective)| {
+                json!({ "law": law_name(*contender), "gains": gains_json(*contender), "objective": objective })
+            })
+        })
+        .collect();
+    let mut whole = tuned.verdict().map_or_else(|| json!({}), |v| row_json(law_name(v.contender), v));
+    let rest = json!({
+        "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
+        "checked": checked.iter().map(Checked::json).collect::<Vec<_>>(),
+        "laws": rows, "tried": tried, "interrupted": tuned.interrupted, "files": files,
+    });
+    if let (Some(whole), Value::Object(rest)) = (whole.as_object_mut(), rest) {
+        whole.extend(rest);
+    }
+    Ok(serde_json::to_string_pretty(&whole)? + "\n")
+}
+
+fn plant_json(on: &Identified) -> Value {
+    let line = &on.plant.line;
+    let reach = on.plant.reach(1.0);
+    json!({
+        "fixed_ms": 1e3 * line.intercept, "polygon_ns": 1e9 * line.slope,
+        "polygon_ns_95": [1e9 * line.slope_95.0, 1e9 * line.slope_95.1], "scatter": line.scatter,
+        "dead_time_frames": on.plant.dead_time, "reach_ms": [1e3 * reach.least_s, 1e3 * reach.most_s],
+    })
+}
+
+fn row_json(name: &str, v: &Verdict) -> Value {
+    json!({
+        "law": name, "gains": gains_json(v.contender), "settle_s": v.settle_s, "overshoot": v.overshoot,
+        "miss_share": v.miss_share, "gain_margin": v.margins.map(|m| m.gain), "delay_margin_frames": v.margins.map(|m| m.delay),
+        "reversals": v.reversals, "quality": v.quality, "robust_to": v.robust_to, "asked": v.asked, "at_speed": v.at_speed,
+        "objective": v.objective,
+    })
+}
+
+/// The law's name, as scenes and `--analyse` write it.
+fn law_name(contender: Contender) -> &'static str {
+    match contender {
+        Contender::Feedback(Law::Printed { .. }) => "printed",
+        Contender::Feedback(Law::Corrected { .. }) => "corrected",
+        Contender::Adaptive { .. } => "adaptive",
+    }
+}
+
+fn gains_json(contender: Contender) -> Value {
+    match contender {
+        Contender::Feedback(Law::Printed { alpha, beta }) => json!({ "alpha": alpha, "beta": beta }),
+        Contender::Feedback(Law::Corrected { kappa, lead, margin }) => {
+            json!({ "kappa": kappa, "lead": lead, "margin": margin })
+        }
+        Contender::Adaptive { margin } => json!({ "margin": margin }),
+    }
+}
+
+/// The explanation of given gains.
+pub(super) fn analysis(on: &Identified, e: &Explanation, v: &Verdict) -> String {
+    let near = e.near.map_or_else(String::new, |near| {
+        format!(
+            "  near the set point a frame removes {:.1} % of an error, and the loop swings past {:.1} %; with the machine's speed off as far \
+             as the target can be reached: {}\n",
+            100.0 * near.gain,
+            100.0 * near.gain * near.gain_margin(),
+            v.margins.map_or_else(|| "out of reach".to_owned(), margins)
+        )
+    });
+    let rest = |eps: f64, ratio: f64, end: bool| {
+        format!("ε̂ = {eps:.4} at {ratio:.2} of its time{}", if end { " (a limit)" } else { "" })
+    };
+    let rests: Vec<_> = e.rests.iter().map(|r| rest(r.eps_hat, r.ratio, r.clamped)).collect();
+    let cycle = e.cycle.map_or_else(String::new, |c| {
+        format!("  it swings by {:.1} % of its time every {:.3} s\n", 100.0 * c.amplitude, c.period_s)
+    });
+    let settle = |k: usize| e.from[k].settle_s.map_or_else(|| "never".to_owned(), |s| format!("{s:.2} s"));
+    format!(
+        "{}  {}, {}: set point {:.2} ms, of which {:.0} % goes with polygons\n{near}  can rest: {}\n{cycle}  settles from 0.4 of the rate: \
+         {}, from 2.5: {}; overshoot {:.2}, {:.2}\n  n changes {:.3} times a frame at rest; late {:.2} % of disturbed frames\n\n{}\n",
+        plant(on),
+        law_name(v.contender),
+        gains::told(v.contender),
+        1e3 * e.set_s,
+        100.0 * e.share,
+        rests.join("; "),
+        settle(0),
+        settle(1),
+        e.from[0].overshoot,
+        e.from[1].overshoot,
+        e.chatter,
+        100.0 * v.miss_share,
+        e.sentences
+    )
+}
+
+/// The same as JSON.
+pub(super) fn analysis_json(on: &Identified, e: &Explanation, v: &Verdict) -> anyhow::Result<String> {
+    let rests: Vec<_> =
+        e.rests.iter().map(|r| json!({ "eps": r.eps_hat, "ratio": r.ratio, "clamped": r.clamped })).collect();
+    let mut whole = row_json(law_name(v.contender), v);
+    let rest = json!({
+        "scene": on.scene.name, "target_hz": on.target_hz, "machine": on.machine, "plant": plant_json(on),
+        "set_ms": 1e3 * e.set_s, "share": e.share, "loop_gain": e.near.map(|n| n.gain),
+        "loop_gain_boundary": e.near.map(|n| n.gain * n.gain_margin()), "rests": rests, "chatter": e.chatter,
+        "cycle": e.cycle.map(|c| json!({ "amplitude": c.amplitude, "period_s": c.period_s })), "sentences": e.sentences,
+    });
+    if let (Some(whole), Value::Object(rest)) = (whole.as_object_mut(), rest) {
+        whole.extend(rest);
+    }
+    Ok(serde_json::to_string_pretty(&whole)? + "\n")
+}

@@ -1,0 +1,301 @@
+//! The default policy: spends every frame's time where it gains most, by a cost table that is corrected by measurements.
+//!
+//! In: objects with levels, weights, measured times. Out: a level for every object, and [`Plan`]s that state the predicted time and value.
+//! Never here: clocks, threads, the nature of an object; allocation once the buffers have grown. Theory: `docs/theory/budget.md`, §7.
+//!
+//! ```
+//! use crate::adaptive::{Adaptive, Offer, Settings, Time};
+//!
+//! let mut adaptive = Adaptive::new(Settings::default());
+//! let offer = |cost, gain| Offer { cost, gain };
+//! for id in 0..100 {
+//!     adaptive.set(id, 0, false, &[offer(100.0, 0.5), offer(400.0, 0.8), offer(2000.0, 1.0)]);
+//!     adaptive.weigh(id, 1000.0 / (1.0 + id as f64)); // the pixels it covers
+//! }
+//! let plan = adaptive.choose(0, Time { target: 50_000.0, fixed: 2_000.0 });
+//! assert!(plan.feasible && plan.predicted <= 50_000.0);
+//! assert!(adaptive.level(0) > adaptive.level(99));
+//! adaptive.observe(0, 0, 1.1 * (plan.predicted - 2_000.0)); // measured
+//! ```
+
+mod hysteresis;
+pub mod joint;
+mod options;
+mod pick;
+mod speed_estimator;
+
+pub use hysteresis::{Ladder, Trim, is_late};
+pub use options::Offer;
+pub use speed_estimator::{Gauge, Lesson};
+
+use crate::select::Level;
+use hysteresis::Hold;
+use options::Menu;
+use pick::{Picker, Terms};
+
+/// Stages with a κ of their own: drawing, culling, classes of simulation.
+pub const STAGES: usize = 4;
+/// Frames whose measurement may still arrive: later measurements are ignored.
+const IN_FLIGHT: usize = 8;
+/// Frames after a start or a disturbance whose measurements are ignored.
+const UNSETTLED: u8 = 3;
+/// A relative change up to this counts as none: positions and times are rounded.
+const ROUNDING: f64 = 1e-9;
+/// Greatest fall of the planned κ from one frame to the next: lateness is corrected immediately, spare time is used slowly.
+const EASING: f64 = 0.95;
+
+/// The settings of [`Adaptive`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Settings {
+    /// The least margin, as a fraction of T; 0 … 0.5. If it is below the machine's noise, every other frame is late.
+    pub margin: f64,
+    /// z: standard deviations of the prediction's error that the margin covers at least; 0 … 5. On a machine that errs by 5 %, 0.5 is late
+    /// by 5 % once in 400 frames and leaves 2 % of the time; 1.5 less than once in 1250, and leaves 4 %.
+    pub sigmas: f64,
+    /// h: additional weight of a step that was taken in the last choice; 0 … 2. At 0 levels change visibly often; above 1 little is gained.
+    pub hysteresis: f64,
+    /// Frames after a change for which an object is reluctant to reverse it: one that fell may not rise, one that rose falls after others;
+    /// 0 … 255. Below 4, levels that come and go within three frames are visible.
+    pub dwell: u8,
+    /// Whether [`Trim`] corrects the budget as well.
+    pub trim: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self { margin: 0.02, sigmas: 0.5, hysteresis: 0.25, dwell: 8, trim: false }
+    }
+}
+
+impl Settings {
+    fn sound(self) -> Self {
+        let (margin, sigmas) = (crate::within(self.margin, (0.0, 0.5)), crate::within(self.sigmas, (0.0, 5.0)));
+        Self { margin, sigmas, hysteresis: crate::within(self.hysteresis, (0.0, 2.0)), ..self }
+    }
+}
+
+/// The time of a frame, ticks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Time {
+    /// T, > 0.
+    pub target: f64,
+    /// Ticks spent before anything is chosen, ≥ 0.
+    pub fixed: f64,
+}
+
+/// A choice, with its predicted time and value.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Plan {
+    /// Whether the choice fits; if not, everything is in its lowest form and still exceeds the budget.
+    pub feasible: bool,
+    /// Whether this is the last choice, kept because nothing has moved.
+    pub held: bool,
+    /// Ticks that may be spent on the choice.
+    pub budget: f64,
+    /// The expected time of the frame including the fixed part, ticks.
+    pub predicted: f64,
+    /// Weighted gain of the choice.
+    pub value: f64,
+    /// The certificate: no choice within the budget has more; 0 where there is none.
+    pub upper: f64,
+    /// λ: gain of one more tick; 0 where everything is at its finest.
+    pub lambda: f64,
+}
+
+impl Plan {
+    /// Upper bound of the relative loss against the best choice.
+    #[must_use]
+    pub fn gap(&self) -> f64 {
+        if self.upper > 0.0 { (1.0 - self.value / self.upper).max(0.0) } else { 0.0 }
+    }
+}
+
+/// The prediction for a frame, stored until the frame is measured.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+struct Sent {
+    frame: u64,
+    target: f64,
+    table: [u64; STAGES],
+    teaches: bool,
+}
+
+/// Objects, the estimates of the machine, and the last choice.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Adaptive {
+    settings: Settings,
+    menu: Menu,
+    picker: Picker,
+    gauges: [Gauge; STAGES],
+    /// κ used in plans: follows the gauges up immediately and down slowly.
+    kappa: [f64; STAGES],
+    ladder: Ladder,
+    hold: Hold,
+    trim: Trim,
+    sent: [Option<Sent>; IN_FLIGHT],
+    unsettled: u8,
+    plan: Plan,
+    table: [u64; STAGES],
+    /// The menu's change counter and the time at the last choice.
+    chosen_for: Option<(u64, Time)>,
+}
+
+impl Adaptive {
+    /// A controller without measurements.
+    #[must_use]
+    pub fn new(settings: Settings) -> Self {
+        Self {
+            settings: settings.sound(),
+            menu: Menu::default(),
+            picker: Picker::default(),
+            gauges: [Gauge::default(); STAGES],
+            kappa: [1.0; STAGES],
+            ladder: Ladder::default(),
+            hold: Hold::default(),
+            trim: Trim::default(),
+            sent: [None; IN_FLIGHT],
+            unsettled: UNSETTLED,
+            plan: Plan::default(),
+            table: [0; STAGES],
+            chosen_for: None,
+        }
+    }
+
+    /// Adds an object, or replaces its levels (coarsest first; cost by the table of `stage`, `0..STAGES`, else the last).
+    ///
+    /// A new object starts at its lowest form with weight 1. `droppable` objects may be left out altogether.
+    pub fn set(&mut self, id: u64, stage: usize, droppable: bool, levels: &[Offer]) {
+        self.menu.set(id, stage.min(STAGES - 1), droppable, levels);
+    }
+
+    /// Sets the factor of an object's gains from the next choice on; NaN and negative values are 0, and 0 gives the lowest form. `false`
+    /// where there is no such object.
+    pub fn weigh(&mut self, id: u64, weight: f64) -> bool {
+        self.menu.weigh(id, weight)
+    }
+
+    /// Removes an object; `false` where there is no such object.
+    pub fn remove(&mut self, id: u64) -> bool {
+        self.menu.remove(id)
+    }
+
+    /// Takes other settings from the next choice on.
+    pub fn set_settings(&mut self, settings: Settings) {
+        self.settings = settings.sound();
+        self.chosen_for = None;
+    }
+
+    /// Chooses for a frame; the result is read with [`Self::level`]. Frame numbers must be unique.
+    pub fn choose(&mut self, frame: u64, time: Time) -> Plan {
+        let (mut target, mut fixed) = (time.target, time.fixed);
+        if !(target.is_finite() && target > 0.0) {
+            (target, fixed) = (1.0, 1.0); // no time at all: everything at its lowest, reported as infeasible
+        }
+        fixed = if fixed > 0.0 { fixed } else { 0.0 };
+        for (planned, gauge) in self.kappa.iter_mut().zip(&self.gauges) {
+            *planned = gauge.kappa().max(EASING * *planned);
+        }
+        let trim = if self.settings.trim { self.trim.part() } else { 0.0 };
+        let budget = target * (1.0 - self.margin() + trim) - fixed;
+        let terms = Terms::new(budget, self.kappa, 1.0 + self.settings.hysteresis);
+        if self.may_keep(time, &terms, target, fixed) {
+            self.menu.objects_mut().iter_mut().for_each(|o| o.dwell = o.dwell.saturating_sub(1));
+        } else {
+            self.pick(terms);
+            self.chosen_for = Some((self.menu.changes, time));
+        }
+        self.plan.predicted = self.cost(&terms) + fixed;
+        self.plan.budget = budget;
+        let teaches = self.unsettled == 0;
+        self.unsettled = self.unsettled.saturating_sub(1);
+        self.sent[frame as usize % IN_FLIGHT] = Some(Sent { frame, target, table: self.table, teaches });
+        self.plan
+    }
+
+    /// Reports the time that a stage of a frame took, ticks, without the fixed part. Measurements may come late, and in any order.
+    pub fn observe(&mut self, frame: u64, stage: usize, took: f64) -> Lesson {
+        match self.sent[frame as usize % IN_FLIGHT] {
+            Some(sent) if sent.frame == frame && sent.teaches && stage < STAGES => {
+                self.gauges[stage].observe(sent.table[stage] as f64 / sent.target, took / sent.target)
+            }
+            _ => Lesson::Refused,
+        }
+    }
+
+    /// Reports the time that a whole frame took, ticks: for the miss ladder and the trim.
+    pub fn finished(&mut self, frame: u64, took: f64) {
+        match self.sent[frame as usize % IN_FLIGHT] {
+            Some(sent) if sent.frame == frame && sent.teaches && took.is_finite() => {
+                self.ladder.observe(took / sent.target);
+                let left_over = 1.0 - self.settings.margin - took / sent.target;
+                self.trim.observe(left_over, self.plan.lambda == 0.0);
+            }
+            _ => {}
+        }
+    }
+
+    /// Reports an outside disturbance (a resize, a shader compiled, a hidden window): measurements of the next few frames are ignored.
+    pub fn disturb(&mut self) {
+        self.unsettled = UNSETTLED;
+        self.sent = [None; IN_FLIGHT];
+    }
+
+    /// The level given to an object; `None` where it is left out, is unknown, or has no levels.
+    #[must_use]
+    pub fn level(&self, id: u64) -> Level {
+        let object = self.menu.find(id)?;
+        self.menu.vertex(object, object.taken).level
+    }
+
+    /// The lowest form of an object, for the rest of a frame when [`is_late`] is true.
+    #[must_use]
+    pub fn lowest(&self, id: u64) -> Level {
+        self.menu.find(id)?.base.level
+    }
+
+    /// The gauge of a stage; of the last where there is no such stage.
+    #[must_use]
+    pub fn gauge(&self, stage: usize) -> &Gauge {
+        &self.gauges[stage.min(STAGES - 1)]
+    }
+
+    /// κ of a stage in the last plan: follows the gauge up immediately, and down by 5 % a frame at most.
+    #[must_use]
+    pub fn planned_kappa(&self, stage: usize) -> f64 {
+        self.kappa[stage.min(STAGES - 1)]
+    }
+
+    /// The present margin, as a fraction of T.
+    #[must_use]
+    pub fn margin(&self) -> f64 {
+        let used = self.gauges.iter().zip(&self.table).filter(|(_, table)| **table > 0);
+        let sigma = used.map(|(gauge, _)| gauge.sigma()).fold(0.0, f64::max);
+        self.settings.margin.max((self.settings.sigmas + self.ladder.extra_sigmas()) * sigma).min(0.5)
+    }
+
+    fn cost(&self, terms: &Terms) -> f64 {
+        self.table.iter().zip(&terms.kappa).map(|(&t, k)| t as f64 * k).sum()
+    }
+
+    /// Whether nothing has moved and the last choice still holds.
+    fn may_keep(&mut self, time: Time, terms: &Terms, target: f64, fixed: f64) -> bool {
+        let is_same = |(changes, before): (u64, Time)| {
+            let fixed = (time.fixed - before.fixed).abs() <= ROUNDING * before.target;
+            changes == self.menu.changes && time.target == before.target && fixed
+        };
+        let still = self.chosen_for.is_some_and(is_same) && self.plan.feasible;
+        let predicted = (self.cost(terms) + fixed) / target;
+        let goal = (terms.budget + fixed) / target;
+        if !still {
+            self.hold = Hold::default();
+        }
+        self.plan.held = still && self.hold.keeps(predicted, goal, self.plan.lambda > 0.0);
+        self.plan.held
+    }
+
+    fn pick(&mut self, terms: Terms) {
+        let picked = self.picker.pick(&mut self.menu, terms, self.settings.dwell);
+        self.table = picked.table;
+        let (value, upper, lambda) = (picked.value, picked.upper, picked.lambda);
+        self.plan = Plan { feasible: picked.feasible, held: false, value, upper, lambda, ..self.plan };
+    }
+}

@@ -1,0 +1,62 @@
+//! Perceptual benefit of a level (FS93, §5), for shapes with levels and for shaded surfaces.
+//!
+//! In: an object as the camera sees it, triangles, a shading. Out: a weight for the object and an accuracy for the level; their product
+//! is the benefit, in pixels. Never here: costs. Theory: `docs/theory/control.md`, eq. 20 … 22.
+
+use super::view::{Kind, ObjectView, Shading};
+use crate::cost::benefit;
+use crate::cost::benefit::{BASE_ERROR, Picture, Sliders, size_worth};
+
+/// Triangles of the coarsest closed surface, a tetrahedron: half of the covered pixels are drawn wrong.
+const COARSEST: f64 = 4.0;
+
+/// Loss of a textured object drawn without its texture: a quarter of its pixels are assumed to be wrong.
+const UNPAINTED: f64 = 0.25;
+
+/// Upper limit of covered pixels: no picture has more.
+const PIXELS_MAX: f64 = 1e9;
+
+/// Time over which motion blur is judged, seconds: a frame at 60 Hz.
+const BLUR_S: f64 = 1.0 / 60.0;
+
+/// Pixels covered by an object, 0 if not a valid number.
+pub(super) fn pixels(view: &ObjectView) -> f64 {
+    if view.pixels > 0.0 { view.pixels.min(PIXELS_MAX) } else { 0.0 }
+}
+
+/// Benefit factor common to all levels of an object: size · importance · focus · motion (control.md, eq. 20).
+pub(super) fn weight(view: &ObjectView, sliders: &Sliders, polygon_px: f64) -> f64 {
+    let importance = if view.importance > 0.0 { view.importance.min(1e6) } else { 0.0 };
+    let blur = if view.speed_px_s > 0.0 { view.speed_px_s * BLUR_S / polygon_px } else { 0.0 };
+    let off_centre = if view.off_centre.is_nan() { 1.0 } else { view.off_centre };
+    let factors = [
+        (importance, sliders.importance),
+        ((1.0 - off_centre).clamp(0.0, 1.0), sliders.focus),
+        // half of the benefit is lost at a motion of one polygon per frame
+        (1.0 / (1.0 + blur), sliders.motion),
+    ];
+    let size = size_worth(pixels(view), sliders.size);
+    factors.into_iter().fold(size, |all, (factor, slider)| all * (1.0 - slider * (1.0 - factor)).max(0.0))
+}
+
+/// The fraction of an object's pixels that a level draws correctly, 0 … 1: its shape by the triangles, its light by the shading
+/// (control.md, eq. 21 and 22), relative to the best shading allowed.
+pub(super) fn accuracy(kind: &Kind, polygons: f64, (shading, best): (Shading, Shading), pixels: f64) -> f64 {
+    let (pieces, coarsest) = match *kind {
+        // a tube counts as a row of balls of its length
+        Kind::Tube { length_m, radius_m } => ((0.5 * length_m / radius_m).max(1.0), COARSEST),
+        Kind::Primitive { .. } => (1.0, COARSEST),
+        Kind::Counted { least, .. } | Kind::Group { impostors: [least, ..], .. } => (1.0, f64::from(least.max(1))),
+    };
+    let most = (pixels / pieces).max(1.0);
+    let samples = (polygons / pieces / coarsest).min(most).max(1.0);
+    let shape = 1.0 - BASE_ERROR / samples;
+    let picture = |shading| Picture { level: 0, polygons, vertices: 0.5 * polygons + 2.0, shading };
+    let light = match shading {
+        Shading::Flat => benefit::accuracy(pixels, &picture(benefit::Shading::Flat)),
+        Shading::Gouraud => benefit::accuracy(pixels, &picture(benefit::Shading::Gouraud)),
+        Shading::PerPixel | Shading::Textured | Shading::Shadowed => 1.0,
+    };
+    let painted = if best == Shading::Textured && shading < best { 1.0 - UNPAINTED } else { 1.0 };
+    shape * light * painted
+}

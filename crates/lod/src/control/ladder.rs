@@ -1,0 +1,295 @@
+//! The levels that an object can be drawn at, as rungs with a cost and an accuracy: the options of a selection.
+//!
+//! In: descriptions of objects, prices. Out: a [`Ladder`] per object, recomputed only if something it depends on has changed. Never here: a
+//! choice, or the present benefit of an object ([`crate::control::benefit`]). Theory: `docs/theory/control.md`, eq. 23.
+
+use super::benefit;
+use super::level::{Held, Span, open, polygons};
+use super::plan::Seen;
+use super::price::Prices;
+use super::view::{Kind, ObjectView, Shading};
+use crate::cost::benefit::Sliders;
+use crate::hysteresis;
+use metachron_core::{AgentId, N_MAX, Resolution, ResolutionRange};
+
+/// Total rungs per octave of polygons, divided by the number of objects: a single object may have fine steps, hundreds get coarse ones.
+const STEPS: usize = 256;
+
+/// Fewest and most rungs per octave: past the most, a step is below a twentieth of an object.
+const STEPS_AN_OCTAVE: (usize, usize) = (2, 16);
+
+/// Accuracy added by each step beyond the object's requested range.
+const RAISED: f64 = 1e-12;
+
+/// Lengths and radii that differ by less than this factor give the same ladder: a tube that stretches slightly keeps its own.
+const SAME: f64 = 1.1;
+
+/// One level of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Rung {
+    pub resolution: Resolution,
+    pub polygons: f64,
+    pub shading: Shading,
+    /// Seconds by the prices.
+    pub cost_s: f64,
+    /// Fraction of the object's pixels drawn correctly, 0 … 1; for an impostor, relative to the finest impostor.
+    pub accuracy: f64,
+}
+
+/// The inputs that the rungs depend on.
+#[derive(Debug, Clone, Copy)]
+struct Key {
+    id: AgentId,
+    kind: Kind,
+    range: ResolutionRange,
+    shading: (Shading, Shading),
+    /// Pixels covered, in half octaves.
+    size: u8,
+    steps: usize,
+    /// Whether the object may be drawn better than its requested range.
+    raise: bool,
+}
+
+/// The levels of one object, cheapest first; for a group its impostors.
+#[derive(Debug, Clone)]
+pub(super) struct Ladder {
+    key: Key,
+    /// Changes whenever the rungs change.
+    pub version: u64,
+    pub rungs: Vec<Rung>,
+    /// Number of rungs inside the object's requested range; the rungs after them raise its quality further.
+    pub asked: usize,
+}
+
+/// The ladders of all objects, in the order in which they are given.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ladders {
+    all: Vec<Ladder>,
+    made: u64,
+    /// Distinct ladders made for this frame: after a turn of the camera hundreds of objects need a new one simultaneously, and copies of
+    /// one object at one size share it.
+    new: Vec<usize>,
+}
+
+impl Ladders {
+    /// Updates the ladders of all objects in view.
+    pub fn update(&mut self, views: &[Seen], raise: bool, prices: &Prices, sliders: &Sliders) {
+        let steps = steps_an_octave(views);
+        self.all.truncate(views.len());
+        self.new.clear();
+        for (at, (view, span)) in views.iter().enumerate() {
+            let before = self.all.get(at).map(|ladder| ladder.key);
+            let known = before.filter(|before| before.id == view.id);
+            // an object out of view keeps its ladder
+            if known.is_some() && !view.visible {
+                continue;
+            }
+            let key = Key::of(view, (steps, raise), before);
+            if known.is_some_and(|known| known.is_same(&key)) {
+                continue;
+            }
+            self.made += 1;
+            let alike = self.new.iter().map(|&at| &self.all[at]).find(|ladder| ladder.key.is_copy(&key));
+            let ladder = match alike {
+                Some(ladder) => Ladder { key, version: self.made, ..ladder.clone() },
+                None => Ladder::new(key, self.made, (view, *span), (prices, sliders)),
+            };
+            if alike.is_none() {
+                self.new.push(at);
+            }
+            match self.all.get_mut(at) {
+                Some(place) => *place = ladder,
+                None => self.all.push(ladder),
+            }
+        }
+    }
+
+    /// Deletes all ladders: prices or sliders have changed.
+    pub fn clear(&mut self) {
+        self.all.clear();
+    }
+
+    /// The ladder of object `at`, if there is one.
+    pub fn get(&self, at: usize) -> Option<&Ladder> {
+        self.all.get(at)
+    }
+
+    /// The ladder of the object given as number `at`.
+    pub fn of(&self, at: usize) -> &Ladder {
+        &self.all[at]
+    }
+}
+
+/// Rungs per octave: the more objects there are, the less the rounding of a single one matters.
+fn steps_an_octave(views: &[Seen]) -> usize {
+    let objects = views.iter().filter(|(_, span)| span.full > span.least).count().max(1);
+    let wish = (STEPS / objects).clamp(STEPS_AN_OCTAVE.0, STEPS_AN_OCTAVE.1);
+    1 << wish.ilog2()
+}
+
+impl Key {
+    fn of(view: &ObjectView, (steps, raise): (usize, bool), before: Option<Self>) -> Self {
+        let held = before.filter(|before| before.id == view.id).map(|before| before.size);
+        let size = hysteresis::floor(held, 2.0 * libm::log2(benefit::pixels(view).max(1.0)));
+        Self { id: view.id, kind: view.kind, range: view.range, shading: view.shading, size, steps, raise }
+    }
+
+    fn is_same(&self, other: &Self) -> bool {
+        let kinds = match (self.kind, other.kind) {
+            (Kind::Tube { length_m: l, radius_m: r }, Kind::Tube { length_m, radius_m }) => {
+                is_near(l, length_m) && is_near(r, radius_m)
+            }
+            (Kind::Primitive { triangles: a, .. }, Kind::Primitive { triangles: b, .. }) => a == b,
+            (Kind::Counted { least: a, most: b, .. }, Kind::Counted { least, most, .. }) => (a, b) == (least, most),
+            (Kind::Group { impostors: a, .. }, Kind::Group { impostors: b, .. }) => a == b,
+            _ => false,
+        };
+        kinds
+            && (self.range, self.shading, self.size, self.steps, self.raise)
+                == (other.range, other.shading, other.size, other.steps, other.raise)
+    }
+
+    /// Whether both keys give bit-identical rungs: meshes of one size.
+    fn is_copy(&self, other: &Self) -> bool {
+        matches!((self.kind, other.kind), (Kind::Counted { .. }, Kind::Counted { .. })) && self.is_same(other)
+    }
+
+    /// Pixels at the middle of the half octave.
+    fn pixels(&self) -> f64 {
+        libm::exp2(0.5 * f64::from(self.size) + 0.25)
+    }
+}
+
+fn is_near(a: f64, b: f64) -> bool {
+    a <= SAME * b && b <= SAME * a
+}
+
+impl Ladder {
+    fn new(key: Key, version: u64, (view, span): (&ObjectView, Span), with: (&Prices, &Sliders)) -> Self {
+        let rung = |(resolution, polygons), shading| key.rung(resolution, polygons, shading, with);
+        if view.is_group() {
+            let rungs = key.impostors(view, rung);
+            return Self { key, version, asked: rungs.len(), rungs };
+        }
+        let allowed = move |s: &Shading| (key.shading.0..=key.shading.1).contains(s) || *s == key.shading.1;
+        let mut rungs: Vec<Rung> = Vec::new();
+        for cut in key.cuts(view, span) {
+            rungs.extend(Shading::ALL.into_iter().filter(allowed).map(|shading| rung(cut, shading)));
+        }
+        rungs.sort_by(|a, b| a.cost_s.total_cmp(&b.cost_s).then(a.accuracy.total_cmp(&b.accuracy)));
+        let asked = rungs.len();
+        if key.raise {
+            key.raise(view, &mut rungs, rung);
+        }
+        Self { key, version, rungs, asked }
+    }
+
+    /// Size of a triangle on the screen, pixels across, at the geometric middle of the ladder: used for motion blur.
+    pub fn polygon_px(&self) -> f64 {
+        let ends =
+            self.rungs.first().zip(self.rungs[..self.asked].last()).map(|(a, b)| libm::sqrt(a.polygons * b.polygons));
+        libm::sqrt(self.key.pixels() / ends.unwrap_or(1.0).max(1.0)).max(1e-3)
+    }
+}
+
+impl Key {
+    /// The distinct shapes that the object can be cut to, in ascending polygons.
+    fn cuts(&self, view: &ObjectView, span: Span) -> Vec<(Resolution, f64)> {
+        // below one pixel per triangle no difference is visible
+        let most = span.full.min(self.pixels()).max(span.least);
+        let fine = 1.0 / self.steps as f64;
+        let octaves = libm::log2(most / span.least);
+        let count = if octaves.is_finite() { libm::ceil(octaves / fine) as usize } else { 0 };
+        let wishes = (0..count).map(|k| span.least * libm::exp2(fine * k as f64)).chain([most]);
+        let mut cuts: Vec<_> = wishes.map(|wish| Held::default().choose(view, span, wish)).collect();
+        cuts.sort_by(|a, b| a.1.total_cmp(&b.1));
+        cuts.dedup_by(|a, b| a.1 <= b.1);
+        cuts
+    }
+
+    /// The impostors of a group, each with the best shading; accuracy is relative to the finest, whose benefit is in [`super::groups`].
+    fn impostors(&self, view: &ObjectView, rung: impl Fn((Resolution, f64), Shading) -> Rung) -> Vec<Rung> {
+        let at = |n| Resolution { eps_m: self.range.eps_m.1, n };
+        let one = |n| rung((at(n), polygons(view, at(n))), self.shading.1);
+        let mut rungs: Vec<_> = (0..open(view)).map(one).collect();
+        let finest = rungs.last().map_or(1.0, |finest| finest.accuracy);
+        rungs.iter_mut().for_each(|rung| rung.accuracy /= finest);
+        rungs
+    }
+
+    /// Adds rungs above the requested range: a smoother shape, soft shadows, both. Their added accuracy is negligible, so none is taken
+    /// while anything else can use the time.
+    fn raise(&self, view: &ObjectView, rungs: &mut Vec<Rung>, rung: impl Fn((Resolution, f64), Shading) -> Rung) {
+        let Some(full) = rungs.iter().copied().max_by(|a, b| a.accuracy.total_cmp(&b.accuracy)) else { return };
+        let Resolution { eps_m, n } = full.resolution;
+        let finer = match self.kind {
+            Kind::Tube { .. } => Resolution { eps_m: 0.5 * eps_m, n },
+            _ => Resolution { eps_m, n: (n + 1).min(N_MAX) },
+        };
+        let polygons = match self.kind {
+            Kind::Counted { .. } | Kind::Group { .. } => full.polygons,
+            _ => polygons(view, finer),
+        };
+        let smoother = (polygons > full.polygons && polygons <= self.pixels()).then_some((finer, polygons));
+        let plain = (full.resolution, full.polygons);
+        let better = [
+            smoother.map(|cut| rung(cut, full.shading)),
+            Some(rung(plain, Shading::Shadowed)),
+            smoother.map(|cut| rung(cut, Shading::Shadowed)),
+        ];
+        for (k, rung) in better.into_iter().flatten().enumerate() {
+            rungs.push(Rung { accuracy: full.accuracy + RAISED * (k + 1) as f64, ..rung });
+        }
+    }
+
+    fn rung(
+        &self,
+        resolution: Resolution,
+        polygons: f64,
+        shading: Shading,
+        (prices, sliders): (&Prices, &Sliders),
+    ) -> Rung {
+        let pixels = self.pixels();
+        let accuracy = benefit::accuracy(&self.kind, polygons, (shading, self.shading.1), pixels);
+        let slid = 1.0 - sliders.accuracy.clamp(0.0, 1.0) * (1.0 - accuracy);
+        Rung { resolution, polygons, shading, cost_s: prices.object_s(shading, polygons, pixels), accuracy: slid }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn ladder(impostors: [u32; 8]) -> Ladder {
+        let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
+        let kind = Kind::Group { radius_m: 1.0, members: (0, 0), impostors };
+        let view = ObjectView { range, pixels: 1e4, ..ObjectView::plain(0, kind) };
+        let mut ladders = Ladders::default();
+        ladders.update(&[(view, Span::of(&view))], true, &Prices::default(), &Sliders::default());
+        ladders.of(0).clone()
+    }
+
+    #[test]
+    fn a_group_has_a_rung_for_each_impostor_and_the_finest_counts_whole() {
+        let Ladder { rungs, asked, .. } = ladder([20, 80, 320, 0, 0, 0, 0, 0]);
+        assert_eq!(
+            rungs.iter().map(|r| (r.resolution.n, r.polygons)).collect::<Vec<_>>(),
+            [(0, 20.0), (1, 80.0), (2, 320.0)]
+        );
+        // 1 - 1/2 a coarsest: half, 7/8 and 31/32 of the covered pixels; a group gets no rungs above its range
+        let parts: Vec<f64> = rungs.iter().map(|rung| rung.accuracy).collect();
+        let expected = [0.5 / (31.0 / 32.0), (7.0 / 8.0) / (31.0 / 32.0), 1.0];
+        assert!(parts.iter().zip(expected).all(|(a, b)| (a - b).abs() < 1e-12) && asked == 3, "{parts:?}");
+        let costs: Vec<f64> = rungs.iter().map(|rung| 1e6 * rung.cost_s).collect();
+        let by_hand = [20.0, 80.0, 320.0].map(|polygons| 5.0 + 0.22 * polygons);
+        assert!(costs.iter().zip(by_hand).all(|(a, b)| (a - b).abs() < 1e-9), "{costs:?}");
+    }
+
+    #[test]
+    fn one_impostor_counts_whole_to_the_bit_and_none_is_no_rung() {
+        let one = ladder([37, 0, 0, 0, 0, 0, 0, 0]);
+        assert_eq!(one.rungs.iter().map(|rung| rung.accuracy).collect::<Vec<_>>(), [1.0]);
+        assert!(ladder([0; 8]).rungs.is_empty());
+        assert_eq!(ladder([1, 2, 3, 4, 5, 6, 7, 8]).rungs.len(), 8);
+    }
+}

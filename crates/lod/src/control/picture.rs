@@ -1,0 +1,352 @@
+//! The controller of the picture: a level for every object in view, by the selected policy.
+//!
+//! In: the objects in view, then the time of the frame. Out: a [`Plan`]. Never here: drawing, measuring, a policy's own rule. A frame is
+//! `plan`, draw, `observe`. Theory: `docs/theory/control.md`.
+
+mod ahead;
+mod settings;
+
+use super::adaptive::AdaptiveChoice;
+use super::benefit;
+use super::feedback::{Feedback, POLYGONS_AT_ONE, unseen};
+use super::flicker::Changes;
+use super::groups::Groups;
+use super::hierarchy::Hierarchy;
+use super::ladder::Ladders;
+use super::level;
+use super::level::Span;
+use super::plan::{FrameWork, LevelDemand, Plan, Seen, in_view, steers};
+use super::policy::{Law, Policy};
+use super::price::{Backdrop, Prices};
+use super::quality_boost::Raise;
+use super::query::{Ask, Promise};
+use super::select::Select;
+use super::status::Status;
+use super::view::ObjectView;
+use crate::cost::benefit::Sliders;
+use crate::cost::pipeline::Pipeline;
+use crate::cost::value::Value;
+use ahead::Ahead;
+use metachron_core::{AgentId, Resolution};
+
+/// The share of a new measurement in the smoothed speed on the screen: about five frames of memory.
+const SPEED_NEWS: f64 = 0.2;
+
+/// The share of a new measurement in the smoothed time of a frame outside drawing.
+const OVERHEAD_NEWS: f64 = 0.1;
+
+/// A smaller change of a frame's fixed part, as a fraction of the target, is ignored: it fluctuates, and levels should not follow that.
+const FIXED_TREMBLE: f64 = 0.01;
+
+/// The fraction of a frame that policies with a prediction leave free by default.
+const MARGIN: f64 = 0.02;
+/// The same for a lag, which is a bound and not a goal: a camera that starts to move makes a frame 2.4 % longer than predicted.
+const LAG_MARGIN: f64 = 0.03;
+
+/// Chooses the level of every picture.
+#[derive(Debug, Clone)]
+pub struct PictureControl {
+    policy: Policy,
+    target_hz: f64,
+    /// The fraction of a frame to be left free, if the user sets one.
+    margin: Option<f64>,
+    sliders: Sliders,
+    value: Value,
+    prices: Prices,
+    backdrop: Backdrop,
+    frozen: bool,
+    /// The rule for raising quality beyond the objects' requested ranges, if that is allowed.
+    raise: Option<Raise>,
+    /// Time of a frame outside drawing, seconds, smoothed.
+    overhead_s: Option<f64>,
+    /// Time of a frame that is spent whatever is chosen, seconds, as used for the last choice.
+    fixed_s: f64,
+    /// Time of the frame used by others, seconds.
+    reserve_s: f64,
+    /// The same plus the time reserved for choosing, as used for the last choice.
+    others_s: f64,
+    /// The bound of the lag and how it is shared, if the lag is bounded.
+    pipeline: Option<Pipeline>,
+    /// Culling time of the frame that is chosen for, seconds.
+    cull_s: f64,
+    feedback: Feedback,
+    select: Select,
+    hierarchy: Hierarchy,
+    adaptive: AdaptiveChoice,
+    ladders: Ladders,
+    groups: Groups,
+    changes: Changes,
+    /// Speeds on the screen, smoothed, by object.
+    speeds: Vec<(AgentId, Option<f64>)>,
+    views: Vec<Seen>,
+    plan: Plan,
+    /// The choice for the next frame, made while this one is drawn.
+    ahead: Option<Ahead>,
+    /// Predicted time of this frame's levels when they were chosen over their predicted time as seen now, both by the prices.
+    chosen_part: f64,
+}
+
+impl PictureControl {
+    /// A controller for `target_hz` frames a second (finite, > 0), which starts in the middle of its range.
+    #[must_use]
+    pub fn new(policy: Policy, law: Law, target_hz: f64) -> Self {
+        Self {
+            policy,
+            target_hz,
+            margin: None,
+            sliders: usual_sliders(),
+            value: Value::Plain,
+            prices: Prices::default(),
+            backdrop: Backdrop::default(),
+            frozen: false,
+            raise: None,
+            overhead_s: None,
+            fixed_s: 0.0,
+            reserve_s: 0.0,
+            others_s: 0.0,
+            pipeline: None,
+            cull_s: 0.0,
+            feedback: Feedback::new(law),
+            select: Select::default(),
+            hierarchy: Hierarchy::default(),
+            adaptive: AdaptiveChoice::default(),
+            ladders: Ladders::default(),
+            groups: Groups::default(),
+            changes: Changes::default(),
+            speeds: Vec::new(),
+            views: Vec::new(),
+            plan: Plan::default(),
+            ahead: None,
+            chosen_part: 1.0,
+        }
+    }
+
+    /// Reports the time of the frame drawn by the last [`PictureControl::plan`].
+    pub fn observe(&mut self, frame: FrameWork) {
+        let (work_s, drawn_s) = (frame.work.as_secs_f64(), frame.draw.min(frame.work).as_secs_f64());
+        if frame.skip {
+            self.adaptive.disturb();
+        }
+        if frame.skip || work_s <= 0.0 {
+            return;
+        }
+        let overhead_s = work_s - drawn_s;
+        self.overhead_s = Some(self.overhead_s.map_or(overhead_s, |held| held + OVERHEAD_NEWS * (overhead_s - held)));
+        let target_s = self.target_s();
+        if !steers(&self.views) {
+            return;
+        }
+        match self.policy {
+            Policy::Feedback => self.feedback.observe(work_s, self.target_hz, self.plan.polygons),
+            Policy::Threshold => self.select.observe(work_s, target_s),
+            Policy::Adaptive if self.is_as_chosen() => {
+                let drawn_s = (drawn_s - self.prices.backdrop_s(self.backdrop)).max(0.0);
+                self.adaptive.observe(self.chosen_part * drawn_s, (work_s, self.others_s), target_s);
+            }
+            _ => {}
+        }
+    }
+
+    /// Chooses the level of every object for the next frame.
+    pub fn plan(&mut self, objects: &[ObjectView]) -> &Plan {
+        self.look(objects);
+        let same = self.plan.levels.len() == objects.len();
+        if self.frozen && same && self.plan.levels.iter().zip(objects).all(|(level, object)| level.id == object.id) {
+            self.count();
+            return &self.plan;
+        }
+        let mut levels = std::mem::take(&mut self.plan.levels);
+        levels.clear();
+        self.plan.promise = self.choose(&mut levels);
+        self.plan.levels = levels;
+        (self.ahead, self.chosen_part) = (None, 1.0);
+        self.adaptive.take_up();
+        self.count();
+        &self.plan
+    }
+
+    fn choose(&mut self, levels: &mut Vec<LevelDemand>) -> Promise {
+        match self.policy {
+            Policy::Full => self.plan_full(levels),
+            Policy::Feedback => self.feedback.plan(&self.views, levels),
+            _ => {
+                levels.extend(self.views.iter().map(|(view, _)| unseen(view)));
+                return self.choose_by_cost(levels);
+            }
+        }
+        Promise { feasible: true, ..Promise::default() }
+    }
+
+    /// Target time of a frame: its share of a second, or the lag if that is less.
+    fn target_s(&self) -> f64 {
+        self.pipeline.map_or(f64::INFINITY, |pipeline| pipeline.lag).min(1.0 / self.target_hz)
+    }
+
+    /// The fraction of a frame that is left free by policies with a prediction.
+    fn margin_now(&self) -> f64 {
+        let bound = self.pipeline.is_some_and(|pipeline| pipeline.lag * self.target_hz < 1.0);
+        self.margin.unwrap_or(if bound { LAG_MARGIN } else { MARGIN })
+    }
+
+    fn choose_by_cost(&mut self, levels: &mut [LevelDemand]) -> Promise {
+        let (raised, prices) = (self.raise.is_some_and(|raise| raise.is_open()), self.policy.prices(&self.prices));
+        self.ladders.update(&self.views, raised, &prices, &self.sliders);
+        self.groups.update(&self.views);
+        let (target_s, overhead_s) = (self.target_s(), self.overhead_s.unwrap_or(0.0));
+        let split = self.pipeline.map(|pipeline| Pipeline { lag: target_s, ..pipeline }.split(self.cull_s));
+        let kept_s = split.map_or(0.0, |split| target_s - split.draw - overhead_s);
+        self.others_s = self.reserve_s + kept_s;
+        let fixed_s = self.prices.backdrop_s(self.backdrop) + overhead_s + self.others_s;
+        if (fixed_s - self.fixed_s).abs() > FIXED_TREMBLE * target_s {
+            self.fixed_s = fixed_s;
+        }
+        let ask = Ask {
+            views: &self.views,
+            ladders: &self.ladders,
+            sliders: &self.sliders,
+            value: self.value,
+            target_s,
+            choose_s: split.map(|split| split.choose),
+            margin: self.margin_now(),
+            fixed_s: self.fixed_s,
+        };
+        let mut promise = match self.policy {
+            Policy::Adaptive => self.adaptive.choose(&ask, &self.groups, levels),
+            Policy::Hierarchical | Policy::HierarchicalFlat | Policy::MacielShirley => {
+                self.hierarchy.choose(self.policy, &ask, &self.groups, levels)
+            }
+            policy => self.select.choose(policy, &ask, levels),
+        };
+        if let (Policy::Adaptive | Policy::RobinHood, Some(raise)) = (self.policy, &mut self.raise) {
+            raise.observe(&ask, levels, &promise);
+        }
+        // time reserved for others is not spent by the frame
+        promise.predicted_s = (promise.predicted_s - self.others_s).max(0.0);
+        promise
+    }
+
+    /// The plan of the last frame.
+    #[must_use]
+    pub fn last_plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// Stores the objects in view with their polygon ranges and smoothed speeds.
+    fn look(&mut self, objects: &[ObjectView]) {
+        self.views.truncate(objects.len());
+        self.speeds.resize(objects.len(), (AgentId(0), None));
+        for (at, (object, (of, held))) in objects.iter().zip(&mut self.speeds).enumerate() {
+            // an unchanged object that stays out of view has no speed, and its polygon range stays
+            if !object.visible && held.is_none() && self.views.get(at).is_some_and(|(known, _)| known == object) {
+                continue;
+            }
+            let mut view = *object;
+            if *of != view.id || !view.visible {
+                (*of, *held) = (view.id, None);
+            }
+            if view.visible {
+                let now = if view.speed_px_s.is_finite() { view.speed_px_s.max(0.0) } else { 0.0 };
+                view.speed_px_s = held.map_or(now, |before| before + SPEED_NEWS * (now - before));
+                *held = Some(view.speed_px_s);
+            }
+            let seen = (view, Span::of(&view));
+            match self.views.get_mut(at) {
+                Some(place) => *place = seen,
+                None => self.views.push(seen),
+            }
+        }
+    }
+
+    /// Updates the totals of the plan.
+    fn count(&mut self) {
+        let drawn = self.views.iter().zip(&self.plan.levels).filter(|((view, _), _)| view.visible);
+        self.plan.polygons = drawn.map(|(_, level)| level.polygons).sum();
+        self.plan.full_polygons = in_view(&self.views).map(|(_, span)| span.full).sum();
+        (self.plan.changes, self.plan.reversals) = self.changes.count(&self.views, &self.plan.levels);
+    }
+
+    fn plan_full(&self, levels: &mut Vec<LevelDemand>) {
+        levels.extend(self.views.iter().map(|(view, span)| {
+            let n = if view.is_group() { level::open(view) } else { view.range.n.1 };
+            let resolution = Resolution { eps_m: view.range.eps_m.0, n };
+            LevelDemand { id: view.id, resolution, polygons: span.full, shading: view.shading.1 }
+        }));
+    }
+
+    /// Time that the default policy would take of a frame without competition, seconds, and the gain of one more second, pixels: 0 if it
+    /// has all it can use. `None` for policies without a price.
+    #[must_use]
+    pub fn wants(&self) -> Option<(f64, f64)> {
+        if self.policy != Policy::Adaptive || self.plan.levels.is_empty() {
+            return None;
+        }
+        let lambda = self.adaptive.lambda();
+        let all_s = (1.0 - self.adaptive.margin()) * self.target_s();
+        Some((if lambda > 0.0 { all_s } else { self.plan.promise.predicted_s }, lambda))
+    }
+
+    /// The benefit of object `at` in the last choice at an accuracy of 1, pixels; 0 if unknown.
+    #[must_use]
+    pub fn weight(&self, at: usize) -> f64 {
+        let Some((view, _)) = self.views.get(at) else { return 0.0 };
+        self.ladders.get(at).map_or(0.0, |ladder| benefit::weight(view, &self.sliders, ladder.polygon_px()))
+    }
+
+    /// The state of the controller; its text is for the viewer and the report.
+    #[must_use]
+    pub fn status(&self) -> Status {
+        match self.policy {
+            Policy::Full => Status::Full,
+            _ if !steers(&self.views) && in_view(&self.views).next().is_some() => Status::Fixed,
+            Policy::Feedback => self.feedback.status(),
+            Policy::Adaptive => self.adaptive.status(),
+            _ => Status::of_promise(&self.plan.promise),
+        }
+    }
+
+    /// The loop variable ε̂: for feedback that of its law, for other policies 480 over the polygons in view.
+    #[must_use]
+    pub fn eps_hat(&self) -> f64 {
+        match self.policy {
+            Policy::Feedback => self.feedback.eps_hat(),
+            _ => POLYGONS_AT_ONE / self.plan.polygons.max(1.0),
+        }
+    }
+
+    /// Target work of a frame, seconds: T_set = (1 − margin)/target.
+    #[must_use]
+    pub fn set_point_s(&self) -> f64 {
+        let share = match self.policy {
+            Policy::Feedback => self.law().set_share(),
+            Policy::Adaptive => 1.0 - self.adaptive.margin(),
+            _ => 1.0 - self.margin_now(),
+        };
+        share / self.target_hz
+    }
+
+    /// The policy in use.
+    #[must_use]
+    pub fn policy(&self) -> Policy {
+        self.policy
+    }
+
+    /// The law in use.
+    #[must_use]
+    pub fn law(&self) -> Law {
+        self.feedback.law()
+    }
+
+    /// The target frame rate, frames per second.
+    #[must_use]
+    pub fn target_hz(&self) -> f64 {
+        self.target_hz
+    }
+}
+
+/// Size, accuracy and importance count in full, motion by half: moving objects are judged less strictly than resting ones.
+fn usual_sliders() -> Sliders {
+    Sliders { size: 1.0, accuracy: 1.0, importance: 1.0, focus: 0.0, motion: 0.5, hysteresis: 0.0 }
+}
+
+#[cfg(test)]
+mod tests;

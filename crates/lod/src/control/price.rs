@@ -1,0 +1,243 @@
+//! Cost of drawing: by lines, two stages for each shading of which the slower counts; by areas, a price per triangle for every area that it
+//! may cover; and the picture itself.
+//!
+//! In: coefficients, declared, or fitted to measured pictures. Out: seconds. Never here: a measurement.
+//! Theory: `docs/theory/budget.md`, eq. 41 … 44.
+
+use super::area::Areas;
+use super::plan::LevelDemand;
+use super::view::{ObjectView, Shading};
+use crate::cost::fit::{Sample, fit};
+use crate::cost::stages::{Stages, Work};
+
+/// Vertices of a closed mesh per triangle (Euler: half as many and two more).
+const VERTICES_A_TRIANGLE: f64 = 0.5;
+
+/// Cost factor of a pixel in soft shadow: thirteen more comparisons and four more depths.
+const SOFTER: f64 = 2.5;
+
+/// Cost of drawing on one machine, seconds.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Prices {
+    /// An empty picture, ≥ 0.
+    pub frame_s: f64,
+    /// Each pixel of the picture, independent of its content, ≥ 0.
+    pub pixel_s: f64,
+    /// An object by its shading, flat first: setup + max(c₁ polygons + c₂ vertices, c₃ pixels that it covers).
+    pub shading: [Stages; 4],
+    /// The same by the area of its triangles, if that was measured: then it replaces the stages.
+    pub areas: Option<[Areas; 4]>,
+}
+
+/// A measured picture of equal objects.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Measured {
+    /// Pixels of the picture.
+    pub picture_px: f64,
+    /// Objects in the picture; 0 to measure the cost of an empty picture.
+    pub objects: f64,
+    /// Triangles of each.
+    pub polygons: f64,
+    /// Pixels that each covers.
+    pub pixels: f64,
+    /// How they are shaded.
+    pub shading: Shading,
+    /// Measured time of the picture.
+    pub seconds: f64,
+}
+
+/// The part of a picture that is independent of the choice.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Backdrop {
+    /// Pixels of the picture, ≥ 0.
+    pub pixels: f64,
+    /// Triangles that are not subject to a choice: fixed solids, the floor; ≥ 0.
+    pub triangles: f64,
+}
+
+impl Default for Prices {
+    /// Two cores with Mesa, from one measurement: the assumption until better prices are known.
+    fn default() -> Self {
+        let object = Stages { setup: 5e-6, polygon: 0.22e-6, vertex: 0.0, pixel: 0.0 };
+        Self { frame_s: 1.4e-3, pixel_s: 6e-9, shading: [object; 4], areas: None }
+    }
+}
+
+impl Prices {
+    /// The same prices; an invalid or negative number is replaced by twice the default.
+    #[must_use]
+    pub fn sound(self) -> Self {
+        let usual = Self::default();
+        let of = |x: f64, prior: f64| if x.is_finite() && x >= 0.0 { x } else { 2.0 * prior };
+        let stages = |s: Stages, p: Stages| Stages {
+            setup: of(s.setup, p.setup),
+            polygon: of(s.polygon, p.polygon),
+            vertex: of(s.vertex, p.vertex),
+            pixel: of(s.pixel, p.pixel),
+        };
+        Self {
+            frame_s: of(self.frame_s, usual.frame_s),
+            pixel_s: of(self.pixel_s, usual.pixel_s),
+            shading: std::array::from_fn(|i| stages(self.shading[i], usual.shading[i])),
+            areas: self.areas.filter(|areas| areas.iter().all(Areas::is_sound)),
+        }
+    }
+
+    /// The same prices without those by area: for policies that use two stages only (FS93, MB97, GB99).
+    #[must_use]
+    pub fn by_lines(self) -> Self {
+        Self { areas: None, ..self }
+    }
+
+    /// The prices that fit measured pictures best; `None` with too few of them: needs two sizes without an object, and for each shading
+    /// eight pictures of objects.
+    #[must_use]
+    pub fn fitted(pictures: &[Measured]) -> Option<Self> {
+        let (pixel_s, frame_s) = line(pictures.iter().filter(|p| p.objects == 0.0).map(|p| (p.picture_px, p.seconds)))?;
+        let draws = |shading: Shading| {
+            let of = pictures.iter().filter(move |p| p.objects > 0.0 && p.shading == shading);
+            of.map(move |p| (p.polygons, p.pixels, (p.seconds - frame_s - pixel_s * p.picture_px) / p.objects))
+        };
+        let object = |shading: Shading| {
+            let sample = |(polygons, pixels, time): (f64, f64, f64)| Sample { work: work(polygons, pixels), time };
+            fit(&draws(shading).map(sample).collect::<Vec<_>>()).map(|found| found.stages)
+        };
+        let [flat, gouraud, per_pixel, textured] = Shading::ALL.map(object);
+        let shading = [flat?, gouraud?, per_pixel?, textured?];
+        let [flat, gouraud, per_pixel, textured] =
+            Shading::ALL.map(|shading| Areas::fitted(&draws(shading).collect::<Vec<_>>()));
+        let areas = || Some([flat?, gouraud?, per_pixel?, textured?]);
+        Some(Self { frame_s, pixel_s, shading, areas: areas() })
+    }
+
+    /// Predicted time of a measured picture, seconds.
+    #[must_use]
+    pub fn predict_s(&self, picture: &Measured) -> f64 {
+        let backdrop = Backdrop { pixels: picture.picture_px, triangles: 0.0 };
+        self.backdrop_s(backdrop) + picture.objects * self.object_s(picture.shading, picture.polygons, picture.pixels)
+    }
+
+    /// The coefficients of a shading; for [`Shading::Shadowed`] those of textured light with 2.5 times the time per pixel.
+    #[must_use]
+    pub fn of(&self, shading: Shading) -> Stages {
+        match shading {
+            Shading::Shadowed => {
+                let textured = self.of(Shading::Textured);
+                Stages { pixel: SOFTER * textured.pixel, ..textured }
+            }
+            asked => self.shading[asked as usize],
+        }
+    }
+
+    /// Seconds of an object with `polygons` triangles that covers `pixels`.
+    #[must_use]
+    pub fn object_s(&self, shading: Shading, polygons: f64, pixels: f64) -> f64 {
+        match (&self.areas, shading) {
+            (None, _) => self.of(shading).time(work(polygons, pixels)),
+            (Some(areas), Shading::Shadowed) => areas[Shading::Textured as usize].time(polygons, SOFTER * pixels),
+            (Some(areas), _) => areas[shading as usize].time(polygons, pixels),
+        }
+    }
+
+    /// Seconds of the objects in view at these levels; both in the same order.
+    #[must_use]
+    pub fn objects_s<'a>(&self, views: impl Iterator<Item = &'a ObjectView>, levels: &[LevelDemand]) -> f64 {
+        let drawn = views.zip(levels).filter(|(view, level)| view.visible && level.polygons > 0.0);
+        drawn.map(|(view, level)| self.object_s(level.shading, level.polygons, view.pixels)).fold(0.0, |sum, s| sum + s)
+    }
+
+    /// Seconds of a picture's part that is independent of the choice.
+    #[must_use]
+    pub fn backdrop_s(&self, backdrop: Backdrop) -> f64 {
+        let part = |x: f64| if x > 0.0 { x } else { 0.0 };
+        let polygon_s = self.of(Shading::PerPixel).polygon;
+        self.frame_s + self.pixel_s * part(backdrop.pixels) + polygon_s * part(backdrop.triangles)
+    }
+}
+
+fn work(polygons: f64, pixels: f64) -> Work {
+    Work { polygons, vertices: VERTICES_A_TRIANGLE * polygons + 2.0, pixels }
+}
+
+/// Slope and intercept of the least-squares line through points, neither below 0; `None` with fewer than two abscissas.
+fn line(points: impl Iterator<Item = (f64, f64)> + Clone) -> Option<(f64, f64)> {
+    let sound = points.filter(|(x, y)| x.is_finite() && y.is_finite());
+    let (n, x, y) = sound.clone().fold((0.0, 0.0, 0.0), |(n, x, y), p| (n + 1.0, x + p.0, y + p.1));
+    let (mean_x, mean_y) = (x / n, y / n);
+    let sums =
+        sound.fold((0.0, 0.0), |(xx, xy), (x, y)| (xx + (x - mean_x) * (x - mean_x), xy + (x - mean_x) * (y - mean_y)));
+    let slope = (sums.1 / sums.0).max(0.0);
+    (sums.0 > 0.0).then(|| (slope, (mean_y - slope * mean_x).max(0.0)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Pictures of a machine with noise of 3 %; one of twenty is interrupted.
+    fn pictures(seed: u32, machine: &Prices) -> Vec<Measured> {
+        let (mut state, mut all) = (u64::from(seed), Vec::new());
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        };
+        for shading in Shading::ALL {
+            for k in 0..40 {
+                let objects = if k % 10 == 0 { 0.0 } else { 36.0 };
+                let (polygons, pixels) = (10.0 * 400.0_f64.powf(random()), 10.0 * 500.0_f64.powf(random()));
+                let mut picture =
+                    Measured { picture_px: 1e5 + 9e5 * random(), objects, polygons, pixels, shading, seconds: 0.0 };
+                let stall = if random() < 0.05 && objects > 0.0 { 1.6 } else { 1.0 };
+                picture.seconds = machine.predict_s(&picture) * stall * (1.0 + 0.06 * (random() - 0.5));
+                all.push(picture);
+            }
+        }
+        all
+    }
+
+    #[test]
+    fn pictures_kept_out_of_the_fit_are_predicted_within_a_tenth_at_nineteen_of_twenty() {
+        let stages = |polygon, pixel| Stages { setup: 4e-6, polygon, vertex: 0.0, pixel };
+        let machine = Prices {
+            frame_s: 1.4e-3,
+            pixel_s: 6e-9,
+            shading: [stages(0.2e-6, 5e-9), stages(0.25e-6, 8e-9), stages(0.3e-6, 40e-9), stages(0.3e-6, 55e-9)],
+            areas: None,
+        };
+        let found = Prices::fitted(&pictures(1, &machine)).unwrap().by_lines();
+        // without interruptions: no model predicts those
+        let others = pictures(2, &machine);
+        let calm = others.iter().filter(|p| p.seconds < 1.3 * machine.predict_s(p));
+        let mut errors: Vec<_> = calm.map(|p| (found.predict_s(p) / p.seconds - 1.0).abs()).collect();
+        errors.sort_by(f64::total_cmp);
+        assert!(errors[errors.len() * 95 / 100] < 0.1, "{:?} of {found:?}", errors[errors.len() * 95 / 100]);
+    }
+
+    #[test]
+    fn too_few_pictures_give_no_prices() {
+        let all = pictures(3, &Prices::default());
+        assert_eq!(Prices::fitted(&[]), None);
+        assert_eq!(Prices::fitted(&all.iter().copied().filter(|p| p.objects > 0.0).collect::<Vec<_>>()), None);
+        let without = all.iter().copied().filter(|p| p.objects == 0.0 || p.shading != Shading::Gouraud);
+        assert_eq!(Prices::fitted(&without.collect::<Vec<_>>()), None);
+    }
+
+    #[test]
+    fn the_slower_stage_counts() {
+        let stages = Stages { setup: 1.0, polygon: 2.0, vertex: 4.0, pixel: 0.5 };
+        let prices = Prices { frame_s: 0.0, pixel_s: 0.0, shading: [stages; 4], areas: None };
+        // 1 + max(2·10 + 4·(5 + 2), 0.5 px)
+        assert_eq!(prices.object_s(Shading::Flat, 10.0, 10.0), 49.0);
+        assert_eq!(prices.object_s(Shading::Flat, 10.0, 200.0), 101.0);
+    }
+
+    #[test]
+    fn a_price_that_is_none_is_twice_the_usual_one() {
+        let mut prices = Prices { frame_s: f64::NAN, pixel_s: -1.0, ..Prices::default() };
+        prices.shading[1].polygon = f64::INFINITY;
+        let sound = prices.sound();
+        assert_eq!((sound.frame_s, sound.pixel_s, sound.shading[1].polygon), (2.8e-3, 12e-9, 0.44e-6));
+        assert_eq!(sound.shading[0], Prices::default().shading[0]);
+        assert!(sound.backdrop_s(Backdrop { pixels: f64::NAN, triangles: -1.0 }) == 2.8e-3);
+    }
+}

@@ -1,0 +1,319 @@
+//! The rate controller of an agent: dt and ε of its simulation from the measured time of its turns.
+//!
+//! In: a [`TurnMeasure`] after every turn. Out: occasionally a [`RateDemand`]. Never here: agents, clocks. One loop variable z moves
+//! through two ranges in series: first ε grows to its coarsest, then dt to its longest; back in the reverse order.
+//! Theory: `docs/theory/control.md`, eq. 17 … 19.
+
+mod full_load;
+
+use crate::Bound;
+use crate::log_law::LESSON_MAX;
+use full_load::{FullLoad, IN_A_ROW};
+
+/// Measured times of a turn.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TurnMeasure {
+    /// Time the turn took, seconds, > 0.
+    pub work_s: f64,
+    /// Time between turns at the rate that the scene requests, seconds, > 0: at a dt of [`RateLimits::dt_wanted_s`].
+    pub wanted_period_s: f64,
+    /// Actual time between turns, seconds, > 0, smoothed over a few of them.
+    pub real_period_s: f64,
+    /// Length of the step made, simulated seconds, > 0.
+    pub dt_s: f64,
+}
+
+/// Limits of the demands to an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateLimits {
+    /// Length of a step at the requested rate, simulated seconds, > 0.
+    pub dt_wanted_s: f64,
+    /// Longest step, simulated seconds. If not above `dt_wanted_s`, the rate is fixed.
+    pub dt_max_s: f64,
+    /// Finest and coarsest ε of the simulation, metres; equal values fix ε. `None` for a model without ε.
+    pub eps_m: Option<(f64, f64)>,
+    /// The fraction of its period that the agent's work may take, 0.01 … 1. Cores over agents, less some reserve, is fair.
+    pub share: f64,
+}
+
+/// The requested step and spacing of an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RateDemand {
+    /// Length of a step, simulated seconds.
+    pub dt_s: f64,
+    /// ε of the simulation, metres; `None` for a model without ε.
+    pub eps_m: Option<f64>,
+}
+
+/// Measurements are averaged over this long, seconds: many turns, so that a single hiccup has no effect …
+const WINDOW_S: f64 = 0.25;
+
+/// … and of at least this many turns.
+const WINDOW_TURNS: u32 = 8;
+
+/// A turn of more than this many times the mean of the last windows is clamped to it: such delays are due to the scheduler, not the agent.
+const SPIKE: f64 = 8.0;
+
+/// Above this ratio of real to wanted period, beyond what the agent's own work explains, the agent counts as delayed by others.
+const LATE: f64 = 1.03;
+
+/// κ: the share of such a delay (of logarithms) that one demand removes.
+const KAPPA: f64 = 0.5;
+
+/// Least |Δ ln| of a demand: re-meshing costs accuracy, which 10 % of ε do not justify.
+const RETUNE_MIN: f64 = 0.095;
+
+/// Windows without delay before anything gets finer: initially a second, doubled whenever that turns out to have been too early.
+const PATIENCE: (u32, u32) = (4, 128);
+
+/// Greatest refinement by one demand after delays by others, ln 1.25: a small step tests whether they are still there.
+const REFINE_MAX: f64 = 0.223;
+/// … otherwise the fraction of the distance that one demand refines.
+const REFINE_PART: f64 = 0.5;
+
+/// The dead zone of ln(load/share), 80 % … 105 %: wider than [`RETUNE_MIN`], so that there is always an ε at which it rests.
+const DEAD: (f64, f64) = (-0.223, 0.049);
+/// Target inside the dead zone.
+const MIDDLE: f64 = 0.5 * (DEAD.0 + DEAD.1);
+
+#[derive(Debug, Clone, Copy, Default)]
+struct Window {
+    turns: u32,
+    span_s: f64,
+    work_s: f64,
+    wanted_s: f64,
+    /// The part of the work that exceeds its own turn's period.
+    over_s: f64,
+    late: f64,
+}
+
+/// Controls dt and ε of one agent.
+#[derive(Debug, Clone)]
+pub struct RateControl {
+    limits: RateLimits,
+    /// Upper ends of the two ranges of z: ln(coarsest ε / finest ε), and that plus ln(longest dt / wanted dt).
+    landing: f64,
+    top: f64,
+    window: Window,
+    full: FullLoad,
+    /// Best known target of the loop variable z.
+    aim: f64,
+    /// z at the last change of the target for the agent's own load.
+    asked: f64,
+    /// ln(finest ε that makes a visible difference / finest ε), from 0.
+    plain: f64,
+    /// z of the last demand sent to the agent.
+    sent: f64,
+    /// Windows in a row in which others delayed the agent, and in which they did not.
+    late: usize,
+    calm: u32,
+    patience: u32,
+    /// z before the last demand, if that refined and is not confirmed yet.
+    refined_from: Option<f64>,
+    rest: Option<Bound>,
+}
+
+impl RateControl {
+    /// A controller of an agent that presently steps by `dt_wanted_s` and simulates at `eps_m`.
+    #[must_use]
+    pub fn new(limits: RateLimits, eps_m: Option<f64>) -> Self {
+        let landing = limits.eps_m.map_or(0.0, |(fine, coarse)| ratio_ln(coarse, fine));
+        let top = landing + ratio_ln(limits.dt_max_s, limits.dt_wanted_s);
+        let start = eps_m.zip(limits.eps_m).map_or(0.0, |(now, (fine, _))| ratio_ln(now, fine).min(landing));
+        let limits =
+            RateLimits { share: if limits.share > 0.0 { limits.share.clamp(0.01, 1.0) } else { 1.0 }, ..limits };
+        Self {
+            limits,
+            landing,
+            top,
+            window: Window::default(),
+            full: FullLoad::default(),
+            aim: start,
+            asked: start,
+            plain: 0.0,
+            sent: start,
+            late: 0,
+            calm: 0,
+            patience: PATIENCE.0,
+            refined_from: None,
+            rest: None,
+        }
+    }
+
+    /// Whether anything can be controlled: fixed values switch the controller off.
+    #[must_use]
+    pub fn steers(&self) -> bool {
+        self.top > 0.0
+    }
+
+    /// Changes the fraction of its period that the agent's work may take: clamped to 0.001 … 1; not above 0 is ignored.
+    pub fn set_share(&mut self, share: f64) {
+        if share > 0.0 {
+            self.limits.share = share.clamp(1e-3, 1.0);
+        }
+    }
+
+    /// The fraction of its period that the agent's work may take.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.limits.share
+    }
+
+    /// Sets the finest ε that makes a visible difference, metres, > 0; +∞ if the agent is not seen. Until the next call no finer ε is
+    /// demanded; afterwards the agent returns to its own target.
+    pub fn set_plain(&mut self, eps_m: f64) {
+        if let Some((fine, _)) = self.limits.eps_m {
+            self.plain = if eps_m == f64::INFINITY { self.landing } else { ratio_ln(eps_m, fine).min(self.landing) };
+        }
+    }
+
+    /// The present target of z: by load, and by visibility.
+    fn held(&self) -> f64 {
+        self.asked.max(self.plain)
+    }
+
+    /// Load of one core at the finest ε and the wanted rate, from 0, as the mean of the last windows; `None` before the first measurement.
+    /// Work falls as 1/ε and as 1/dt.
+    #[must_use]
+    pub fn full_load(&self) -> Option<f64> {
+        self.full.mean()
+    }
+
+    /// The least fraction of that load, 0 … 1: at the coarsest ε and the longest dt.
+    #[must_use]
+    pub fn least_part(&self) -> f64 {
+        libm::exp(-self.top)
+    }
+
+    /// Reports the time of a turn; gives a demand when dt or ε should change.
+    pub fn after_turn(&mut self, turn: &TurnMeasure) -> Option<RateDemand> {
+        if !self.steers() || !self.collect(turn) {
+            return None;
+        }
+        let window = std::mem::take(&mut self.window);
+        self.note(&window);
+        self.learn(&window);
+        self.demand_if_worth_it()
+    }
+
+    /// Adds a turn to the window; `true` when the window is full. An invalid measurement is left out.
+    fn collect(&mut self, turn: &TurnMeasure) -> bool {
+        let all = [turn.work_s, turn.wanted_period_s, turn.real_period_s, turn.dt_s];
+        if !all.iter().all(|x| x.is_finite() && *x > 0.0) {
+            return false;
+        }
+        // the period that belongs to the present step
+        let wanted_s = turn.wanted_period_s * turn.dt_s / self.limits.dt_wanted_s;
+        if !(wanted_s.is_finite() && wanted_s > 0.0) {
+            return false;
+        }
+        let usual_s = self.full.mean().map_or(f64::INFINITY, |load| load * libm::exp(-self.sent) * wanted_s);
+        let work_s = turn.work_s.min(SPIKE * usual_s);
+        let window = &mut self.window;
+        window.turns += 1;
+        window.span_s += turn.real_period_s.max(wanted_s);
+        window.work_s += work_s;
+        window.over_s += (work_s - wanted_s).max(0.0);
+        window.wanted_s += wanted_s;
+        window.late += turn.real_period_s / wanted_s;
+        window.span_s >= WINDOW_S && window.turns >= WINDOW_TURNS
+    }
+
+    /// Stores the load scaled to the finest level: in both ranges it falls as e⁻ᶻ (control.md, eq. 18). While the agent does less work than
+    /// it may (for lack of visibility), the measurement says nothing of its full load and is skipped, unless none is known.
+    fn note(&mut self, window: &Window) {
+        let load = window.work_s / window.wanted_s;
+        let eased = self.sent > self.asked && load <= self.limits.share * libm::exp(DEAD.1);
+        if !eased || self.full.mean().is_none() {
+            self.full.note(load * libm::exp(self.sent));
+        }
+    }
+
+    /// Updates the target of z by the agent's own work, and by delays from others (control.md, eq. 19).
+    fn learn(&mut self, window: &Window) {
+        let lateness = window.late / f64::from(window.turns) - window.over_s / window.wanted_s;
+        self.late = if lateness > LATE { self.late + 1 } else { 0 };
+        self.calm = if self.late > 0 { 0 } else { self.calm.saturating_add(1) };
+        if self.late >= IN_A_ROW {
+            self.give_way(lateness);
+        }
+        if self.calm >= 2 * self.patience && self.refined_from.take().is_some() {
+            self.patience = (self.patience / 2).max(PATIENCE.0);
+        }
+        let Some(full) = self.full.mean() else { return };
+        let wish = libm::log(full / self.limits.share);
+        let eased = self.sent > self.asked;
+        let from = if eased { self.sent } else { self.aim };
+        let step = wish - from;
+        self.rest = match () {
+            () if wish > self.top + DEAD.1 => Some(Bound::Coarsest),
+            () if self.asked == 0.0 && step < DEAD.0 => Some(Bound::Finest),
+            () => None,
+        };
+        if step > DEAD.1 {
+            // not into the range of dt if the range of ε suffices
+            let end = if wish <= self.landing + DEAD.1 { self.landing } else { self.top };
+            self.aim = (wish - MIDDLE).min(end);
+        } else if step < DEAD.0 && !eased {
+            self.rise(wish - MIDDLE);
+        }
+    }
+
+    /// Delayed by others: the last refinement was too much, is reverted, and tried again after twice the wait.
+    fn give_way(&mut self, lateness: f64) {
+        self.aim = (self.aim.max(self.sent) + KAPPA * libm::log(lateness).min(LESSON_MAX)).min(self.top);
+        if let Some(before) = self.refined_from.take() {
+            self.patience = (2 * self.patience).min(PATIENCE.1);
+            self.aim = self.aim.max(before);
+        }
+    }
+
+    /// With time to spare: refines, once delays by others have ceased for long enough.
+    fn rise(&mut self, to: f64) {
+        if self.calm >= self.patience {
+            let part = if self.patience == PATIENCE.0 { REFINE_PART * (self.asked - to) } else { 0.0 };
+            self.aim = to.max(self.asked - part.max(REFINE_MAX)).max(0.0);
+        }
+    }
+
+    fn demand_if_worth_it(&mut self) -> Option<RateDemand> {
+        if self.is_worth_it(self.asked, self.aim) {
+            if self.aim < self.asked {
+                (self.refined_from, self.calm) = (Some(self.asked), 0);
+            }
+            self.asked = self.aim;
+        }
+        if !self.is_worth_it(self.sent, self.held()) {
+            return None;
+        }
+        self.sent = self.held();
+        Some(self.demand())
+    }
+
+    fn is_worth_it(&self, from: f64, to: f64) -> bool {
+        to != from && ((to - from).abs() >= RETUNE_MIN || to <= 0.0 || to >= self.top)
+    }
+
+    /// The present demand (control.md, eq. 17).
+    #[must_use]
+    pub fn demand(&self) -> RateDemand {
+        let on_stair = |fine: f64, coarse: f64, rise: f64| (fine * libm::exp(rise)).min(coarse.max(fine));
+        let eps_m = self.limits.eps_m.map(|(fine, coarse)| on_stair(fine, coarse, self.held().min(self.landing)));
+        let dt_s = on_stair(self.limits.dt_wanted_s, self.limits.dt_max_s, (self.held() - self.landing).max(0.0));
+        RateDemand { dt_s, eps_m }
+    }
+
+    /// The end of the range at which the agent rests: finest with time to spare, or coarsest and still late.
+    #[must_use]
+    pub fn rest(&self) -> Option<Bound> {
+        self.rest
+    }
+}
+
+/// ln(a/b); 0 if b is not below a or one of them is not a valid length.
+fn ratio_ln(a: f64, b: f64) -> f64 {
+    if a.is_finite() && b > 0.0 && a > b { libm::log(a / b) } else { 0.0 }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,36 @@
+//! Tuning: finds, explains and checks gains. How a scene's frame time responds to its resolution, and which law holds it best.
+//!
+//! In: frames of an experiment ([`Observed`]). Out: the plant behind them ([`Plant`]), the behaviour of a law on it ([`explain`],
+//! [`judge`]) and the best gains ([`search()`]). Closed loops are simulated with the controller used for drawing,
+//! [`crate::control::PictureControl`], on the fitted plant, so that the gains found apply to the real loop. Never here: scenes, threads of
+//! agents, drawing, files.
+//! Theory: `docs/theory/control.md`, section 8.
+
+mod candidate;
+mod disturbance;
+mod equilibria;
+mod explain;
+mod margins;
+mod measures;
+mod plant;
+mod play;
+mod relay;
+mod robust_fit;
+mod search;
+mod trials;
+
+#[cfg(test)]
+mod tests;
+
+pub use candidate::Contender;
+pub use disturbance::Disturbance;
+pub use equilibria::{FixedPoint, fixed_points};
+pub use explain::{Explanation, explain, refusal};
+pub use margins::Loop;
+pub use measures::{BAND, Cycle, LATE, Measures, settled_after};
+pub use plant::{NoPlant, Observed, Plant, Reach};
+pub use play::{Beat, Start, Trial, play};
+pub use relay::relay_gains;
+pub use robust_fit::Line;
+pub use search::{Family, Found, Search, search};
+pub use trials::{Extent, Margins, Verdict, judge, measure, speeds_in_reach};

@@ -1,0 +1,234 @@
+//! Benchmark of a GPU adapter: drawing times of pictures of many equal balls, by triangles, covered pixels and shading (FS93, §4; RH05,
+//! §4.1).
+//!
+//! In: an adapter. Out: measured pictures. Never here: a fit, a file. The benchmark takes one or two seconds on a software rasteriser
+//! (CPU); no picture is begun after three seconds, the rest is left for the next run.
+
+use super::draw::RendererOptions;
+use super::level::{Level, Shading};
+use super::offscreen::{Gpu, GpuError, Offscreen};
+use super::picture::Style;
+use super::scene_view::{Actor, Form, Look, Material, Stage, States};
+use super::view::{Camera, Size};
+use glam::{DQuat, DVec3};
+use metachron_core::{AgentId, Resolution, SimTime};
+use metachron_geometry::{Generator, Model, Pattern, Placement, Tom, generate};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// One measured picture.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drawn {
+    /// Pixels of the picture.
+    pub picture_px: f64,
+    /// Objects in it.
+    pub objects: u32,
+    /// Triangles per object.
+    pub polygons: f64,
+    /// Pixels that each object covers.
+    pub pixels: f64,
+    /// Shading of the objects.
+    pub shading: Shading,
+    /// Median of a few drawing times, seconds.
+    pub seconds: f64,
+}
+
+/// Pictures without an object, to measure the cost of the picture and its pixels alone.
+const EMPTY: [Size; 3] =
+    [Size { width: 320, height: 180 }, Size { width: 640, height: 360 }, Size { width: 960, height: 540 }];
+/// Pictures of balls.
+const SIZE: Size = Size { width: 640, height: 360 };
+/// Balls along the side of a square (few where they are large), and the most pixels that each may cover without overlapping the next.
+const SQUARES: [(u32, f64); 4] = [(6, 2e3), (4, 4.4e3), (2, 17e3), (1, 60e3)];
+/// Radius of a ball, and the distance between centres of neighbours, metres.
+const RADIUS_M: f64 = 0.05;
+const APART_M: f64 = 0.12;
+/// Triangles of a ball.
+const TRIANGLES: [u32; 4] = [8, 32, 128, 512];
+/// Fewest pixels that a ball covers: for one area per triangle, the triangle counts that are drawn begin there …
+const LEAST_PX: f64 = 100.0;
+/// … and are this many.
+const NUMBERS: usize = 2;
+/// No picture is begun later than this after the first; the pictures measured until then are returned.
+const LONGEST: Duration = Duration::from_secs(3);
+/// Drawings of each picture after the first one, which makes meshes and buffers …
+const DRAWINGS: usize = 5;
+/// … or as many as fit into this time: a fiftieth of the whole, as there are about fifty pictures.
+const PICTURE: Duration = Duration::from_millis(60);
+const SHADINGS: [Shading; 4] = [Shading::Flat, Shading::Gouraud, Shading::PerPixel, Shading::Textured];
+
+/// A picture to draw: of this size without an object, or balls of (shading, triangles, pixels) each.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum Ask {
+    Empty(Size),
+    Balls(Shading, u32, f64),
+}
+
+/// All pictures in drawing order: balls whose triangles cover the least and the greatest area come first.
+fn asks(areas_px: &[f64]) -> Vec<Ask> {
+    let of = |area_px| {
+        numbers(area_px).flat_map(|(triangles, pixels)| SHADINGS.map(|shading| Ask::Balls(shading, triangles, pixels)))
+    };
+    EMPTY.into_iter().map(Ask::Empty).chain(ends_first(areas_px).flat_map(of)).collect()
+}
+
+/// The fraction of all pictures still to be measured when `known` are done, 0 … 1.
+#[must_use]
+pub fn benchmark_left(areas_px: &[f64], known: usize) -> f64 {
+    let all = asks(areas_px).len();
+    all.saturating_sub(known) as f64 / all.max(1) as f64
+}
+
+/// Draws all pictures after the first `known`, or as many as there is time for.
+///
+/// # Errors
+/// As [`Offscreen::new`] and [`Offscreen::render`].
+pub fn benchmark(gpu: &Gpu, options: RendererOptions, areas_px: &[f64], known: usize) -> Result<Vec<Drawn>, GpuError> {
+    let Ok(ball) = Tom::new(&generate(Generator::Sphere, 0, TRIANGLES[TRIANGLES.len() - 1])) else {
+        return Ok(Vec::new());
+    };
+    let ball = Arc::new(ball);
+    let mut screen = Offscreen::new(gpu.clone(), SIZE, options)?;
+    // shaders are compiled at their first use, which must not count as drawing time
+    for shading in SHADINGS {
+        measure(&mut screen, &ball, (shading, TRIANGLES[0], SQUARES[0].1))?;
+    }
+    let (begun, mut drawn) = (Instant::now(), Vec::new());
+    for ask in asks(areas_px).into_iter().skip(known) {
+        if begun.elapsed() > LONGEST {
+            break;
+        }
+        drawn.push(match ask {
+            Ask::Balls(shading, triangles, pixels) => measure(&mut screen, &ball, (shading, triangles, pixels))?,
+            Ask::Empty(size) => {
+                screen = screen.resized(size)?;
+                let found = empty(&mut screen)?;
+                screen = screen.resized(SIZE)?;
+                found
+            }
+        });
+    }
+    Ok(drawn)
+}
+
+/// A picture without an object.
+fn empty(screen: &mut Offscreen) -> Result<Drawn, GpuError> {
+    let seconds = median(screen, &mut Stage::new(Vec::new(), Vec::new()), 1.0, &[])?;
+    let (picture_px, shading) = (screen.size().pixels(), Shading::PerPixel);
+    Ok(Drawn { picture_px, objects: 0, polygons: 0.0, pixels: 0.0, shading, seconds })
+}
+
+/// The first, the last, the second, the last but one and so on: the pictures measured until time runs out span the whole range.
+fn ends_first(sorted: &[f64]) -> impl Iterator<Item = f64> {
+    let last = sorted.len().saturating_sub(1);
+    (0..sorted.len()).map(move |k| sorted[if k % 2 == 0 { k / 2 } else { last - k / 2 }])
+}
+
+/// Triangle counts of balls whose triangles cover `area_px` each, and the pixels that such a ball covers.
+fn numbers(area_px: f64) -> impl Iterator<Item = (u32, f64)> {
+    let covers = TRIANGLES.into_iter().map(move |triangles| (triangles, area_px * f64::from(triangles)));
+    covers.filter(|(_, pixels)| (LEAST_PX..=SQUARES[SQUARES.len() - 1].1).contains(pixels)).take(NUMBERS)
+}
+
+fn measure(
+    screen: &mut Offscreen,
+    ball: &Arc<Tom>,
+    (shading, triangles, pixels): (Shading, u32, f64),
+) -> Result<Drawn, GpuError> {
+    let (side, _) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap_or(SQUARES[SQUARES.len() - 1]);
+    let mut stage = balls(ball, side, shading == Shading::Textured);
+    let cut = ball.cut(triangles).triangles;
+    let level = Level { shading, triangles: cut, ..Resolution { eps_m: 1.0, n: 0 }.into() };
+    // covered pixels are measured at 1 m; from there they fall with the square of the distance
+    let distance_m = (seen_pixels(&mut stage, 1.0) / (pixels / f64::from(triangles) * f64::from(cut))).sqrt();
+    let seconds = median(screen, &mut stage, distance_m, &vec![level; (side * side) as usize])?;
+    let pixels = seen_pixels(&mut stage, distance_m);
+    let polygons = f64::from(cut);
+    Ok(Drawn { picture_px: SIZE.pixels(), objects: side * side, polygons, pixels, shading, seconds })
+}
+
+/// Pixels that the first ball covers.
+fn seen_pixels(stage: &mut Stage, distance_m: f64) -> f64 {
+    stage.survey(&camera(distance_m), SIZE);
+    stage.seen().first().map_or(0.0, |seen| seen.pixels)
+}
+
+fn median(screen: &mut Offscreen, stage: &mut Stage, distance_m: f64, levels: &[Level]) -> Result<f64, GpuError> {
+    let (camera, mut times) = (camera(distance_m), Vec::with_capacity(DRAWINGS));
+    let mut draw = || -> Result<f64, GpuError> {
+        let started = Instant::now();
+        stage.survey(&camera, screen.size());
+        screen.render(stage.compose(&camera, levels, Style::default(), None), &camera)?;
+        Ok(started.elapsed().as_secs_f64())
+    };
+    draw()?;
+    let begun = Instant::now();
+    while times.is_empty() || times.len() < DRAWINGS && begun.elapsed() < PICTURE {
+        times.push(draw()?);
+    }
+    times.sort_by(f64::total_cmp);
+    Ok(times[times.len() / 2])
+}
+
+fn camera(distance_m: f64) -> Camera {
+    Camera::looking(DVec3::new(0.0, -distance_m, 0.0), DVec3::ZERO, 0.6)
+}
+
+/// A square of balls across the view, with or without a pattern on them.
+fn balls(ball: &Arc<Tom>, side: u32, painted: bool) -> Stage {
+    let look = Look { colour: [200, 120, 100], material: Material::Plastic };
+    let model = Model::Mesh(Arc::clone(ball));
+    let actor = |id| {
+        let at = Placement { position: place(id, side), rotation: DQuat::IDENTITY, scale: RADIUS_M };
+        Actor { id: AgentId(id), form: Form::Scenery(model.clone(), at), look }
+    };
+    let mut stage = Stage::new((0..side * side).map(actor).collect(), Vec::new());
+    if painted {
+        let texture = Arc::new(Pattern::Checker.texture(RADIUS_M as f32));
+        (0..side * side).for_each(|id| stage.paint(AgentId(id), &texture));
+    }
+    stage.pose(SimTime::ZERO, States::Latest);
+    stage
+}
+
+/// Position of a ball in the square, metres.
+fn place(id: u32, side: u32) -> DVec3 {
+    let along = |i: u32| (f64::from(i) - 0.5 * f64::from(side - 1)) * APART_M;
+    DVec3::new(along(id % side), 0.0, along(id / side))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_known_is_not_drawn_again() {
+        let areas = [1.0, 16.0, 256.0];
+        let all = asks(&areas);
+        assert_eq!(all[..3], EMPTY.map(Ask::Empty));
+        assert!(all.len() > 20 && all[3..].iter().all(|ask| matches!(ask, Ask::Balls(..))));
+        assert_eq!([0, all.len(), 2 * all.len()].map(|known| benchmark_left(&areas, known)), [1.0, 0.0, 0.0]);
+    }
+
+    #[test]
+    fn areas_are_gone_through_from_both_ends() {
+        assert_eq!(ends_first(&[1.0, 2.0, 3.0, 4.0, 5.0]).collect::<Vec<_>>(), [1.0, 5.0, 2.0, 4.0, 3.0]);
+        assert_eq!(ends_first(&[1.0, 2.0]).collect::<Vec<_>>(), [1.0, 2.0]);
+        assert_eq!(ends_first(&[]).count(), 0);
+    }
+
+    #[test]
+    fn every_area_is_drawn_with_balls_that_stand_beside_each_other() {
+        for area_px in [1.0, 4.0, 16.0, 64.0, 256.0, 1024.0, 4096.0] {
+            let all: Vec<_> = numbers(area_px).collect();
+            assert!(!all.is_empty() && (all.len() == NUMBERS || area_px > 2000.0), "{area_px}: {all:?}");
+            for (triangles, pixels) in all {
+                assert!((pixels / f64::from(triangles) / area_px - 1.0).abs() < 1e-12);
+                let (side, most) = SQUARES.into_iter().find(|(_, most)| pixels <= *most).unwrap();
+                // a ball is 1/1.2 as wide as its cell, and the cells fill no more than the height of the picture
+                let wide_px = 2.0 * (most / std::f64::consts::PI).sqrt() * APART_M / (2.0 * RADIUS_M);
+                assert!(wide_px * f64::from(side) < 1.02 * f64::from(SIZE.height) + 0.2 * wide_px, "{side} of {most}");
+            }
+        }
+    }
+}

@@ -1,0 +1,43 @@
+//! Draws the newest states (wgpu) and the panels around them (egui). Reads snapshots, never the runtime.
+//!
+//! A frame: [`Stage::see`] receives the newest snapshots, [`Stage::pose`] poses them at the frame's time, [`Stage::survey`] finds which
+//! actors are visible and how large, [`Stage::compose`] makes the [`Picture`] at the requested levels, [`Renderer::render`] draws it.
+//! [`Stage`] needs no GPU; [`Offscreen`] needs no window.
+#[cfg(feature = "gpu")]
+mod benchmark;
+mod compose;
+#[cfg(feature = "gpu")]
+mod draw;
+#[cfg(feature = "gpu")]
+mod image_metrics;
+mod instances;
+mod level;
+mod light_volume;
+mod lod_transition;
+#[cfg(feature = "gpu")]
+pub mod offscreen;
+mod pick;
+mod picture;
+mod pose;
+mod scene_view;
+mod skin;
+mod texturing;
+mod view;
+mod visibility;
+
+#[cfg(feature = "gpu")]
+pub use benchmark::{Drawn, benchmark, benchmark_left};
+pub use compose::Hand;
+#[cfg(feature = "gpu")]
+pub use draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
+#[cfg(feature = "gpu")]
+pub use image_metrics::{psnr_db, ssim};
+pub use level::{Level, Shading};
+#[cfg(feature = "gpu")]
+pub use offscreen::{Gpu, GpuError, Lost, Offscreen, PictureFile};
+pub use pick::Hit;
+pub use picture::{Colouring, FloorDraw, MeshCorner, MeshKey, Picture, SkinSample, SolidInstance, SolidKind, Style};
+pub use scene_view::{Actor, Form, Look, Material, Prop, Stage, States};
+pub use skin::{ROPE_LEVEL, SkinRun, Skins};
+pub use view::{Camera, Frustum, Ray, Size};
+pub use visibility::Seen;

@@ -1,0 +1,338 @@
+//! Pictures without a window: choosing an adapter, drawing into a texture, reading it back, writing a file.
+//!
+//! In: the environment (`WGPU_BACKEND`, `WGPU_ADAPTER_NAME`, as usual in wgpu), a picture. Out: pixels, PNG files. Never here: windows, the
+//! content of the picture.
+
+use super::draw::{DrawError, DrawTimes, Renderer, RendererOptions, Target};
+use super::picture::Picture;
+use super::view::{Camera, Size};
+use image::RgbaImage;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// Whether and why a device was lost.
+#[derive(Debug, Clone, Default)]
+pub struct Lost(Arc<OnceLock<String>>);
+
+impl Lost {
+    /// Watches a device from now on; replaces the watcher set before.
+    #[must_use]
+    pub fn watch(device: &wgpu::Device) -> Self {
+        let lost = Self::default();
+        let cell = Arc::clone(&lost.0);
+        device.set_device_lost_callback(move |reason, message| {
+            // only the first loss counts
+            let _ = cell.set(if message.is_empty() { format!("{reason:?}") } else { message });
+        });
+        lost
+    }
+
+    /// The driver's message when the device was lost; `None` while it works.
+    #[must_use]
+    pub fn reason(&self) -> Option<String> {
+        self.0.get().cloned()
+    }
+}
+
+/// Reasons for having no GPU to draw with, or no picture from it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum GpuError {
+    /// No adapter of any backend. Runs without pictures are not affected.
+    #[error(
+        "no graphics adapter was found. Mesa's software driver is enough: on Debian or Ubuntu \
+         `apt-get install mesa-vulkan-drivers`, on Fedora `dnf install mesa-vulkan-drivers` ({detail})"
+    )]
+    NoAdapter {
+        /// The message of wgpu, shortened.
+        detail: String,
+    },
+    /// An adapter was found but could not be opened.
+    #[error("the graphics adapter {adapter} would not open: {detail}")]
+    NoDevice {
+        /// The adapter's name.
+        adapter: String,
+        /// The message of wgpu.
+        detail: String,
+    },
+    /// Drawing failed.
+    #[error(transparent)]
+    Draw(#[from] DrawError),
+    /// The pixels could not be read back. Drawing again may succeed.
+    #[error("the picture could not be read back: {detail}")]
+    ReadBack {
+        /// The message of wgpu.
+        detail: String,
+    },
+    /// The file could not be written.
+    #[error("the picture could not be written to {path}")]
+    File {
+        /// The intended path.
+        path: PathBuf,
+        /// The reason.
+        source: image::ImageError,
+    },
+}
+
+/// An adapter and its device.
+#[derive(Debug, Clone)]
+pub struct Gpu {
+    /// The adapter's description.
+    pub info: wgpu::AdapterInfo,
+    /// The device.
+    pub device: wgpu::Device,
+    /// Its queue.
+    pub queue: wgpu::Queue,
+}
+
+impl Gpu {
+    /// Opens an adapter without a window: Vulkan (or the system's native API), else OpenGL. `WGPU_BACKEND` and `WGPU_ADAPTER_NAME` override
+    /// this.
+    ///
+    /// # Errors
+    /// [`GpuError::NoAdapter`] states what to install; [`GpuError::NoDevice`] names the adapter that could not be opened.
+    pub fn headless() -> Result<Self, GpuError> {
+        let choices = match wgpu::Backends::from_env() {
+            Some(chosen) => vec![chosen],
+            None => vec![wgpu::Backends::PRIMARY, wgpu::Backends::GL],
+        };
+        let mut detail = String::new();
+        for backends in choices {
+            match Self::open(backends) {
+                Err(GpuError::NoAdapter { detail: more }) => {
+                    detail = if detail.is_empty() { more } else { format!("{detail}; {more}") };
+                }
+                opened => return opened,
+            }
+        }
+        Err(GpuError::NoAdapter { detail })
+    }
+
+    fn open(backends: wgpu::Backends) -> Result<Self, GpuError> {
+        let descriptor =
+            wgpu::InstanceDescriptor { backends, ..wgpu::InstanceDescriptor::new_without_display_handle() }.with_env();
+        let instance = wgpu::Instance::new(wgpu::InstanceDescriptor { backends, ..descriptor });
+        let adapter = pollster::block_on(choose(&instance))?;
+        let info = adapter.get_info();
+        let descriptor = device_descriptor(&adapter);
+        let opened = pollster::block_on(adapter.request_device(&descriptor));
+        let (device, queue) =
+            opened.map_err(|error| GpuError::NoDevice { adapter: info.name.clone(), detail: error.to_string() })?;
+        Ok(Self { info, device, queue })
+    }
+
+    /// Whether it is a software rasteriser (CPU).
+    #[must_use]
+    pub fn is_processor(&self) -> bool {
+        self.info.device_type == wgpu::DeviceType::Cpu
+    }
+
+    /// The adapter in one line: name, backend and driver.
+    #[must_use]
+    pub fn describe(&self) -> String {
+        format!("{} ({}, {})", self.info.name, self.info.backend, self.info.driver)
+    }
+}
+
+/// Requirements on an adapter, with or without a window: its own texture sizes, and time stamps where supported.
+pub fn device_descriptor(adapter: &wgpu::Adapter) -> wgpu::DeviceDescriptor<'static> {
+    wgpu::DeviceDescriptor {
+        label: Some("metachron"),
+        required_features: adapter.features() & wgpu::Features::TIMESTAMP_QUERY,
+        required_limits: wgpu::Limits::downlevel_defaults().using_resolution(adapter.limits()),
+        ..Default::default()
+    }
+}
+
+async fn choose(instance: &wgpu::Instance) -> Result<wgpu::Adapter, GpuError> {
+    if std::env::var("WGPU_ADAPTER_NAME").is_ok() {
+        let named = wgpu::util::initialize_adapter_from_env(instance, None).await;
+        return named.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) });
+    }
+    let options = wgpu::RequestAdapterOptions {
+        power_preference: wgpu::PowerPreference::from_env().unwrap_or(wgpu::PowerPreference::HighPerformance),
+        ..Default::default()
+    };
+    let found = instance.request_adapter(&options).await;
+    found.map_err(|error| GpuError::NoAdapter { detail: shortened(&error.to_string()) })
+}
+
+/// The first line of a library's message, shortened to 160 characters.
+fn shortened(words: &str) -> String {
+    const MOST: usize = 160;
+    let line = words.lines().next().unwrap_or_default();
+    match line.char_indices().nth(MOST) {
+        Some((end, _)) => format!("{} …", line[..end].trim_end()),
+        None => line.to_owned(),
+    }
+}
+
+/// A picture in memory.
+pub type PictureFile = RgbaImage;
+
+/// Draws pictures into its own texture.
+#[derive(Debug)]
+pub struct Offscreen {
+    gpu: Gpu,
+    renderer: Renderer,
+    size: Size,
+    texture: Option<(wgpu::Texture, wgpu::TextureView)>,
+}
+
+/// Format of the textures that are read back: the shaders apply the sRGB curve themselves, which costs a software rasteriser less than an
+/// sRGB format.
+const FORMAT: wgpu::TextureFormat = wgpu::TextureFormat::Rgba8Unorm;
+
+impl Offscreen {
+    /// A target of `size` on `gpu`; one without pixels draws nothing.
+    ///
+    /// # Errors
+    /// [`GpuError::Draw`] where the device lacks a feature or the size is beyond its limit.
+    pub fn new(gpu: Gpu, size: Size, options: RendererOptions) -> Result<Self, GpuError> {
+        let renderer = Renderer::new(&gpu.device, &gpu.queue, FORMAT, options)?;
+        Self::with(gpu, renderer, size)
+    }
+
+    /// The same with another size; the renderer and its caches are kept.
+    ///
+    /// # Errors
+    /// [`GpuError::Draw`] where the size is beyond the device's limit.
+    pub fn resized(self, size: Size) -> Result<Self, GpuError> {
+        Self::with(self.gpu, self.renderer, size)
+    }
+
+    fn with(gpu: Gpu, renderer: Renderer, size: Size) -> Result<Self, GpuError> {
+        let max = gpu.device.limits().max_texture_dimension_2d;
+        if size.width > max || size.height > max {
+            return Err(DrawError::TooLarge { width: size.width, height: size.height, max }.into());
+        }
+        let texture = (!size.is_empty()).then(|| {
+            let texture = gpu.device.create_texture(&wgpu::TextureDescriptor {
+                label: Some("offscreen"),
+                size: wgpu::Extent3d { width: size.width, height: size.height, depth_or_array_layers: 1 },
+                mip_level_count: 1,
+                sample_count: 1,
+                dimension: wgpu::TextureDimension::D2,
+                format: FORMAT,
+                usage: wgpu::TextureUsages::RENDER_ATTACHMENT | wgpu::TextureUsages::COPY_SRC,
+                view_formats: &[],
+            });
+            let view = texture.create_view(&wgpu::TextureViewDescriptor::default());
+            (texture, view)
+        });
+        Ok(Self { gpu, renderer, size, texture })
+    }
+
+    /// The device that draws.
+    #[must_use]
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// The renderer that draws.
+    #[must_use]
+    pub fn renderer(&self) -> &Renderer {
+        &self.renderer
+    }
+
+    /// The target's size.
+    #[must_use]
+    pub fn size(&self) -> Size {
+        self.size
+    }
+
+    /// Draws and waits for completion, so that a clock around this call measures the frame's whole work.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn render(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
+        let times = self.submit(picture, camera)?;
+        Ok(DrawTimes { gpu: self.wait()?, ..times })
+    }
+
+    /// Starts drawing: [`Offscreen::wait`] waits for completion, and this thread is free until then.
+    ///
+    /// # Errors
+    /// As [`Renderer::render`].
+    pub fn submit(&mut self, picture: &Picture, camera: &Camera) -> Result<DrawTimes, GpuError> {
+        let Some((_, view)) = &self.texture else { return Ok(DrawTimes::default()) };
+        Ok(self.renderer.render(picture, camera, Target { view, size: self.size })?)
+    }
+
+    /// Waits until all submitted work is drawn; returns the GPU time, where the adapter reports one.
+    ///
+    /// # Errors
+    /// [`GpuError::Draw`] where the device was lost.
+    pub fn wait(&mut self) -> Result<Option<Duration>, GpuError> {
+        wait(&self.gpu.device, self.renderer.lost())?;
+        Ok(self.renderer.gpu_time())
+    }
+
+    /// The pixels of the last picture, sRGB.
+    ///
+    /// # Errors
+    /// [`GpuError::ReadBack`] where the device could not read them.
+    pub fn read_back(&self) -> Result<PictureFile, GpuError> {
+        match &self.texture {
+            None => Ok(RgbaImage::new(0, 0)),
+            Some((texture, _)) => read_back(&self.gpu, texture, self.renderer.lost()),
+        }
+    }
+
+    /// Writes the last picture to a PNG file.
+    ///
+    /// # Errors
+    /// [`GpuError::ReadBack`], or [`GpuError::File`] with the path.
+    pub fn save(&self, path: &Path) -> Result<(), GpuError> {
+        write_png(&self.read_back()?, path)
+    }
+}
+
+/// Waits until all submitted work is done.
+pub fn wait(device: &wgpu::Device, lost: &Lost) -> Result<(), GpuError> {
+    let polled = device.poll(wgpu::PollType::wait_indefinitely());
+    if let Some(reason) = lost.reason() {
+        return Err(DrawError::DeviceLost { reason }.into());
+    }
+    polled.map(|_| ()).map_err(|error| GpuError::ReadBack { detail: error.to_string() })
+}
+
+/// The pixels of a texture with four bytes per pixel, after all submitted work.
+pub fn read_back(gpu: &Gpu, texture: &wgpu::Texture, lost: &Lost) -> Result<PictureFile, GpuError> {
+    let (width, height) = (texture.width(), texture.height());
+    let pitch = (4 * width).next_multiple_of(wgpu::COPY_BYTES_PER_ROW_ALIGNMENT);
+    let buffer = gpu.device.create_buffer(&wgpu::BufferDescriptor {
+        label: Some("read back"),
+        size: u64::from(pitch) * u64::from(height),
+        usage: wgpu::BufferUsages::COPY_DST | wgpu::BufferUsages::MAP_READ,
+        mapped_at_creation: false,
+    });
+    let mut encoder = gpu.device.create_command_encoder(&wgpu::CommandEncoderDescriptor::default());
+    let layout = wgpu::TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(pitch), rows_per_image: None };
+    encoder.copy_texture_to_buffer(
+        texture.as_image_copy(),
+        wgpu::TexelCopyBufferInfo { buffer: &buffer, layout },
+        wgpu::Extent3d { width, height, depth_or_array_layers: 1 },
+    );
+    gpu.queue.submit([encoder.finish()]);
+    let failed = Arc::new(OnceLock::new());
+    let cell = Arc::clone(&failed);
+    buffer.map_async(wgpu::MapMode::Read, .., move |result| {
+        let _ = cell.set(result.err().map(|error| error.to_string()));
+    });
+    wait(&gpu.device, lost)?;
+    if let Some(Some(detail)) = failed.get() {
+        return Err(GpuError::ReadBack { detail: detail.clone() });
+    }
+    let bytes = buffer.get_mapped_range(..).map_err(|error| GpuError::ReadBack { detail: error.to_string() })?;
+    let rows = bytes.chunks_exact(pitch as usize).flat_map(|row| &row[..4 * width as usize]);
+    let image = RgbaImage::from_raw(width, height, rows.copied().collect());
+    image.ok_or_else(|| GpuError::ReadBack { detail: "fewer bytes than pixels".into() })
+}
+
+/// Writes a picture as PNG.
+pub fn write_png(image: &PictureFile, path: &Path) -> Result<(), GpuError> {
+    let saved = image.save_with_format(path, image::ImageFormat::Png);
+    saved.map_err(|source| GpuError::File { path: path.to_path_buf(), source })
+}

@@ -1,0 +1,394 @@
+//! From published snapshots to the states that a frame shows.
+//!
+//! In: the newest snapshot of each agent and the frame's time. Out: one pose per object, at the time that the choice of [`States`] gives,
+//! and its age. Never here: threads, clocks, the GPU. Nothing is allocated once sizes settle.
+
+use super::lod_transition::Glide;
+use super::picture::Picture;
+use super::pose;
+use super::texturing::Painting;
+use super::view::{Camera, Size};
+use super::visibility::Seen;
+use glam::{DQuat, DVec3};
+use metachron_core::{AgentId, Body, CurveState, RigidState, SimTime, Snapshot};
+use metachron_geometry::SurfaceForm;
+use metachron_geometry::{
+    Extent, Model, Obstacle, Placement, PrimitiveMesh, Skeleton, Solid, ToolShape, creased_mesh, hull_mesh,
+};
+use std::sync::Arc;
+
+/// The states that a frame shows.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum States {
+    /// Interpolated between the two newest: smooth, one step of the agent late.
+    #[default]
+    Interpolate,
+    /// The newest, extrapolated by its velocities to the frame's time: on time, wrong where forces act.
+    Extrapolate,
+    /// The newest, unchanged: on time to one step, not smooth where steps are longer than frames.
+    Latest,
+}
+
+/// Material of a surface.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default)]
+pub enum Material {
+    /// Wet tissue with its own texture.
+    Tissue,
+    /// Brushed metal.
+    Metal,
+    /// Satin plastic.
+    #[default]
+    Plastic,
+    /// Matt, soft skin.
+    Skin,
+}
+
+/// Appearance of an object.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Look {
+    /// Colour, sRGB.
+    pub colour: [u8; 3],
+    /// Material.
+    pub material: Material,
+}
+
+/// Drawn form of an agent.
+#[derive(Debug, Clone)]
+pub enum Form {
+    /// Not drawn.
+    Unseen,
+    /// A skin over a framed curve.
+    Tube,
+    /// A rigid solid.
+    Solid(Solid),
+    /// A grasping tool.
+    Tool(ToolShape),
+    /// Static geometry without snapshots; its level gives the number of triangles.
+    Scenery(Model, Placement),
+    /// The skin of a sheet or soft solid.
+    Skin(SurfaceForm),
+    /// A rope.
+    Rope {
+        /// Its radius, metres.
+        radius_m: f64,
+    },
+}
+
+/// An agent to be drawn.
+#[derive(Debug, Clone)]
+pub struct Actor {
+    /// The agent.
+    pub id: AgentId,
+    /// Its form.
+    pub form: Form,
+    /// Its colour and material.
+    pub look: Look,
+}
+
+/// A visible static solid. The first plane among the props is the floor.
+#[derive(Debug, Clone)]
+pub struct Prop {
+    /// Shape and pose.
+    pub obstacle: Obstacle,
+    /// Its colour and material.
+    pub look: Look,
+}
+
+/// All objects that can be drawn, and their states at the time of a frame.
+#[derive(Debug, Default)]
+pub struct Stage {
+    pub(super) tracks: Vec<Track>,
+    pub(super) props: Vec<PropShape>,
+    pub(super) picture: Picture,
+    pub(super) scratch: super::compose::Scratch,
+    /// Results of the last survey, and the camera and picture size of that survey.
+    pub(super) found: Vec<Seen>,
+    /// The actors that the last survey updated.
+    pub(super) looked: Vec<usize>,
+    pub(super) eye: Option<(Camera, Size)>,
+    /// Frames over which meshes change their cut.
+    pub(super) glide_frames: u8,
+}
+
+/// One agent over time.
+#[derive(Debug)]
+pub(super) struct Track {
+    pub actor: Actor,
+    pub body: BodyShape,
+    before: Option<Arc<Snapshot>>,
+    newest: Option<Arc<Snapshot>>,
+    awake: bool,
+    /// The agent is at rest and shown at rest: its pose stays unchanged until the next snapshot.
+    still: bool,
+    /// Whether it was posed again since the last survey.
+    pub fresh: bool,
+    /// The displayed state.
+    pub pose: Body,
+    pub shown: SimTime,
+    pub age_s: f64,
+    pub bounds: Bounds,
+    pub seen: bool,
+    pub skeleton: Skeleton,
+    /// ε at which the skeleton was made from the present pose; `None` where it was made from an earlier one.
+    pub cut_m: Option<f64>,
+    /// The cut at which a mesh is drawn while visible.
+    pub glide: Option<Glide>,
+    /// The displayed curve of a rope.
+    pub rope: CurveState,
+    /// Texture of scenery.
+    pub painting: Option<Painting>,
+}
+
+/// A static solid with its drawing data.
+#[derive(Debug)]
+pub(super) struct PropShape {
+    pub solid: Solid,
+    pub look: Look,
+    pub position: DVec3,
+    pub rotation: DQuat,
+    pub body: BodyShape,
+}
+
+/// The mesh of a solid that is not a primitive, and the size of any solid.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct BodyShape {
+    /// Index among the given meshes, or of scenery among the models.
+    pub given: Option<u32>,
+    /// Centre of a bounding ball, from the origin in body axes, metres.
+    pub middle_m: DVec3,
+    /// Radius of that ball, metres.
+    pub radius_m: f64,
+    /// A quarter of its surface, m²: the mean projected area over all view directions (Cauchy), exact for convex bodies.
+    pub mean_area_m2: f64,
+}
+
+/// A bounding ball and box.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Bounds {
+    pub centre: DVec3,
+    pub radius_m: f64,
+    /// Half extents of the axis-aligned bounding box about the centre, metres.
+    pub half_m: DVec3,
+}
+
+impl Bounds {
+    fn ball(centre: DVec3, radius_m: f64) -> Self {
+        Self { centre, radius_m, half_m: DVec3::splat(radius_m) }
+    }
+
+    /// Bounds of points, with a skin of this thickness.
+    fn of(points: &[DVec3], skin_m: f64) -> Self {
+        let corners = points.iter().copied().reduce(DVec3::min).zip(points.iter().copied().reduce(DVec3::max));
+        let Some((low, high)) = corners else { return Self::default() };
+        let radius_m = 0.5 * low.distance(high) + skin_m;
+        Self { centre: 0.5 * (low + high), radius_m, half_m: 0.5 * (high - low) + skin_m }
+    }
+}
+
+impl Stage {
+    /// A stage with these actors and props.
+    #[must_use]
+    pub fn new(actors: Vec<Actor>, props: Vec<Prop>) -> Self {
+        let (mut meshes, mut models) = (Vec::new(), Models::default());
+        let props = props.into_iter().map(|prop| PropShape::new(prop, &mut meshes)).collect();
+        let tracks = actors.into_iter().map(|actor| Track::new(actor, &mut meshes, &mut models)).collect();
+        let models = models.0.into_iter().map(|(model, _)| model).collect();
+        let picture = Picture { meshes: meshes.into(), models, ..Picture::default() };
+        Self { tracks, props, picture, ..Self::default() }
+    }
+
+    /// Receives the newest snapshot of an agent; `awake` states whether the agent continues to step.
+    /// A snapshot already received changes nothing, one of an earlier time restarts the agent's history (a reset).
+    pub fn see(&mut self, id: AgentId, newest: &Arc<Snapshot>, awake: bool) {
+        // the index of an actor is mostly its agent's number
+        let here = |track: &Track| track.actor.id == id;
+        let at = id.0 as usize;
+        let at = if self.tracks.get(at).is_some_and(here) { Some(at) } else { self.tracks.iter().position(here) };
+        if let Some(track) = at.and_then(|at| self.tracks.get_mut(at)) {
+            track.see(newest, awake);
+        }
+    }
+
+    /// Poses every object at the frame's time by the rule of `states`, except those that rest and are shown at rest; returns the number
+    /// posed.
+    pub fn pose(&mut self, time: SimTime, states: States) -> usize {
+        let mut posed = 0;
+        for track in self.tracks.iter_mut().filter(|track| !track.still) {
+            posed += usize::from(track.pose_at(time, states));
+        }
+        posed
+    }
+
+    /// Age in seconds of the newest state of an agent when the frame was posed; zero for one at rest.
+    #[must_use]
+    pub fn age_s(&self, id: AgentId) -> Option<f64> {
+        self.tracks.iter().find(|track| track.actor.id == id).map(|track| track.age_s)
+    }
+
+    /// The state of an agent that the frame shows, and its time.
+    #[must_use]
+    pub fn shown(&self, id: AgentId) -> Option<(&Body, SimTime)> {
+        self.tracks.iter().find(|track| track.actor.id == id).map(|track| (&track.pose, track.shown))
+    }
+}
+
+impl Track {
+    fn new(actor: Actor, meshes: &mut Vec<PrimitiveMesh>, models: &mut Models) -> Self {
+        let body = match &actor.form {
+            Form::Solid(solid) => BodyShape::of(solid, meshes),
+            Form::Scenery(model, at) => models.body(model, at),
+            Form::Tool(tool) => {
+                let radius_m = tool.shaft_length_m + 12.0 * tool.shaft_radius_m;
+                let side = 2.0 * tool.shaft_radius_m * tool.shaft_length_m;
+                BodyShape { radius_m, mean_area_m2: side, ..BodyShape::default() }
+            }
+            Form::Tube | Form::Skin(_) | Form::Rope { .. } | Form::Unseen => BodyShape::default(),
+        };
+        let pose = match &actor.form {
+            Form::Scenery(_, at) => {
+                Body::Rigid(RigidState { position: at.position, rotation: at.rotation, ..RigidState::default() })
+            }
+            _ => Body::Nothing,
+        };
+        let mut track = Self {
+            actor,
+            body,
+            before: None,
+            newest: None,
+            awake: true,
+            still: false,
+            fresh: true,
+            pose,
+            shown: SimTime::ZERO,
+            age_s: 0.0,
+            bounds: Bounds::default(),
+            seen: true,
+            skeleton: Skeleton::default(),
+            cut_m: None,
+            glide: None,
+            rope: CurveState::default(),
+            painting: None,
+        };
+        track.bounds = track.find_bounds();
+        track
+    }
+
+    fn see(&mut self, newest: &Arc<Snapshot>, awake: bool) {
+        (self.awake, self.still) = (awake, false);
+        match &self.newest {
+            Some(known) if known.moment() == newest.moment() && known.steps == newest.steps => {}
+            Some(known) if known.moment() < newest.moment() => {
+                self.before = self.newest.replace(Arc::clone(newest));
+            }
+            _ => {
+                self.before = None;
+                self.newest = Some(Arc::clone(newest));
+            }
+        }
+    }
+
+    /// Whether there was a snapshot to pose it by.
+    fn pose_at(&mut self, time: SimTime, states: States) -> bool {
+        let Some(newest) = &self.newest else { return false };
+        self.age_s = if self.awake { time.secs_after(newest.moment()).max(0.0) } else { 0.0 };
+        self.shown = match (states, &self.before) {
+            (States::Interpolate, Some(before)) => pose::between(before, newest, time, &mut self.pose),
+            (States::Extrapolate, _) if self.awake => pose::beyond(newest, time, &mut self.pose),
+            _ => {
+                pose::copy(&newest.body, &mut self.pose);
+                newest.moment()
+            }
+        };
+        self.bounds = self.find_bounds();
+        self.still = !self.awake && self.shown == newest.moment();
+        (self.fresh, self.cut_m) = (true, None);
+        true
+    }
+
+    fn find_bounds(&self) -> Bounds {
+        match &self.pose {
+            Body::Nothing => Bounds::default(),
+            Body::Rigid(rigid) => {
+                let centre = rigid.position + rigid.rotation * self.body.middle_m;
+                Bounds::ball(centre, self.body.radius_m)
+            }
+            Body::Tool(tool) => {
+                let half = 0.5 * self.body.radius_m;
+                Bounds::ball(tool.tip - tool.rotation * DVec3::Z * half, 1.2 * half)
+            }
+            Body::Curve(curve) => Bounds::of(&curve.positions, curve.radii_m.iter().copied().fold(0.0, f64::max)),
+            Body::Soft(soft) => Bounds::of(&soft.positions, 0.0),
+        }
+    }
+}
+
+impl PropShape {
+    fn new(prop: Prop, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+        let Obstacle { solid, position, rotation, .. } = prop.obstacle;
+        let body = BodyShape::of(&solid, meshes);
+        Self { solid, look: prop.look, position, rotation, body }
+    }
+
+    /// Half extents of the axis-aligned bounding box about its position, metres.
+    pub fn half_extents(&self) -> DVec3 {
+        match self.solid {
+            Solid::Box { half_extents_m: h } => {
+                let axes = glam::DMat3::from_quat(self.rotation);
+                axes.x_axis.abs() * h.x + axes.y_axis.abs() * h.y + axes.z_axis.abs() * h.z
+            }
+            _ => DVec3::splat(self.body.radius_m),
+        }
+    }
+}
+
+/// Every model once, with its extent, shared by its copies.
+#[derive(Default)]
+struct Models(Vec<(Model, Extent)>);
+
+impl Models {
+    fn body(&mut self, model: &Model, at: &Placement) -> BodyShape {
+        let number = self.0.iter().position(|(known, _)| known.is(model)).unwrap_or_else(|| {
+            self.0.push((model.clone(), model.extent()));
+            self.0.len() - 1
+        });
+        let extent = self.0[number].1;
+        BodyShape {
+            given: Some(number as u32),
+            middle_m: extent.centre * at.scale,
+            radius_m: extent.radius * at.scale,
+            mean_area_m2: 0.25 * extent.area * at.scale * at.scale,
+        }
+    }
+}
+
+impl BodyShape {
+    fn of(solid: &Solid, meshes: &mut Vec<PrimitiveMesh>) -> Self {
+        use std::f64::consts::PI;
+        let given = |mesh: PrimitiveMesh, meshes: &mut Vec<PrimitiveMesh>| {
+            let far = mesh.vertices.iter().map(|v| v.core.as_dvec3().length()).fold(0.0, f64::max);
+            let area: f64 = mesh
+                .triangles
+                .iter()
+                .map(|t| {
+                    let [a, b, c] = t.map(|i| mesh.vertices[i as usize].core.as_dvec3());
+                    0.5 * (b - a).cross(c - a).length()
+                })
+                .sum();
+            meshes.push(mesh);
+            let given = Some(meshes.len() as u32 - 1);
+            Self { given, radius_m: far, mean_area_m2: 0.25 * area, ..Self::default() }
+        };
+        let plain = |radius_m: f64, area: f64| Self { radius_m, mean_area_m2: 0.25 * area, ..Self::default() };
+        match solid {
+            Solid::Ball { radius_m: r } => plain(*r, 4.0 * PI * r * r),
+            Solid::Box { half_extents_m: h } => plain(h.length(), 8.0 * (h.x * h.y + h.y * h.z + h.z * h.x)),
+            Solid::Capsule { radius_m: r, half_height_m: h } => plain(r + h, 4.0 * PI * r * (r + h)),
+            Solid::Cylinder { radius_m: r, half_height_m: h } => {
+                plain((r * r + h * h).sqrt(), 2.0 * PI * r * (r + 2.0 * h))
+            }
+            Solid::Plane => Self::default(),
+            Solid::Hull { points_m } => hull_mesh(points_m).map_or_else(Self::default, |mesh| given(mesh, meshes)),
+            Solid::Mesh { points_m, triangles } => given(creased_mesh(points_m, triangles), meshes),
+        }
+    }
+}

@@ -1,0 +1,241 @@
+//! Visibility, screen size and screen speed of every actor: the input of a policy that divides a budget.
+//!
+//! In: posed objects and a camera. Out: one [`Seen`] per actor. Never here: levels.
+
+use super::scene_view::{Form, Stage, Track};
+use super::view::{Camera, Frustum, Size};
+use glam::DVec3;
+use metachron_core::{AgentId, Body, CurveState};
+
+/// The view of an actor by the camera.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Seen {
+    /// The agent.
+    pub id: AgentId,
+    /// Whether any part of it may be in the picture.
+    pub visible: bool,
+    /// Covered area, pixels, ≥ 0, hidden parts included; at most the picture's.
+    pub pixels: f64,
+    /// Distance of its centre from the eye, metres.
+    pub distance_m: f64,
+    /// Speed across the picture, pixels per second of simulated time: the root mean square over its points.
+    pub speed_px_s: f64,
+    /// Rest length and mean radius of a tube, metres.
+    pub tube_m: Option<(f64, f64)>,
+    /// Distance of its centre from the middle of the picture, as a fraction of half the diagonal.
+    pub off_centre: f64,
+    /// Distance of its centre from the camera's target, metres.
+    pub from_focus_m: f64,
+    /// Centre of a bounding ball, metres.
+    pub centre_m: DVec3,
+    /// Radius of that ball, metres.
+    pub radius_m: f64,
+}
+
+impl Stage {
+    /// Updates [`Stage::seen`]. Actors that were not posed again are skipped while camera and size are unchanged ([`Stage::looked`] lists
+    /// the updated ones). Stores the visibility for [`Stage::compose`].
+    pub fn survey(&mut self, camera: &Camera, size: Size) {
+        let eye = Some((*camera, size));
+        let moved = self.eye != eye;
+        self.eye = eye;
+        let frustum = camera.frustum(size);
+        self.looked.clear();
+        for (at, track) in self.tracks.iter_mut().enumerate().filter(|(_, track)| moved || track.fresh) {
+            let view = look(track, camera, (size, &frustum));
+            (track.seen, track.fresh) = (view.visible, false);
+            if !track.seen {
+                track.glide = None;
+            }
+            match self.found.get_mut(at) {
+                Some(before) => *before = view,
+                None => self.found.push(view),
+            }
+            self.looked.push(at);
+        }
+    }
+
+    /// The indices of the actors that the last [`Stage::survey`] updated, ascending.
+    #[must_use]
+    pub fn looked(&self) -> &[usize] {
+        &self.looked
+    }
+
+    /// Results of the last [`Stage::survey`], one entry per actor in their order.
+    #[must_use]
+    pub fn seen(&self) -> &[Seen] {
+        &self.found
+    }
+
+    /// Centre and radius in metres of a bounding ball of one actor, or of all; `None` where nothing is drawn.
+    #[must_use]
+    pub fn bounds(&self, of: Option<AgentId>) -> Option<(DVec3, f64)> {
+        let wanted = |track: &&Track| of.is_none_or(|id| track.actor.id == id) && track.bounds.radius_m > 0.0;
+        let balls = || self.tracks.iter().filter(wanted).map(|track| (track.bounds.centre, track.bounds.radius_m));
+        let count = balls().count();
+        let centre = balls().map(|(centre, _)| centre).sum::<DVec3>() / count as f64;
+        (count > 0).then(|| (centre, balls().map(|(c, r)| c.distance(centre) + r).fold(0.0, f64::max)))
+    }
+}
+
+fn look(track: &Track, camera: &Camera, (size, frustum): (Size, &Frustum)) -> Seen {
+    let bounds = track.bounds;
+    let unseen = matches!(track.actor.form, Form::Unseen) || matches!(track.pose, Body::Nothing) || size.is_empty();
+    let visible = !unseen && frustum.sees(bounds.centre, bounds.radius_m);
+    let scale = camera.pixels_per_metre((bounds.centre - camera.eye()).dot(camera.forward()), size);
+    let across = |v: DVec3| (v - camera.forward() * v.dot(camera.forward())).length_squared();
+    let (area, speed_m_s, tube_m) = match &track.pose {
+        Body::Curve(curve) if !visible => (0.0, 0.0, tube_measures(curve)),
+        Body::Curve(curve) => {
+            let sum: f64 = curve.velocities.iter().map(|v| across(*v)).sum();
+            let speed = (sum / curve.velocities.len().max(1) as f64).sqrt();
+            (curve_pixels(curve, camera, (size, frustum)), speed, tube_measures(curve))
+        }
+        Body::Rigid(rigid) => (track.body.mean_area_m2 * scale * scale, across(rigid.velocity).sqrt(), None),
+        Body::Tool(tool) => (track.body.mean_area_m2 * scale * scale, across(tool.velocity).sqrt(), None),
+        Body::Soft(soft) => {
+            let sum: f64 = soft.velocities.iter().map(|v| across(*v)).sum();
+            let half = bounds.half_m;
+            // the mean side of its bounding box: more than a sheet covers, about what a ball covers
+            let area = 4.0 / 3.0 * (half.x * half.y + half.y * half.z + half.z * half.x);
+            (area * scale * scale, (sum / soft.velocities.len().max(1) as f64).sqrt(), None)
+        }
+        Body::Nothing => (0.0, 0.0, None),
+    };
+    Seen {
+        id: track.actor.id,
+        visible,
+        pixels: if visible { area.clamp(0.0, size.pixels()) } else { 0.0 },
+        distance_m: bounds.centre.distance(camera.eye()),
+        speed_px_s: speed_m_s * scale,
+        tube_m,
+        off_centre: across(bounds.centre - camera.eye()).sqrt() * scale / half_diagonal_px(size),
+        from_focus_m: bounds.centre.distance(camera.target_m),
+        centre_m: bounds.centre,
+        radius_m: bounds.radius_m,
+    }
+}
+
+/// Half the diagonal of the picture, pixels, at least 1.
+fn half_diagonal_px(size: Size) -> f64 {
+    (0.5 * f64::from(size.width).hypot(f64::from(size.height))).max(1.0)
+}
+
+/// Area of a tube on the screen: the sum over segments of projected length times projected width.
+fn curve_pixels(curve: &CurveState, camera: &Camera, (size, frustum): (Size, &Frustum)) -> f64 {
+    let (eye, forward, near_m) = (camera.eye(), camera.forward(), camera.near_m());
+    // pixels per metre across the view at a depth of one metre
+    let pixels_m = camera.pixels_per_metre(1.0, size);
+    let segment = |i: usize| {
+        let (a, b) = (curve.positions[i], curve.positions[i + 1]);
+        let middle = 0.5 * (a + b) - eye;
+        let depth = middle.dot(forward);
+        let radius = curve.radii_m[i];
+        if depth < near_m || !frustum.sees(middle + eye, radius) {
+            return 0.0;
+        }
+        let (chord, sight) = (b - a, middle.normalize());
+        let width = 2.0 * radius;
+        let length = (chord - sight * chord.dot(sight)).length();
+        let scale = pixels_m / depth;
+        length * width * scale * scale
+    };
+    (0..curve.positions.len().saturating_sub(1)).map(segment).sum()
+}
+
+fn tube_measures(curve: &CurveState) -> Option<(f64, f64)> {
+    let mean = curve.radii_m.iter().sum::<f64>() / curve.radii_m.len() as f64;
+    curve.arc_m.last().map(|&length| (length, mean))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::scene_view::{Actor, Look, Material, States};
+    use super::*;
+    use metachron_core::{RigidState, SimTime, Snapshot};
+    use metachron_geometry::Solid;
+    use std::sync::Arc;
+
+    const SIZE: Size = Size { width: 800, height: 600 };
+
+    fn ball_at(position: DVec3, velocity: DVec3) -> Seen {
+        let look = Look { colour: [200; 3], material: Material::Plastic };
+        let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
+        let mut stage = Stage::new(vec![Actor { id: AgentId(0), form, look }], vec![]);
+        let body = Body::Rigid(RigidState { position, velocity, ..RigidState::default() });
+        stage.see(AgentId(0), &Arc::new(Snapshot { body, ..Snapshot::default() }), true);
+        stage.pose(SimTime::ZERO, States::Latest);
+        stage.survey(&Camera::looking(DVec3::new(4.0, 0.0, 0.0), DVec3::ZERO, 0.8), SIZE);
+        stage.seen()[0]
+    }
+
+    #[test]
+    fn what_rests_is_posed_and_looked_at_once_and_again_when_the_camera_moves_or_there_is_news() {
+        let look = Look { colour: [200; 3], material: Material::Plastic };
+        let form = Form::Solid(Solid::Ball { radius_m: 0.1 });
+        let actor = |id| Actor { id: AgentId(id), form: form.clone(), look };
+        let mut stage = Stage::new((0..1010).map(actor).collect(), vec![]);
+        let state = |id: u32, ms: u64| {
+            let position = DVec3::new(f64::from(id), 1e-3 * ms as f64, 0.0);
+            let body = Body::Rigid(RigidState { position, ..RigidState::default() });
+            let time = SimTime::from_nanos(ms * 1_000_000);
+            Arc::new(Snapshot { time, steps: ms / 10, body, ..Snapshot::default() })
+        };
+        let camera = |x: f64| Camera::looking(DVec3::new(x, -4.0, 0.0), DVec3::new(x, 0.0, 0.0), 0.8);
+        let mut plain = Stage::new((0..1010).map(actor).collect(), vec![]);
+        (0..1010).for_each(|id| plain.see(AgentId(id), &state(id, 0), true));
+        plain.pose(SimTime::ZERO, States::Latest);
+        // ten keep moving, a thousand have come to rest
+        let mut frame = |ms: u64, news: &[u32], x: f64| {
+            (0..10).for_each(|id| stage.see(AgentId(id), &state(id, ms), true));
+            news.iter().for_each(|id| stage.see(AgentId(*id), &state(*id, ms), false));
+            let posed = stage.pose(SimTime::from_nanos(ms * 1_000_000), States::Interpolate);
+            stage.survey(&camera(x), SIZE);
+            let looks = stage.looked().len();
+            plain.survey(&camera(x), SIZE);
+            let same = |(a, b): (&Seen, &Seen)| a.id.0 < 10 || a.id.0 == 700 || a == b;
+            assert!(stage.seen().len() == 1010 && stage.seen().iter().zip(plain.seen()).all(same));
+            (posed, looks, (1e3 * stage.seen()[700].centre_m.y).round())
+        };
+        let all: Vec<u32> = (10..1010).collect();
+        assert_eq!(frame(0, &all, 0.0), (1010, 1010, 0.0));
+        assert_eq!(frame(10, &[], 0.0), (10, 10, 0.0));
+        assert_eq!(frame(20, &[], 0.0), (10, 10, 0.0));
+        assert_eq!(frame(30, &[], 500.0), (10, 1010, 0.0), "another camera");
+        assert_eq!(frame(40, &[], 500.0), (10, 10, 0.0));
+        // speed after five steps of 10 ms; a frame shows one step less
+        assert_eq!(frame(50, &[700], 500.0), (11, 11, 40.0));
+        assert_eq!(frame(60, &[], 500.0), (11, 11, 50.0));
+        assert_eq!(frame(70, &[], 500.0), (10, 10, 50.0));
+    }
+
+    #[test]
+    fn a_ball_covers_the_circle_it_projects_to() {
+        let near = ball_at(DVec3::ZERO, DVec3::ZERO);
+        let radius_px = 0.1 * 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        assert!((near.pixels / (std::f64::consts::PI * radius_px * radius_px) - 1.0).abs() < 1e-12);
+        let far = ball_at(DVec3::new(-4.0, 0.0, 0.0), DVec3::ZERO);
+        assert!((near.pixels / far.pixels - 4.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn speed_counts_across_the_view_only() {
+        let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        assert!((ball_at(DVec3::ZERO, DVec3::Y).speed_px_s - scale).abs() < 1e-9);
+        assert!(ball_at(DVec3::ZERO, DVec3::X).speed_px_s < 1e-9);
+    }
+
+    #[test]
+    fn the_corner_of_the_picture_is_one_away_from_its_middle() {
+        let scale = 600.0 / (2.0 * 0.4_f64.tan() * 4.0);
+        let corner = ball_at(DVec3::new(0.0, 400.0 / scale, 300.0 / scale), DVec3::ZERO);
+        assert!((corner.off_centre - 1.0).abs() < 1e-9 && (corner.from_focus_m - 500.0 / scale).abs() < 1e-9);
+        assert!(ball_at(DVec3::ZERO, DVec3::ZERO).off_centre < 1e-9);
+    }
+
+    #[test]
+    fn what_is_out_of_sight_covers_nothing() {
+        let behind = ball_at(DVec3::new(9.0, 0.0, 0.0), DVec3::ZERO);
+        assert!(!behind.visible && behind.pixels == 0.0);
+    }
+}

@@ -1,0 +1,416 @@
+//! One turn of an agent, the same for every executor.
+//!
+//! begin   take commands, drop lag, look around, step, write the snapshot
+//! finish  record, publish, touch, call the governor, rest or go on
+//!
+//! Between the two an executor lets the turn's time pass: on a thread it has passed, lockstep charges it. A turn that fails, by an error of
+//! the model, a state that is not finite or a panic (a bug of metachron), parks the agent with the reason; nothing of it is published and
+//! the other agents go on. Never here: threads, sleeping, events, any law of control, the turns of the agents that an agent leads
+//! ([`super::island`]).
+
+use super::agent_clock::Timeline;
+use super::agent_clock::{LAG_CAP, Pace, Start};
+use super::faults::Faults;
+use super::fellows::Fellows;
+use super::governor::{Demand, Governor, TurnMeasure};
+use super::handle::Shared;
+use super::island::Company;
+use super::metrics::{Diary, SMOOTHING};
+use super::observation::{Eyes, Peers};
+use super::slot::SlotWriter;
+use metachron_contact::Link;
+use metachron_contact::{Agent, Pull, Surroundings};
+use metachron_core::{AgentId, Resolution, ResolutionRange, SimSpan, SimTime, Snapshot, StepReport};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+use std::sync::atomic::Ordering::Relaxed;
+use std::time::Duration;
+
+/// An agent with its runtime state.
+pub(super) struct Actor {
+    pub shared: Arc<Shared>,
+    pub peers: Arc<Peers>,
+    pub agent: Box<dyn Agent>,
+    pub pace: Pace,
+    pub dt_range: (SimSpan, SimSpan),
+    pub range: Option<ResolutionRange>,
+    pub governor: Option<Box<dyn Governor>>,
+    pub faults: Faults,
+    pub writer: SlotWriter<Snapshot>,
+    pub eyes: Eyes,
+    pub links: Vec<Link>,
+    pub hands: Vec<Pull>,
+    /// The agents it leads.
+    pub company: Company,
+    pub diary: Diary,
+    pub rhythm: Rhythm,
+    pub open: Option<Open>,
+    /// Whether an agent that does not step with it was next to it in its previous turn, if that was checked.
+    pub beside: Option<bool>,
+    /// The state that was written last is withheld.
+    pub withheld: bool,
+    /// Up to which revision each ledger was announced to its receiver.
+    pub announced: Vec<(AgentId, u64)>,
+    /// Wall time of turns whose CPU time is not known yet, nanoseconds.
+    pub unsettled_ns: u64,
+    /// Simulated time up to which the workers of a pool have served it.
+    pub served: SimTime,
+    /// Service that it lacks relative to its present worker's queue: it makes that up.
+    pub owed: SimSpan,
+}
+
+/// A turn between its begin and its finish.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Open {
+    pub start: Start,
+    pub dt: SimSpan,
+    /// The resolution of the step, if a governor needs it.
+    pub resolution: Option<Resolution>,
+    /// Its own error estimates afterwards, metres: in all, and the part caused by its time steps.
+    pub errors_m: [f64; 2],
+    /// Whether it may rest after this turn.
+    pub rests: bool,
+}
+
+/// A step that was made.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Made {
+    pub report: StepReport,
+    /// Its length: at most the requested one.
+    pub dt: SimSpan,
+}
+
+/// Cost of a turn that has begun.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Effort {
+    /// Work of one step, in the model's unit.
+    pub work: f64,
+    /// Number of such steps: one, and one more for every step of the agents it leads.
+    pub steps: u32,
+}
+
+/// Continuation after a turn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Next {
+    /// The next turn, when the pace says.
+    Due,
+    /// Rest until the agent is woken.
+    Rest,
+    /// It hands its turns over to this agent.
+    Join(AgentId),
+    /// Parked: no more turns.
+    Parked,
+}
+
+/// Measures the interval between the starts of an agent's turns.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Rhythm {
+    last: Option<(Duration, u64)>,
+    period_s: Option<f32>,
+}
+
+impl Rhythm {
+    fn beat(&mut self, timeline: &Timeline, wall: Duration) {
+        let piece = timeline.piece();
+        match self.last.filter(|&(_, p)| p == piece) {
+            None => self.period_s = None,
+            Some((last, _)) => {
+                let sample = wall.saturating_sub(last).as_secs_f32();
+                self.period_s = Some(self.period_s.map_or(sample, |old| old + SMOOTHING as f32 * (sample - old)));
+            }
+        }
+        self.last = Some((wall, piece));
+    }
+}
+
+impl Actor {
+    pub fn id(&self) -> AgentId {
+        self.shared.id
+    }
+
+    /// Whether the agent is parked.
+    pub fn is_parked(&self) -> bool {
+        !self.shared.gauges.is_running() && !self.shared.gauges.is_resting()
+    }
+
+    /// Publishes the initial state of the agent, or parks it.
+    pub fn introduce(&mut self) {
+        let time = self.pace.time();
+        let written = contained(|| self.write_snapshot(time, false));
+        match written {
+            Ok(()) => drop(self.writer.publish()),
+            Err(reason) => self.park(reason),
+        }
+        self.tell();
+        self.diary.pace(&self.shared.gauges, &self.pace);
+    }
+
+    /// Looks around before the first step and publishes the result, if the agent has links; to be called after [`Self::introduce`] of all
+    /// agents.
+    pub fn look(&mut self) {
+        if self.links.is_empty() || self.is_parked() {
+            return;
+        }
+        let (me, time, dt) = (self.shared.id, self.pace.time(), self.pace.dt());
+        self.eyes.look(&self.peers, &self.writer, (me, self.pace.scene_time(), dt), &Fellows::default());
+        let neighbours = self.eyes.neighbours();
+        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let agent = &mut self.agent;
+        let looked = contained(|| {
+            agent.look(dt, &around);
+            Ok(())
+        });
+        match looked {
+            Ok(()) => self.introduce(),
+            Err(reason) => self.park(reason),
+        }
+    }
+
+    /// Steps at wall time `wall`, with all agents it leads, or waits for peers that are behind: the cost of that, or `None` if it failed
+    /// and is parked now.
+    pub fn begin(&mut self, timeline: &Timeline, wall: Duration) -> Option<Effort> {
+        self.shared.board.heed(self.id());
+        self.take_in();
+        match contained(|| self.attempt(timeline, wall)) {
+            Ok((open, effort)) => {
+                self.open = open;
+                Some(effort)
+            }
+            Err(reason) => {
+                self.park(reason);
+                self.disband(timeline, wall);
+                None
+            }
+        }
+    }
+
+    /// Ends the turn that began: it took `work_s` seconds and it is wall time `wall`.
+    pub fn finish(&mut self, timeline: &Timeline, wall: Duration, work_s: f64) -> Next {
+        // it waited, or another agent leads it from now on
+        let Some(open) = self.open.take() else { return self.seek_leader().map_or(Next::Due, Next::Join) };
+        let now = timeline.sim_at(wall);
+        let mut published = self.conclude(&open, now, work_s);
+        published &= self.conclude_led(now, work_s);
+        if let Err(reason) = contained(|| self.consult(timeline, &open, work_s)) {
+            self.park(reason);
+            self.disband(timeline, wall);
+            return Next::Parked;
+        }
+        self.part();
+        if let Some(leader) = self.seek_leader() {
+            return Next::Join(leader);
+        }
+        // an agent does not rest in a state that was not published
+        if open.rests && published && self.lie_down(now) { Next::Rest } else { Next::Due }
+    }
+
+    /// Whether the agent was woken from its rest; it then runs again at the timeline's present, with all agents it leads.
+    pub fn wakes(&mut self, timeline: &Timeline, wall: Duration) -> bool {
+        if !self.shared.board.take_wake(self.id()) {
+            return false;
+        }
+        self.get_up(timeline, wall);
+        true
+    }
+
+    /// Accounts for the wall time of a turn, shared equally with the agents it leads.
+    pub fn count(&mut self, wall: Duration) {
+        let share = if self.company.is_empty() { wall } else { wall / (1 + self.company.len() as u32) };
+        let share_ns = share.as_nanos() as u64;
+        self.unsettled_ns += share_ns;
+        self.company.each(|seat| seat.unsettled_ns += share_ns);
+    }
+
+    /// Accounts for the CPU time of the turns since the last call: the fraction `share` of their wall time.
+    pub fn settle(&mut self, share: f64) {
+        let nanos = (std::mem::take(&mut self.unsettled_ns) as f64 * share) as u64;
+        let cpu = &self.shared.gauges.cpu_nanos;
+        // no other thread writes: an atomic exchange would cost more
+        cpu.store(cpu.load(Relaxed) + nanos, Relaxed);
+        self.company.each(|seat| seat.settle(share));
+    }
+
+    /// Completes the metrics at the end of a run: a resting agent has rested until now, and the last state is published.
+    pub fn close_account(&mut self, timeline: &Timeline, wall: Duration) {
+        self.show_withheld();
+        if self.shared.gauges.is_resting() {
+            self.hold_watched(timeline.sim_at(wall));
+            self.pace.wake(timeline, wall);
+            self.diary.pace(&self.shared.gauges, &self.pace);
+        }
+        self.diary.flush(&self.shared.gauges);
+        self.company.each(|seat| seat.close_account(timeline, wall));
+    }
+
+    /// Parks the agent for good, for this reason.
+    pub fn park(&mut self, reason: String) {
+        self.show_withheld();
+        self.diary.flush(&self.shared.gauges);
+        self.shared.gauges.park(reason);
+        self.tell();
+        if let Some(crowd) = &self.peers.crowd {
+            crowd.stay(self.id());
+        }
+        self.shut_door();
+    }
+
+    /// Returns no open turn if it waits instead, or hands its turns over before it steps.
+    fn attempt(&mut self, timeline: &Timeline, wall: Duration) -> Result<(Option<Open>, Effort), String> {
+        self.take_commands();
+        let now = timeline.sim_at(wall);
+        let near = self.keeps_company(now, self.pace.is_late(timeline, wall));
+        let before = self.pace.time();
+        let start = self.pace.begin(timeline, wall, near);
+        let leapt = self.pace.time().since(before);
+        if near && start.late > LAG_CAP || self.pace.put_off() > SimSpan::ZERO {
+            self.shared.board.note_far_behind(now);
+        }
+        // even if it waits: the awaited agents may wait for one that it leads
+        let alone = self.gather(timeline, wall, (&start, leapt));
+        if self.waits(wall) || self.is_called() {
+            return Ok((None, Effort { work: 0.0, steps: alone }));
+        }
+        if self.governor.is_some() {
+            self.rhythm.beat(timeline, wall);
+        }
+        let wanted = self.faults.span(self.pace.wanted(), self.id(), self.diary.steps());
+        let is_met = self.peers.crowd.is_some() || !self.links.is_empty();
+        let wanted = if is_met { self.pace.stretch(wanted, timeline, wall, near) } else { wanted };
+        let resolution = self.governor.as_ref().and_then(|_| self.agent.resolution());
+        let (Made { report, dt }, led) =
+            if self.company.is_empty() { (self.step(wanted)?, 0) } else { self.lead(wanted)? };
+        self.pace.shorten(wanted, dt);
+        let done = &self.shared.gauges.work;
+        done.set(done.get() + report.work * f64::from(1 + led));
+        let rests = report.at_rest && self.may_rest(timeline.sim_at(wall));
+        let mut open = Open { start, dt, resolution, errors_m: [0.0; 2], rests };
+        self.write_led(&open);
+        self.write_snapshot(self.pace.time() + dt, rests)?;
+        open.errors_m = self.writer.filled().map_or([0.0; 2], |state| [state.residual_m, state.drift_m]);
+        self.pace.advance_by(dt);
+        Ok((Some(open), Effort { work: report.work, steps: 1 + led + alone }))
+    }
+
+    /// Whether another agent has found since its last step that it should lead this one: a slow agent that stepped once more alone would
+    /// not be where its leader expects it.
+    fn is_called(&mut self) -> bool {
+        if self.shared.seating.is_none() || self.eyes.neighbours().is_empty() {
+            return false;
+        }
+        self.eyes.look_again();
+        self.seek_leader().is_some()
+    }
+
+    /// Steps alone, by `wanted` or by the shorter step that the agent chooses.
+    pub fn step(&mut self, wanted: SimSpan) -> Result<Made, String> {
+        let time = self.pace.time();
+        self.eyes.look(
+            &self.peers,
+            &self.writer,
+            (self.shared.id, self.pace.scene_time(), wanted),
+            &Fellows::default(),
+        );
+        let (me, neighbours) = (self.shared.id, self.eyes.neighbours());
+        let around = Surroundings { me, time, neighbours, hands: &self.hands, links: &self.links };
+        let dt = self.agent.longest_step(wanted, &around).min(wanted);
+        let report = self.agent.step(dt, &around).map_err(|e| e.to_string())?;
+        Ok(Made { report, dt })
+    }
+
+    pub fn take_commands(&mut self) {
+        let letters = self.shared.mail.take();
+        if let Some(wanted) = letters.retune {
+            self.retune(wanted);
+        }
+        if let Some(dt) = letters.dt {
+            self.set_dt(dt);
+        }
+        if let Some(hand) = letters.hand {
+            self.hands.clear();
+            self.hands.extend(hand);
+        }
+    }
+
+    /// Whether no outside influence prevents the agent from resting at simulated time `now`.
+    pub fn is_let_alone(&self, now: SimTime) -> bool {
+        self.hands.is_empty() && !self.shared.board.is_stirred(self.id(), now)
+    }
+
+    fn consult(&mut self, timeline: &Timeline, open: &Open, work_s: f64) -> Result<(), String> {
+        let Some(governor) = &mut self.governor else { return Ok(()) };
+        let wanted_period_s = 1.0 / (self.shared.wanted_hz * timeline.speed());
+        let Demand { dt, resolution } = governor.after_step(&TurnMeasure {
+            work_s,
+            wanted_period_s,
+            real_period_s: self.rhythm.period_s.map_or(wanted_period_s, f64::from),
+            lateness_s: open.start.late.as_secs_f64(),
+            dropped: open.start.dropped,
+            dt: open.dt,
+            resolution: open.resolution,
+            residual_m: open.errors_m[0],
+            drift_m: open.errors_m[1],
+        });
+        dt.into_iter().for_each(|dt| self.set_dt(dt));
+        resolution.into_iter().for_each(|wanted| self.retune(wanted));
+        Ok(())
+    }
+
+    fn set_dt(&mut self, dt: SimSpan) {
+        self.pace.set_dt(dt.clamp(self.dt_range.0, self.dt_range.1));
+    }
+
+    fn retune(&mut self, wanted: Resolution) {
+        let Some(range) = &self.range else { return };
+        let wanted = range.clamp(wanted);
+        if self.agent.resolution().is_some_and(|held| held != wanted) {
+            self.agent.retune(wanted);
+        }
+    }
+
+    fn lie_down(&mut self, now: SimTime) -> bool {
+        let led = self.company.ids();
+        let rests = self.shared.board.try_rest(self.id(), led, now);
+        if rests {
+            self.rest_now();
+        }
+        rests
+    }
+
+    /// Puts it to rest, with all agents it leads.
+    fn rest_now(&mut self) {
+        self.diary.flush(&self.shared.gauges);
+        self.shared.gauges.set_resting(true);
+        self.tell();
+        if let Some(crowd) = &self.peers.crowd {
+            crowd.stay(self.id());
+        }
+        self.company.each(Actor::rest_now);
+    }
+
+    /// Continues after a rest, at the timeline's present, with all agents it leads.
+    fn get_up(&mut self, timeline: &Timeline, wall: Duration) {
+        self.hold_watched(timeline.sim_at(wall));
+        self.pace.wake(timeline, wall);
+        // as an agent that newly comes near its peers: while it slept their time went on
+        self.beside = Some(false);
+        self.rhythm = Rhythm::default();
+        self.diary.restart(timeline.sim_at(wall));
+        self.diary.pace(&self.shared.gauges, &self.pace);
+        self.shared.gauges.set_resting(false);
+        self.tell();
+        self.company.each(|seat| seat.get_up(timeline, wall));
+    }
+}
+
+/// Runs `part` of a turn; an error or a panic in it is the reason to park.
+pub(super) fn contained<T>(part: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    // the agent is not used again after a panic, so its broken invariants have no effect
+    match catch_unwind(AssertUnwindSafe(part)) {
+        Ok(result) => result,
+        Err(payload) => {
+            let text = payload.downcast_ref::<&str>().copied().map(str::to_owned);
+            let text = text.or_else(|| payload.downcast_ref::<String>().cloned()).unwrap_or_default();
+            Err(format!("panicked, which is a bug in metachron: {text}"))
+        }
+    }
+}

@@ -1,0 +1,162 @@
+//! Broad phase between agents: which agents may touch each other.
+//!
+//! In: the box that each agent publishes, and a bound of its speed. Out: for every agent a list of the peers near enough to touch within
+//! its next turns, and of those that have given impulses to it ([`Sight`]). Agents exchange atomic words only: no agent waits for another.
+//! A distant peer is not checked before the time at which it could be near (an appointment); an agent that becomes faster than its
+//! published speed enters itself in a common log, and is checked again.
+//! Never here: shapes, contacts, snapshots. A run in which no two agents could touch has no crowd.
+
+mod neighbour_list;
+mod published_bounds;
+
+pub(super) use neighbour_list::Sight;
+
+use metachron_core::{AgentId, Bounds, SimTime};
+use published_bounds::{Berth, Reach, Seen};
+use std::sync::OnceLock;
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering::SeqCst};
+
+/// Shared data by which the agents of a run find each other.
+#[derive(Debug)]
+pub(super) struct Crowd {
+    berths: Vec<Berth>,
+    /// Agents that became faster than their published speed, newest last; a word holds the entry's index and the agent's number.
+    log: Vec<AtomicU64>,
+    /// Number of entries ever written.
+    noted: AtomicU64,
+    calls: Vec<Calls>,
+}
+
+/// Agents that have given impulses to one agent since its last query: a bit each, on pages allocated on first use, since most agents never
+/// interact with most others.
+#[derive(Debug, Default)]
+struct Calls {
+    any: AtomicBool,
+    pages: OnceLock<Box<[OnceLock<Page>]>>,
+}
+
+/// The bits of some callers.
+type Page = Box<[AtomicU64; PAGE_WORDS]>;
+
+/// Words of a page: it covers 1024 agents.
+const PAGE_WORDS: usize = 16;
+
+/// Stored log entries: a reader that is further behind checks all agents again.
+const LOG_LENGTH: u64 = 1024;
+
+/// Least published speed, m/s: small vibrations need not be logged.
+const SPEED_LEAST_M_S: f64 = 0.0625;
+
+/// The published speed is this factor above the measured one, so that speed may grow a little before a log entry is needed.
+const SPEED_ROOM: f64 = 1.25;
+
+impl Crowd {
+    /// A crowd of that many agents, none of which has published a box.
+    pub fn new(agents: usize) -> Self {
+        Self {
+            berths: std::iter::repeat_with(Berth::default).take(agents).collect(),
+            log: zeros(LOG_LENGTH as usize),
+            noted: AtomicU64::new(0),
+            calls: std::iter::repeat_with(Calls::default).take(agents).collect(),
+        }
+    }
+
+    /// Publishes that `id` is inside `bounds` at its time `time`; called by the thread that makes its turns. Returns the published speed.
+    pub fn stand(&self, id: AgentId, bounds: &Bounds, time: SimTime) -> f64 {
+        let Some(berth) = self.berths.get(id.0 as usize) else { return 0.0 };
+        let before = berth.mine();
+        let said = before.map_or(0.0, |reach| reach.speed_m_s);
+        let speed_m_s = promise(bounds.speed_m_s, said);
+        berth.write(&Reach::new(bounds, speed_m_s, time));
+        if speed_m_s > said || before.is_none() {
+            self.note(id);
+        }
+        speed_m_s
+    }
+
+    /// The last published box of `id`.
+    fn seen(&self, id: AgentId) -> Seen {
+        self.berths.get(id.0 as usize).map_or(Seen::Nowhere, Berth::read)
+    }
+
+    /// Publishes speed zero for `id`: it stays in place until it publishes a box again.
+    pub fn stay(&self, id: AgentId) {
+        let Some(berth) = self.berths.get(id.0 as usize) else { return };
+        if let Some(reach) = berth.mine() {
+            berth.write(&Reach { speed_m_s: 0.0, ..reach });
+        }
+    }
+
+    /// Notifies `to` that `from` has given an impulse to it: `to` lists `from` at its next turn.
+    pub fn call(&self, to: AgentId, from: AgentId) {
+        let Some(calls) = self.calls.get(to.0 as usize) else { return };
+        let (word, bit) = (from.0 as usize / 64, 1 << (from.0 % 64));
+        let pages = self.calls.len().div_ceil(64 * PAGE_WORDS);
+        let pages = calls.pages.get_or_init(|| std::iter::repeat_with(OnceLock::new).take(pages).collect());
+        if let Some(page) = pages.get(word / PAGE_WORDS) {
+            page.get_or_init(Box::default)[word % PAGE_WORDS].fetch_or(bit, SeqCst);
+            calls.any.store(true, SeqCst);
+        }
+    }
+
+    /// Visits the agents that have called `id` since the last query, by rising numbers.
+    pub fn answer(&self, id: AgentId, mut visit: impl FnMut(AgentId)) {
+        let Some(calls) = self.calls.get(id.0 as usize) else { return };
+        if !(calls.any.load(SeqCst) && calls.any.swap(false, SeqCst)) {
+            return;
+        }
+        let pages = calls.pages.get().into_iter().flat_map(|pages| pages.iter().enumerate());
+        for (page, words) in pages.filter_map(|(at, page)| Some((at, page.get()?))) {
+            for (word, bits) in words.iter().enumerate() {
+                let mut bits = bits.swap(0, SeqCst);
+                while bits != 0 {
+                    visit(AgentId((page * PAGE_WORDS + word) as u32 * 64 + bits.trailing_zeros()));
+                    bits &= bits - 1;
+                }
+            }
+        }
+    }
+
+    fn note(&self, id: AgentId) {
+        let at = self.noted.fetch_add(1, SeqCst);
+        self.log[(at % LOG_LENGTH) as usize].store(word(at, id), SeqCst);
+    }
+
+    /// Visits the log entries from number `from` on and returns the number of the next one; `None` if some are overwritten or not yet
+    /// written: any agent may be affected.
+    fn notes(&self, from: u64, mut visit: impl FnMut(AgentId)) -> (u64, Option<()>) {
+        let end = self.noted.load(SeqCst);
+        if end - from > LOG_LENGTH / 2 {
+            return (end, None);
+        }
+        for at in from..end {
+            let note = self.log[(at % LOG_LENGTH) as usize].load(SeqCst);
+            let id = AgentId(note as u32);
+            if note != word(at, id) {
+                return (end, None);
+            }
+            visit(id);
+        }
+        (end, Some(()))
+    }
+}
+
+/// A log entry: its index, so that an older entry in the same place is recognised, and the agent.
+const fn word(at: u64, id: AgentId) -> u64 {
+    ((at + 1) << 32) | id.0 as u64
+}
+
+fn zeros(count: usize) -> Vec<AtomicU64> {
+    std::iter::repeat_with(AtomicU64::default).take(count).collect()
+}
+
+/// The speed to publish for an agent of `speed_m_s` that published `said` before: a power of two above it, so that it seldom changes,
+/// lowered only if it is far too high.
+fn promise(speed_m_s: f64, said: f64) -> f64 {
+    let wanted = (speed_m_s * SPEED_ROOM).max(SPEED_LEAST_M_S);
+    let told = libm::exp2(libm::ceil(libm::log2(wanted)));
+    if said >= speed_m_s && said >= SPEED_LEAST_M_S && said <= 4.0 * told { said } else { told }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,176 @@
+//! Handle of a running agent: its newest state, its metrics, its commands.
+//!
+//! Out: snapshots and numbers, without ever waiting for the agent. In: commands. Never here: the agent itself.
+
+use super::histogram::Times;
+use super::island::Seating;
+use super::mailbox::{Command, Mailbox, SendError};
+use super::metrics::{AgentState, AgentStats, Gauges};
+use super::probe::{Sample, Trace};
+use super::sleep::Switchboard;
+use super::slot::LatestSlot;
+use metachron_core::{AgentId, HASH_START, SimSpan, SimTime, Snapshot};
+use std::sync::atomic::Ordering::Relaxed;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// Data shared by an agent and its observers.
+#[derive(Debug)]
+pub(super) struct Shared {
+    pub id: AgentId,
+    pub name: Arc<str>,
+    pub model: &'static str,
+    pub wanted_hz: f64,
+    pub gauges: Gauges,
+    pub mail: Mailbox,
+    pub slot: Arc<LatestSlot<Snapshot>>,
+    pub board: Arc<Switchboard>,
+    /// Entry for agents that it is to lead, and the place to which it returns from a leader; `None` where no agent can be led.
+    pub seating: Option<Seating>,
+    /// Used by readers only: the agent never waits for this lock.
+    pub ages: Mutex<Times>,
+    /// Empty for most agents. Only the agent writes, so that it never waits during the run; readers read at the end.
+    pub traces: Vec<Mutex<Trace>>,
+}
+
+/// A running agent, seen from outside. Copies refer to the same agent; they outlive the run and then show its final state.
+#[derive(Debug, Clone)]
+pub struct AgentHandle {
+    pub(super) shared: Arc<Shared>,
+}
+
+impl AgentHandle {
+    /// Its number: its place in the list at the start.
+    #[must_use]
+    pub fn id(&self) -> AgentId {
+        self.shared.id
+    }
+
+    /// Its name in the scene.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.shared.name
+    }
+
+    /// Its model.
+    #[must_use]
+    pub fn model(&self) -> &'static str {
+        self.shared.model
+    }
+
+    /// Its newest state. There is one from the start on.
+    #[must_use]
+    pub fn latest(&self) -> Arc<Snapshot> {
+        self.shared.slot.latest()
+    }
+
+    /// Age of `snapshot` at the simulated time `now`, seconds, ≥ 0.
+    ///
+    /// Zero for a state that covers `now` (one that is on time does), and for the state of an agent at rest: it is still valid.
+    #[must_use]
+    pub fn age_s(&self, snapshot: &Snapshot, now: SimTime) -> f64 {
+        if self.shared.gauges.is_resting() { 0.0 } else { now.since(snapshot.moment()).as_secs_f64() }
+    }
+
+    /// Counts the age of a state that was used, seconds ([`Self::age_s`]); invalid ages are ignored.
+    pub fn record_age(&self, age_s: f64) {
+        if let Ok(age) = Duration::try_from_secs_f64(age_s) {
+            self.ages().record(age);
+        }
+    }
+
+    /// Counts several ages.
+    pub(super) fn record_ages(&self, ages: impl Iterator<Item = SimSpan>) {
+        let mut counted = self.ages();
+        ages.for_each(|age| counted.record(Duration::from_nanos(age.as_nanos())));
+    }
+
+    /// Counts a state that covered the present in so many frames.
+    pub(super) fn record_no_age(&self, frames: usize) {
+        self.ages().record_often(Duration::ZERO, u16::try_from(frames).unwrap_or(u16::MAX));
+    }
+
+    fn ages(&self) -> MutexGuard<'_, Times> {
+        self.shared.ages.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// The leader of the island in which it steps; `None` if it makes its own turns.
+    #[must_use]
+    pub fn led_by(&self) -> Option<AgentId> {
+        Some(self.shared.board.leader(self.shared.id)).filter(|leader| *leader != self.shared.id)
+    }
+
+    /// State of its execution.
+    #[must_use]
+    pub fn state(&self) -> AgentState {
+        self.shared.gauges.state()
+    }
+
+    /// Sends a command to the agent; it obeys at its next turn, and wakes for it.
+    ///
+    /// # Errors
+    /// [`SendError::BadNumber`]: nothing was delivered.
+    pub fn send(&self, command: Command) -> Result<(), SendError> {
+        self.shared.mail.post(command)?;
+        self.shared.board.wake(self.shared.id);
+        Ok(())
+    }
+
+    /// CPU time of its turns so far, seconds; updated about twice a second on threads.
+    #[must_use]
+    pub fn cpu_s(&self) -> f64 {
+        self.shared.gauges.cpu_nanos.load(Relaxed) as f64 * 1e-9
+    }
+
+    /// Samples of the point watched as number `watch`; empty if there is none. To be read when the run has ended: until then reading may
+    /// block the agent.
+    #[must_use]
+    pub fn samples(&self, watch: usize) -> Vec<Sample> {
+        let trace = self.shared.traces.get(watch).map(|trace| trace.lock().unwrap_or_else(PoisonError::into_inner));
+        trace.map_or_else(Vec::new, |trace| trace.samples().to_vec())
+    }
+
+    /// Steps taken.
+    #[must_use]
+    pub fn steps(&self) -> u64 {
+        self.shared.gauges.steps.load(Relaxed)
+    }
+
+    /// Its statistics so far. Reading the percentiles of its ages takes microseconds: for a table, not for every draw call.
+    #[must_use]
+    pub fn stats(&self) -> AgentStats {
+        let Shared { gauges, .. } = &*self.shared;
+        let newest = self.latest();
+        let span = |nanos: &std::sync::atomic::AtomicU64| SimSpan::from_nanos(nanos.load(Relaxed));
+        AgentStats {
+            id: self.shared.id,
+            name: Arc::clone(&self.shared.name),
+            model: self.shared.model,
+            steps: gauges.steps.load(Relaxed),
+            rate_hz: if gauges.is_running() { gauges.rate_hz.get() } else { 0.0 },
+            mean_hz: gauges.mean_hz.get(),
+            wanted_hz: self.shared.wanted_hz,
+            dt: span(&gauges.dt),
+            resolution: newest.resolution,
+            work_s: gauges.work_s.get(),
+            work: gauges.work.get(),
+            cpu_s: self.cpu_s(),
+            age: self.ages().spread(),
+            late: gauges.late(),
+            misses: gauges.misses.load(Relaxed),
+            dropped: span(&gauges.dropped),
+            rested: span(&gauges.rested),
+            state: gauges.state(),
+            energy_j: newest.energy_j,
+            residual_m: newest.residual_m,
+            drift_m: newest.drift_m,
+            led_by: self.led_by(),
+        }
+    }
+}
+
+/// Hash of the newest states of all `agents`, in their order: equal numbers mean bit-identical states.
+#[must_use]
+pub fn state_hash(agents: &[AgentHandle]) -> u64 {
+    agents.iter().fold(HASH_START, |hash, agent| agent.latest().fold_hash(hash))
+}

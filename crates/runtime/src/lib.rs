@@ -1,0 +1,103 @@
+//! Execution of agents: threads, clocks, slots and pacing.
+//!
+//! In: agents with their rates and links ([`AgentSpawn`]). Out: [`AgentHandle`]s with their newest states and statistics.
+//! Every executor makes the same turns of an agent behind the same interface, [`Run`], so that there is one frame loop: [`Threads`] gives
+//! each agent its own thread and real time; [`Pool`] shares a few threads among thousands; [`Lockstep`] runs all in virtual time on a
+//! declared [`Machine`], bit-identical from run to run. Agents near enough to touch see each other without being linked (`crowd`), and
+//! agents in lasting contact share the turns of one of them (`island`). Never here: a model of physics, a picture, a control law, a file.
+
+mod abreast;
+mod agent_clock;
+mod agent_runner;
+mod broad_phase;
+mod clock;
+mod cpu;
+mod dirty_set;
+mod faults;
+mod fellows;
+mod governor;
+mod handle;
+mod histogram;
+mod island;
+#[cfg(test)]
+mod live_tests;
+mod lockstep;
+mod machine;
+mod mailbox;
+mod metrics;
+mod observation;
+mod pool;
+mod prefetch;
+mod priority;
+mod probe;
+mod publish;
+mod reader;
+mod seqlock;
+mod sleep;
+mod slot;
+mod spawn;
+mod sync;
+#[cfg(test)]
+mod testing;
+mod threads;
+mod worker_wakeup;
+
+pub use agent_clock::{Drive, SPEED_RANGE, SharedTimeline, Timeline};
+pub use agent_clock::{LAG_CAP, Pace, Start};
+pub use clock::{Clock, ManualClock, SystemClock, wait_until};
+pub use faults::Faults;
+pub use governor::{Demand, Governor, TurnMeasure};
+pub use handle::{AgentHandle, state_hash};
+pub use lockstep::Lockstep;
+pub use machine::{DrawPrice, Machine, OTHER_STEP_US, ObjectPrice, PRESETS, StepPrice};
+pub use mailbox::{Command, SendError};
+pub use metrics::{AgentState, AgentStats, Spread};
+pub use pool::Pool;
+pub use priority::{Priority, PriorityRefused};
+pub use probe::{SAMPLES_MAX, Sample, Watch};
+pub use reader::Reader;
+pub use slot::{LatestSlot, SlotWriter};
+pub use spawn::{AgentSpawn, RATE_MAX_HZ, RunError};
+pub use threads::{AUTO_THREADS_MAX, THREADS_MAX, Threads};
+
+use metachron_core::{AgentId, SimTime};
+use std::time::Duration;
+
+/// A run of agents, on any executor.
+pub trait Run: Send {
+    /// Wall time since the run began; virtual in lockstep.
+    fn now(&self) -> Duration;
+
+    /// Waits until the wall time `until`, while the agents run; returns immediately if that has passed.
+    fn wait_until(&mut self, until: Duration);
+
+    /// Lets the frame's own work of `work` pass: nothing on threads, where it really passed; in lockstep it occupies a core of the declared
+    /// machine, and takes longer if agents compete for the cores.
+    fn spend(&mut self, work: Duration);
+
+    /// The timeline in force.
+    fn timeline(&self) -> Timeline;
+
+    /// Changes the timeline: pause, run, speed, single step.
+    fn drive(&mut self, drive: Drive);
+
+    /// All agents, in the order of their numbers.
+    fn agents(&self) -> &[AgentHandle];
+
+    /// Ends the run: waits for the turns in progress (with a timeout) and returns every agent's statistics. Existing handles keep showing
+    /// the last states.
+    fn shutdown(&mut self) -> Vec<AgentStats>;
+
+    /// Simulated time now.
+    fn sim_now(&self) -> SimTime {
+        self.timeline().sim_at(self.now())
+    }
+
+    /// Sends a command to an agent ([`AgentHandle::send`]).
+    ///
+    /// # Errors
+    /// [`SendError`]: nothing was delivered.
+    fn send(&self, to: AgentId, command: Command) -> Result<(), SendError> {
+        self.agents().get(to.0 as usize).ok_or(SendError::NoAgent(to))?.send(command)
+    }
+}

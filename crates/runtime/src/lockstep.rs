@@ -1,0 +1,296 @@
+//! One thread, virtual time, declared costs: the executor for tests, tuning, charts and replay.
+//!
+//! In: agents and a [`Machine`]. Out: a run that is bit-identical every time. Events happen in the order (time, ends before starts,
+//! number): a turn sees the states published when it starts, and its own state is seen when its declared cost has passed, on cores that all
+//! turns and the frame loop share. Never here: a wall clock, except for the CPU time that is reported.
+
+mod cores;
+
+use super::Run;
+use super::agent_clock::{Drive, Timeline};
+use super::agent_runner::{Actor, Effort, Next};
+use super::cpu::CpuBatch;
+use super::handle::AgentHandle;
+use super::island::{Seating, empty_rooms, move_in};
+use super::machine::{Machine, duration};
+use super::metrics::AgentStats;
+use super::sleep::Switchboard;
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use cores::Cores;
+use metachron_core::AgentId;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+
+/// Agents in virtual time on a declared machine.
+pub struct Lockstep {
+    machine: Machine,
+    timeline: Timeline,
+    now: Duration,
+    lives: Vec<Life>,
+    /// Due times of the turns of waiting agents, without those that the timeline never reaches.
+    due: BinaryHeap<Reverse<(Duration, u32)>>,
+    cores: Cores,
+    handles: Vec<AgentHandle>,
+    board: Arc<Switchboard>,
+    batch: CpuBatch,
+    /// Agents that have made turns in the open batch.
+    unsettled: Vec<u32>,
+}
+
+/// An agent and the phase of its turns.
+struct Life {
+    /// `None` while another agent leads it.
+    actor: Option<Box<Actor>>,
+    phase: Phase,
+    turns: u64,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Phase {
+    Waiting,
+    /// In a turn that began at this time.
+    Busy(Duration),
+    Resting,
+    Led,
+    Parked,
+}
+
+/// The number of the frame loop's own job: above every agent's, so that agents' jobs come first at equal end times.
+const FRAME: u32 = u32::MAX;
+
+impl Lockstep {
+    /// Begins a run at virtual time zero.
+    ///
+    /// # Errors
+    /// [`RunError`] for agents that cannot run as asked.
+    pub fn start(spawns: Vec<AgentSpawn>, machine: Machine) -> Result<Self, RunError> {
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let phase = |actor: &Option<Box<Actor>>| match actor {
+            None => Phase::Led,
+            Some(actor) if actor.is_parked() => Phase::Parked,
+            Some(_) => Phase::Waiting,
+        };
+        let lives = actors.into_iter().map(|actor| Life { phase: phase(&actor), actor, turns: 0 }).collect();
+        let (timeline, cores) = (Timeline::new(), Cores::new(machine.cores));
+        let (due, batch, unsettled) = (BinaryHeap::with_capacity(handles.len()), CpuBatch::default(), Vec::new());
+        let now = Duration::ZERO;
+        let mut run = Self { machine, timeline, now, lives, due, cores, handles, board, batch, unsettled };
+        run.schedule_all();
+        Ok(run)
+    }
+
+    /// The declared machine.
+    #[must_use]
+    pub const fn machine(&self) -> &Machine {
+        &self.machine
+    }
+
+    fn schedule_all(&mut self) {
+        self.due.clear();
+        for whose in 0..self.lives.len() {
+            self.schedule(whose);
+        }
+    }
+
+    /// Schedules the next turn, if the agent waits for one.
+    fn schedule(&mut self, whose: usize) {
+        let life = &self.lives[whose];
+        if life.phase == Phase::Waiting
+            && let Some(due) = life.actor.as_ref().and_then(|actor| actor.pace.due(&self.timeline))
+        {
+            self.due.push(Reverse((due.max(self.now), whose as u32)));
+        }
+    }
+
+    /// Serves the summoned agents: sleepers that are woken, and agents that return from a leader.
+    fn wake_sleepers(&mut self) {
+        if !self.board.take_rung() {
+            return;
+        }
+        for whose in 0..self.lives.len() {
+            let life = &mut self.lives[whose];
+            match (life.phase, &mut life.actor) {
+                (Phase::Resting, Some(actor)) => {
+                    if !actor.wakes(&self.timeline, self.now) {
+                        continue;
+                    }
+                    life.phase = Phase::Waiting;
+                }
+                (Phase::Led, _) => {
+                    let home = self.handles[whose].shared.seating.as_ref().and_then(Seating::come_home);
+                    let Some(actor) = home else { continue };
+                    life.phase = if actor.is_parked() { Phase::Parked } else { Phase::Waiting };
+                    life.actor = Some(actor);
+                }
+                _ => continue,
+            }
+            self.schedule(whose);
+        }
+    }
+
+    /// Advances to the next event; `None` if there is none up to `limit`.
+    fn next_event(&mut self, limit: Duration) -> Option<Event> {
+        self.wake_sleepers();
+        let end = self.cores.until_end().map(|span| self.now.saturating_add(span));
+        let due = self.due.peek().map(|&Reverse((due, _))| due);
+        let at = end.into_iter().chain(due).min()?;
+        if at > limit {
+            return None;
+        }
+        self.cores.pass(at - self.now);
+        self.now = at;
+        // time advanced to the end of a job or to a due turn, whichever was first
+        match self.cores.take_ended() {
+            Some(whose) => Some(Event::End(whose)),
+            None => self.due.pop().map(|Reverse((_, whose))| Event::Start(whose)),
+        }
+    }
+
+    /// Processes events until `limit`, or until the frame's own job has ended.
+    fn run(&mut self, limit: Duration) {
+        while let Some(event) = self.next_event(limit) {
+            match event {
+                Event::Start(whose) => self.begin(whose as usize),
+                Event::End(FRAME) => break,
+                Event::End(whose) => self.finish(whose as usize),
+            }
+        }
+        self.settle();
+    }
+
+    fn begin(&mut self, whose: usize) {
+        self.batch.open();
+        let started = Instant::now();
+        let life = &mut self.lives[whose];
+        let Some(actor) = &mut life.actor else { return };
+        match actor.begin(&self.timeline, self.now) {
+            Some(Effort { work, steps }) => {
+                let model = actor.shared.model;
+                let step_s = self.machine.step_s(model, work, whose as u64, life.turns);
+                let seconds = f64::from(steps) * step_s * self.machine.slower(self.now);
+                self.cores.start(whose as u32, duration(seconds));
+                life.turns += 1;
+                life.phase = Phase::Busy(self.now);
+            }
+            None => life.phase = Phase::Parked,
+        }
+        self.count_cpu(whose, started.elapsed());
+    }
+
+    fn finish(&mut self, whose: usize) {
+        self.batch.open();
+        let started = Instant::now();
+        let life = &mut self.lives[whose];
+        let (Phase::Busy(since), Some(actor)) = (life.phase, &mut life.actor) else { return };
+        let took = (self.now - since).as_secs_f64();
+        let next = actor.finish(&self.timeline, self.now, took);
+        life.phase = match next {
+            Next::Due | Next::Join(_) => Phase::Waiting,
+            Next::Rest => Phase::Resting,
+            Next::Parked => Phase::Parked,
+        };
+        self.count_cpu(whose, started.elapsed());
+        if let Next::Join(leader) = next {
+            self.hand_over(whose, leader);
+        }
+        self.schedule(whose);
+    }
+
+    /// Hands an agent over to `leader`, if the leader accepts it now.
+    fn hand_over(&mut self, whose: usize, leader: AgentId) {
+        self.settle();
+        let life = &mut self.lives[whose];
+        life.actor = life.actor.take().and_then(|actor| move_in(actor, leader).err());
+        if life.actor.is_none() {
+            life.phase = Phase::Led;
+        }
+    }
+
+    fn count_cpu(&mut self, whose: usize, wall: Duration) {
+        if let Some(actor) = &mut self.lives[whose].actor {
+            if actor.unsettled_ns == 0 {
+                self.unsettled.push(whose as u32);
+            }
+            actor.count(wall);
+        }
+        if self.batch.add(wall) {
+            self.settle();
+        }
+    }
+
+    /// Ends all agents, whatever their phase.
+    fn end(&mut self) {
+        let actors = self.lives.drain(..).filter_map(|life| life.actor);
+        actors.for_each(|mut actor| actor.close_account(&self.timeline, self.now));
+        empty_rooms(&self.handles, &self.timeline, self.now);
+    }
+
+    fn settle(&mut self) {
+        if self.batch.is_empty() {
+            return;
+        }
+        let share = self.batch.close();
+        for whose in self.unsettled.drain(..) {
+            if let Some(actor) = &mut self.lives[whose as usize].actor {
+                actor.settle(share);
+            }
+        }
+    }
+}
+
+impl Drop for Lockstep {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+/// An event in virtual time.
+enum Event {
+    /// An agent's turn begins.
+    Start(u32),
+    /// The job of an agent, or of the frame, ends.
+    End(u32),
+}
+
+impl Run for Lockstep {
+    fn now(&self) -> Duration {
+        self.now
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        if until < self.now {
+            return;
+        }
+        self.run(until);
+        self.cores.pass(until - self.now);
+        self.now = until;
+    }
+
+    fn spend(&mut self, work: Duration) {
+        self.cores.start(FRAME, work);
+        self.run(Duration::MAX);
+    }
+
+    fn timeline(&self) -> Timeline {
+        self.timeline
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.timeline = self.timeline.after(self.now, drive);
+        self.schedule_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.handles
+    }
+
+    fn shutdown(&mut self) -> Vec<AgentStats> {
+        self.end();
+        self.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

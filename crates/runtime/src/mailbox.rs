@@ -1,0 +1,172 @@
+//! Commands to an agent: the newest of each kind, taken at its next turn.
+//!
+//! In: [`Command`]s from any thread. Out: the newest of each kind, once. Storage is bounded: one place per kind, which a newer command
+//! overwrites. Never here: the execution of commands ([`crate::agent_runner`] does).
+
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Anchor, Resolution, SimSpan};
+use std::sync::atomic::{
+    AtomicBool,
+    Ordering::{Acquire, Release},
+};
+use std::sync::{Mutex, OnceLock, PoisonError};
+
+/// A command to an agent.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// Simulate at this resolution; clamped to the agent's range.
+    Retune(Resolution),
+    /// Step by this span; clamped to the agent's range.
+    SetDt(SimSpan),
+    /// The user spring pulls at the agent until the next such command; `None` releases it.
+    Hand(Option<Pull>),
+    /// Wake up from rest.
+    Wake,
+}
+
+/// Reason why a command was not delivered.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SendError {
+    /// There is no such agent.
+    #[error("there is no agent {} in this run", .0.0)]
+    NoAgent(AgentId),
+    /// The command holds a number that is not finite, or a negative stiffness or damping.
+    #[error("refused {0:?}: every number must be finite, stiffness and damping not negative")]
+    BadNumber(Command),
+}
+
+/// The newest command of each kind, waiting for one agent.
+#[derive(Debug, Default)]
+pub(super) struct Mailbox {
+    /// Whether there is any command: an agent without commands reads only this.
+    full: AtomicBool,
+    /// Allocated by the first command: most agents never get one.
+    letters: OnceLock<Box<Mutex<Letters>>>,
+}
+
+/// Contents of a mailbox.
+#[derive(Debug, Default)]
+pub(super) struct Letters {
+    /// The newest requested resolution.
+    pub retune: Option<Resolution>,
+    /// The newest requested step length.
+    pub dt: Option<SimSpan>,
+    /// The newest state of the user spring.
+    pub hand: Option<Option<Pull>>,
+}
+
+impl Mailbox {
+    /// Stores `command` in the place of its kind.
+    ///
+    /// # Errors
+    /// [`SendError::BadNumber`]; nothing is delivered then.
+    pub fn post(&self, command: Command) -> Result<(), SendError> {
+        if !is_sound(&command) {
+            return Err(SendError::BadNumber(command));
+        }
+        if command == Command::Wake {
+            return Ok(());
+        }
+        let letters = self.letters.get_or_init(Box::default);
+        let mut letters = letters.lock().unwrap_or_else(PoisonError::into_inner);
+        match command {
+            Command::Retune(resolution) => letters.retune = Some(resolution),
+            Command::SetDt(dt) => letters.dt = Some(dt),
+            Command::Hand(pull) => letters.hand = Some(pull),
+            Command::Wake => {}
+        }
+        self.full.store(true, Release);
+        Ok(())
+    }
+
+    /// Whether any command has arrived.
+    pub fn has_letters(&self) -> bool {
+        self.full.load(Acquire)
+    }
+
+    /// All commands since the last call. Never blocks: while another thread is writing it returns nothing yet.
+    pub fn take(&self) -> Letters {
+        if !self.has_letters() {
+            return Letters::default();
+        }
+        let Some(Ok(mut letters)) = self.letters.get().map(|letters| letters.try_lock()) else {
+            return Letters::default();
+        };
+        self.full.store(false, Release);
+        std::mem::take(&mut *letters)
+    }
+}
+
+fn is_sound(command: &Command) -> bool {
+    match command {
+        Command::Retune(wanted) => wanted.eps_m.is_finite(),
+        Command::SetDt(_) | Command::Hand(None) | Command::Wake => true,
+        Command::Hand(Some(pull)) => {
+            let anchor = match pull.anchor {
+                Anchor::Arc(arc_m) => arc_m.is_finite(),
+                Anchor::Local(point) => point.is_finite(),
+                Anchor::Vertex(_) => true,
+            };
+            let springs = [pull.stiffness_n_m, pull.damping_n_s_m];
+            anchor
+                && pull.target.is_finite()
+                && pull.target_velocity.is_finite()
+                && springs.iter().all(|k| k.is_finite() && *k >= 0.0)
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+
+    fn pull(target: DVec3) -> Pull {
+        let anchor = Anchor::Local(DVec3::ZERO);
+        Pull { by: None, anchor, target, target_velocity: DVec3::ZERO, stiffness_n_m: 1.0, damping_n_s_m: 0.0 }
+    }
+
+    #[test]
+    fn the_newest_command_of_a_kind_takes_the_place_of_the_older() {
+        let mail = Mailbox::default();
+        for eps_m in [0.1, 0.2, 0.3] {
+            mail.post(Command::Retune(Resolution { eps_m, n: 1 })).unwrap();
+        }
+        mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
+        let taken = mail.take();
+        assert_eq!((taken.retune.unwrap().eps_m, taken.dt), (0.3, Some(SimSpan::from_nanos(5))));
+        let taken = mail.take();
+        assert_eq!((taken.retune, taken.dt, taken.hand), (None, None, None), "once");
+    }
+
+    #[test]
+    fn letting_go_is_a_command_too() {
+        let mail = Mailbox::default();
+        mail.post(Command::Hand(Some(pull(DVec3::X)))).unwrap();
+        mail.post(Command::Hand(None)).unwrap();
+        assert_eq!(mail.take().hand, Some(None));
+        assert_eq!(mail.take().hand, None);
+    }
+
+    #[test]
+    fn who_finds_somebody_writing_finds_it_the_next_time() {
+        let mail = Mailbox::default();
+        mail.post(Command::SetDt(SimSpan::from_nanos(5))).unwrap();
+        let writing = mail.letters.get().unwrap().lock().unwrap();
+        assert_eq!(mail.take().dt, None);
+        drop(writing);
+        assert_eq!(mail.take().dt, Some(SimSpan::from_nanos(5)));
+    }
+
+    #[test]
+    fn a_pull_that_is_not_finite_is_refused_at_the_door() {
+        let mail = Mailbox::default();
+        let bad = Command::Hand(Some(pull(DVec3::NAN)));
+        assert!(matches!(mail.post(bad), Err(SendError::BadNumber(_))));
+        let negative = Pull { stiffness_n_m: -1.0, ..pull(DVec3::X) };
+        assert!(mail.post(Command::Hand(Some(negative))).is_err());
+        assert!(mail.post(Command::Retune(Resolution { eps_m: f64::NAN, n: 0 })).is_err());
+        assert_eq!(mail.take().hand, None);
+    }
+}

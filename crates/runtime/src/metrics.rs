@@ -1,0 +1,265 @@
+//! Metrics of an agent: the cost of its turns and how well it keeps its time, readable from any thread at any moment.
+//!
+//! In: turns, from the thread that makes them. Out: [`AgentStats`]. Each number is one atomic word: consistent in itself, and as new as the
+//! last turn. Never here: locks on the agent's side, printing.
+
+use super::agent_clock::Pace;
+use super::histogram::Times;
+use metachron_core::{AgentId, Resolution, SimSpan, SimTime};
+use std::sync::atomic::{AtomicU8, AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, OnceLock};
+use std::time::Duration;
+
+/// State of an agent's execution.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum AgentState {
+    /// It steps.
+    Running,
+    /// It is at rest and takes no steps until it is woken.
+    Resting,
+    /// It was parked for this reason; its last snapshot remains.
+    Parked(String),
+}
+
+/// Two percentiles and the maximum of a set of times, seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Spread {
+    /// The median, to 2 %.
+    pub p50_s: f64,
+    /// The 99th percentile, to 2 %.
+    pub p99_s: f64,
+    /// The maximum; longer times than 16.8 s count as 16.8 s.
+    pub max_s: f64,
+}
+
+/// Statistics of an agent so far.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AgentStats {
+    /// The agent.
+    pub id: AgentId,
+    /// Its name in the scene.
+    pub name: Arc<str>,
+    /// Its model.
+    pub model: &'static str,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps per simulated second over the last half second; zero at rest and when parked.
+    pub rate_hz: f64,
+    /// Steps per simulated second over all time that it was awake.
+    pub mean_hz: f64,
+    /// Steps per simulated second requested by the scene.
+    pub wanted_hz: f64,
+    /// The present step length.
+    pub dt: SimSpan,
+    /// The resolution of the newest state; `None` for a model that has none.
+    pub resolution: Option<Resolution>,
+    /// Wall time of a turn, seconds, waiting for a core included, smoothed; virtual in lockstep.
+    pub work_s: f64,
+    /// Work of its steps so far, in its model's unit.
+    pub work: f64,
+    /// CPU time of its turns so far, seconds; measured, in lockstep too.
+    pub cpu_s: f64,
+    /// Age of its newest state when a reader used it ([`crate::AgentHandle::record_age`]).
+    pub age: Spread,
+    /// Delay between the release of its turns and their start, wall time.
+    pub late: Spread,
+    /// Turns published after the end of their step.
+    pub misses: u64,
+    /// Simulated time dropped because it could not be made up.
+    pub dropped: SimSpan,
+    /// Simulated time at rest.
+    pub rested: SimSpan,
+    /// State of its execution.
+    pub state: AgentState,
+    /// Mechanical energy of the newest state, joules.
+    pub energy_j: f64,
+    /// Estimated error of the newest state, metres.
+    pub residual_m: f64,
+    /// The part of it caused by its time steps, metres.
+    pub drift_m: f64,
+    /// The leader that makes its turns, on the leader's thread and clock, because the two share an island; `None` if it makes them itself.
+    pub led_by: Option<AgentId>,
+}
+
+/// A number that one thread writes and any thread reads.
+#[derive(Debug, Default)]
+pub(super) struct Gauge(AtomicU64);
+
+impl Gauge {
+    pub fn set(&self, value: f64) {
+        self.0.store(value.to_bits(), Relaxed);
+    }
+
+    pub fn get(&self) -> f64 {
+        f64::from_bits(self.0.load(Relaxed))
+    }
+}
+
+const RUNNING: u8 = 0;
+const RESTING: u8 = 1;
+const PARKED: u8 = 2;
+
+/// The readable side of an agent's metrics.
+#[derive(Debug, Default)]
+pub(super) struct Gauges {
+    pub steps: AtomicU64,
+    pub misses: AtomicU64,
+    pub dt: AtomicU64,
+    pub dropped: AtomicU64,
+    pub rested: AtomicU64,
+    pub cpu_nanos: AtomicU64,
+    pub rate_hz: Gauge,
+    pub mean_hz: Gauge,
+    pub work_s: Gauge,
+    pub work: Gauge,
+    late: [Gauge; 3],
+    state: AtomicU8,
+    reason: OnceLock<String>,
+}
+
+impl Gauges {
+    pub fn state(&self) -> AgentState {
+        match self.state.load(Relaxed) {
+            RUNNING => AgentState::Running,
+            RESTING => AgentState::Resting,
+            _ => AgentState::Parked(self.reason.get().cloned().unwrap_or_default()),
+        }
+    }
+
+    pub fn is_resting(&self) -> bool {
+        self.state.load(Relaxed) == RESTING
+    }
+
+    pub fn is_running(&self) -> bool {
+        self.state.load(Relaxed) == RUNNING
+    }
+
+    pub fn set_resting(&self, resting: bool) {
+        self.state.store(if resting { RESTING } else { RUNNING }, Relaxed);
+    }
+
+    /// Parks the agent for good; the first reason is kept.
+    pub fn park(&self, reason: String) {
+        self.reason.get_or_init(|| reason);
+        self.state.store(PARKED, Relaxed);
+    }
+
+    pub fn late(&self) -> Spread {
+        let [p50_s, p99_s, max_s] = [0, 1, 2].map(|k| self.late[k].get());
+        Spread { p50_s, p99_s, max_s }
+    }
+
+    fn set_late(&self, spread: Spread) {
+        for (gauge, value) in self.late.iter().zip([spread.p50_s, spread.p99_s, spread.max_s]) {
+            gauge.set(value);
+        }
+    }
+}
+
+/// Window of the recent rate, simulated time.
+const RATE_WINDOW: SimSpan = SimSpan::from_nanos(500_000_000);
+
+/// The weight of a new value in a smoothed one: about eight values count.
+pub(super) const SMOOTHING: f64 = 0.125;
+
+/// The writing side of an agent's metrics, owned by the thread that makes its turns.
+#[derive(Debug)]
+pub(super) struct Diary {
+    steps: u64,
+    misses: u64,
+    late: Times,
+    work_s: Option<f64>,
+    window: (SimTime, u64),
+    first_window: bool,
+}
+
+/// A turn, as recorded in the metrics.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Entry {
+    /// Simulated time at the turn's end.
+    pub now: SimTime,
+    /// How late it began.
+    pub late: Duration,
+    /// Whether it was published after the end of its step.
+    pub missed: bool,
+    /// Its duration, seconds.
+    pub work_s: f64,
+}
+
+impl Diary {
+    pub fn new() -> Self {
+        let window = (SimTime::ZERO, 0);
+        Self { steps: 0, misses: 0, late: Times::default(), work_s: None, window, first_window: true }
+    }
+
+    /// Steps recorded so far.
+    pub const fn steps(&self) -> u64 {
+        self.steps
+    }
+
+    /// Reads a word of the memory that a turn will write to ([`crate::prefetch`]).
+    pub fn fetch(&self) {
+        self.late.fetch();
+    }
+
+    /// Records a turn.
+    pub fn write(&mut self, gauges: &Gauges, pace: &Pace, entry: Entry) {
+        self.steps += 1;
+        self.misses += u64::from(entry.missed);
+        self.late.record(entry.late);
+        let work_s = self.work_s.map_or(entry.work_s, |old| old + SMOOTHING * (entry.work_s - old));
+        self.work_s = Some(work_s);
+        gauges.steps.store(self.steps, Relaxed);
+        gauges.misses.store(self.misses, Relaxed);
+        gauges.work_s.set(work_s);
+        self.pace(gauges, pace);
+        // the step just made covers the time up to the agent's own
+        let lived = pace.scene_time().max(entry.now).since(SimTime::ZERO + pace.rested());
+        gauges.mean_hz.set(self.steps as f64 / lived.as_secs_f64());
+        self.count_rate(gauges, entry.now);
+    }
+
+    /// Publishes the values of the pace.
+    pub fn pace(&self, gauges: &Gauges, pace: &Pace) {
+        gauges.dt.store(pace.dt().as_nanos(), Relaxed);
+        gauges.dropped.store(pace.dropped().as_nanos(), Relaxed);
+        gauges.rested.store(pace.rested().as_nanos(), Relaxed);
+    }
+
+    /// Restarts the measurement of the rate, after a rest.
+    pub fn restart(&mut self, now: SimTime) {
+        self.window = (now, self.steps);
+    }
+
+    /// Updates the percentiles: too expensive for every turn.
+    pub fn flush(&self, gauges: &Gauges) {
+        gauges.set_late(self.late.spread());
+    }
+
+    fn count_rate(&mut self, gauges: &Gauges, now: SimTime) {
+        let (since, steps) = self.window;
+        let span = now.since(since);
+        let full = span >= RATE_WINDOW;
+        if full || (self.first_window && span > SimSpan::ZERO) {
+            gauges.rate_hz.set((self.steps - steps) as f64 / span.as_secs_f64());
+        }
+        if full {
+            self.window = (now, self.steps);
+            self.first_window = false;
+            self.flush(gauges);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_first_reason_to_park_stands() {
+        let gauges = Gauges::default();
+        gauges.park("first".into());
+        gauges.park("second".into());
+        assert_eq!(gauges.state(), AgentState::Parked("first".into()));
+    }
+}

@@ -1,0 +1,260 @@
+//! An agent's view of its peers: which it sees, and by which law each pair interacts.
+//!
+//! In: the links and laws of the scene, the crowd. Out: [`Neighbour`]s with their newest states: first the linked peers, always and in
+//! their order; then peers near enough to touch, and peers with unsettled impulse ledgers, by rising numbers. No allocation once the sizes
+//! settle. Never here: when an agent looks.
+
+use super::broad_phase::Crowd;
+use super::broad_phase::Sight;
+use super::fellows::Fellows;
+use super::handle::Shared;
+use super::slot::{LatestSlot, SlotWriter};
+use metachron_contact::Neighbour;
+use metachron_contact::{Law, Standing, acknowledged, keep_step, owns};
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Form, FormKind};
+use std::sync::Arc;
+
+/// Data of all agents of a run, fixed at the start.
+#[derive(Debug)]
+pub(super) struct Peers {
+    pub all: Vec<Peer>,
+    /// `None` if no two agents could touch: then no agent searches for peers.
+    pub crowd: Option<Crowd>,
+    /// Pairs joined by links with the ledger law, each in both orders, sorted.
+    pub linked: Vec<[AgentId; 2]>,
+}
+
+/// Data of one agent for its peers.
+pub(super) struct Peer {
+    pub shared: Arc<Shared>,
+    pub form: Option<Arc<Form>>,
+    /// The laws of its pairs that are not [`Law::Ledger`], by rising numbers of the peers.
+    pub laws: Vec<(AgentId, Law)>,
+}
+
+/// The list of peers that an agent sees.
+#[derive(Debug, Default)]
+pub(super) struct Eyes {
+    neighbours: Vec<Neighbour>,
+    /// One for each neighbour, in their order.
+    looks: Vec<Look>,
+    /// The first `links` neighbours are the linked ones.
+    links: usize,
+    /// Only in a crowd.
+    sight: Option<Box<Sight>>,
+    /// Agents to be seen in addition to the linked ones.
+    wanted: Vec<AgentId>,
+}
+
+/// Source of one neighbour's states.
+#[derive(Debug)]
+struct Look {
+    slot: Arc<LatestSlot<Snapshot>>,
+    /// It steps in the same island: the island's solve, and no law, determines their interaction.
+    fellow: bool,
+}
+
+impl std::fmt::Debug for Peer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Peer").field("shared", &self.shared).field("laws", &self.laws).finish_non_exhaustive()
+    }
+}
+
+impl Peer {
+    fn standing(&self) -> Standing {
+        Standing::new(self.shared.id, self.shared.model, self.shared.wanted_hz, self.form.as_deref())
+    }
+
+    fn law(&self, other: AgentId) -> Law {
+        self.laws.binary_search_by_key(&other, |(id, _)| *id).map_or(Law::Ledger, |at| self.laws[at].1)
+    }
+
+    /// Whether the two could ever touch.
+    pub fn touches(&self, other: &Self) -> bool {
+        let (Some(mine), Some(theirs)) = (&self.form, &other.form) else { return false };
+        !(is_led(mine) && is_led(theirs)) && self.law(other.shared.id) != Law::Off
+    }
+
+    /// The neighbour `other` as seen by this agent; `linked`: a link by the ledger joins the two.
+    fn meets(&self, other: &Self, linked: bool) -> Neighbour {
+        // a tool needs the form to grasp it, even if it passes through it
+        let known = self.touches(other) || self.form.as_deref().is_some_and(is_led);
+        let snapshot = other.shared.slot.latest();
+        let (mine, its) = (self.standing(), other.standing());
+        Neighbour {
+            id: other.shared.id,
+            step_s: snapshot.step_s(other.shared.wanted_hz.recip()),
+            snapshot,
+            form: if known { other.form.clone() } else { None },
+            law: self.law(other.shared.id),
+            owned: owns(mine, its, linked),
+            in_step: keep_step(mine, its, linked),
+        }
+    }
+}
+
+impl Peers {
+    pub fn get(&self, id: AgentId) -> Option<&Peer> {
+        self.all.get(id.0 as usize)
+    }
+
+    /// The neighbour `other` as seen by `me`.
+    fn meet(&self, me: AgentId, other: AgentId) -> Option<Neighbour> {
+        let linked = self.linked.binary_search(&[me, other]).is_ok();
+        Some(self.get(me)?.meets(self.get(other)?, linked))
+    }
+
+    /// The view of `me`, which is linked to `links`.
+    pub fn eyes(&self, me: AgentId, links: &[AgentId]) -> Eyes {
+        let sight = self.crowd.is_some().then(|| Box::new(Sight::new(me)));
+        let mut eyes = Eyes { sight, ..Eyes::default() };
+        links.iter().for_each(|id| eyes.list(self, me, *id));
+        eyes.links = eyes.neighbours.len();
+        eyes
+    }
+}
+
+impl Eyes {
+    /// Its neighbours, as they were at the last look.
+    pub fn neighbours(&self) -> &[Neighbour] {
+        &self.neighbours
+    }
+
+    /// Publishes the bounds of the state that this agent has just written to the crowd.
+    pub fn stand(&mut self, peers: &Peers, state: &Snapshot) {
+        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
+            sight.stand(crowd, state.bounds.as_ref(), state.moment());
+        }
+    }
+
+    /// Whether all impulses exchanged between `me`, whose states `writer` writes, and its neighbours for which `live` is true have been
+    /// taken.
+    pub fn is_settled(&self, me: AgentId, writer: &SlotWriter<Snapshot>, live: impl Fn(AgentId) -> bool) -> bool {
+        newest(writer, |mine| self.neighbours.iter().filter(|n| live(n.id)).all(|n| is_settled(me, mine, n)))
+    }
+
+    /// Reads the newest states of the present neighbours, without searching for others.
+    pub fn look_again(&mut self) {
+        for (neighbour, look) in self.neighbours.iter_mut().zip(&self.looks) {
+            neighbour.snapshot = look.slot.latest();
+        }
+    }
+
+    /// Updates the neighbours before the step of `dt` from `now` of `me`, whose states `writer` writes and which shares an island with
+    /// `fellows`.
+    pub fn look(
+        &mut self,
+        peers: &Peers,
+        me: &SlotWriter<Snapshot>,
+        (id, now, dt): (AgentId, SimTime, SimSpan),
+        fellows: &Fellows,
+    ) {
+        if let (Some(sight), Some(crowd)) = (&mut self.sight, &peers.crowd) {
+            let mine = peers.get(id);
+            sight
+                .look(crowd, (now, dt), fellows, |other| mine.zip(peers.get(other)).is_some_and(|(a, b)| a.touches(b)));
+            self.want(crowd, me, id, fellows);
+            self.list_wanted(peers, id);
+        }
+        for (neighbour, look) in self.neighbours.iter_mut().zip(&mut self.looks) {
+            let fellow = fellows.has(neighbour.id);
+            if fellow != look.fellow {
+                look.fellow = fellow;
+                regard(neighbour, peers, id, fellow);
+            }
+            neighbour.snapshot = look.slot.latest();
+        }
+    }
+
+    /// Collects the agents to be seen: near peers, callers, former neighbours with unsettled ledgers, and agents that give impulses to a
+    /// body to which this agent also gives.
+    fn want(&mut self, crowd: &Crowd, me: &SlotWriter<Snapshot>, id: AgentId, fellows: &Fellows) {
+        let Self { neighbours, links, sight, wanted, looks } = self;
+        let (linked, near_once) = neighbours.split_at_mut(*links);
+        let is_linked = |id: AgentId| linked.iter().any(|link| link.id == id);
+        wanted.clear();
+        let near = sight.iter().flat_map(|sight| sight.near().iter().copied());
+        wanted.extend(near.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+        let near = wanted.len();
+        for (neighbour, look) in near_once.iter_mut().zip(&looks[*links..]) {
+            if wanted[..near].binary_search(&neighbour.id).is_ok() {
+                continue;
+            }
+            neighbour.snapshot = look.slot.latest();
+            if !newest(me, |mine| is_settled(id, mine, neighbour)) {
+                wanted.push(neighbour.id);
+            }
+        }
+        crowd.answer(id, |caller| {
+            if !is_linked(caller) {
+                wanted.push(caller);
+            }
+        });
+        for neighbour in linked.iter().chain(&*near_once) {
+            let givers = others_who_give(id, &neighbour.snapshot);
+            wanted.extend(givers.filter(|id| !is_linked(*id) && !fellows.has(*id)));
+        }
+        if wanted.len() > near {
+            wanted.sort_unstable();
+            wanted.dedup();
+        }
+    }
+
+    fn list_wanted(&mut self, peers: &Peers, me: AgentId) {
+        if self.neighbours[self.links..].iter().map(|n| n.id).eq(self.wanted.iter().copied()) {
+            return;
+        }
+        self.neighbours.truncate(self.links);
+        self.looks.truncate(self.links);
+        for at in 0..self.wanted.len() {
+            self.list(peers, me, self.wanted[at]);
+        }
+    }
+
+    fn list(&mut self, peers: &Peers, me: AgentId, id: AgentId) {
+        let (Some(theirs), Some(neighbour)) = (peers.get(id), peers.meet(me, id)) else { return };
+        self.neighbours.push(neighbour);
+        self.looks.push(Look { slot: Arc::clone(&theirs.shared.slot), fellow: false });
+    }
+}
+
+/// Whether the form is a tool's.
+const fn is_led(form: &Form) -> bool {
+    matches!(form.kind, FormKind::Tool(_))
+}
+
+/// Treats `neighbour` as a member of the same island, or again as a peer outside it.
+fn regard(neighbour: &mut Neighbour, peers: &Peers, me: AgentId, fellow: bool) {
+    if fellow {
+        (neighbour.form, neighbour.law, neighbour.owned) = (None, Law::Off, false);
+    } else if let Some(stranger) = peers.meet(me, neighbour.id) {
+        *neighbour = stranger;
+    }
+}
+
+/// Whether all impulses that the two have given each other have been taken.
+fn is_settled(me: AgentId, mine: &Snapshot, other: &Neighbour) -> bool {
+    let given = mine.given.iter().find(|ledger| ledger.with == other.id);
+    let received = other.snapshot.given.iter().find(|ledger| ledger.with == me);
+    let taken = mine.taken.iter().find(|ledger| ledger.with == other.id);
+    given.is_none_or(|ledger| ledger.is_settled(acknowledged(other, me)))
+        && received.is_none_or(|ledger| ledger.is_settled(taken))
+}
+
+/// The other agents that give impulses to an agent to which `me` also gives: their impulses must be anticipated.
+fn others_who_give(me: AgentId, other: &Snapshot) -> impl Iterator<Item = AgentId> + '_ {
+    let mine = other.taken.iter().any(|ledger| ledger.with == me);
+    other.taken.iter().map(|ledger| ledger.with).filter(move |with| mine && *with != me)
+}
+
+/// The state that was written last, published or not.
+pub(super) fn newest<R>(writer: &SlotWriter<Snapshot>, read: impl FnOnce(&Snapshot) -> R) -> R {
+    match writer.filled() {
+        Some(state) => read(state),
+        None => read(&writer.slot().latest()),
+    }
+}
+
+#[cfg(test)]
+mod tests;

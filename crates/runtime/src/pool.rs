@@ -1,0 +1,117 @@
+//! Executor in real time with a few workers for thousands of agents.
+//!
+//! In: agents and a [`Clock`]. Out: [`Run`]. Each worker makes the turns that are due, earliest deadline first, and sleeps when none is;
+//! agents have their own clocks as on threads, and do not depend on the worker that makes their turns.
+//! A thread per agent costs a context switch per turn; a worker just goes from one agent to the next.
+//! Under overload every agent falls to the same share of its rate (`pool/queue.rs`). Never here: virtual time, declared costs.
+
+mod queue;
+mod shared;
+mod supervisor;
+mod watchdog;
+mod worker;
+
+use super::Run;
+use super::agent_clock::{Drive, Timeline};
+use super::clock::Clock;
+use super::handle::AgentHandle;
+use super::metrics::AgentStats;
+use super::priority::Priority;
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use shared::Hall;
+use std::num::NonZero;
+use std::sync::Arc;
+use std::sync::mpsc::Sender;
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+use supervisor::{Note, Staff};
+
+/// A step that takes longer is given up: its agent is parked, its worker replaced.
+const PATIENCE: Duration = Duration::from_secs(5);
+
+/// Agents that share workers.
+pub struct Pool {
+    hall: Arc<Hall>,
+    notes: Sender<Note>,
+    watch: Option<JoinHandle<()>>,
+}
+
+impl Pool {
+    /// Starts a worker per core that the system gives; simulated time is paused until [`Drive::Run`]. If the system refuses `priority`
+    /// ([`Priority::ask`]) workers have the ordinary one.
+    ///
+    /// # Errors
+    /// [`RunError`] for agents that cannot run as requested, and if the system gives no thread.
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
+        let workers = thread::available_parallelism().map_or(1, NonZero::get);
+        Self::with_workers(spawns, clock, workers, (PATIENCE, priority))
+    }
+
+    /// Starts `workers` workers, at least one, each given up after `patience` in one step.
+    pub(super) fn with_workers(
+        spawns: Vec<AgentSpawn>,
+        clock: Arc<dyn Clock>,
+        workers: usize,
+        (patience, priority): (Duration, Priority),
+    ) -> Result<Self, RunError> {
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let workers = workers.clamp(1, handles.len().max(1));
+        board.hire(workers);
+        let hall = Arc::new(Hall::new(clock, board, handles, actors, workers));
+        hall.timeline.drive(Duration::ZERO, Drive::Pause);
+        let no_thread = |source| RunError::NoThread { name: "the pool's workers".to_owned(), source };
+        let staff = Staff::hire(Arc::clone(&hall), workers, patience, priority).map_err(no_thread)?;
+        let notes = staff.notes();
+        let watch = thread::Builder::new().name("pool:watch".to_owned()).spawn(|| staff.watch()).map_err(|source| {
+            hall.board.stop();
+            no_thread(source)
+        })?;
+        Ok(Self { hall, notes, watch: Some(watch) })
+    }
+
+    fn end(&mut self) {
+        self.hall.board.stop();
+        // the send fails only if the watchdog has already ended
+        let _ = self.notes.send(Note::Stop);
+        drop(self.watch.take().map(JoinHandle::join));
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl Run for Pool {
+    fn now(&self) -> Duration {
+        self.hall.clock.now()
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        super::clock::wait_until(&*self.hall.clock, until);
+    }
+
+    fn spend(&mut self, _work: Duration) {}
+
+    fn timeline(&self) -> Timeline {
+        self.hall.timeline.read()
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.hall.timeline.drive(self.hall.clock.now(), drive);
+        self.hall.board.unpark_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.hall.handles
+    }
+
+    fn shutdown(&mut self) -> Vec<AgentStats> {
+        self.end();
+        self.hall.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,177 @@
+//! Shared state of a pool's workers.
+//!
+//! In: agents between their turns, summons. Out: for each worker its next turn, or how long it may sleep.
+//! Every worker has its own queue, with a lock that is normally uncontended. A worker without work helps one whose turn is overdue, and
+//! takes the agent over; at intervals a worker with work checks whether agents of other workers are served worse.
+//! Agents at rest are stored in one slot each until they are summoned. Never here: threads, turns.
+
+use super::super::agent_clock::{SharedTimeline, Timeline};
+use super::super::agent_runner::Actor;
+use super::super::clock::Clock;
+use super::super::handle::AgentHandle;
+use super::super::island::Seating;
+use super::super::sleep::Switchboard;
+use super::queue::{NEVER, Queue};
+use crossbeam::atomic::AtomicCell;
+use crossbeam::utils::CachePadded;
+use metachron_core::AgentId;
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// A turn overdue by this much is made by any idle worker: with less, workers would take each other's agents for no gain.
+const OVERDUE: Duration = Duration::from_millis(1);
+
+/// An agent of another worker is taken over if it has been served this much less, served nanoseconds.
+const UNJUST: u64 = 5_000_000;
+
+/// Agents taken over in one go.
+const HAUL: usize = 8;
+
+/// State shared by all workers.
+pub(super) struct Hall {
+    pub clock: Arc<dyn Clock>,
+    pub timeline: SharedTimeline,
+    pub board: Arc<Switchboard>,
+    pub handles: Vec<AgentHandle>,
+    shelves: Vec<CachePadded<Shelf>>,
+    beds: Vec<AtomicCell<Option<Box<Actor>>>>,
+}
+
+/// The queue of one worker, and its key figures, readable without the lock.
+#[derive(Default)]
+struct Shelf {
+    queue: Mutex<Queue>,
+    due: AtomicU64,
+    frontier: AtomicU64,
+}
+
+impl Hall {
+    pub fn new(
+        clock: Arc<dyn Clock>,
+        board: Arc<Switchboard>,
+        handles: Vec<AgentHandle>,
+        actors: Vec<Option<Box<Actor>>>,
+        workers: usize,
+    ) -> Self {
+        let beds = handles.iter().map(|_| AtomicCell::new(None)).collect();
+        let shelves = std::iter::repeat_with(CachePadded::default).take(workers).collect();
+        let hall = Self { clock, timeline: SharedTimeline::new(), board, handles, shelves, beds };
+        // neighbours in the scene share a worker, and still every worker gets agents of each kind
+        let block = (actors.len() / (8 * workers)).clamp(1, 64);
+        for (at, actor) in actors.into_iter().enumerate() {
+            if let Some(actor) = actor.filter(|actor| !actor.is_parked()) {
+                hall.shelves[at / block % workers].with(|queue| queue.put(actor, Duration::ZERO));
+            }
+        }
+        hall
+    }
+
+    /// The next turn of worker `at`, which returns the agent of the last one as `back`; `None` if none is due.
+    pub fn exchange(
+        &self,
+        at: usize,
+        back: Option<Box<Actor>>,
+        timeline: &Timeline,
+        now: Duration,
+    ) -> Option<Box<Actor>> {
+        let taken = self.shelves[at].with(|queue| {
+            queue.keep_time(timeline, now);
+            back.into_iter().for_each(|actor| queue.put_back(actor, now));
+            queue.take(now)
+        });
+        taken.or_else(|| self.help(at, timeline, now))
+    }
+
+    /// Adds `actor` to the queue of worker `at`.
+    pub fn put(&self, at: usize, actor: Box<Actor>, now: Duration) {
+        self.shelves[at].with(|queue| queue.put(actor, now));
+    }
+
+    /// Stores `actor` at rest; returns it if it has been woken meanwhile.
+    pub fn lay(&self, actor: Box<Actor>) -> Option<Box<Actor>> {
+        let id = actor.id();
+        let bed = self.beds.get(id.0 as usize)?;
+        // a summons before this found the slot empty: then its mark is seen here; a later one finds the agent
+        drop(bed.swap(Some(actor)));
+        if self.board.is_woken(id) { bed.take() } else { None }
+    }
+
+    /// Takes the agent out of its resting slot.
+    pub fn lift(&self, id: AgentId) -> Option<Box<Actor>> {
+        self.beds.get(id.0 as usize)?.take()
+    }
+
+    /// The agent that has returned from a leader.
+    pub fn come_home(&self, id: AgentId) -> Option<Box<Actor>> {
+        self.handles.get(id.0 as usize)?.shared.seating.as_ref().and_then(Seating::come_home)
+    }
+
+    /// How long worker `at` may sleep from `now` on; `None`: until it is woken.
+    pub fn pause(&self, at: usize, now: Duration) -> Option<Duration> {
+        let mine = moment(self.shelves[at].due.load(Relaxed));
+        let next = (at + 1) % self.shelves.len();
+        // each worker watches the next one; a worker that finds it late searches further
+        let theirs = moment(self.shelves[next].due.load(Relaxed)).filter(|_| next != at);
+        let watch = theirs.map(|due| due.saturating_add(OVERDUE).max(now + OVERDUE / 4));
+        let until = mine.into_iter().chain(watch).min()?;
+        Some(until.saturating_sub(now))
+    }
+
+    /// Takes over agents that another worker serves worse than worker `at` serves its own.
+    pub fn balance(&self, at: usize, timeline: &Timeline, now: Duration) {
+        let mine = self.shelves[at].frontier.load(Relaxed);
+        let unjust = |shelf: &Shelf| shelf.frontier.load(Relaxed).saturating_add(UNJUST) < mine;
+        if mine == NEVER || !self.shelves.iter().any(|shelf| unjust(shelf)) {
+            return;
+        }
+        let Some(shelf) = self.shelves.iter().find(|shelf| unjust(shelf)) else { return };
+        let mut haul = Queue::default();
+        shelf.try_with(|queue| {
+            queue.keep_time(timeline, now);
+            let _ = (0..HAUL).take_while(|_| queue.give(&mut haul, now)).count();
+        });
+        self.shelves[at].with(|queue| while haul.give(queue, now) {});
+    }
+
+    /// Visits and removes all resting and queued agents, at the end of a run.
+    pub fn clear(&self, mut visit: impl FnMut(Box<Actor>)) {
+        self.beds.iter().filter_map(AtomicCell::take).for_each(&mut visit);
+        self.shelves.iter().for_each(|shelf| shelf.with(|queue| queue.drain().for_each(&mut visit)));
+    }
+
+    /// An overdue turn of another worker.
+    fn help(&self, at: usize, timeline: &Timeline, now: Duration) -> Option<Box<Actor>> {
+        let count = self.shelves.len();
+        let others = (1..count).map(|k| &self.shelves[(at + k) % count]);
+        let late = |shelf: &Shelf| moment(shelf.due.load(Relaxed)).is_some_and(|due| due + OVERDUE <= now);
+        others.filter(|shelf| late(shelf)).find_map(|shelf| {
+            shelf.try_with(|queue| {
+                queue.keep_time(timeline, now);
+                queue.take(now)
+            })
+        })
+    }
+}
+
+impl Shelf {
+    fn with<R>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
+        self.show(self.queue.lock().unwrap_or_else(PoisonError::into_inner), act)
+    }
+
+    /// As [`Self::with`], if the queue's lock is free.
+    fn try_with<R: Default>(&self, act: impl FnOnce(&mut Queue) -> R) -> R {
+        self.queue.try_lock().map_or_else(|_| R::default(), |queue| self.show(queue, act))
+    }
+
+    fn show<R>(&self, mut queue: MutexGuard<'_, Queue>, act: impl FnOnce(&mut Queue) -> R) -> R {
+        let result = act(&mut queue);
+        self.due.store(queue.due(), Relaxed);
+        self.frontier.store(queue.frontier(), Relaxed);
+        result
+    }
+}
+
+fn moment(nanos: u64) -> Option<Duration> {
+    (nanos != NEVER).then(|| Duration::from_nanos(nanos))
+}

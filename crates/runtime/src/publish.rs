@@ -1,0 +1,105 @@
+//! Publication of an agent: its states, and the notification of the agents that it acts on.
+//!
+//! In: a step that has been made. Out: a state, written and later published or withheld ([`super::faults`]); the agents it acts on are
+//! notified once the state is visible. Never here: the step, the agent's own view.
+
+use super::agent_runner::{Actor, Open};
+use super::metrics::Entry;
+use super::probe::Trace;
+use metachron_core::SimTime;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+impl Actor {
+    /// Records a step in the metrics and publishes its state; whether the state is visible.
+    pub fn conclude(&mut self, open: &Open, now: SimTime, work_s: f64) -> bool {
+        let missed = now > self.pace.scene_time();
+        let entry = Entry { now, late: open.start.late, missed, work_s };
+        // metrics first: a state that is visible is accounted for
+        self.diary.write(&self.shared.gauges, &self.pace, entry);
+        self.withheld = self.faults.loses(self.id(), self.diary.steps());
+        !self.withheld && self.show(now)
+    }
+
+    /// Publishes the state that was written last; whether it is visible.
+    pub fn show(&mut self, now: SimTime) -> bool {
+        let concerns = self.writer.filled().is_some_and(|state| !(state.touches.is_empty() && state.given.is_empty()));
+        let published = self.writer.publish();
+        if published {
+            self.tell();
+            if concerns {
+                self.announce(now);
+            }
+        }
+        published
+    }
+
+    /// Writes the state at `time`, to be published later; `at_rest`: the agent is about to rest in it.
+    pub fn write_snapshot(&mut self, time: SimTime, at_rest: bool) -> Result<(), String> {
+        let (agent, put_off, shorter) = (&self.agent, self.pace.put_off(), self.pace.shorter());
+        self.withheld = false;
+        let finite = self.writer.fill(|into| {
+            into.clear();
+            agent.write_snapshot(into);
+            (into.time, into.put_off, into.shorter, into.at_rest) = (time, put_off, shorter, at_rest);
+            into.is_finite()
+        });
+        let model = self.shared.model;
+        if let (true, Some(state)) = (finite, self.writer.filled()) {
+            self.eyes.stand(&self.peers, state);
+            self.shared.traces.iter().for_each(|trace| locked(trace).look(state));
+            Ok(())
+        } else {
+            Err(format!("the state of this {model} at {:.6} s is not finite", time.as_secs_f64()))
+        }
+    }
+
+    /// Publishes a withheld state: the last state of an agent is never withheld.
+    pub fn show_withheld(&mut self) {
+        if std::mem::take(&mut self.withheld) && self.writer.publish() {
+            self.tell();
+        }
+    }
+
+    /// Reports a new state of this agent to the run's reader.
+    pub fn tell(&self) {
+        self.shared.board.news.tell(self.shared.id);
+    }
+
+    /// Records that the watched points stay in place until `now`: a state at rest is still valid.
+    pub fn hold_watched(&self, now: SimTime) {
+        if self.shared.traces.is_empty() {
+            return;
+        }
+        let state = self.shared.slot.latest();
+        self.shared.traces.iter().for_each(|trace| locked(trace).hold(&state, now));
+    }
+
+    /// Notifies the agents that this agent acts on, once its state is visible.
+    fn announce(&mut self, now: SimTime) {
+        let newest = self.shared.slot.latest();
+        let board = &self.shared.board;
+        let leader = board.leader(self.shared.id);
+        let others = newest.touches.iter().filter(|id| board.leader(**id) != leader);
+        others.for_each(|id| board.touch(*id, now));
+        let Some(crowd) = &self.peers.crowd else { return };
+        for ledger in &newest.given {
+            let known = self.announced.iter_mut().find(|(with, _)| *with == ledger.with);
+            if known.as_ref().is_some_and(|(_, revision)| *revision == ledger.revision) {
+                continue;
+            }
+            match known {
+                Some((_, revision)) => *revision = ledger.revision,
+                None => self.announced.push((ledger.with, ledger.revision)),
+            }
+            crowd.call(ledger.with, self.shared.id);
+            if board.rests(ledger.with) {
+                board.wake(ledger.with);
+            }
+        }
+    }
+}
+
+/// Uncontended while the agent runs: other threads read at the end.
+fn locked(trace: &Mutex<Trace>) -> MutexGuard<'_, Trace> {
+    trace.lock().unwrap_or_else(PoisonError::into_inner)
+}

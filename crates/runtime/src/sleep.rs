@@ -1,0 +1,347 @@
+//! Sleep registry: which agents are at rest, and how they are woken.
+//!
+//! In: wakes and touches from any thread. Out: a flag per agent, and its thread unparked, or a wake-up of its pool.
+//! An agent that is led has no turns of its own: waking it wakes its leader, and the leader rests for all agents it leads.
+//! Never here: when an agent is due ([`crate::agent_clock`]), its commands ([`super::mailbox`]).
+//!
+//! Leaders have lower numbers than those they lead, so that the chain of leaders always ends.
+//! No wake is lost: an agent that goes to rest raises `resting` first and reads `woken` and `touched` after; a caller that wakes it writes
+//! these first and reads `resting` after. With a fence (SeqCst) between, at least one of the two sees the other.
+
+use super::dirty_set::News;
+use super::sync::atomic::{
+    AtomicBool, AtomicU32, AtomicU64,
+    Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
+    fence,
+};
+use super::sync::thread::Thread;
+use super::worker_wakeup::Bell;
+use metachron_core::{AgentId, SimSpan, SimTime};
+use std::sync::OnceLock;
+
+/// How long after the last touch an agent may not rest, simulated time: longer than the period of any touching agent above 10 Hz, so that
+/// an agent does not go to rest between two touches.
+const TOUCH_HOLD: SimSpan = SimSpan::from_nanos(100_000_000);
+
+/// How long after an agent was far behind the others check for it, simulated time; and the least interval between two records of it.
+const FAR_BEHIND_HOLD: SimSpan = SimSpan::from_nanos(2_000_000_000);
+const FAR_BEHIND_NOTED: SimSpan = SimSpan::from_nanos(100_000_000);
+
+/// The flags of one agent.
+#[derive(Debug)]
+struct Signal {
+    resting: AtomicBool,
+    woken: AtomicBool,
+    /// Number of the agent that makes its turns; [`NOBODY`] if it makes them itself.
+    leader: AtomicU32,
+    /// It makes no more turns and accepts no agents to lead.
+    closed: AtomicBool,
+    /// Simulated nanoseconds of the last touch, plus one; zero for never.
+    touched: AtomicU64,
+    thread: OnceLock<Thread>,
+}
+
+/// Not the number of any agent.
+const NOBODY: u32 = u32::MAX;
+
+impl Default for Signal {
+    fn default() -> Self {
+        Self {
+            resting: AtomicBool::new(false),
+            woken: AtomicBool::new(false),
+            leader: AtomicU32::new(NOBODY),
+            closed: AtomicBool::new(false),
+            touched: AtomicU64::new(0),
+            thread: OnceLock::new(),
+        }
+    }
+}
+
+/// The flags of all agents of a run.
+#[derive(Debug)]
+pub(super) struct Switchboard {
+    signals: Vec<Signal>,
+    /// An agent was summoned: the lockstep loop serves it.
+    rung: AtomicBool,
+    stop: AtomicBool,
+    /// Simulated nanoseconds at which an agent near peers was last far behind, plus one; zero for never.
+    far_behind: AtomicU64,
+    /// Wake-up of the workers, where agents have no threads of their own.
+    bell: OnceLock<Bell>,
+    /// Agents with new states, for the reader of the run.
+    pub news: News,
+}
+
+impl Switchboard {
+    pub fn new(agents: usize) -> Self {
+        let signals = std::iter::repeat_with(Signal::default).take(agents).collect();
+        Self {
+            signals,
+            rung: AtomicBool::new(false),
+            stop: AtomicBool::new(false),
+            far_behind: AtomicU64::new(0),
+            bell: OnceLock::new(),
+            news: News::new(agents),
+        }
+    }
+
+    /// From now on summons go to this many workers of a pool.
+    pub fn hire(&self, workers: usize) {
+        self.bell.get_or_init(|| Bell::new(self.signals.len(), workers));
+    }
+
+    /// Wake-up of the workers; `None` where every agent has its own thread.
+    pub fn bell(&self) -> Option<&Bell> {
+        self.bell.get()
+    }
+
+    fn signal(&self, id: AgentId) -> Option<&Signal> {
+        self.signals.get(id.0 as usize)
+    }
+
+    /// Registers the thread to unpark for `id`.
+    pub fn lives_on(&self, id: AgentId, thread: Thread) {
+        if let Some(signal) = self.signal(id) {
+            signal.thread.get_or_init(|| thread);
+        }
+    }
+
+    /// Assigns the turns of `id` to `leader`, which has a lower number; `None`: it makes them itself again.
+    pub fn follow(&self, id: AgentId, leader: Option<AgentId>) {
+        if let Some(signal) = self.signal(id) {
+            signal.leader.store(leader.map_or(NOBODY, |l| l.0), Release);
+        }
+    }
+
+    /// The agent that makes the turns of `id`, at the end of the chain of leaders; `id` itself if it is not led.
+    pub fn leader(&self, id: AgentId) -> AgentId {
+        let mut at = id;
+        while let Some(next) = self.next_up(at) {
+            at = next;
+        }
+        at
+    }
+
+    fn next_up(&self, id: AgentId) -> Option<AgentId> {
+        let leader = self.signal(id)?.leader.load(Acquire);
+        (leader < id.0).then_some(AgentId(leader))
+    }
+
+    /// Declares that `id` makes no more turns.
+    pub fn close(&self, id: AgentId) {
+        if let Some(signal) = self.signal(id) {
+            signal.closed.store(true, Release);
+        }
+    }
+
+    /// Whether `id` makes no more turns.
+    pub fn is_closed(&self, id: AgentId) -> bool {
+        self.signal(id).is_some_and(|signal| signal.closed.load(Acquire))
+    }
+
+    /// `id` must not rest before its next turn; if it is at rest, it wakes.
+    pub fn wake(&self, id: AgentId) {
+        let mut at = Some(id);
+        while let Some(who) = at {
+            let Some(signal) = self.signal(who) else { return };
+            signal.woken.store(true, Release);
+            fence(SeqCst);
+            if signal.resting.load(Relaxed) {
+                self.summon(who);
+            }
+            at = self.next_up(who);
+        }
+    }
+
+    /// Makes the thread that serves `id` check its flags.
+    pub fn summon(&self, id: AgentId) {
+        let Some(signal) = self.signal(id) else { return };
+        if let Some(bell) = self.bell.get() {
+            bell.ring(id);
+            return;
+        }
+        self.rung.store(true, Release);
+        signal.thread.get().inspect(|t| t.unpark());
+    }
+
+    /// Reports that another agent acts on `id` at simulated time `now`.
+    pub fn touch(&self, id: AgentId, now: SimTime) {
+        let Some(signal) = self.signal(id) else { return };
+        signal.touched.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
+        fence(SeqCst);
+        if self.rests(id) {
+            self.wake(id);
+        }
+    }
+
+    /// Whether the agent that makes the turns of `id` is at rest.
+    pub fn rests(&self, id: AgentId) -> bool {
+        self.signal(self.leader(id)).is_some_and(|signal| signal.resting.load(Acquire))
+    }
+
+    /// Whether `id` was woken, or touched so recently that it may not rest at `now`.
+    pub fn is_stirred(&self, id: AgentId, now: SimTime) -> bool {
+        self.signal(id).is_some_and(|signal| signal.woken.load(Acquire) || signal.is_held(now))
+    }
+
+    /// Puts the agent to rest, with all agents it leads, unless one of them was woken or recently touched; whether it did.
+    pub fn try_rest(&self, id: AgentId, led: impl Iterator<Item = AgentId>, now: SimTime) -> bool {
+        let Some(signal) = self.signal(id) else { return false };
+        signal.resting.store(true, Release);
+        fence(SeqCst);
+        let mut disturbed = false;
+        for signal in std::iter::once(id).chain(led).filter_map(|id| self.signal(id)) {
+            disturbed |= signal.is_held(now) | signal.take_wake();
+        }
+        if disturbed {
+            signal.resting.store(false, Release);
+        }
+        !disturbed
+    }
+
+    /// A turn of `id` begins: clears its wake-up, which this turn handles. To be called before the turn reads its inputs.
+    pub fn heed(&self, id: AgentId) {
+        if let Some(signal) = self.signal(id) {
+            signal.take_wake();
+        }
+    }
+
+    /// Whether `id` was woken and has not handled it yet.
+    pub fn is_woken(&self, id: AgentId) -> bool {
+        self.signal(id).is_some_and(|signal| signal.woken.load(Acquire))
+    }
+
+    /// Ends the rest of `id` if it was woken; whether it was.
+    pub fn take_wake(&self, id: AgentId) -> bool {
+        let Some(signal) = self.signal(id) else { return false };
+        let woken = signal.take_wake();
+        if woken {
+            signal.resting.store(false, Release);
+        }
+        woken
+    }
+
+    /// Whether any agent was summoned since the last call.
+    pub fn take_rung(&self) -> bool {
+        self.rung.load(Relaxed) && self.rung.swap(false, AcqRel)
+    }
+
+    /// Unparks every thread, so that it reads the timeline again.
+    pub fn unpark_all(&self) {
+        if let Some(bell) = self.bell.get() {
+            bell.rouse_all();
+        }
+        self.signals.iter().filter_map(|s| s.thread.get()).for_each(Thread::unpark);
+    }
+
+    /// Records at `now` that an agent near peers is far behind, or is still postponed relative to the scene's time.
+    pub fn note_far_behind(&self, now: SimTime) {
+        let noted = self.far_behind.load(Relaxed);
+        // all agents read this word: it is written seldom
+        if noted == 0 || now > SimTime::from_nanos(noted - 1) + FAR_BEHIND_NOTED {
+            self.far_behind.fetch_max(now.as_nanos().saturating_add(1), AcqRel);
+        }
+    }
+
+    /// Whether any agent was far behind recently.
+    pub fn is_anybody_far_behind(&self, now: SimTime) -> bool {
+        let noted = self.far_behind.load(Acquire);
+        noted > 0 && SimTime::from_nanos(noted - 1) + FAR_BEHIND_HOLD > now
+    }
+
+    /// Asks every thread to end.
+    pub fn stop(&self) {
+        self.stop.store(true, Release);
+        self.unpark_all();
+    }
+
+    /// Whether threads have been asked to end.
+    pub fn stopping(&self) -> bool {
+        self.stop.load(Acquire)
+    }
+}
+
+impl Signal {
+    /// Whether it was woken since the last call; writes before the wake are then visible.
+    fn take_wake(&self) -> bool {
+        // a flag that is down is not written: its cache line stays shared by all readers;
+        // a flag that is up is exchanged, not just cleared: else a wake right before would be overwritten unseen
+        self.woken.load(Relaxed) && self.woken.swap(false, AcqRel)
+    }
+
+    /// Whether the last touch still keeps it awake.
+    fn is_held(&self, now: SimTime) -> bool {
+        let touched = self.touched.load(Acquire);
+        touched > 0 && SimTime::from_nanos(touched - 1) + TOUCH_HOLD > now
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const ME: AgentId = AgentId(0);
+
+    fn try_rest(board: &Switchboard, now: SimTime) -> bool {
+        board.try_rest(ME, std::iter::empty(), now)
+    }
+
+    #[test]
+    fn a_wake_before_the_rest_is_not_lost() {
+        let board = Switchboard::new(1);
+        board.wake(ME);
+        assert!(!try_rest(&board, SimTime::ZERO), "woken before it lay down");
+        assert!(try_rest(&board, SimTime::ZERO), "that wake is used up");
+        board.wake(ME);
+        assert!(board.take_rung());
+        assert!(board.take_wake(ME));
+        assert!(!board.take_wake(ME));
+    }
+
+    #[test]
+    fn a_touched_agent_stays_awake_for_the_hold() {
+        let board = Switchboard::new(1);
+        board.touch(ME, SimTime::ZERO);
+        assert!(!try_rest(&board, SimTime::from_nanos(99_999_999)));
+        assert!(try_rest(&board, SimTime::from_nanos(100_000_000)));
+        board.touch(ME, SimTime::from_nanos(200_000_000));
+        assert!(board.take_wake(ME));
+    }
+
+    #[test]
+    fn who_is_led_wakes_its_leader_and_the_leaders_leader() {
+        let board = Switchboard::new(3);
+        board.follow(AgentId(2), Some(AgentId(1)));
+        board.follow(AgentId(1), Some(ME));
+        assert_eq!(board.leader(AgentId(2)), ME);
+        let led = || [AgentId(1), AgentId(2)].into_iter();
+        assert!(board.try_rest(ME, led(), SimTime::ZERO));
+        board.wake(AgentId(2));
+        assert!(board.take_rung() && board.take_wake(ME));
+        assert!(!board.try_rest(ME, led(), SimTime::ZERO), "the wake of one it leads is its own");
+        assert!(board.try_rest(ME, led(), SimTime::ZERO));
+        board.touch(AgentId(1), SimTime::from_nanos(500_000_000));
+        assert!(board.take_wake(ME));
+        board.follow(AgentId(1), None);
+        assert_eq!(board.leader(AgentId(2)), AgentId(1));
+    }
+
+    #[test]
+    fn who_was_far_behind_is_forgotten_after_a_while() {
+        let (board, at) = (Switchboard::new(1), |ms: u64| SimTime::from_nanos(1_000_000 * ms));
+        assert!(!board.is_anybody_far_behind(SimTime::ZERO));
+        board.note_far_behind(SimTime::ZERO);
+        assert!(board.is_anybody_far_behind(at(1999)) && !board.is_anybody_far_behind(at(2000)));
+        board.note_far_behind(at(1500));
+        board.note_far_behind(at(1550));
+        assert!(board.is_anybody_far_behind(at(3499)) && !board.is_anybody_far_behind(at(3500)));
+    }
+
+    #[test]
+    fn strangers_are_nobody() {
+        let board = Switchboard::new(1);
+        board.wake(AgentId(7));
+        board.touch(AgentId(7), SimTime::ZERO);
+        assert!(!board.take_rung());
+    }
+}

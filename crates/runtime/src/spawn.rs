@@ -1,0 +1,352 @@
+//! Assembly of a run: checks the requested agents, and introduces them to each other.
+//!
+//! In: [`AgentSpawn`]s; an agent's number is its place in their list. Out: actors and handles, or a [`RunError`].
+//! Never here: threads, time passing.
+
+use super::agent_clock::Pace;
+use super::agent_runner::{Actor, Rhythm};
+use super::broad_phase::Crowd;
+use super::faults::Faults;
+use super::governor::Governor;
+use super::handle::{AgentHandle, Shared};
+use super::histogram::Times;
+use super::island::{Company as Led, Seating, assign};
+use super::mailbox::Mailbox;
+use super::metrics::{Diary, Gauges};
+use super::observation::{Peer, Peers};
+use super::probe::{Trace, Watch};
+use super::sleep::Switchboard;
+use super::slot::SlotWriter;
+use metachron_contact::Agent;
+use metachron_contact::{Law, Link};
+use metachron_core::{AgentId, DT_MAX_S, ResolutionRange, SimSpan, SimTime, Snapshot};
+use metachron_geometry::{Form, FormKind};
+use std::sync::{Arc, Mutex};
+
+/// Description of an agent to be started.
+pub struct AgentSpawn {
+    /// Its name in the scene.
+    pub name: String,
+    /// The agent.
+    pub agent: Box<dyn Agent>,
+    /// Requested steps per simulated second, `0 < rate <=` [`RATE_MAX_HZ`].
+    pub rate_hz: f64,
+    /// The length of its first step; clamped to `dt_range`.
+    pub dt: SimSpan,
+    /// The shortest and the longest allowed step; `0 < shortest <= longest <=` [`DT_MAX_S`].
+    pub dt_range: (SimSpan, SimSpan),
+    /// The allowed resolutions; `None` for an agent that is never retuned.
+    pub range: Option<ResolutionRange>,
+    /// Agents whose newest states it always sees. Its own number and repeats are ignored.
+    pub links: Vec<AgentId>,
+    /// Laws between it and its peers, where not [`Law::Ledger`]. Given by one side; if both give one, that of the lower number counts.
+    pub laws: Vec<(AgentId, Law)>,
+    /// Permanent links to peers. Given by one side; the peer is informed, and both always see each other.
+    pub attached: Vec<Link>,
+    /// An agent with which it shares an island from the first step on: the lower number leads.
+    pub together: Option<AgentId>,
+    /// Faults injected on purpose.
+    pub faults: Faults,
+    /// Points of it that are recorded ([`AgentHandle::samples`]).
+    pub watches: Vec<Watch>,
+    /// Governor of its rate; `None` for an agent with fixed settings.
+    pub governor: Option<Box<dyn Governor>>,
+}
+
+impl AgentSpawn {
+    /// An agent that steps `rate_hz` times a second with a fixed step, without links and without a governor.
+    #[must_use]
+    pub fn alone(name: impl Into<String>, agent: Box<dyn Agent>, rate_hz: f64) -> Self {
+        // an invalid rate is reported when the run begins
+        let dt = SimSpan::from_secs_f64(1.0 / rate_hz).unwrap_or(SimSpan::ZERO);
+        Self {
+            name: name.into(),
+            agent,
+            rate_hz,
+            dt,
+            dt_range: (dt, dt),
+            range: None,
+            links: Vec::new(),
+            laws: Vec::new(),
+            attached: Vec::new(),
+            together: None,
+            faults: Faults::default(),
+            watches: Vec::new(),
+            governor: None,
+        }
+    }
+}
+
+/// The highest allowed rate: a step of a microsecond is less than a thread needs to wake.
+pub const RATE_MAX_HZ: f64 = 1e6;
+
+/// Reason why a run did not start. No agent has made a step.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RunError {
+    /// More agents than this executor takes.
+    #[error(
+        "{agents} agents are too many for a thread each, at most {most}: run them with executor = \"pool\" or \"auto\""
+    )]
+    TooMany {
+        /// Number of requested agents.
+        agents: usize,
+        /// The limit.
+        most: usize,
+    },
+    /// An invalid rate.
+    #[error("agent \"{name}\": the rate of {rate_hz} Hz must be above zero and at most 1e6")]
+    BadRate {
+        /// The agent's name.
+        name: String,
+        /// The requested rate, Hz.
+        rate_hz: f64,
+    },
+    /// An invalid range of step lengths.
+    #[error(
+        "agent \"{name}\": the step range {shortest_s} s to {longest_s} s must rise, lie above zero and end at 1 s at most"
+    )]
+    BadStep {
+        /// The agent's name.
+        name: String,
+        /// The shortest requested step, seconds.
+        shortest_s: f64,
+        /// The longest requested step, seconds.
+        longest_s: f64,
+    },
+    /// A link to an agent that does not exist.
+    #[error("agent \"{name}\" is linked to agent {link}, which does not exist")]
+    BadLink {
+        /// The agent's name.
+        name: String,
+        /// The number of the missing agent.
+        link: u32,
+    },
+    /// Invalid fault rates.
+    #[error("agent \"{name}\": jitter {jitter} and loss {loss} must lie from 0 to below 1")]
+    BadFaults {
+        /// The agent's name.
+        name: String,
+        /// The requested jitter.
+        jitter: f64,
+        /// The requested loss.
+        loss: f64,
+    },
+    /// The system gave no thread.
+    #[error("the system gives no thread for {name}: {source}")]
+    NoThread {
+        /// The purpose of the thread.
+        name: String,
+        /// The system's error.
+        source: std::io::Error,
+    },
+}
+
+/// The agents of a run, before their first turn.
+pub(super) struct Company {
+    /// Agents with turns of their own; an agent that is led from the start belongs to its leader.
+    pub actors: Vec<Option<Box<Actor>>>,
+    pub handles: Vec<AgentHandle>,
+    pub board: Arc<Switchboard>,
+}
+
+/// Assembles all agents; each has published its initial state, at simulated time zero.
+pub(super) fn assemble(mut spawns: Vec<AgentSpawn>) -> Result<Company, RunError> {
+    let count = spawns.len();
+    spawns.iter().try_for_each(|spawn| check(spawn, count))?;
+    attach_both_sides(&mut spawns);
+    let board = Arc::new(Switchboard::new(count));
+    let (peers, writers) = peers(&mut spawns, &board);
+    let peers = Arc::new(peers);
+    let together: Vec<_> = spawns.iter().map(|spawn| spawn.together).collect();
+    let ids = (0..).map(AgentId);
+    let actors = ids.zip(spawns).zip(writers).map(|((id, spawn), writer)| actor(id, spawn, &peers, writer));
+    let mut actors: Vec<_> = actors.collect();
+    actors.iter_mut().for_each(Actor::introduce);
+    actors.iter_mut().for_each(Actor::look);
+    let handles = peers.all.iter().map(|peer| AgentHandle { shared: Arc::clone(&peer.shared) }).collect();
+    Ok(Company { actors: assign(actors, &together), handles, board })
+}
+
+fn check(spawn: &AgentSpawn, agents: usize) -> Result<(), RunError> {
+    let name = || spawn.name.clone();
+    if !(spawn.rate_hz > 0.0 && spawn.rate_hz <= RATE_MAX_HZ) {
+        return Err(RunError::BadRate { name: name(), rate_hz: spawn.rate_hz });
+    }
+    let (shortest, longest) = spawn.dt_range;
+    let (shortest_s, longest_s) = (shortest.as_secs_f64(), longest.as_secs_f64());
+    if shortest == SimSpan::ZERO || shortest > longest || longest_s > DT_MAX_S {
+        return Err(RunError::BadStep { name: name(), shortest_s, longest_s });
+    }
+    let Faults { jitter, loss, .. } = spawn.faults;
+    if !spawn.faults.is_sound() {
+        return Err(RunError::BadFaults { name: name(), jitter, loss });
+    }
+    let laws = spawn.laws.iter().map(|(id, _)| *id);
+    let mut others =
+        spawn.links.iter().copied().chain(laws).chain(spawn.attached.iter().map(|l| l.other)).chain(spawn.together);
+    match others.find(|other| other.0 as usize >= agents) {
+        Some(link) => Err(RunError::BadLink { name: name(), link: link.0 }),
+        None => Ok(()),
+    }
+}
+
+/// Gives every permanent link to both sides, and lets them see each other.
+fn attach_both_sides(spawns: &mut [AgentSpawn]) {
+    for at in 0..spawns.len() {
+        let me = AgentId(at as u32);
+        for link in spawns[at].attached.clone() {
+            let other = &mut spawns[link.other.0 as usize];
+            let back = Link { other: me, here: link.there, there: link.here, ..link };
+            if !other.attached.contains(&back) {
+                other.attached.push(back);
+            }
+            other.links.push(me);
+            spawns[at].links.push(link.other);
+        }
+    }
+}
+
+/// The data fixed at the start, and the writer of each agent.
+fn peers(spawns: &mut [AgentSpawn], board: &Arc<Switchboard>) -> (Peers, Vec<SlotWriter<Snapshot>>) {
+    let forms: Vec<_> = spawns.iter().map(|spawn| spawn.agent.form()).collect();
+    // only rigid bodies can lead and be led
+    let rigid = |form: &Option<Arc<Form>>| form.as_ref().is_some_and(|form| matches!(form.kind, FormKind::Solid(_)));
+    let led = forms.iter().filter(|form| rigid(form)).count() > 1;
+    let mut writers = Vec::with_capacity(spawns.len());
+    let mut all = Vec::with_capacity(spawns.len());
+    for ((spawn, id), form) in spawns.iter_mut().zip((0..).map(AgentId)).zip(forms) {
+        let writer = SlotWriter::new(Snapshot::default());
+        let seated = led && rigid(&form);
+        let shared = Arc::new(shared(id, spawn, (board, &writer), seated));
+        writers.push(writer);
+        all.push(Peer { shared, form, laws: Vec::new() });
+    }
+    settle_laws(spawns, &mut all);
+    let crowd = meet_at_all(&all).then(|| Crowd::new(all.len()));
+    let linked = linked(spawns);
+    (Peers { all, crowd, linked }, writers)
+}
+
+/// Pairs joined by links with the ledger law, each in both orders, sorted.
+fn linked(spawns: &[AgentSpawn]) -> Vec<[AgentId; 2]> {
+    let mut linked = Vec::new();
+    for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
+        let links = spawn.attached.iter().filter(|link| link.law == Law::Ledger);
+        linked.extend(links.map(|link| [me, link.other]));
+    }
+    linked.sort_unstable();
+    linked
+}
+
+/// Whether any two agents could touch.
+fn meet_at_all(all: &[Peer]) -> bool {
+    let formed: Vec<&Peer> = all.iter().filter(|peer| peer.form.is_some()).collect();
+    formed.iter().enumerate().any(|(at, peer)| formed[..at].iter().any(|other| peer.touches(other)))
+}
+
+/// Stores the law of every pair on both sides.
+fn settle_laws(spawns: &[AgentSpawn], all: &mut [Peer]) {
+    for (spawn, me) in spawns.iter().zip((0..).map(AgentId)) {
+        for &(other, law) in spawn.laws.iter().filter(|(other, _)| *other != me) {
+            for (a, b) in [(me, other), (other, me)] {
+                let laws = &mut all[a.0 as usize].laws;
+                if let Err(at) = laws.binary_search_by_key(&b, |(id, _)| *id) {
+                    laws.insert(at, (b, law));
+                }
+            }
+        }
+    }
+}
+
+fn shared(
+    id: AgentId,
+    spawn: &mut AgentSpawn,
+    (board, writer): (&Arc<Switchboard>, &SlotWriter<Snapshot>),
+    seated: bool,
+) -> Shared {
+    Shared {
+        id,
+        name: std::mem::take(&mut spawn.name).into(),
+        model: spawn.agent.model(),
+        wanted_hz: spawn.rate_hz,
+        gauges: Gauges::default(),
+        mail: Mailbox::default(),
+        slot: writer.slot(),
+        board: Arc::clone(board),
+        seating: seated.then(Seating::default),
+        ages: Mutex::new(Times::default()),
+        traces: spawn.watches.drain(..).map(|watch| Mutex::new(Trace::new(watch))).collect(),
+    }
+}
+
+fn actor(id: AgentId, spawn: AgentSpawn, peers: &Arc<Peers>, writer: SlotWriter<Snapshot>) -> Actor {
+    let me = &peers.all[id.0 as usize];
+    let mut links: Vec<AgentId> = Vec::with_capacity(spawn.links.len());
+    for link in spawn.links {
+        if link != id && !links.contains(&link) {
+            links.push(link);
+        }
+    }
+    Actor {
+        shared: Arc::clone(&me.shared),
+        peers: Arc::clone(peers),
+        agent: spawn.agent,
+        pace: Pace::new(SimTime::ZERO, spawn.dt.clamp(spawn.dt_range.0, spawn.dt_range.1)),
+        dt_range: spawn.dt_range,
+        range: spawn.range,
+        governor: spawn.governor,
+        faults: spawn.faults,
+        writer,
+        eyes: peers.eyes(id, &links),
+        links: spawn.attached,
+        hands: Vec::with_capacity(1),
+        company: Led::default(),
+        diary: Diary::new(),
+        rhythm: Rhythm::default(),
+        open: None,
+        beside: None,
+        withheld: false,
+        announced: Vec::new(),
+        unsettled_ns: 0,
+        served: SimTime::ZERO,
+        owed: SimSpan::ZERO,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use glam::DVec3;
+    use metachron_geometry::Solid;
+    use metachron_models::rigid::RigidBody;
+    use metachron_models::rigid::RigidSpec;
+    use metachron_models::rod::Tube;
+    use metachron_models::rod::{Material, Section, TubeSpec};
+
+    fn ball() -> AgentSpawn {
+        let spec = RigidSpec::free(Solid::Ball { radius_m: 0.1 }, DVec3::ZERO, 1.0);
+        AgentSpawn::alone("ball", Box::new(RigidBody::new(spec).unwrap()), 100.0)
+    }
+
+    fn tube() -> AgentSpawn {
+        let material = Material { young_pa: 1e6, poisson: 0.45, density_kg_m3: 1050.0, shear_factor: 0.5 };
+        let spec = TubeSpec::free(vec![DVec3::ZERO, DVec3::X], Section::hollow(0.015, 0.002, material), 8);
+        AgentSpawn::alone("tube", Box::new(Tube::new(spec).unwrap()), 100.0)
+    }
+
+    /// Whether a crowd is set up, and how many agents can lead or be led.
+    fn set_up(mut spawns: Vec<AgentSpawn>) -> (bool, usize) {
+        let board = Arc::new(Switchboard::new(spawns.len()));
+        let (peers, _) = peers(&mut spawns, &board);
+        (peers.crowd.is_some(), peers.all.iter().filter(|peer| peer.shared.seating.is_some()).count())
+    }
+
+    #[test]
+    fn what_a_scene_does_not_need_is_not_set_up() {
+        assert_eq!(set_up(vec![ball()]), (false, 0));
+        assert_eq!(set_up(vec![tube()]), (false, 0));
+        assert_eq!(set_up(vec![tube(), tube(), ball()]), (true, 0));
+        assert_eq!(set_up(vec![tube(), ball(), ball()]), (true, 2));
+    }
+}

@@ -1,0 +1,269 @@
+//! Default executor in real time: a thread per agent.
+//!
+//! In: agents and a [`Clock`]. Out: [`Run`]. A thread sleeps until its agent is due and is woken by a command, a touch, a changed timeline
+//! and the end; a thread whose agent rests or is led by another sleeps without a timer, a thread whose agent is parked ends.
+//! Never here: virtual time, declared costs.
+
+use super::Run;
+use super::agent_clock::{Drive, SharedTimeline, Timeline};
+use super::agent_runner::{Actor, Next};
+use super::clock::{Clock, wait_until};
+use super::cpu::CpuBatch;
+use super::handle::{AgentHandle, Shared};
+use super::island::{Seating, empty_rooms, move_in};
+use super::metrics::AgentStats;
+use super::priority::Priority;
+use super::sleep::Switchboard;
+use super::spawn::{AgentSpawn, Company, RunError, assemble};
+use metachron_core::AgentId;
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, Sender, channel};
+use std::thread::{self, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// The most agents with a thread each; beyond, waking them costs more than their steps.
+pub const THREADS_MAX: usize = 1000;
+
+/// Up to this many agents have a thread each if the scene names no executor: 10 agents of 200 Hz cost 15 µs a turn on threads and 20 in a
+/// pool, 100 cost 10 and 6 (`docs/throughput.md`).
+pub const AUTO_THREADS_MAX: usize = 64;
+
+/// How long the end of a run waits after the last agent that ended. A step that takes longer counts as hung; its thread is left behind.
+const PATIENCE: Duration = Duration::from_millis(400);
+
+/// Agents on threads of their own.
+pub struct Threads {
+    clock: Arc<dyn Clock>,
+    timeline: Arc<SharedTimeline>,
+    board: Arc<Switchboard>,
+    handles: Vec<AgentHandle>,
+    threads: Vec<Option<JoinHandle<()>>>,
+    ended: Receiver<AgentId>,
+    priority: Priority,
+}
+
+impl Threads {
+    /// Gives every agent its thread; simulated time is paused until [`Drive::Run`]. If the system refuses `priority` ([`Priority::ask`])
+    /// the threads have the ordinary one.
+    ///
+    /// # Errors
+    /// [`RunError`] for more than [`THREADS_MAX`] agents, for agents that cannot run as requested, and if the system gives no thread.
+    pub fn start(spawns: Vec<AgentSpawn>, clock: Arc<dyn Clock>, priority: Priority) -> Result<Self, RunError> {
+        if spawns.len() > THREADS_MAX {
+            return Err(RunError::TooMany { agents: spawns.len(), most: THREADS_MAX });
+        }
+        let Company { actors, handles, board } = assemble(spawns)?;
+        let timeline = Arc::new(SharedTimeline::new());
+        timeline.drive(Duration::ZERO, Drive::Pause);
+        let (sender, ended) = channel();
+        let mut run = Self { clock, timeline, board, handles, threads: Vec::new(), ended, priority };
+        for (actor, id) in actors.into_iter().zip((0..).map(AgentId)) {
+            // on an error the run so far is dropped, which ends its threads
+            let shared = Arc::clone(&run.handles[id.0 as usize].shared);
+            let thread = run.spawn(actor, shared, sender.clone())?;
+            run.board.lives_on(id, thread.thread().clone());
+            run.threads.push(Some(thread));
+        }
+        Ok(run)
+    }
+
+    fn spawn(
+        &self,
+        actor: Option<Box<Actor>>,
+        shared: Arc<Shared>,
+        ended: Sender<AgentId>,
+    ) -> Result<JoinHandle<()>, RunError> {
+        let name = format!("agent:{}", shared.name.replace('\0', ""));
+        let stage =
+            Stage { clock: Arc::clone(&self.clock), timeline: Arc::clone(&self.timeline), batch: CpuBatch::default() };
+        let farewell = Farewell { id: shared.id, ended };
+        let builder = thread::Builder::new().name(name.clone());
+        let priority = self.priority;
+        let body = move || {
+            let _farewell = farewell;
+            // a refusal was already reported to the caller of `Priority::ask`
+            drop(priority.take());
+            stage.live(actor, &shared);
+        };
+        builder.spawn(body).map_err(|source| RunError::NoThread { name, source })
+    }
+
+    /// Ends all threads and waits for them until a timeout.
+    fn end(&mut self) {
+        self.board.stop();
+        let mut missing = self.threads.iter().flatten().count();
+        while missing > 0 {
+            let Ok(id) = self.ended.recv_timeout(PATIENCE) else { break };
+            missing -= 1;
+            if let Some(thread) = self.threads.get_mut(id.0 as usize).and_then(Option::take) {
+                // a panic outside a turn is a bug of metachron: it has been printed, and the other threads must still be joined
+                drop(thread.join());
+            }
+        }
+        for (handle, _) in self.handles.iter().zip(&self.threads).filter(|(_, thread)| thread.is_some()) {
+            handle.shared.gauges.park(format!("a step has not ended within {} s", PATIENCE.as_secs_f64()));
+        }
+        self.threads.clear();
+        empty_rooms(&self.handles, &self.timeline.read(), self.clock.now());
+    }
+}
+
+impl Drop for Threads {
+    fn drop(&mut self) {
+        self.end();
+    }
+}
+
+impl Run for Threads {
+    fn now(&self) -> Duration {
+        self.clock.now()
+    }
+
+    fn wait_until(&mut self, until: Duration) {
+        wait_until(&*self.clock, until);
+    }
+
+    fn spend(&mut self, _work: Duration) {}
+
+    fn timeline(&self) -> Timeline {
+        self.timeline.read()
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        self.timeline.drive(self.clock.now(), drive);
+        self.board.unpark_all();
+    }
+
+    fn agents(&self) -> &[AgentHandle] {
+        &self.handles
+    }
+
+    fn shutdown(&mut self) -> Vec<AgentStats> {
+        self.end();
+        self.handles.iter().map(AgentHandle::stats).collect()
+    }
+}
+
+/// Reports that a thread has ended, for whatever reason.
+struct Farewell {
+    id: AgentId,
+    ended: Sender<AgentId>,
+}
+
+impl Drop for Farewell {
+    fn drop(&mut self) {
+        // the send fails only after the final timeout, when the report is no longer needed
+        let _ = self.ended.send(self.id);
+    }
+}
+
+/// Working state of an agent's thread.
+struct Stage {
+    clock: Arc<dyn Clock>,
+    timeline: Arc<SharedTimeline>,
+    batch: CpuBatch,
+}
+
+impl Stage {
+    /// The thread's main loop: turn after turn until the agent is asked to end, or is parked. While it is led, its leader has the actor.
+    fn live(mut self, mut here: Option<Box<Actor>>, shared: &Shared) {
+        while !shared.board.stopping() {
+            here = match here {
+                Some(actor) => match self.live_alone(actor) {
+                    Some(actor) if actor.is_parked() => return,
+                    moved => moved,
+                },
+                None => self.wait_for(shared.seating.as_ref()),
+            };
+        }
+        if let Some(mut actor) = here {
+            self.settle(&mut actor);
+            actor.close_account(&self.timeline.read(), self.clock.now());
+        }
+    }
+
+    /// Makes the turns of `actor` until it hands them over (`None`), is asked to end, or is parked.
+    fn live_alone(&mut self, mut actor: Box<Actor>) -> Option<Box<Actor>> {
+        let board = Arc::clone(&actor.shared.board);
+        let mut next = if actor.is_parked() { Next::Parked } else { Next::Due };
+        while !board.stopping() {
+            next = match next {
+                Next::Due => self.wait_or_turn(&mut actor),
+                Next::Rest => self.doze(&mut actor),
+                Next::Join(leader) => {
+                    self.settle(&mut actor);
+                    actor = move_in(actor, leader).err()?;
+                    Next::Due
+                }
+                Next::Parked => {
+                    self.settle(&mut actor);
+                    break;
+                }
+            };
+        }
+        Some(actor)
+    }
+
+    /// Waits until the agent returns from its leader.
+    fn wait_for(&self, seating: Option<&Seating>) -> Option<Box<Actor>> {
+        let home = seating.and_then(Seating::come_home);
+        if home.is_none() {
+            thread::park();
+        }
+        home
+    }
+
+    /// Makes a turn if one is due, else sleeps until it is. A wake in between ends the sleep early, which is harmless.
+    fn wait_or_turn(&mut self, actor: &mut Actor) -> Next {
+        let timeline = self.timeline.read();
+        let now = self.clock.now();
+        match actor.pace.due(&timeline) {
+            Some(due) if due <= now => self.turn(actor, &timeline, now),
+            Some(due) => {
+                thread::park_timeout(due - now);
+                Next::Due
+            }
+            None => {
+                self.settle(actor);
+                thread::park();
+                Next::Due
+            }
+        }
+    }
+
+    fn doze(&mut self, actor: &mut Actor) -> Next {
+        if actor.wakes(&self.timeline.read(), self.clock.now()) {
+            return Next::Due;
+        }
+        self.settle(actor);
+        thread::park();
+        Next::Rest
+    }
+
+    fn turn(&mut self, actor: &mut Actor, timeline: &Timeline, began: Duration) -> Next {
+        self.batch.open();
+        let started = Instant::now();
+        let next = match actor.begin(timeline, began) {
+            None => Next::Parked,
+            Some(_) => {
+                let now = self.clock.now();
+                actor.finish(timeline, now, now.saturating_sub(began).as_secs_f64())
+            }
+        };
+        let wall = started.elapsed();
+        actor.count(wall);
+        if self.batch.add(wall) {
+            self.settle(actor);
+        }
+        next
+    }
+
+    fn settle(&mut self, actor: &mut Actor) {
+        if !self.batch.is_empty() {
+            actor.settle(self.batch.close());
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,170 @@
+//! Wake-up of a pool's workers: which agents were summoned, and which sleeping worker can serve them.
+//!
+//! In: summons from any thread. Out: the summoned agents, once, to the first worker that looks.
+//! No thread blocks another, and no summons is lost: the caller marks the agent first and looks for sleepers after; a worker declares
+//! itself asleep first and looks at the marks after. With a fence (SeqCst) between, at least one of the two sees the other.
+//! Never here: what a worker does with the summoned agents, how long it sleeps.
+
+use super::sync::Mutex;
+use super::sync::atomic::{
+    AtomicBool, AtomicU64,
+    Ordering::{AcqRel, Acquire, Relaxed, Release, SeqCst},
+    fence,
+};
+use super::sync::thread;
+use super::sync::thread::Thread;
+use metachron_core::AgentId;
+use std::sync::PoisonError;
+use std::time::Duration;
+
+/// The marks of all agents and the sleep states of all workers.
+#[derive(Debug)]
+pub(super) struct Bell {
+    /// One bit per agent.
+    marks: Vec<AtomicU64>,
+    rung: AtomicBool,
+    beds: Vec<Bed>,
+}
+
+/// Sleep state of one worker.
+#[derive(Debug, Default)]
+struct Bed {
+    asleep: AtomicBool,
+    /// Changes only when a worker is replaced.
+    thread: Mutex<Option<Thread>>,
+}
+
+impl Bell {
+    pub fn new(agents: usize, workers: usize) -> Self {
+        Self {
+            marks: std::iter::repeat_with(AtomicU64::default).take(agents.div_ceil(64)).collect(),
+            rung: AtomicBool::new(false),
+            beds: std::iter::repeat_with(Bed::default).take(workers).collect(),
+        }
+    }
+
+    /// Worker `at` runs on this thread.
+    pub fn enter(&self, at: usize) {
+        if let Some(bed) = self.beds.get(at) {
+            bed.asleep.store(false, Relaxed);
+            *bed.thread.lock().unwrap_or_else(PoisonError::into_inner) = Some(thread::current());
+        }
+    }
+
+    /// Summons `id`: a worker that is awake sees it before its next turn, else one is woken.
+    pub fn ring(&self, id: AgentId) {
+        let Some(word) = self.marks.get(id.0 as usize / 64) else { return };
+        word.fetch_or(1 << (id.0 % 64), Release);
+        self.rung.store(true, Release);
+        fence(SeqCst);
+        self.rouse();
+    }
+
+    /// Wakes one sleeping worker, if there is one.
+    pub fn rouse(&self) {
+        if let Some(bed) = self.beds.iter().find(|bed| bed.asleep.load(Relaxed) && bed.asleep.swap(false, AcqRel)) {
+            bed.wake();
+        }
+    }
+
+    /// Makes every worker check for work, whether it sleeps or is about to.
+    pub fn rouse_all(&self) {
+        self.beds.iter().for_each(Bed::wake);
+    }
+
+    /// Whether any agent was summoned since the last [`Self::answer`].
+    pub fn has_rung(&self) -> bool {
+        self.rung.load(Acquire)
+    }
+
+    /// Visits the agents summoned since the last call, by rising numbers; returns their count.
+    pub fn answer(&self, mut visit: impl FnMut(AgentId)) -> usize {
+        if !self.rung.swap(false, AcqRel) {
+            return 0;
+        }
+        let mut count = 0;
+        for (at, word) in self.marks.iter().enumerate().filter(|(_, word)| word.load(Relaxed) != 0) {
+            let mut bits = word.swap(0, AcqRel);
+            while bits != 0 {
+                visit(AgentId(at as u32 * 64 + bits.trailing_zeros()));
+                bits &= bits - 1;
+                count += 1;
+            }
+        }
+        count
+    }
+
+    /// Sleeps as worker `at` for `span` (`None`: without a timeout), unless an agent was summoned. It may wake early.
+    pub fn sleep(&self, at: usize, span: Option<Duration>) {
+        let Some(bed) = self.beds.get(at) else { return };
+        bed.asleep.store(true, Relaxed);
+        fence(SeqCst);
+        if !self.has_rung() {
+            match span {
+                Some(span) => thread::park_timeout(span),
+                None => thread::park(),
+            }
+        }
+        bed.asleep.store(false, Relaxed);
+    }
+}
+
+impl Bed {
+    fn wake(&self) {
+        if let Some(thread) = &*self.thread.lock().unwrap_or_else(PoisonError::into_inner) {
+            thread.unpark();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn answered(bell: &Bell) -> Vec<u32> {
+        let mut seen = Vec::new();
+        let count = bell.answer(|id| seen.push(id.0));
+        assert_eq!(count, seen.len());
+        seen
+    }
+
+    #[test]
+    fn who_was_summoned_is_found_once() {
+        let bell = Bell::new(200, 1);
+        assert!(answered(&bell).is_empty());
+        [199, 3, 64, 3, 0].iter().for_each(|id| bell.ring(AgentId(*id)));
+        assert!(bell.has_rung());
+        assert_eq!(answered(&bell), [0, 3, 64, 199]);
+        assert!(answered(&bell).is_empty());
+        bell.ring(AgentId(5000));
+        assert!(!bell.has_rung(), "strangers are nobody");
+    }
+
+    #[test]
+    fn nobody_sleeps_through_a_summons() {
+        let bell = Bell::new(1, 1);
+        let (rings, done) = (20_000, AtomicBool::new(false));
+        let answered = AtomicU64::new(0);
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                bell.enter(0);
+                while !done.load(SeqCst) {
+                    bell.sleep(0, None);
+                    bell.answer(|_| {
+                        answered.fetch_add(1, SeqCst);
+                    });
+                }
+            });
+            for ring in 1..=rings {
+                bell.ring(AgentId(0));
+                while answered.load(SeqCst) < ring {
+                    thread::yield_now();
+                }
+            }
+            done.store(true, SeqCst);
+            bell.ring(AgentId(0));
+            bell.rouse_all();
+        });
+        assert!(answered.load(SeqCst) >= rings);
+    }
+}

@@ -1,0 +1,220 @@
+//! Reads the couplings of a scene file: pairs that act on each other otherwise than by ledger contact, which is the default.
+//!
+//! In: [`CouplingFile`]s and the objects of the scene. Out: [`Coupling`]s, problems to the [`Checker`].
+//! Never here: forces.
+
+use super::POSITION_MAX_M;
+use super::object::{Named, Objects};
+use super::soft;
+use crate::check::{Allowed, Checker, Place, allowed};
+use crate::format::{CouplingFile, CouplingKind as Kind, CouplingLaw, Spot};
+use glam::DVec3;
+use metachron_contact::Law;
+use metachron_core::{AgentId, Anchor};
+use metachron_models::rigid::RigidBody;
+use metachron_models::soft::SoftShape;
+use metachron_world::Spec;
+use metachron_world::couplings::{Coupling, CouplingKind};
+use std::collections::BTreeMap;
+
+/// Most couplings of a scene.
+const COUPLINGS_MAX: usize = 10_000;
+
+const STIFFNESS: Allowed = allowed(1e-6..=1e9, "N/m");
+const DAMPING: Allowed = allowed(0.0..=1e7, "N·s/m");
+const REST: Allowed = allowed(0.0..=1e4, "m");
+
+/// The couplings of the scene.
+pub(crate) fn couplings(c: &mut Checker<'_, '_>, files: &[CouplingFile], objects: &Objects) -> Vec<Coupling> {
+    if files.len() > COUPLINGS_MAX {
+        let expected = format!("expected at most {COUPLINGS_MAX}");
+        c.wrong(&Place::new("", ""), "coupling", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    let mut contacts = BTreeMap::new();
+    let mut found = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let place = Place::new(format!("coupling.{i}"), format!("of the coupling of `{}` and `{}`", file.a, file.b));
+        let Some(coupling) = coupling(c, &place, file, objects) else { continue };
+        let pair = (coupling.a.min(coupling.b), coupling.a.max(coupling.b));
+        if coupling.kind == CouplingKind::Contact && contacts.insert(pair, i).is_some() {
+            c.wrong(&place, "b", "is coupled with `a` by contact already", "expected one contact law for a pair");
+        }
+        found.push(coupling);
+    }
+    found
+}
+
+fn coupling(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile, objects: &Objects) -> Option<Coupling> {
+    let (a, b) = (end(c, place, ("a", &file.a), objects), end(c, place, ("b", &file.b), objects));
+    let (a, b) = (a?, b?);
+    if a == b {
+        c.wrong(place, "b", "is the object that `a` is", "expected another object: a coupling has two");
+        return None;
+    }
+    if let (Named::Tool(_), Named::Tool(_)) = (a, b) {
+        let expected = "expected a tube or a rigid object: both instruments are led, neither gives way";
+        c.wrong(place, "b", "is an instrument, as `a` is", expected);
+        return None;
+    }
+    let before = c.count();
+    let stays = matches!(file.law.unwrap_or_default(), CouplingLaw::Ledger | CouplingLaw::Off);
+    if [a, b].into_iter().any(|end| matches!(end, Named::Soft(_))) && !stays {
+        let what = format!("is `{}`, which sheets, solids and ropes do not know", file.law.unwrap_or_default().name());
+        c.wrong(place, "law", what, "expected `ledger` or `off`");
+    }
+    check_keys(c, place, file);
+    let law = law(c, place, file);
+    let kind = match file.kind.unwrap_or_default() {
+        Kind::Contact => Some(CouplingKind::Contact),
+        Kind::Attach => attach(c, place, file, (a, b), objects),
+    };
+    if c.count() > before {
+        return None;
+    }
+    Some(Coupling { a: a.agent()?, b: b.agent()?, kind: kind?, law: law? })
+}
+
+/// The agent at one end of a coupling; refuses static solids, scenery and synthetic agents.
+fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<Named> {
+    let (what, expected) = match objects.names.get(name) {
+        None => {
+            let moves = |named| !matches!(named, Named::Fixed | Named::Scenery | Named::Synthetic(_));
+            c.reference(place, key, name, objects.names.only(moves));
+            return None;
+        }
+        Some(Named::Fixed) => (
+            "which is fixed",
+            "expected an object that moves: what is fixed is touched by everything, without a coupling",
+        ),
+        Some(Named::Scenery) => ("which is only seen", "expected a tube, a rigid object or an instrument"),
+        Some(Named::Synthetic(_)) => ("which has no matter", "expected a tube, a rigid object or an instrument"),
+        Some(named) => return Some(named),
+    };
+    c.wrong(place, key, format_args!("names `{name}`, {what}"), expected);
+    None
+}
+
+/// Reports keys that have no meaning for this kind and law, and required keys that are missing.
+fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) {
+    let (kind, law) = (file.kind.unwrap_or_default(), file.law.unwrap_or_default());
+    let attach = kind == Kind::Attach;
+    let spring = attach || !matches!(law, CouplingLaw::Ledger | CouplingLaw::Off);
+    let what = if attach { "an attachment".to_owned() } else { format!("contact by `{}`", law.name()) };
+    for (key, given, belongs, needed) in [
+        ("at_a", file.at_a.is_some(), attach, attach),
+        ("at_b", file.at_b.is_some(), attach, attach),
+        ("rest_m", file.rest_m.is_some(), attach, false),
+        ("stiffness_n_m", file.stiffness_n_m.is_some(), spring, spring),
+        ("damping_n_s_m", file.damping_n_s_m.is_some(), spring, false),
+    ] {
+        if given && !belongs {
+            c.wrong(place, key, format_args!("does not belong to {what}"), "expected no such key here");
+        }
+        if !given && needed {
+            c.wrong(place, key, "is missing", format!("{what} needs it: expected `{key}` in this table"));
+        }
+    }
+    if attach && law == CouplingLaw::Off {
+        c.wrong(place, "law", "is `off`, which attaches nothing", "expected another law, or no such coupling");
+    } else if attach && matches!(law, CouplingLaw::Penalty | CouplingLaw::PenaltyExtrapolated) {
+        let what = format!("is `{}`, a law of contacts", law.name());
+        c.wrong(place, "law", what, "expected `ledger` or `tlm`: nothing else attaches");
+    }
+}
+
+fn law(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<Law> {
+    let law = file.law.unwrap_or_default();
+    let extrapolate = law == CouplingLaw::PenaltyExtrapolated;
+    let (stiffness_n_m, damping_n_s_m) = match law {
+        CouplingLaw::Ledger => return Some(Law::Ledger),
+        CouplingLaw::Off => return Some(Law::Off),
+        _ => spring(c, place, file)?,
+    };
+    Some(match law {
+        CouplingLaw::Tlm => Law::Tlm { stiffness_n_m, damping_n_s_m },
+        _ => Law::Penalty { stiffness_n_m, damping_n_s_m, extrapolate },
+    })
+}
+
+fn spring(c: &mut Checker<'_, '_>, place: &Place, file: &CouplingFile) -> Option<(f64, f64)> {
+    let stiffness = c.number(place, "stiffness_n_m", file.stiffness_n_m?, &STIFFNESS);
+    Some((stiffness, c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 0.0), &DAMPING)))
+}
+
+fn attach(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &CouplingFile,
+    (a, b): (Named, Named),
+    objects: &Objects,
+) -> Option<CouplingKind> {
+    let at_a = anchor(c, place, ("at_a", file.at_a?), a, objects);
+    let at_b = anchor(c, place, ("at_b", file.at_b?), b, objects);
+    let (stiffness_n_m, damping_n_s_m) = spring(c, place, file)?;
+    let rest_m = c.number_or(place, "rest_m", (file.rest_m, 0.0), &REST);
+    Some(CouplingKind::Attach { at_a: at_a?, at_b: at_b?, stiffness_n_m, damping_n_s_m, rest_m })
+}
+
+/// The material point of the object `named` that `spot` denotes.
+fn anchor(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    (key, spot): (&str, Spot),
+    named: Named,
+    objects: &Objects,
+) -> Option<Anchor> {
+    let id = named.agent()?;
+    if let Some(Spec::Soft(spec)) = spec_of(objects, id) {
+        let is_rope = matches!(spec.shape, SoftShape::Rope { .. });
+        return match spot {
+            Spot::Share(share) if is_rope => soft::along(spec, c.number(place, key, share, &allowed(0.0..=1.0, ""))),
+            Spot::Point(at) if !is_rope => soft::nearest(spec, c.point(place, key, at, POSITION_MAX_M)),
+            Spot::Share(_) => {
+                let expected = "expected a point [x, y, z] in the object's axes, metres from its middle";
+                c.wrong(place, key, "is a share of a length", expected);
+                None
+            }
+            Spot::Point(_) => {
+                c.wrong(place, key, "is a point, but the object is a rope", "expected a share of its length, 0 … 1");
+                None
+            }
+        };
+    }
+    match (spot, matches!(named, Named::Tube(_))) {
+        (Spot::Share(share), true) => {
+            let share = c.number(place, key, share, &allowed(0.0..=1.0, ""));
+            Some(Anchor::Arc(share * tube_length_m(objects, id)?))
+        }
+        (Spot::Point(at), false) => {
+            let at = c.point(place, key, at, POSITION_MAX_M);
+            Some(Anchor::Local(at - centre_of_mass(objects, id)))
+        }
+        (Spot::Point(_), true) => {
+            c.wrong(place, key, "is a point, but the object is a tube", "expected a share of its length, 0 … 1");
+            None
+        }
+        (Spot::Share(_), false) => {
+            c.wrong(place, key, "is a share of a length", "expected a point [x, y, z] in the object's axes, metres");
+            None
+        }
+    }
+}
+
+fn spec_of(objects: &Objects, id: AgentId) -> Option<&Spec> {
+    objects.agents.iter().find(|member| member.id == id).map(|member| &member.spec)
+}
+
+/// Rest length of a tube's skeleton, metres; `None` where the tube cannot be built, which is reported elsewhere.
+fn tube_length_m(objects: &Objects, id: AgentId) -> Option<f64> {
+    let Spec::Tube(spec) = spec_of(objects, id)? else { return None };
+    metachron_models::rod::Tube::new(spec.clone()).ok().map(|tube| tube.length_m())
+}
+
+/// The centre of mass of a rigid object in its shape's axes; zero for any other object, such as an instrument, whose origin is its tip.
+fn centre_of_mass(objects: &Objects, id: AgentId) -> DVec3 {
+    match spec_of(objects, id) {
+        Some(Spec::Rigid(spec)) => RigidBody::new(spec.clone()).map_or(DVec3::ZERO, |body| body.com_local()),
+        _ => DVec3::ZERO,
+    }
+}

@@ -1,0 +1,207 @@
+//! Builds the impostor of a group: one mesh, and the levels that it is cut to.
+//!
+//! In: a `[[group]]` table, the scenery that it names. Out: the mesh as scenery, and the triangles of each level.
+//! Never here: membership of groups, choice of the level drawn. Theory: `docs/theory/multiresolution.md`, section 2.
+
+use super::scenery::mesh_model;
+use crate::check::{Checker, Place, allowed};
+use crate::format::GroupFile;
+use crate::source::Source;
+use glam::{DQuat, DVec3};
+use metachron_geometry::{Model, Placement, Tom, proxy};
+use metachron_world::{GROUP_LEVELS_MAX, Look, Scenery};
+use std::sync::Arc;
+
+/// By default the finest level has this share of its members' triangles, within these bounds.
+const SHARE: f64 = 0.05;
+const TRIANGLES: (u32, u32) = (12, 2000);
+/// Each coarser level has this many times fewer triangles.
+const COARSER: u32 = 4;
+
+/// The mesh of a group and its levels; `None` where something is wrong, which is reported.
+pub(super) fn impostors(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &GroupFile,
+    (members, source): (&[Scenery], &Source),
+) -> Option<(Scenery, Vec<u32>)> {
+    let before = c.count();
+    let wanted = file.levels.as_deref();
+    if let Some(levels) = wanted {
+        check(c, place, levels);
+    }
+    let first = members.first()?;
+    let (tom, at) = match &file.proxy {
+        Some(given) => {
+            let (tom, at) = mesh_model(c, &place.table("proxy"), given, source)?;
+            let has = tom.range().1.max(given.triangles.unwrap_or(0));
+            if let Some((key, count)) = wanted.and_then(|levels| past(levels, has)) {
+                let what = format_args!("has {count} triangles where `proxy` has {has}");
+                c.wrong(place, &key, what, format!("expected at most {has}"));
+            }
+            (tom, at)
+        }
+        None if c.count() > before => return None,
+        None => made_of(c, place, members, wanted)?,
+    };
+    if c.count() > before {
+        return None;
+    }
+    let levels = match wanted {
+        Some(levels) => cuts(c, place, (levels, &tom))?,
+        None => usual(&tom),
+    };
+    let importance = members.iter().map(|m| m.look.importance).fold(0.0, f64::max);
+    let look = Look { colour: mean_colour(members), importance, ..first.look };
+    Some((Scenery { name: file.name.clone(), model: Model::Mesh(tom), at, look, texture: None }, levels))
+}
+
+/// Reports levels that are wrong whatever mesh they are cut from.
+fn check(c: &mut Checker<'_, '_>, place: &Place, levels: &[u32]) {
+    if levels.is_empty() || levels.len() > GROUP_LEVELS_MAX {
+        let expected = format!("expected 1 to {GROUP_LEVELS_MAX} numbers of triangles");
+        return c.wrong(place, "levels", format_args!("has {} entries", levels.len()), expected);
+    }
+    for (at, count) in levels.iter().enumerate() {
+        let key = format!("levels.{at}");
+        c.number(place, &key, f64::from(*count), &allowed(1.0..=1e5, ""));
+        if let Some(before) = at.checked_sub(1).map(|at| levels[at]).filter(|before| before >= count) {
+            let expected = "expected rising numbers, the coarsest level first";
+            c.wrong(place, &key, format_args!("goes from {before} to {count}"), expected);
+        }
+    }
+}
+
+/// The first level with more triangles than `has`, and its key.
+fn past(levels: &[u32], has: u32) -> Option<(String, u32)> {
+    levels.iter().enumerate().find(|(_, count)| **count > has).map(|(at, count)| (format!("levels.{at}"), *count))
+}
+
+/// One mesh made of all members.
+fn made_of(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    members: &[Scenery],
+    wanted: Option<&[u32]>,
+) -> Option<(Arc<Tom>, Placement)> {
+    let all: f64 = members.iter().map(|m| f64::from(m.model.range().1)).sum();
+    let usual = (SHARE * all).round().clamp(f64::from(TRIANGLES.0), f64::from(TRIANGLES.1)) as u32;
+    let finest = wanted.and_then(<[u32]>::last).copied().unwrap_or(usual);
+    let origin = members.iter().map(|m| m.at.position).sum::<DVec3>() / members.len() as f64;
+    let parts: Vec<(Model, Placement)> = members.iter().map(|m| (m.model.clone(), m.at)).collect();
+    match proxy(&parts, origin, finest) {
+        Ok(tom) => Some((Arc::new(tom), Placement { position: origin, rotation: DQuat::IDENTITY, scale: 1.0 })),
+        Err(why) => {
+            c.wrong(place, "members", format_args!("cannot be drawn as one: {why}"), "expected meshes with an area");
+            None
+        }
+    }
+}
+
+/// The triangles that the mesh has at each level; `None` where two levels are equal or one is below its coarsest, which is reported.
+fn cuts(c: &mut Checker<'_, '_>, place: &Place, (levels, tom): (&[u32], &Tom)) -> Option<Vec<u32>> {
+    let (least, most) = tom.range();
+    let mut made: Vec<u32> = Vec::with_capacity(levels.len());
+    for (at, count) in levels.iter().enumerate() {
+        let cut = tom.cut(*count).triangles;
+        if *count < least || made.last().is_some_and(|before| *before >= cut) {
+            let what = format_args!(
+                "asks for {count} triangles, which gives {cut} as the level before it or the coarsest does"
+            );
+            let expected = format!("expected levels from {least} to {most}, which is what its mesh can be cut to");
+            c.wrong(place, &format!("levels.{at}"), what, expected);
+            return None;
+        }
+        made.push(cut);
+    }
+    Some(made)
+}
+
+/// Default levels: all triangles of the mesh, then coarser levels as long as they have enough triangles to show a shape.
+fn usual(tom: &Tom) -> Vec<u32> {
+    let (least, most) = tom.range();
+    let coarser = |count: &u32| Some(count / COARSER).filter(|count| *count >= TRIANGLES.0.max(least));
+    let mut levels: Vec<u32> = std::iter::successors(Some(most), coarser).take(GROUP_LEVELS_MAX).collect();
+    levels.reverse();
+    let mut levels: Vec<u32> = levels.into_iter().map(|count| tom.cut(count).triangles).collect();
+    levels.dedup();
+    levels
+}
+
+/// Mean colour of the members, weighted by their triangles.
+fn mean_colour(members: &[Scenery]) -> [u8; 3] {
+    let weight = |m: &Scenery| f64::from(m.model.range().1);
+    let all: f64 = members.iter().map(weight).sum();
+    std::array::from_fn(|i| {
+        (members.iter().map(|m| weight(m) * f64::from(m.look.colour[i])).sum::<f64>() / all.max(1.0)).round() as u8
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::{SceneError, Source, load};
+    use metachron_world::Scene;
+
+    /// A forest of 25 balls of 200 triangles as a group with these keys in addition to its name and members.
+    fn wood(keys: &str) -> Result<Scene, SceneError> {
+        let text = format!(
+            "format = 1\n[[object]]\nname = \"b\"\nmodel = \"mesh\"\ngenerate = \"sphere\"\ntriangles = 200\ngrid = [5, 5, 1]\nspacing_m = [3, 3, 0]\n[[group]]\nname = \"g\"\nmembers = [\"b-*\"]\n{keys}\n"
+        );
+        Source::memory("group", text.as_bytes()).and_then(|source| load(&source, &[]))
+    }
+
+    fn levels(keys: &str) -> Vec<u32> {
+        wood(keys).unwrap().groups[0].levels.clone()
+    }
+
+    fn told(keys: &str) -> String {
+        let problems = wood(keys).expect_err(keys).problems;
+        problems.iter().map(|p| format!("{}; {}; {}\n", p.message, p.expected, p.text)).collect()
+    }
+
+    #[test]
+    fn levels_are_cuts_of_one_mesh_with_the_triangles_asked_for() {
+        let made = levels("levels = [20, 80, 320]");
+        assert_eq!(made.len(), 3, "{made:?}");
+        // removing a vertex removes two triangles, in a chain of substitutes a few more
+        assert!(made.iter().zip([20, 80, 320]).all(|(cut, asked)| *cut <= asked && cut + 6 > asked), "{made:?}");
+        let sphere = "proxy = { generate = \"sphere\", triangles = 320, scale = 8 }";
+        assert_eq!(levels(&format!("{sphere}\nlevels = [20, 320]")).len(), 2);
+        assert_eq!(levels("levels = [64]").len(), 1);
+    }
+
+    #[test]
+    fn without_levels_there_are_some_from_a_twentieth_of_the_members_down_by_quarters() {
+        let made = levels("");
+        // 25 balls of about 200 triangles: 250, 62, 15
+        assert_eq!(made.len(), 3, "{made:?}");
+        assert!(made[2].abs_diff(250) <= 8 && made[1].abs_diff(62) <= 6 && made[0].abs_diff(15) <= 4, "{made:?}");
+        assert_eq!(levels("proxy = { generate = \"sphere\", triangles = 20, scale = 8 }"), [20]);
+    }
+
+    #[test]
+    fn wrong_levels_are_refused_where_they_stand() {
+        let small = "proxy = { generate = \"sphere\", triangles = 100, scale = 8 }\nlevels = [20, 320]";
+        let cases = [
+            ("levels = []", "`levels` of group `g` has 0 entries; expected 1 to 8"),
+            ("levels = [1, 2, 3, 4, 5, 6, 7, 8, 9]", "has 9 entries"),
+            ("levels = [80, 20]", "goes from 80 to 20; expected rising"),
+            ("levels = [80, 80]", "goes from 80 to 80"),
+            ("levels = [0, 20]", "is 0; expected a number from 1 to 100000"),
+            ("levels = [20, 200000]", "is 200000"),
+            ("levels = [-4]", "integer `-4`"),
+            ("levels = [nan]", "floating point"),
+            ("levels = [20.5]", "floating point"),
+            ("levels = [\"few\"]", "string"),
+            ("levels = 20", "integer `20`"),
+            ("levels = [20, 21]", "as the level before it"),
+            ("levels = [1]", "expected levels from"),
+            (small, "has 320 triangles where `proxy` has 100; expected at most 100"),
+            ("proxy_triangles = 20", "proxy_triangles"),
+        ];
+        for (keys, expected) in cases {
+            let told = told(keys);
+            assert!(told.contains(expected), "{keys}\n{told}");
+        }
+    }
+}

@@ -1,0 +1,102 @@
+//! Reads an instrument of a scene file as a [`ToolSpec`].
+
+use super::POSITION_MAX_M;
+use super::object::{Given, Named, Names};
+use super::rigid::rotation;
+use crate::check::{Checker, Place, allowed};
+use crate::format::{InstrumentFile, KeyframeFile};
+use glam::{DQuat, DVec3};
+use metachron_core::AgentId;
+use metachron_models::tool::{Keyframe, ToolSpec};
+use std::ops::RangeInclusive;
+
+/// Most keyframes of a script.
+const KEYFRAMES_MAX: usize = 10_000;
+/// Default reach of the jaws, metres.
+const REACH_DEFAULT_M: f64 = 0.02;
+/// Default limit of the force of a tool's drive, newtons: an arm holds against it without effort.
+const FORCE_DEFAULT_N: f64 = 50.0;
+/// Allowed limits of that force. The tip has a mass of 6 g per newton (docs/theory/coupling.md, eq. 9e): past a kilonewton it presses
+/// an object of 50 g millimetres into the floor, past a hundred kilonewtons through it.
+const FORCES_N: RangeInclusive<f64> = 1e-3..=1e3;
+/// See [`FORCES_N`].
+const FORCES_WHY: &str = "N: a stronger drive would press what is light into what it stands on";
+
+/// Reads an instrument.
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &InstrumentFile, given: &Given<'_>, names: &Names) -> ToolSpec {
+    let place = given.place;
+    ToolSpec {
+        keyframes: keyframes(c, place, &file.keyframe),
+        repeat: file.repeat.unwrap_or(false),
+        reach_m: c.number_or(place, "reach_m", (file.reach_m, REACH_DEFAULT_M), &allowed(1e-6..=100.0, "m")),
+        stiffness_n_m: c.number_or(place, "stiffness_n_m", (file.stiffness_n_m, 200.0), &allowed(1e-3..=1e7, "N/m")),
+        damping_n_s_m: c.number_or(place, "damping_n_s_m", (file.damping_n_s_m, 1.0), &allowed(0.0..=1e5, "N·s/m")),
+        max_force_n: c.number_or(
+            place,
+            "max_force_n",
+            (file.max_force_n, FORCE_DEFAULT_N),
+            &allowed(FORCES_N, FORCES_WHY),
+        ),
+        graspable: graspable(c, place, file, names),
+        starts_off_m: DVec3::ZERO,
+    }
+}
+
+fn graspable(c: &mut Checker<'_, '_>, place: &Place, file: &InstrumentFile, names: &Names) -> Vec<AgentId> {
+    let Some(wanted) = &file.grasps else { return names.tubes().map(|(_, id)| id).collect() };
+    let mut found = Vec::with_capacity(wanted.len().min(names.len()));
+    for (i, name) in wanted.iter().enumerate() {
+        let key = format!("grasps.{i}");
+        let named = names.get(name);
+        if let Some(what) = named.and_then(ungraspable) {
+            let expected = "expected the name of a tube, sheet, solid, rope or rigid object that moves";
+            c.wrong(place, &key, format_args!("names `{name}`, {what}, which jaws cannot hold"), expected);
+        } else if c.reference(place, &key, name, names.only(|named| named.graspable().is_some())) {
+            found.extend(named.and_then(Named::graspable).filter(|id| !found.contains(id)));
+        }
+    }
+    found
+}
+
+/// Description of an object that jaws cannot hold; `None` for one that they can.
+const fn ungraspable(named: Named) -> Option<&'static str> {
+    match named {
+        Named::Fixed => Some("a fixed object"),
+        Named::Scenery => Some("a mesh or tree without matter"),
+        Named::Tool(_) => Some("an instrument"),
+        Named::Synthetic(_) => Some("an agent without matter"),
+        Named::Rigid(_) | Named::Tube(_) | Named::Soft(_) => None,
+    }
+}
+
+fn keyframes(c: &mut Checker<'_, '_>, place: &Place, files: &[KeyframeFile]) -> Vec<Keyframe> {
+    let still = Keyframe { at_s: 0.0, tip_m: DVec3::ZERO, rotation: DQuat::IDENTITY, jaw: 1.0 };
+    if !(1..=KEYFRAMES_MAX).contains(&files.len()) {
+        let expected = format!("expected 1 … {KEYFRAMES_MAX}; one is a tool that waits for a hand");
+        c.wrong(place, "keyframe", format_args!("has {} entries", files.len()), expected);
+        return vec![still];
+    }
+    let mut out: Vec<Keyframe> = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let before = out.last().copied();
+        let key = keyframe(c, &place.entry("keyframe", i), file, before.unwrap_or(still));
+        if let (None, Some(before)) = (file.at_s, before) {
+            let expected = format!("expected `at_s` above {} in this table", before.at_s);
+            c.wrong(&place.entry("keyframe", i), "at_s", "is missing", expected);
+        } else if before.is_some_and(|b| key.at_s <= b.at_s) {
+            let expected = format!("expected a time after the keyframe before, {} s", out[i - 1].at_s);
+            c.wrong(&place.entry("keyframe", i), "at_s", format_args!("is {}", key.at_s), expected);
+        }
+        out.push(key);
+    }
+    out
+}
+
+fn keyframe(c: &mut Checker<'_, '_>, place: &Place, file: &KeyframeFile, before: Keyframe) -> Keyframe {
+    Keyframe {
+        at_s: c.number_or(place, "at_s", (file.at_s, 0.0), &allowed(0.0..=1e6, "s")),
+        tip_m: c.point(place, "tip_m", file.tip_m, POSITION_MAX_M),
+        rotation: file.rotation_deg.map_or(before.rotation, |deg| rotation(c.point(place, "rotation_deg", deg, 1e6))),
+        jaw: c.number_or(place, "jaw", (file.jaw, before.jaw), &allowed(0.0..=1.0, "")),
+    }
+}

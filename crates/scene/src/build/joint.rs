@@ -1,0 +1,183 @@
+//! Reads the joints of a scene file: the objects at both ends, the anchors, and whether the joint can hold there.
+//!
+//! In: [`JointFile`]s and the objects of the scene. Out: [`Joint`]s that can hold from the first step on, problems to the
+//! [`Checker`]. Never here: solving joints.
+
+use super::POSITION_MAX_M;
+use super::joint_keys::{Leaves, leaves};
+use super::joint_rules::{Held, check_start, contradictions};
+use super::object::{Named, Objects};
+use crate::check::{Checker, Place};
+use crate::format::{JointFile, JointKind as Kind, Point};
+use glam::{DQuat, DVec3};
+use metachron_core::AgentId;
+use metachron_models::rigid::{Joint, JointKind};
+use metachron_world::Spec;
+
+/// Most joints of a scene.
+const JOINTS_MAX: usize = 10_000;
+/// The name of the world in joints: no object may have it.
+pub(super) const WORLD: &str = "world";
+
+/// One end of a joint, and its pose at the start.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct End {
+    /// `None` is the world.
+    pub(super) agent: Option<AgentId>,
+    pub(super) position: DVec3,
+    pub(super) rotation: DQuat,
+}
+
+impl End {
+    pub(super) fn to_world(self, local: DVec3) -> DVec3 {
+        self.position + self.rotation * local
+    }
+
+    fn to_local(self, world: DVec3) -> DVec3 {
+        self.rotation.conjugate() * (world - self.position)
+    }
+}
+
+/// The joints of the scene.
+pub(crate) fn joints(c: &mut Checker<'_, '_>, files: &[JointFile], objects: &Objects) -> Vec<Joint> {
+    if files.len() > JOINTS_MAX {
+        let expected = format!("expected at most {JOINTS_MAX}");
+        c.wrong(&Place::new("", ""), "joint", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    let held: Vec<Held> = files.iter().enumerate().filter_map(|(i, file)| held(c, i, file, objects)).collect();
+    contradictions(c, &held);
+    held.into_iter().filter_map(Held::joint).collect()
+}
+
+fn held(c: &mut Checker<'_, '_>, index: usize, file: &JointFile, objects: &Objects) -> Option<Held> {
+    let place = Place::new(format!("joint.{index}"), format!("of the joint of `{}` and `{}`", file.a, file.b));
+    let before = c.count();
+    let free = leaves(c, &place, file);
+    let (a, b) = (end(c, &place, ("a", &file.a), objects), end(c, &place, ("b", &file.b), objects));
+    let (a, b) = (a?, b?);
+    if a.agent == b.agent {
+        let (what, expected) = match a.agent {
+            Some(_) => ("is the object that `a` is", "expected another object: a joint holds two"),
+            None => ("cannot move, as `a` cannot", "expected at least one object that moves"),
+        };
+        c.wrong(&place, "b", what, expected);
+        return None;
+    }
+    let at_a_m = file.at_a_m.map_or(DVec3::ZERO, |at| c.point(&place, "at_a_m", at, POSITION_MAX_M));
+    let from = a.to_world(at_a_m);
+    let to = other_anchor(c, &place, file, (b, from))?;
+    if c.count() > before {
+        return None;
+    }
+    let held = Held { place, ends: [a, b], anchors: [from, to], leaves: free?, collide: collide(file) };
+    check_start(c, &held).then_some(held)
+}
+
+/// One end of a joint: a rigid object, the world, or a fixed object, which becomes a pose in the world.
+fn end(c: &mut Checker<'_, '_>, place: &Place, (key, name): (&str, &str), objects: &Objects) -> Option<End> {
+    if name == WORLD {
+        if key == "a" {
+            c.wrong(place, key, "is the world", "expected a rigid object; the world is written as `b`");
+            return None;
+        }
+        return Some(End { agent: None, position: DVec3::ZERO, rotation: DQuat::IDENTITY });
+    }
+    let wrong = |c: &mut Checker<'_, '_>, what: &str, expected: &str| {
+        c.wrong(place, key, format_args!("names `{name}`, {what}"), expected);
+        None
+    };
+    match objects.names.get(name) {
+        Some(Named::Rigid(id)) => {
+            let member = objects.agents.iter().find(|member| member.id == id)?;
+            let Spec::Rigid(body) = &member.spec else { return None };
+            Some(End { agent: Some(id), position: body.position, rotation: body.rotation.normalize() })
+        }
+        Some(Named::Fixed) => {
+            let solid = objects.obstacles.iter().find(|obstacle| obstacle.name == name)?;
+            Some(End { agent: None, position: solid.position, rotation: solid.rotation.normalize() })
+        }
+        Some(Named::Tube(_)) => wrong(
+            c,
+            "which is a tube",
+            "expected a rigid object; a tube is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `clamp` and `pin`",
+        ),
+        Some(Named::Soft(_)) => wrong(
+            c,
+            "which is soft",
+            "expected a rigid object; a sheet, solid or rope is held by a `[[coupling]]` of `kind = \"attach\"`, or by its own `hold`",
+        ),
+        Some(Named::Tool(_)) => wrong(
+            c,
+            "which is an instrument",
+            "expected a rigid object; an instrument holds by its jaws, or by a `[[coupling]]` of `kind = \"attach\"`",
+        ),
+        Some(Named::Synthetic(_)) => wrong(c, "which has no matter", "expected a rigid object"),
+        Some(Named::Scenery) => wrong(c, "which is only seen", "expected a rigid object"),
+        None => {
+            let held = |named| matches!(named, Named::Rigid(_) | Named::Fixed);
+            c.reference(place, key, name, objects.names.only(held));
+            None
+        }
+    }
+}
+
+/// The anchor on `b`, in the world: `at_b_m` if given; else the anchor on `a`, or for springs and ropes the origin of `b`.
+fn other_anchor(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile, (b, from): (End, DVec3)) -> Option<DVec3> {
+    let given = |c: &mut Checker<'_, '_>, at: Point| b.to_world(c.point(place, "at_b_m", at, POSITION_MAX_M));
+    match (file.at_b_m, file.kind) {
+        (Some(at), _) => Some(given(c, at)),
+        (None, Kind::Spring | Kind::Rope) if b.agent.is_none() && file.b == WORLD => {
+            let expected = format!("expected the other end of the {} in the world, metres", file.kind.name());
+            c.wrong(place, "at_b_m", "is missing", expected);
+            None
+        }
+        (None, Kind::Spring | Kind::Rope) => Some(b.position),
+        (None, _) => Some(from),
+    }
+}
+
+fn collide(file: &JointFile) -> bool {
+    file.collide.unwrap_or(matches!(file.kind, Kind::Spring | Kind::Rope))
+}
+
+impl Held {
+    /// The joint with an agent as `a`. Where `a` is fixed in the file, the ends are swapped and the axis is reversed: b's motion relative
+    /// to a about `axis` is a's relative to b about the opposite axis.
+    fn joint(self) -> Option<Joint> {
+        let Self { ends: [a, b], anchors: [from, to], .. } = self;
+        match (a.agent, b.agent) {
+            (Some(id), other) => Some(self.between((id, other), (a, from), (b, to), 1.0)),
+            (None, Some(id)) => Some(self.between((id, None), (b, to), (a, from), -1.0)),
+            (None, None) => None,
+        }
+    }
+
+    fn between(
+        &self,
+        (id, other): (AgentId, Option<AgentId>),
+        (a, from): (End, DVec3),
+        (b, to): (End, DVec3),
+        sign: f64,
+    ) -> Joint {
+        let axis = |world: DVec3| a.rotation.conjugate() * world * sign;
+        let length = from.distance(to);
+        let kind = match self.leaves {
+            Leaves::Nothing => JointKind::Fixed,
+            Leaves::Turn { range_rad, .. } => JointKind::Revolute { axis: axis(self.axis()), range_rad },
+            Leaves::Turns => JointKind::Spherical,
+            Leaves::Slide { range_m, .. } => JointKind::Prismatic { axis: axis(self.axis()), range_m },
+            Leaves::Spring { stiffness_n_m, damping_n_s_m, rest_m } => {
+                JointKind::Spring { stiffness_n_m, damping_n_s_m, rest_m: rest_m.unwrap_or(length) }
+            }
+            Leaves::Rope { length_m } => JointKind::Rope { length_m: length_m.unwrap_or(length) },
+        };
+        // a joint to the world is given in the world's axes
+        let (anchor_b_m, rotation_b) = match other {
+            Some(_) => (b.to_local(to), b.rotation),
+            None => (to, DQuat::IDENTITY),
+        };
+        let rest = (a.rotation.conjugate() * rotation_b).normalize();
+        Joint { a: id, b: other, kind, anchor_a_m: a.to_local(from), anchor_b_m, rest, collide: self.collide }
+    }
+}

@@ -1,0 +1,132 @@
+//! Reads the keys of a joint: which belong to its kind, and the motion that they leave free.
+
+use crate::check::{Checker, Place, allowed};
+use crate::format::{JointFile, JointKind as Kind};
+use glam::DVec3;
+
+/// Longest spring or rope, metres.
+const LENGTH_MAX_M: f64 = 1e4;
+/// An axis shorter than this has no direction.
+const AXIS_MIN: f64 = 1e-9;
+/// Largest coordinate of an axis.
+const AXIS_MAX: f64 = 1e6;
+
+/// The motion that a joint leaves free, as its keys say; axes are unit vectors in the axes of `a`.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Leaves {
+    Nothing,
+    Turn { axis: DVec3, range_rad: Option<[f64; 2]> },
+    Turns,
+    Slide { axis: DVec3, range_m: Option<[f64; 2]> },
+    Spring { stiffness_n_m: f64, damping_n_s_m: f64, rest_m: Option<f64> },
+    Rope { length_m: Option<f64> },
+}
+
+/// The keys of each kind that not all kinds have: required ones, then optional ones.
+const fn keys_of(kind: Kind) -> (&'static [&'static str], &'static [&'static str]) {
+    match kind {
+        Kind::Fixed | Kind::Spherical => (&[], &[]),
+        Kind::Revolute => (&["axis"], &["range_deg"]),
+        Kind::Prismatic => (&["axis"], &["range_m"]),
+        Kind::Spring => (&["stiffness_n_m"], &["damping_n_s_m", "rest_m"]),
+        Kind::Rope => (&[], &["length_m"]),
+    }
+}
+
+/// Reads the motion that the joint leaves free.
+pub(super) fn leaves(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<Leaves> {
+    if !check_keys(c, place, file) {
+        return None;
+    }
+    Some(match file.kind {
+        Kind::Fixed => Leaves::Nothing,
+        Kind::Spherical => Leaves::Turns,
+        Kind::Revolute => {
+            let range = range(c, place, ("range_deg", file.range_deg), 180.0);
+            let around_start = range.is_none_or(|[least, greatest]| least <= 0.0 && greatest >= 0.0);
+            if !around_start {
+                c.wrong(place, "range_deg", "does not contain the start", "expected a range with 0 among it");
+            }
+            Leaves::Turn { axis: axis(c, place, file)?, range_rad: range.map(|r| r.map(f64::to_radians)) }
+        }
+        Kind::Prismatic => {
+            let range_m = range(c, place, ("range_m", file.range_m), LENGTH_MAX_M);
+            Leaves::Slide { axis: axis(c, place, file)?, range_m }
+        }
+        Kind::Spring => {
+            let length = allowed(0.0..=LENGTH_MAX_M, "m");
+            Leaves::Spring {
+                stiffness_n_m: c.number(place, "stiffness_n_m", file.stiffness_n_m?, &allowed(1e-6..=1e9, "N/m")),
+                damping_n_s_m: c.number_or(
+                    place,
+                    "damping_n_s_m",
+                    (file.damping_n_s_m, 0.0),
+                    &allowed(0.0..=1e7, "N·s/m"),
+                ),
+                rest_m: file.rest_m.map(|rest| c.number(place, "rest_m", rest, &length)),
+            }
+        }
+        Kind::Rope => {
+            let length = allowed(1e-6..=LENGTH_MAX_M, "m");
+            Leaves::Rope { length_m: file.length_m.map(|m| c.number(place, "length_m", m, &length)) }
+        }
+    })
+}
+
+/// Reports keys that belong to another kind, and required keys that are missing; returns whether none is missing.
+fn check_keys(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> bool {
+    let (needs, takes) = keys_of(file.kind);
+    let name = file.kind.name();
+    let list = needs.iter().chain(takes).map(|k| format!("`{k}`")).collect::<Vec<_>>().join(", ");
+    let expected = if list.is_empty() {
+        format!("a {name} joint has none of its own")
+    } else {
+        format!("a {name} joint has {list}")
+    };
+    let given = [
+        ("axis", file.axis.is_some()),
+        ("range_m", file.range_m.is_some()),
+        ("range_deg", file.range_deg.is_some()),
+        ("stiffness_n_m", file.stiffness_n_m.is_some()),
+        ("damping_n_s_m", file.damping_n_s_m.is_some()),
+        ("rest_m", file.rest_m.is_some()),
+        ("length_m", file.length_m.is_some()),
+    ];
+    let mut complete = true;
+    for (key, is_given) in given {
+        if is_given && !needs.contains(&key) && !takes.contains(&key) {
+            c.wrong(place, key, format_args!("does not belong to a {name} joint"), expected.clone());
+        }
+        if !is_given && needs.contains(&key) {
+            c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
+            complete = false;
+        }
+    }
+    complete
+}
+
+fn axis(c: &mut Checker<'_, '_>, place: &Place, file: &JointFile) -> Option<DVec3> {
+    let before = c.count();
+    let axis = c.point(place, "axis", file.axis?, AXIS_MAX);
+    if c.count() == before && axis.length() < AXIS_MIN {
+        c.wrong(place, "axis", "has no direction", "expected a vector longer than 0, such as [0, 0, 1]");
+    }
+    axis.try_normalize()
+}
+
+/// A range with both ends within ± `most`, in order.
+fn range(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    (key, given): (&str, Option<[f64; 2]>),
+    most: f64,
+) -> Option<[f64; 2]> {
+    let [least, greatest] = given?;
+    let within = |end: f64| end.abs() <= most;
+    if !(within(least) && within(greatest) && least <= greatest) {
+        let expected = format!("expected [least, greatest], each up to {most} in magnitude");
+        c.wrong(place, key, format_args!("is [{least}, {greatest}]"), expected);
+        return None;
+    }
+    given
+}

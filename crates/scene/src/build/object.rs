@@ -1,0 +1,456 @@
+//! Reads the objects of a scene: each by its model, with names and links.
+
+use super::common::{faults, levels, look, pace, tolerance, untolerated};
+use super::grid::{Copies, copies};
+use super::joint::WORLD;
+use super::{instrument, rigid, scenery, soft, synthetic, tube};
+use crate::check::{Checker, Place};
+use crate::diagnostic::{Problem, did_you_mean};
+use crate::format::{
+    COMMON_KEYS, CommonFile, FaultsFile, InstrumentFile, MODELS, MeshFile, RigidFile, RopeFile, SheetFile, SolidFile,
+    SyntheticFile, TreeFile, TubeFile,
+};
+use crate::source::Source;
+use glam::DVec3;
+use metachron_core::{AgentId, Resolution, ResolutionRange};
+use metachron_geometry::Obstacle;
+use metachron_models::rigid::Joint;
+use metachron_models::rigid::RigidBody;
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeError;
+use metachron_models::soft::SoftBody;
+use metachron_models::synthetic::Synthetic;
+use metachron_models::tool::Instrument;
+use metachron_world::kinds::Material;
+use metachron_world::{Look, Member, Scenery, Spec};
+use serde::de::DeserializeOwned;
+use std::collections::BTreeMap;
+use std::ops::Range;
+use std::sync::Arc;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// Most agents of a scene: each agent that can be touched stores something for every other one.
+pub(crate) const AGENTS_MAX: usize = 10_000;
+/// Most fixed objects of a scene.
+pub(super) const OBSTACLES_MAX: usize = 10_000;
+/// Longest name, in characters.
+const NAME_MAX: usize = 64;
+
+/// All objects of a scene.
+#[derive(Debug, Default)]
+pub(crate) struct Objects {
+    pub(crate) agents: Vec<Member>,
+    pub(crate) obstacles: Arc<[Obstacle]>,
+    pub(crate) obstacle_looks: Vec<Look>,
+    pub(crate) scenery: Vec<Scenery>,
+    /// Names of fixed objects and of agents.
+    pub(crate) names: Names,
+}
+
+impl Objects {
+    /// Gives every rigid agent the joints of the scene.
+    pub(crate) fn hold(&mut self, joints: &Arc<[Joint]>) {
+        for member in &mut self.agents {
+            if let Spec::Rigid(body) = &mut member.spec {
+                body.joints = Arc::clone(joints);
+            }
+        }
+    }
+}
+
+/// Input of a model's reader in addition to its own table.
+pub(super) struct Given<'a> {
+    pub(super) place: &'a Place,
+    pub(super) source: &'a Source,
+    pub(super) gravity: DVec3,
+    pub(super) obstacles: &'a Arc<[Obstacle]>,
+    pub(super) levels: (u8, u8),
+    pub(super) sleep: bool,
+}
+
+/// Names and what each denotes.
+#[derive(Debug, Default)]
+pub(crate) struct Names(BTreeMap<String, Named>);
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Named {
+    /// A fixed object.
+    Fixed,
+    /// A mesh or tree, which is only drawn.
+    Scenery,
+    /// A rigid object that moves.
+    Rigid(AgentId),
+    /// An instrument.
+    Tool(AgentId),
+    /// An agent without matter.
+    Synthetic(AgentId),
+    /// A tube.
+    Tube(AgentId),
+    /// A sheet, solid or rope.
+    Soft(AgentId),
+}
+
+impl Named {
+    /// The id of an object that jaws can grasp if a scene allows it: one that has matter and moves freely.
+    pub(super) const fn graspable(self) -> Option<AgentId> {
+        match self {
+            Self::Rigid(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
+            Self::Fixed | Self::Scenery | Self::Tool(_) | Self::Synthetic(_) => None,
+        }
+    }
+
+    /// The id of an object that is an agent.
+    pub(crate) const fn agent(self) -> Option<AgentId> {
+        match self {
+            Self::Fixed | Self::Scenery => None,
+            Self::Rigid(id) | Self::Tool(id) | Self::Synthetic(id) | Self::Tube(id) | Self::Soft(id) => Some(id),
+        }
+    }
+}
+
+impl Names {
+    pub(crate) fn get(&self, name: &str) -> Option<Named> {
+        self.0.get(name).copied()
+    }
+
+    pub(crate) fn agents(&self) -> impl Iterator<Item = &str> + Clone {
+        self.0.iter().filter(|(_, n)| n.agent().is_some()).map(|(name, _)| name.as_str())
+    }
+
+    /// The names of the objects that `wanted` accepts.
+    pub(super) fn only(&self, wanted: impl Fn(Named) -> bool + Clone) -> impl Iterator<Item = &str> + Clone {
+        self.0.iter().filter(move |(_, n)| wanted(**n)).map(|(name, _)| name.as_str())
+    }
+
+    pub(super) fn tubes(&self) -> impl Iterator<Item = (&str, AgentId)> + Clone {
+        self.0.iter().filter_map(|(name, n)| if let Named::Tube(id) = n { Some((name.as_str(), *id)) } else { None })
+    }
+
+    pub(super) fn is_known(&self, name: &str) -> bool {
+        self.0.contains_key(name)
+    }
+
+    pub(super) fn len(&self) -> usize {
+        self.0.len()
+    }
+}
+
+/// An object as the file has it.
+pub(super) struct Entry {
+    pub(super) place: Place,
+    pub(super) common: CommonFile,
+    pub(super) model: ModelFile,
+    fixed: bool,
+    pub(super) copies: Copies,
+}
+
+pub(super) enum ModelFile {
+    Tube(TubeFile),
+    Rigid(RigidFile),
+    Sheet(SheetFile),
+    Solid(SolidFile),
+    Rope(RopeFile),
+    Instrument(InstrumentFile),
+    Synthetic(SyntheticFile),
+    Mesh(MeshFile),
+    Tree(TreeFile),
+}
+
+impl ModelFile {
+    /// Whether it is only drawn.
+    const fn is_scenery(&self) -> bool {
+        matches!(self, Self::Mesh(_) | Self::Tree(_))
+    }
+}
+
+/// Input that all objects of a scene share.
+pub(crate) struct Around<'a> {
+    pub(crate) source: &'a Source,
+    pub(crate) gravity: DVec3,
+    pub(crate) faults: Option<&'a FaultsFile>,
+}
+
+/// Reads every `[[object]]`.
+pub(crate) fn read_objects(
+    c: &mut Checker<'_, '_>,
+    list: Option<&Spanned<DeValue<'_>>>,
+    around: &Around<'_>,
+) -> Objects {
+    let Some(list) = list else { return Objects::default() };
+    let DeValue::Array(items) = list.get_ref() else {
+        let found = format!("`object` is of type {}", list.get_ref().type_str());
+        c.push(Problem::new(list.span(), found).expecting("expected tables under `[[object]]`"));
+        return Objects::default();
+    };
+    let mut read = |(i, item)| {
+        let entry = read_entry(c, i, item);
+        if entry.is_none()
+            && let Some(name) = item.get_ref().as_table().and_then(|table| table.get("name")?.get_ref().as_str())
+        {
+            c.unread(name);
+        }
+        entry
+    };
+    let mut entries: Vec<Entry> = items.iter().enumerate().filter_map(&mut read).collect();
+    for entry in &mut entries {
+        if let ModelFile::Rigid(file) = &entry.model {
+            entry.fixed = rigid::is_fixed(c, &entry.place, file);
+        }
+        entry.fixed |= entry.model.is_scenery();
+        let can_move = !matches!(entry.model, ModelFile::Instrument(_) | ModelFile::Synthetic(_));
+        let most = if entry.fixed { OBSTACLES_MAX } else { AGENTS_MAX };
+        entry.copies = copies(c, &entry.place, &entry.common, (can_move, most));
+    }
+    let names = name_all(c, &entries);
+    let (obstacles, obstacle_looks) = fixed_objects(c, &entries, around.source);
+    let obstacles: Arc<[Obstacle]> = obstacles.into();
+    let agents = agents(c, &entries, &names, &Stage { around, obstacles: &obstacles });
+    let scenery = scenery::read(c, &entries, around.source);
+    Objects { agents, obstacles, obstacle_looks, scenery, names }
+}
+
+fn read_entry(c: &mut Checker<'_, '_>, index: usize, item: &Spanned<DeValue<'_>>) -> Option<Entry> {
+    let path = format!("object.{index}");
+    let DeValue::Table(table) = item.get_ref() else {
+        let found = format!("entry {} of `object` is of type {}", index + 1, item.get_ref().type_str());
+        c.push(Problem::new(item.span(), found).expecting("expected a table: `[[object]]`"));
+        return None;
+    };
+    let model = model_name(c, table, item.span())?;
+    let (mut common, mut own) = (DeTable::new(), DeTable::new());
+    for (key, value) in table {
+        // `hold` with a list of sides is a key of the soft models, not the common one
+        let sides = key.get_ref() == "hold" && matches!(value.get_ref(), DeValue::Array(_));
+        let shared = COMMON_KEYS.contains(&key.get_ref().as_ref()) && !sides;
+        let into = if shared { &mut common } else { &mut own };
+        into.insert(key.clone(), value.clone());
+    }
+    own.remove("model");
+    let span = item.span();
+    let common = read::<CommonFile>(c, common, span.clone());
+    let own = match model {
+        "tube" => read(c, own, span).map(ModelFile::Tube),
+        "rigid" => read(c, own, span).map(ModelFile::Rigid),
+        "sheet" => read(c, own, span).map(ModelFile::Sheet),
+        "solid" => read(c, own, span).map(ModelFile::Solid),
+        "rope" => read(c, own, span).map(ModelFile::Rope),
+        "instrument" => read(c, own, span).map(ModelFile::Instrument),
+        "mesh" => read(c, own, span).map(ModelFile::Mesh),
+        "tree" => read(c, own, span).map(ModelFile::Tree),
+        _ => read(c, own, span).map(ModelFile::Synthetic),
+    };
+    let common = common?;
+    let place = Place::new(path, format!("of `{}`", common.name.chars().take(NAME_MAX).collect::<String>()));
+    Some(Entry { place, common, model: own?, fixed: false, copies: Copies::single() })
+}
+
+fn model_name(c: &mut Checker<'_, '_>, table: &DeTable<'_>, span: Range<usize>) -> Option<&'static str> {
+    let list = MODELS.map(|m| format!("`{m}`")).join(", ");
+    let Some(value) = table.get("model") else {
+        let problem = Problem::new(span, "the key `model` is missing".to_owned());
+        c.push(problem.expecting(format!("expected `model` in this table: one of {list}")));
+        return None;
+    };
+    let found = value.get_ref().as_str();
+    if let Some(model) = MODELS.into_iter().find(|m| Some(*m) == found) {
+        return Some(model);
+    }
+    let message = match found {
+        Some(found) => format!("`model` is `{found}`, which does not exist"),
+        None => format!("`model` is of type {}", value.get_ref().type_str()),
+    };
+    let help = found.and_then(|found| did_you_mean(found, MODELS));
+    c.push(Problem::new(value.span(), message).expecting(format!("expected one of {list}")).helped(help));
+    None
+}
+
+fn read<T: DeserializeOwned>(c: &mut Checker<'_, '_>, table: DeTable<'_>, span: Range<usize>) -> Option<T> {
+    c.read(table, span, &[&COMMON_KEYS[..], &["model"]].concat())
+}
+
+/// Gives every object its name and every agent its id, in the order of the file.
+fn name_all(c: &mut Checker<'_, '_>, entries: &[Entry]) -> Names {
+    let mut names = Names::default();
+    let mut next = 0;
+    for entry in entries {
+        let name = &entry.common.name;
+        let named = |id: AgentId| match (&entry.model, entry.fixed) {
+            (ModelFile::Mesh(_) | ModelFile::Tree(_), _) => Named::Scenery,
+            (_, true) => Named::Fixed,
+            (ModelFile::Tube(_), _) => Named::Tube(id),
+            (ModelFile::Rigid(_), _) => Named::Rigid(id),
+            (ModelFile::Sheet(_) | ModelFile::Solid(_) | ModelFile::Rope(_), _) => Named::Soft(id),
+            (ModelFile::Instrument(_), _) => Named::Tool(id),
+            (ModelFile::Synthetic(_), _) => Named::Synthetic(id),
+        };
+        let first = next;
+        next += if entry.fixed { 0 } else { entry.copies.len() as u32 };
+        let length = name.chars().count();
+        if name.trim().is_empty() || length > NAME_MAX || name.chars().any(char::is_control) {
+            let expected = format!("expected 1 … {NAME_MAX} characters that can be seen");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", "is not a name", expected);
+            continue;
+        }
+        if name == WORLD {
+            let what = format!("is `{WORLD}`, by which joints mean what does not move");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected another name");
+        }
+        let taken = (first..).zip(entry.copies.names(name)).filter_map(|(id, name)| {
+            let before = names.0.insert(name.clone(), named(AgentId(id)));
+            before.map(|_| name)
+        });
+        if let Some(name) = taken.collect::<Vec<_>>().first() {
+            let what = format!("`{name}` is taken");
+            c.wrong(&Place::new(entry.place.path.clone(), ""), "name", what, "expected a name of its own");
+        }
+    }
+    names
+}
+
+fn fixed_objects(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> (Vec<Obstacle>, Vec<Look>) {
+    let mut found = (Vec::new(), Vec::new());
+    for entry in entries.iter().filter(|e| e.fixed) {
+        let ModelFile::Rigid(file) = &entry.model else { continue };
+        // checked although not used: a fixed object has no steps, but a wrong rate is still wrong
+        pace(c, &entry.place, &entry.common);
+        untolerated(c, &entry.place, &entry.common);
+        levels(c, &entry.place, &entry.common);
+        let look = look(c, &entry.place, &entry.common, Material::Plastic);
+        if let Some(obstacle) = rigid::obstacle(c, &entry.place, file, source) {
+            for (offset, name) in entry.copies.places(&entry.common.name) {
+                found.0.push(Obstacle { name, position: obstacle.position + offset, ..obstacle.clone() });
+                found.1.push(look);
+            }
+        }
+    }
+    if found.0.len() > OBSTACLES_MAX {
+        too_many(c, "fixed objects", found.0.len(), OBSTACLES_MAX);
+    }
+    found
+}
+
+pub(super) fn too_many(c: &mut Checker<'_, '_>, what: &str, count: usize, most: usize) {
+    let message = format!("the scene has {count} {what}");
+    let span = c.document().locate(&format!("object.{}", most));
+    c.push(Problem::new(span, message).expecting(format!("expected at most {most}")));
+}
+
+struct Stage<'a> {
+    around: &'a Around<'a>,
+    obstacles: &'a Arc<[Obstacle]>,
+}
+
+fn agents(c: &mut Checker<'_, '_>, entries: &[Entry], names: &Names, stage: &Stage<'_>) -> Vec<Member> {
+    let moving: Vec<&Entry> = entries.iter().filter(|e| !e.fixed).collect();
+    let count = moving.iter().map(|entry| entry.copies.len()).sum();
+    if count > AGENTS_MAX {
+        too_many(c, "agents", count, AGENTS_MAX);
+        return Vec::new();
+    }
+    let mut members = Vec::with_capacity(count);
+    let mut firsts = Vec::with_capacity(moving.len());
+    let mut next = 0;
+    for entry in moving {
+        if let Some(member) = member(c, entry, AgentId(next), (names, stage)) {
+            firsts.push((entry, members.len()));
+            members.extend(entry.copies.members(&member));
+        }
+        next += entry.copies.len() as u32;
+    }
+    link(&mut members);
+    if c.count() == 0 {
+        firsts.iter().for_each(|(entry, at)| try_out(c, &entry.place, &members[*at]));
+    }
+    members
+}
+
+/// Reports what only the model can find wrong with an object: builds it once and drops it.
+fn try_out(c: &mut Checker<'_, '_>, place: &Place, member: &Member) {
+    let verdict = match member.spec.clone() {
+        Spec::Tube(spec) => match Tube::new(spec) {
+            Err(TubeError::Cusp { index, degrees }) => {
+                let what = format_args!("turns back on itself at point {index}, by {degrees:.0}°");
+                return c.wrong(place, &format!("path_m.{index}"), what, "expected a turn of at most 170°");
+            }
+            Ok(built) => {
+                tube::check_step(c, place, &built, member.pace.dt_range.1.as_secs_f64());
+                Ok(())
+            }
+            Err(e) => Err(e.to_string()),
+        },
+        Spec::Rigid(spec) => RigidBody::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Soft(spec) => SoftBody::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Instrument(spec) => Instrument::new(spec).map(drop).map_err(|e| e.to_string()),
+        Spec::Synthetic(spec) => {
+            Synthetic::new(spec, member.simulation, member.start).map(drop).map_err(|e| e.to_string())
+        }
+    };
+    if let Err(reason) = verdict {
+        let span = c.document().locate(&format!("{}.name", place.path));
+        let expected = format!("expected a {} that can be built", member.spec.model());
+        c.push(Problem::new(span, format!("`{}` cannot be built: {reason}", member.name)).expecting(expected));
+    }
+}
+
+fn member(c: &mut Checker<'_, '_>, entry: &Entry, id: AgentId, (names, stage): (&Names, &Stage<'_>)) -> Option<Member> {
+    let Entry { place, common, model, .. } = entry;
+    let given = Given {
+        place,
+        source: stage.around.source,
+        gravity: stage.around.gravity,
+        obstacles: stage.obstacles,
+        levels: levels(c, place, common),
+        sleep: common.sleep.unwrap_or(true),
+    };
+    let pace = pace(c, place, common);
+    let faults = faults(c, place, (common.faults.as_ref(), stage.around.faults));
+    let material = match model {
+        ModelFile::Tube(_) | ModelFile::Sheet(_) | ModelFile::Solid(_) => Material::Tissue,
+        ModelFile::Instrument(_) => Material::Metal,
+        _ => Material::Plastic,
+    };
+    let look = look(c, place, common, material);
+    let levels = given.levels;
+    // a body without length has one interval: its ε has no effect
+    let unit = Resolution { eps_m: 1.0, n: levels.1 };
+    let flat = ResolutionRange { eps_m: (1.0, 1.0), n: levels };
+    let (spec, start, simulation, picture) = match model {
+        ModelFile::Tube(file) => {
+            let built = tube::build(c, file, &given);
+            let (start, range) = (built.spec.resolution, built.spec.range);
+            (Spec::Tube(built.spec), start, range, built.picture)
+        }
+        ModelFile::Rigid(file) => (Spec::Rigid(rigid::build(c, file, &given)?), unit, flat, flat),
+        ModelFile::Sheet(file) => (Spec::Soft(soft::sheet(c, file, &given)), unit, flat, flat),
+        ModelFile::Solid(file) => (Spec::Soft(soft::solid(c, file, &given)?), unit, flat, flat),
+        ModelFile::Rope(file) => (Spec::Soft(soft::rope(c, file, &given)), unit, flat, flat),
+        ModelFile::Instrument(file) => (Spec::Instrument(instrument::build(c, file, &given, names)), unit, flat, flat),
+        ModelFile::Synthetic(file) => {
+            let (spec, range) = synthetic::build(c, file, &given);
+            (Spec::Synthetic(spec), Resolution { eps_m: range.eps_m.1, n: levels.1 }, range, flat)
+        }
+        ModelFile::Mesh(_) | ModelFile::Tree(_) => return None,
+    };
+    let (name, links) = (common.name.clone(), Vec::new());
+    let tolerance_m = tolerance(c, place, common, (pace, (!matches!(spec, Spec::Instrument(_))).then_some(simulation)));
+    Some(Member { id, name, spec, pace, tolerance_m, simulation, start, picture, links, look, faults })
+}
+
+/// Links each tool with the agents that it can grasp, in both directions.
+fn link(members: &mut [Member]) {
+    let mut pairs = Vec::new();
+    for member in members.iter() {
+        if let Spec::Instrument(tool) = &member.spec {
+            pairs.extend(tool.graspable.iter().map(|tube| (member.id, *tube)));
+        }
+    }
+    for member in members {
+        let of = |(a, b): &(AgentId, AgentId)| match member.id {
+            id if id == *a => Some(*b),
+            id if id == *b => Some(*a),
+            _ => None,
+        };
+        member.links = pairs.iter().filter_map(of).collect();
+    }
+}

@@ -1,0 +1,305 @@
+//! A rigid object of the file as a [`RigidSpec`], or as an [`Obstacle`] where it is fixed.
+
+use super::POSITION_MAX_M;
+use super::mesh;
+use super::mesh::Mesh;
+use super::object::Given;
+use crate::check::{Allowed, Checker, Place, allowed};
+use crate::format::{Point, RigidFile, Shape};
+use crate::source::Source;
+use glam::{DQuat, DVec3, EulerRot};
+use metachron_geometry::{Obstacle, Solid};
+use metachron_models::rigid::RigidSpec;
+use std::sync::Arc;
+
+/// Density where a scene gives neither mass nor density: water's, kg/m³.
+const DENSITY_DEFAULT_KG_M3: f64 = 1000.0;
+/// Fastest start, m/s and rad/s.
+const SPEED_MAX: f64 = 1e4;
+
+const LENGTH: Allowed = allowed(1e-6..=1e4, "m");
+const MASS: Allowed = allowed(1e-9..=1e9, "kg");
+
+/// Rotation by angles about the world's x, then y, then z axis, in degrees.
+pub(super) fn rotation(degrees: DVec3) -> DQuat {
+    let turn = degrees * (std::f64::consts::PI / 180.0);
+    DQuat::from_euler(EulerRot::ZYX, turn.z, turn.y, turn.x)
+}
+
+/// Whether the object never moves; reports a plane with `fixed = false`.
+pub(super) fn is_fixed(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
+    let plane = file.shape == Shape::Plane;
+    if plane && file.fixed == Some(false) {
+        c.wrong(
+            place,
+            "fixed",
+            "is false, but the object is a plane",
+            "expected true: a plane has no end and cannot move",
+        );
+    }
+    plane || file.fixed == Some(true)
+}
+
+/// Reads a fixed object.
+pub(super) fn obstacle(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Obstacle> {
+    for (key, given) in [("velocity_m_s", file.velocity_m_s), ("spin_rad_s", file.spin_rad_s)] {
+        if given.is_some_and(|v| v != [0.0; 3]) {
+            c.wrong(place, key, "moves an object that is fixed", "expected no motion, or `fixed = false`");
+        }
+    }
+    let solid = solid(c, place, file, source)?;
+    let (position, rotation) = pose(c, place, file);
+    let (restitution, friction) = surface(c, place, file);
+    Some(Obstacle { name: String::new(), solid, position, rotation, friction, restitution })
+}
+
+/// Reads a moving object.
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &RigidFile, given: &Given<'_>) -> Option<RigidSpec> {
+    let place = given.place;
+    let before = c.count();
+    let solid = solid(c, place, file, given.source)?;
+    // a wrong shape gives a wrong mass: one problem is reported, not two
+    let mass_kg = if c.count() == before { mass(c, place, file, &solid) } else { 1.0 };
+    let (position, rotation) = pose(c, place, file);
+    let (restitution, friction) = surface(c, place, file);
+    Some(RigidSpec {
+        solid,
+        position,
+        rotation,
+        velocity: point_or_zero(c, place, "velocity_m_s", file.velocity_m_s, SPEED_MAX),
+        spin: point_or_zero(c, place, "spin_rad_s", file.spin_rad_s, SPEED_MAX),
+        mass_kg,
+        restitution,
+        friction,
+        gravity: given.gravity,
+        obstacles: Arc::clone(given.obstacles),
+        joints: Arc::new([]),
+        sleep: given.sleep,
+    })
+}
+
+pub(super) fn point_or_zero(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    key: &str,
+    value: Option<Point>,
+    most: f64,
+) -> DVec3 {
+    value.map_or(DVec3::ZERO, |value| c.point(place, key, value, most))
+}
+
+fn pose(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (DVec3, DQuat) {
+    let position = point_or_zero(c, place, "position_m", file.position_m, POSITION_MAX_M);
+    (position, rotation(point_or_zero(c, place, "rotation_deg", file.rotation_deg, 1e6)))
+}
+
+fn surface(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> (f64, f64) {
+    let restitution = c.number_or(place, "restitution", (file.restitution, 0.2), &allowed(0.0..=1.0, ""));
+    (restitution, c.number_or(place, "friction", (file.friction, 0.5), &allowed(0.0..=10.0, "")))
+}
+
+/// The keys that each shape takes, of those that describe shapes.
+const fn keys_of(shape: Shape) -> &'static [&'static str] {
+    match shape {
+        Shape::Ball => &["radius_m"],
+        Shape::Box => &["half_extents_m"],
+        Shape::Capsule | Shape::Cylinder => &["radius_m", "half_height_m"],
+        Shape::Plane => &[],
+        Shape::Hull | Shape::Mesh => &["file", "scale"],
+    }
+}
+
+/// Reports keys that belong to another shape, and required keys that are missing; returns whether none is missing.
+fn check_shape_keys(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile) -> bool {
+    let takes = keys_of(file.shape);
+    let given = [
+        ("radius_m", file.radius_m.is_some()),
+        ("half_extents_m", file.half_extents_m.is_some()),
+        ("half_height_m", file.half_height_m.is_some()),
+        ("file", file.file.is_some()),
+        ("scale", file.scale.is_some()),
+    ];
+    let name = format!("{:?}", file.shape).to_lowercase();
+    let list = takes.iter().map(|k| format!("`{k}`")).collect::<Vec<_>>().join(" and ");
+    let expected = if list.is_empty() { format!("a {name} has no measures") } else { format!("a {name} has {list}") };
+    let mut complete = true;
+    for (key, is_given) in given {
+        let takes = takes.contains(&key);
+        if is_given && !takes {
+            c.wrong(place, key, format_args!("does not belong to a {name}"), expected.clone());
+        }
+        if takes && !is_given && key != "scale" {
+            c.wrong(place, key, "is missing", format!("{expected}: expected `{key}` in this table"));
+            complete = false;
+        }
+    }
+    complete
+}
+
+fn solid(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Solid> {
+    if !check_shape_keys(c, place, file) {
+        return None;
+    }
+    let mut length = |key: &str, value: Option<f64>| c.number(place, key, value.unwrap_or_default(), &LENGTH);
+    Some(match file.shape {
+        Shape::Ball => Solid::Ball { radius_m: length("radius_m", file.radius_m) },
+        Shape::Capsule => Solid::Capsule {
+            radius_m: length("radius_m", file.radius_m),
+            half_height_m: length("half_height_m", file.half_height_m),
+        },
+        Shape::Cylinder => Solid::Cylinder {
+            radius_m: length("radius_m", file.radius_m),
+            half_height_m: length("half_height_m", file.half_height_m),
+        },
+        Shape::Box => {
+            let half = file.half_extents_m.unwrap_or_default();
+            let half = std::array::from_fn(|i| length(&format!("half_extents_m.{i}"), Some(half[i])));
+            Solid::Box { half_extents_m: DVec3::from_array(half) }
+        }
+        Shape::Plane => Solid::Plane,
+        Shape::Hull => {
+            let (points_m, _) = from_file(c, place, file, source)?;
+            sound(c, place, Solid::Hull { points_m })?
+        }
+        Shape::Mesh => {
+            let (points_m, triangles) = from_file(c, place, file, source)?;
+            sound(c, place, Solid::Mesh { points_m, triangles })?
+        }
+    })
+}
+
+/// Points of a mesh, metres, and its triangles.
+type Surface = (Arc<[DVec3]>, Arc<[[u32; 3]]>);
+
+fn from_file(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, source: &Source) -> Option<Surface> {
+    let name = file.file.as_deref()?;
+    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
+    let read = source.sibling(name).and_then(|bytes| mesh::read(&bytes, scale));
+    match read {
+        Ok(Mesh { points, triangles, .. }) => Some((points.iter().map(|p| *p * scale).collect(), triangles.into())),
+        Err(why) => {
+            c.wrong(
+                place,
+                "file",
+                format_args!("cannot be used: {name}: {why}"),
+                "expected a .glb or OBJ file beside the scene",
+            );
+            None
+        }
+    }
+}
+
+/// The solid, if the physics can make a shape of it.
+fn sound(c: &mut Checker<'_, '_>, place: &Place, solid: Solid) -> Option<Solid> {
+    match solid.to_shared_shape() {
+        Ok(_) => Some(solid),
+        Err(why) => {
+            c.wrong(place, "file", format_args!("has no usable shape: {why}"), "expected the points of a solid");
+            None
+        }
+    }
+}
+
+fn mass(c: &mut Checker<'_, '_>, place: &Place, file: &RigidFile, solid: &Solid) -> f64 {
+    if let Some(mass) = file.mass_kg {
+        if file.density_kg_m3.is_some() {
+            let expected = "expected `mass_kg` or `density_kg_m3`, not both";
+            c.wrong(place, "density_kg_m3", "contradicts `mass_kg`", expected);
+        }
+        return c.number(place, "mass_kg", mass, &MASS);
+    }
+    let density =
+        c.number_or(place, "density_kg_m3", (file.density_kg_m3, DENSITY_DEFAULT_KG_M3), &allowed(1e-3..=1e6, "kg/m³"));
+    let volume = volume_m3(solid);
+    if is_flat(solid, volume) {
+        let what = format!(
+            "encloses {volume:.1e} m³, so that nothing is there to weigh: its triangles lie in one plane or do not close"
+        );
+        c.wrong(place, "file", what, "expected a closed surface, or `mass_kg`, or `fixed = true`");
+        return 1.0;
+    }
+    let mass = density * volume;
+    if !MASS.contains(mass) {
+        let what = format!("gives a mass of {mass:.3e} kg");
+        c.wrong(place, "density_kg_m3", what, format!("expected a density that gives {MASS}; or set `mass_kg`"));
+        return 1.0;
+    }
+    mass
+}
+
+/// Whether triangles enclose next to nothing of the box around them: volumes are computed in single precision.
+fn is_flat(solid: &Solid, volume: f64) -> bool {
+    let (Solid::Hull { points_m } | Solid::Mesh { points_m, .. }) = solid else { return false };
+    let corners = points_m.iter().copied().reduce(DVec3::min).zip(points_m.iter().copied().reduce(DVec3::max));
+    corners.is_none_or(|(low, high)| volume < 1e-7 * low.distance(high).powi(3))
+}
+
+/// The volume a solid encloses.
+fn volume_m3(solid: &Solid) -> f64 {
+    use std::f64::consts::PI;
+    match solid {
+        Solid::Ball { radius_m } => 4.0 / 3.0 * PI * radius_m.powi(3),
+        Solid::Box { half_extents_m } => 8.0 * half_extents_m.element_product(),
+        Solid::Capsule { radius_m, half_height_m } => {
+            PI * radius_m * radius_m * (4.0 / 3.0 * radius_m + 2.0 * half_height_m)
+        }
+        Solid::Cylinder { radius_m, half_height_m } => PI * radius_m * radius_m * 2.0 * half_height_m,
+        Solid::Plane => 0.0,
+        Solid::Hull { .. } | Solid::Mesh { .. } => {
+            solid.to_shared_shape().map_or(0.0, |shape| f64::from(shape.mass_properties(1.0).mass()).abs())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn rotations_turn_about_the_worlds_axes_in_turn() {
+        // about x, z goes to -y; about z, -y goes to x
+        let turned = rotation(DVec3::new(90.0, 0.0, 90.0)) * DVec3::Z;
+        assert!(turned.distance(DVec3::X) < 1e-15, "{turned}"); // two rotations, one ulp each
+    }
+
+    #[test]
+    fn triangles_in_one_plane_enclose_nothing_and_a_thin_plate_does() {
+        let plate = |height: f64| {
+            let corner = |i: i32| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), height * f64::from(i >> 2));
+            let corners: Vec<DVec3> = (0..8).map(corner).collect();
+            let faces = [
+                [0, 2, 1],
+                [1, 2, 3],
+                [4, 5, 6],
+                [5, 7, 6],
+                [0, 1, 4],
+                [1, 5, 4],
+                [2, 6, 3],
+                [3, 6, 7],
+                [0, 4, 2],
+                [2, 4, 6],
+                [1, 3, 5],
+                [3, 7, 5],
+            ];
+            Solid::Mesh { points_m: corners.into(), triangles: faces.to_vec().into() }
+        };
+        let sheet = Solid::Mesh {
+            points_m: vec![DVec3::ZERO, DVec3::X, DVec3::Y, DVec3::X + DVec3::Y].into(),
+            triangles: vec![[0, 1, 2], [1, 3, 2]].into(),
+        };
+        assert!(is_flat(&sheet, volume_m3(&sheet)));
+        let thin = plate(1e-3);
+        assert!(!is_flat(&thin, volume_m3(&thin)), "{}", volume_m3(&thin));
+        assert!(!is_flat(&Solid::Plane, 0.0));
+    }
+
+    #[test]
+    fn volumes_are_those_of_the_formulas() {
+        let cube: Vec<DVec3> =
+            (0..8).map(|i| DVec3::new(f64::from(i & 1), f64::from(i >> 1 & 1), f64::from(i >> 2))).collect();
+        let hull = volume_m3(&Solid::Hull { points_m: cube.into() });
+        assert!((hull - 1.0).abs() < 1e-5, "{hull}"); // parry computes in f32
+        let capsule = volume_m3(&Solid::Capsule { radius_m: 1.0, half_height_m: 0.5 });
+        assert!((capsule - std::f64::consts::PI * (7.0 / 3.0)).abs() < 1e-14);
+    }
+}

@@ -1,0 +1,246 @@
+//! Reads meshes and trees of a scene file as scenery.
+//!
+//! In: entries of these models. Out: [`Scenery`], copies sharing one model. Never here: groups, drawing.
+
+use super::common::{levels, look, pace, painted_look, parse_colour};
+use super::object::{Entry, ModelFile, OBSTACLES_MAX, too_many};
+use super::rigid::{point_or_zero, rotation};
+use super::texture;
+use super::texture::Textures;
+use super::{POSITION_MAX_M, mesh};
+use crate::check::{Checker, Place, allowed};
+use crate::format::{GeneratorKind, MeshFile, Point, TreeFile, TreeLod};
+use crate::source::Source;
+use glam::{DQuat, DVec3};
+use metachron_geometry::{Generator, Model, Placement, Tom, TreeSpec, generate, geodesic_edges, painted_mesh, tree};
+use metachron_world::kinds::Material;
+use metachron_world::{Look, Scenery};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// Default triangles of a generated mesh.
+const TRIANGLES_DEFAULT: u32 = 1000;
+/// Default boughs and leaves of a tree: the first of (RH05, §6).
+const TREE_DEFAULT: (u32, u32) = (62, 240);
+/// Most boughs, most leaves.
+const PIECES_MAX: f64 = 1e5;
+/// Leaves are less important than the trunk (RH05, §6 gives no number).
+const LEAVES_IMPORTANCE: f64 = 0.5;
+/// Default colours.
+const BARK: [u8; 3] = [0x6e, 0x50, 0x3a];
+const LEAF: [u8; 3] = [0x5a, 0x8a, 0x42];
+
+/// Meshes already made and their greatest coordinate in their own unit, by what they were made from: equal ones are shared.
+type Made = BTreeMap<(String, u32, [Option<u32>; 2]), (Arc<Tom>, f64)>;
+
+/// Reads every mesh and tree.
+pub(super) fn read(c: &mut Checker<'_, '_>, entries: &[Entry], source: &Source) -> Vec<Scenery> {
+    let (mut scenery, mut made, mut textures) = (Vec::new(), Made::new(), Textures::new());
+    for entry in entries {
+        let before = c.count();
+        let parts = match &entry.model {
+            ModelFile::Mesh(file) => {
+                let parts = mesh_parts(c, entry, file, (source, &mut made));
+                texture::painted(c, entry, (file, parts), (source, &mut textures))
+            }
+            ModelFile::Tree(file) => tree_parts(c, entry, file),
+            _ => continue,
+        };
+        if c.count() > before {
+            continue;
+        }
+        for (offset, name) in entry.copies.places(&entry.common.name) {
+            scenery.extend(parts.iter().map(|(suffix, part)| Scenery {
+                name: format!("{name}{suffix}"),
+                at: Placement { position: part.at.position + offset, ..part.at },
+                ..part.clone()
+            }));
+        }
+    }
+    if scenery.len() > OBSTACLES_MAX {
+        too_many(c, "meshes and trees", scenery.len(), OBSTACLES_MAX);
+    }
+    scenery
+}
+
+/// The mesh of a file or a generator, as the table at `place` requests it.
+pub(super) fn mesh_model(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &MeshFile,
+    source: &Source,
+) -> Option<(Arc<Tom>, Placement)> {
+    if file.dome_m.is_some() {
+        c.wrong(place, "dome_m", "makes many of one proxy", "expected a single mesh");
+    }
+    mesh_of(c, place, file, (source, &mut Made::new()))
+}
+
+fn mesh_of(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &MeshFile,
+    (source, made): (&Source, &mut Made),
+) -> Option<(Arc<Tom>, Placement)> {
+    let count = |n: u32| f64::from(n);
+    let triangles = file.triangles.map(|n| c.number(place, "triangles", count(n), &allowed(4.0..=1e6, "")) as u32);
+    let least =
+        file.least_triangles.map(|n| c.number(place, "least_triangles", count(n), &allowed(1.0..=1e6, "")) as u32);
+    let scale = c.number_or(place, "scale", (file.scale, 1.0), &allowed(1e-6..=1e6, ""));
+    let at = Placement { scale, ..placement(c, place, (file.position_m, file.rotation_deg)) };
+    if file.seed.is_some() && file.generate.is_none() {
+        c.wrong(place, "seed", "has nothing to act on", "expected `generate` beside it");
+    }
+    let made_from = match (&file.file, file.generate) {
+        (Some(name), None) => name.clone(),
+        (None, Some(kind)) => format!("{kind:?}"),
+        (Some(_), Some(_)) => {
+            c.wrong(place, "generate", "contradicts `file`", "expected one of them");
+            return None;
+        }
+        (None, None) => {
+            c.wrong(place, "file", "is missing", "expected `file` or `generate` in this table");
+            return None;
+        }
+    };
+    let key = (made_from, file.seed.unwrap_or(0), [triangles, least]);
+    if let Some((tom, reach)) = made.get(&key) {
+        return in_bounds(c, place, "scale", (scale, *reach)).then(|| (Arc::clone(tom), at));
+    }
+    let made_now = match (&file.file, file.generate) {
+        (Some(name), _) => from_file(name, source, scale),
+        (None, kind) => Tom::new(&generate(generator(kind?), u64::from(key.1), triangles.unwrap_or(TRIANGLES_DEFAULT)))
+            .map_err(|why| why.to_string()),
+    };
+    match made_now {
+        Ok(tom) => {
+            let wanted = triangles.or(file.generate.map(|_| TRIANGLES_DEFAULT));
+            let tom = match wanted {
+                Some(most) => tom.truncated(most),
+                None => tom,
+            };
+            let tom = Arc::new(tom.no_coarser(least.unwrap_or(0)));
+            let reach = reach(&tom);
+            made.insert(key, (Arc::clone(&tom), reach));
+            in_bounds(c, place, "scale", (scale, reach)).then_some((tom, at))
+        }
+        Err(why) => {
+            let what = format!("cannot be used: {}: {why}", key.0);
+            c.wrong(place, "file", what, "expected a .glb or OBJ file beside the scene");
+            None
+        }
+    }
+}
+
+fn from_file(name: &str, source: &Source, scale: f64) -> Result<Tom, String> {
+    let mesh = mesh::read(&source.sibling(name)?, scale)?;
+    Tom::new(&painted_mesh(&mesh.points, &mesh.uvs, &mesh.triangles)).map_err(|why| why.to_string())
+}
+
+/// The greatest coordinate of a mesh, in its own unit.
+fn reach(tom: &Tom) -> f64 {
+    tom.vertices().iter().map(|v| f64::from(v.core.abs().max_element())).fold(0.0, f64::max)
+}
+
+/// Whether a mesh whose coordinates go up to `reach` in its own unit is within the bounds of a scene at this scale; reports it if not.
+fn in_bounds(c: &mut Checker<'_, '_>, place: &Place, key: &str, (scale, reach): (f64, f64)) -> bool {
+    let within = mesh::within(reach, scale);
+    if let Err(why) = &within {
+        c.wrong(place, key, format_args!("makes it too large: {why}"), "expected a mesh within the bounds of a scene");
+    }
+    within.is_ok()
+}
+
+const fn generator(kind: GeneratorKind) -> Generator {
+    match kind {
+        GeneratorKind::Sphere => Generator::Sphere,
+        GeneratorKind::Torus => Generator::Torus,
+        GeneratorKind::Blob => Generator::Blob,
+        GeneratorKind::Terrain => Generator::Terrain,
+        GeneratorKind::Seat => Generator::Seat,
+        GeneratorKind::Strut => Generator::Strut,
+        GeneratorKind::Bar => Generator::Bar,
+        GeneratorKind::Table => Generator::Table,
+        GeneratorKind::Shelf => Generator::Shelf,
+        GeneratorKind::Door => Generator::Door,
+        GeneratorKind::Books => Generator::Books,
+    }
+}
+
+fn placement(c: &mut Checker<'_, '_>, place: &Place, (position, turn): (Option<Point>, Option<Point>)) -> Placement {
+    let position = point_or_zero(c, place, "position_m", position, POSITION_MAX_M);
+    let rotation = rotation(point_or_zero(c, place, "rotation_deg", turn, 1e6)).normalize();
+    Placement { position, rotation, scale: 1.0 }
+}
+
+/// The parts of one copy, each with the suffix of its name.
+pub(super) type Parts = Vec<(String, Scenery)>;
+
+/// Checks common keys that scenery does not use: it has no steps, but a wrong rate is still wrong.
+fn read_besides(c: &mut Checker<'_, '_>, entry: &Entry) {
+    pace(c, &entry.place, &entry.common);
+    levels(c, &entry.place, &entry.common);
+}
+
+fn mesh_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &MeshFile, from: (&Source, &mut Made)) -> Parts {
+    read_besides(c, entry);
+    let look = painted_look(c, &entry.place, &entry.common, Material::Plastic);
+    if file.dome_m.is_some() && file.scale.is_some() {
+        c.wrong(&entry.place, "scale", "contradicts `dome_m`", "expected one of them");
+    }
+    let dome = file.dome_m.map(|radius| c.number(&entry.place, "dome_m", radius, &allowed(1e-3..=1e4, "m")));
+    let Some((tom, at)) = mesh_of(c, &entry.place, file, from) else { return Parts::new() };
+    let part = |at| Scenery { name: String::new(), model: Model::Mesh(Arc::clone(&tom)), at, look, texture: None };
+    match dome {
+        None => vec![(String::new(), part(at))],
+        Some(radius_m) => {
+            let places: Vec<Placement> = dome_places(at, radius_m).collect();
+            let scale = places.iter().map(|at| at.scale).fold(0.0, f64::max);
+            in_bounds(c, &entry.place, "dome_m", (scale, reach(&tom)));
+            places.into_iter().enumerate().map(|(k, at)| (format!("-{k}"), part(at))).collect()
+        }
+    }
+}
+
+fn tree_parts(c: &mut Checker<'_, '_>, entry: &Entry, file: &TreeFile) -> Parts {
+    let place = &entry.place;
+    read_besides(c, entry);
+    let bark = look(c, place, &entry.common, Material::Skin);
+    let pieces = allowed(1.0..=PIECES_MAX, "");
+    let mut count = |key: &str, given: Option<u32>, usual: u32| {
+        c.number_or(place, key, (given.map(f64::from), f64::from(usual)), &pieces) as u32
+    };
+    let (branches, leaves) =
+        (count("branches", file.branches, TREE_DEFAULT.0), count("leaves", file.leaves, TREE_DEFAULT.1));
+    let spec = TreeSpec {
+        seed: u64::from(file.seed.unwrap_or(0)),
+        height_m: c.number(place, "height_m", file.height_m, &allowed(0.01..=1e3, "m")),
+        branches,
+        leaves,
+        prefix: file.lod == Some(TreeLod::Prefix),
+    };
+    let share = (file.leaves_importance, LEAVES_IMPORTANCE);
+    let share = c.number_or(place, "leaves_importance", share, &allowed(1e-3..=1.0, ""));
+    let colour = file.leaves_colour.as_deref().map_or(Some(LEAF), parse_colour).unwrap_or_else(|| {
+        c.wrong(place, "leaves_colour", "is no colour", "expected `#rrggbb`, such as `#5a8a42`");
+        LEAF
+    });
+    let leaf = Look { colour, importance: bark.importance * share, ..bark };
+    let bark = Look { colour: if entry.common.colour.is_some() { bark.colour } else { BARK }, ..bark };
+    let at = placement(c, place, (file.position_m, file.rotation_deg));
+    let [trunk, crown] = tree(&spec).map(|foliage| Model::Foliage(Arc::new(foliage)));
+    let part = |model, look| Scenery { name: String::new(), model, at, look, texture: None };
+    vec![(String::new(), part(trunk, bark)), (".leaves".to_owned(), part(crown, leaf))]
+}
+
+/// Placements along every edge of a geodesic sphere about `at`: −1 … 1 on a copy's z axis spans its edge from end to end.
+fn dome_places(at: Placement, radius_m: f64) -> impl Iterator<Item = Placement> {
+    geodesic_edges().into_iter().map(move |[a, b]| {
+        let along = b - a;
+        Placement {
+            position: at.position + at.rotation * (0.5 * radius_m * (a + b)),
+            rotation: at.rotation * DQuat::from_rotation_arc(DVec3::Z, along.normalize()),
+            scale: 0.5 * radius_m * along.length(),
+        }
+    })
+}

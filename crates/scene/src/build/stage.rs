@@ -1,0 +1,288 @@
+//! Reads target, camera, machine and probes of a scene file.
+
+use super::{Names, POSITION_MAX_M};
+use crate::check::{Allowed, Checker, Place, allowed};
+use crate::diagnostic::{Problem, did_you_mean};
+use crate::format::{CameraFile, CameraKeyFile, LoadFile, MODELS, MachineFile, ProbeFile, TargetFile};
+use glam::DVec3;
+use metachron_core::SimSpan;
+use metachron_world::{Camera, Gains, Machine, ObjectCost, Probe, Target, View};
+
+/// Default share of the lag that is reserved for choosing levels: the most that (GB99) needed.
+const OPTIMISER_SHARE: f64 = 0.05;
+/// Default frames per second.
+const FRAME_DEFAULT_HZ: f64 = 60.0;
+/// Default vertical angle of view, degrees.
+const FOV_DEFAULT_DEG: f64 = 40.0;
+/// Most keyframes of a camera.
+const KEYFRAMES_MAX: usize = 10_000;
+/// Most entries of a machine's load.
+const LOADS_MAX: usize = 1000;
+/// Most probes.
+const PROBES_MAX: usize = 1000;
+/// The machines that a scene can name.
+const PRESETS: [&str; 2] = ["two-cores-software", "workstation"];
+/// An eye nearer than this to the point it looks at has no direction, metres.
+const EYE_NEAREST_M: f64 = 1e-6;
+
+const FOV: Allowed = allowed(1.0..=150.0, "degrees");
+const TIME: Allowed = allowed(0.0..=1e6, "s");
+
+/// The target frame rate and how it is held.
+pub(crate) fn target(c: &mut Checker<'_, '_>, file: Option<&TargetFile>) -> Target {
+    let place = Place::new("target", "of `[target]`");
+    let frame_hz = file.and_then(|f| f.frame_hz);
+    let mut gain = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+    let gains = file.map_or_else(Gains::default, |f| Gains {
+        alpha: gain("alpha", f.alpha, allowed(1e-9..=1.0, "")),
+        beta: gain("beta", f.beta, allowed(1e-6..=1e3, "")),
+        kappa: gain("kappa", f.kappa, allowed(1e-3..=1.99, "")),
+        lead: gain("lead", f.lead, allowed(0.0..=1.99, "")),
+        margin: gain("margin", f.margin, allowed(0.0..=0.9, "")),
+    });
+    Target {
+        lag: lag(c, &place, file),
+        frame_hz: c.number_or(&place, "frame_hz", (frame_hz, FRAME_DEFAULT_HZ), &allowed(1.0..=1000.0, "Hz")),
+        policy: file.and_then(|f| f.policy).unwrap_or_default(),
+        value: file.and_then(|f| f.value).unwrap_or_default(),
+        law: file.and_then(|f| f.law).unwrap_or_default(),
+        gains,
+        raise: file.and_then(|f| f.raise).unwrap_or_default(),
+    }
+}
+
+/// The greatest lag in seconds and the optimiser's share of it.
+fn lag(c: &mut Checker<'_, '_>, place: &Place, file: Option<&TargetFile>) -> Option<(f64, f64)> {
+    let share = file.and_then(|f| f.optimiser_share);
+    let part = c.number_or(place, "optimiser_share", (share, OPTIMISER_SHARE), &allowed(1e-3..=0.5, ""));
+    let Some(lag_ms) = file.and_then(|f| f.lag_ms) else {
+        if share.is_some() {
+            c.wrong(place, "optimiser_share", "has nothing to act on", "expected `lag_ms` beside it");
+        }
+        return None;
+    };
+    Some((c.number(place, "lag_ms", lag_ms, &allowed(1.0..=1000.0, "ms")) * 1e-3, part))
+}
+
+/// Reads the camera of the scene.
+pub(crate) fn camera(c: &mut Checker<'_, '_>, file: Option<&CameraFile>) -> Option<Camera> {
+    let file = file?;
+    let place = Place::new("camera", "of `[camera]`");
+    let fov_deg = c.number_or(&place, "fov_deg", (file.fov_deg, FOV_DEFAULT_DEG), &FOV);
+    if let Some(keys) = &file.keyframe {
+        for (key, given) in [
+            ("eye_m", file.eye_m.is_some()),
+            ("look_at_m", file.look_at_m.is_some()),
+            ("period_s", file.period_s.is_some()),
+        ] {
+            if given {
+                c.wrong(&place, key, "contradicts `keyframe`", "expected it in the keyframes alone");
+            }
+        }
+        let keys = camera_keys(c, &place, keys, fov_deg)?;
+        return Some(Camera::Path { keys, repeat: file.repeat.unwrap_or(false), even: file.even.unwrap_or(false) });
+    }
+    for (key, given) in [("repeat", file.repeat.is_some()), ("even", file.even.is_some())] {
+        if given {
+            c.wrong(&place, key, "has no path to act on", "expected `[[camera.keyframe]]` tables beside it");
+        }
+    }
+    let Some(eye) = file.eye_m else {
+        c.wrong(&place, "eye_m", "is missing", "expected `eye_m` or `[[camera.keyframe]]` tables");
+        return None;
+    };
+    let start = view(c, &place, (eye, file.look_at_m.unwrap_or_default()), fov_deg);
+    Some(match file.period_s {
+        None => Camera::Still(start),
+        Some(period_s) if (0.1..=1e5).contains(&period_s.abs()) => Camera::Orbit { start, period_s },
+        Some(period_s) => {
+            let expected = "expected 0.1 … 100000 s, or the same below zero to turn the other way";
+            c.wrong(&place, "period_s", format_args!("is {period_s}"), expected);
+            Camera::Still(start)
+        }
+    })
+}
+
+fn view(c: &mut Checker<'_, '_>, place: &Place, (eye, look_at): ([f64; 3], [f64; 3]), fov_deg: f64) -> View {
+    let eye_m = c.point(place, "eye_m", eye, POSITION_MAX_M);
+    let look_at_m = c.point(place, "look_at_m", look_at, POSITION_MAX_M);
+    if eye_m.distance(look_at_m) < EYE_NEAREST_M && eye_m.is_finite() {
+        c.wrong(place, "eye_m", "is the point that it looks at", "expected a point away from `look_at_m`");
+        return View { eye_m: look_at_m + DVec3::ONE, look_at_m, fov_deg };
+    }
+    View { eye_m, look_at_m, fov_deg }
+}
+
+/// The views of a path, each with its time in seconds.
+fn camera_keys(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    files: &[CameraKeyFile],
+    fov_deg: f64,
+) -> Option<Vec<(f64, View)>> {
+    if !(2..=KEYFRAMES_MAX).contains(&files.len()) {
+        c.wrong(
+            place,
+            "keyframe",
+            format_args!("has {} entries", files.len()),
+            format!("expected 2 … {KEYFRAMES_MAX}"),
+        );
+        return None;
+    }
+    let mut keys: Vec<(f64, View)> = Vec::with_capacity(files.len());
+    for (i, file) in files.iter().enumerate() {
+        let place = place.entry("keyframe", i);
+        let at_s = c.number(&place, "at_s", file.at_s, &TIME);
+        let fov = c.number_or(&place, "fov_deg", (file.fov_deg, fov_deg), &FOV);
+        if let Some((before, _)) = keys.last().filter(|(before, _)| *before >= at_s) {
+            let expected = format!("expected a time after the keyframe before, {before} s");
+            c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
+        }
+        keys.push((at_s, view(c, &place, (file.eye_m, file.look_at_m), fov)));
+    }
+    Some(keys)
+}
+
+/// The values that the scene declares for its machine.
+pub(crate) fn machine(c: &mut Checker<'_, '_>, file: Option<&MachineFile>) -> Machine {
+    let default = MachineFile::default();
+    let file = file.unwrap_or(&default);
+    let place = Place::new("machine", "of `[machine]`");
+    let preset = file.preset.clone().unwrap_or_else(|| PRESETS[0].to_owned());
+    if !PRESETS.contains(&preset.as_str()) {
+        c.reference(&place, "preset", &preset, PRESETS.into_iter());
+    }
+    let mut number = |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+    let cores = number("cores", file.cores.map(f64::from), allowed(1.0..=4096.0, "")).map(|n| n as u32);
+    let draw_setup_ms = number("draw_setup_ms", file.draw_setup_ms, allowed(0.0..=1e4, "ms"));
+    let draw_object_us = number("draw_object_us", file.draw_object_us, allowed(0.0..=1e6, "µs"));
+    let draw_triangle_us = number("draw_triangle_us", file.draw_triangle_us, allowed(0.0..=1e4, "µs"));
+    let draw_pixel_ns = number("draw_pixel_ns", file.draw_pixel_ns, allowed(0.0..=1e6, "ns"));
+    let cull_object_ns = number("cull_object_ns", file.cull_object_ns, allowed(0.0..=1e6, "ns"));
+    let choose_object_ns = number("choose_object_ns", file.choose_object_ns, allowed(0.0..=1e6, "ns"));
+    let noise = number("noise", file.noise, allowed(0.0..=1.0, ""));
+    let wander = number("wander", file.wander, allowed(0.0..=1.0, ""));
+    let spikes = number("spikes", file.spikes, allowed(0.0..=1.0, ""));
+    let seed = file.seed.map(u64::from);
+    let steps = step_prices(c, &place.table("step"), file);
+    let shading = object_costs(c, &place.table("shading"), file);
+    let step_load = load(c, &place, ("step_load", &file.step_load));
+    let load = load(c, &place, ("load", &file.load));
+    Machine {
+        preset,
+        cores,
+        steps,
+        draw_setup_ms,
+        draw_object_us,
+        draw_triangle_us,
+        draw_pixel_ns,
+        cull_object_ns,
+        choose_object_ns,
+        shading,
+        noise,
+        wander,
+        spikes,
+        load,
+        step_load,
+        seed,
+    }
+}
+
+/// Reads additional load of the machine, as (seconds, factor).
+fn load(c: &mut Checker<'_, '_>, place: &Place, (key, entries): (&str, &[LoadFile])) -> Vec<(f64, f64)> {
+    if entries.len() > LOADS_MAX {
+        let expected = format!("expected at most {LOADS_MAX}");
+        c.wrong(place, key, format_args!("has {} entries", entries.len()), expected);
+        return Vec::new();
+    }
+    let mut steps: Vec<(f64, f64)> = Vec::with_capacity(entries.len());
+    for (i, entry) in entries.iter().enumerate() {
+        let place = place.entry(key, i);
+        let at_s = c.number(&place, "at_s", entry.at_s, &TIME);
+        if let Some((before, _)) = steps.last().filter(|(before, _)| *before >= at_s) {
+            let expected = format!("expected a time after the entry before, {before} s");
+            c.wrong(&place, "at_s", format_args!("is {at_s}"), expected);
+        }
+        steps.push((at_s, c.number(&place, "factor", entry.factor, &allowed(0.01..=100.0, ""))));
+    }
+    steps
+}
+
+/// Costs of objects by their shading, in control's order: flat, Gouraud, per pixel, textured.
+fn object_costs(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> [ObjectCost; 4] {
+    let Some(files) = &file.shading else { return Default::default() };
+    let all = [
+        ("flat", files.flat),
+        ("gouraud", files.gouraud),
+        ("per-pixel", files.per_pixel),
+        ("textured", files.textured),
+    ];
+    all.map(|(name, file)| {
+        let (place, file) = (place.table(name), file.unwrap_or_default());
+        let mut number =
+            |key: &str, value: Option<f64>, range: Allowed| value.map(|v| c.number(&place, key, v, &range));
+        ObjectCost {
+            object_us: number("object_us", file.object_us, allowed(0.0..=1e6, "µs")),
+            triangle_us: number("triangle_us", file.triangle_us, allowed(0.0..=1e4, "µs")),
+            vertex_us: number("vertex_us", file.vertex_us, allowed(0.0..=1e4, "µs")),
+            pixel_ns: number("pixel_ns", file.pixel_ns, allowed(0.0..=1e6, "ns")),
+        }
+    })
+}
+
+fn step_prices(c: &mut Checker<'_, '_>, place: &Place, file: &MachineFile) -> Vec<(String, Option<f64>, Option<f64>)> {
+    let mut steps = Vec::with_capacity(file.step.len());
+    for (model, price) in &file.step {
+        if !MODELS.contains(&model.as_str()) {
+            let span = c.document().locate(&format!("machine.step.{model}"));
+            let list = MODELS.map(|m| format!("`{m}`")).join(", ");
+            let problem = Problem::new(span, format!("`{model}` in `[machine.step]` is no model"));
+            c.push(problem.expecting(format!("expected one of {list}")).helped(did_you_mean(model, MODELS)));
+        }
+        let place = place.table(model);
+        let mut cost = |key: &str, v: Option<f64>| v.map(|v| c.number(&place, key, v, &allowed(0.0..=1e9, "µs")));
+        steps.push((model.clone(), cost("base_us", price.base_us), cost("unit_us", price.unit_us)));
+    }
+    steps
+}
+
+/// The points whose state is reported.
+pub(crate) fn probes(c: &mut Checker<'_, '_>, files: &[ProbeFile], names: &Names) -> Vec<Probe> {
+    if files.len() > PROBES_MAX {
+        let expected = format!("expected at most {PROBES_MAX}");
+        c.wrong(&Place::new("", ""), "probe", format_args!("has {} entries", files.len()), expected);
+        return Vec::new();
+    }
+    files
+        .iter()
+        .enumerate()
+        .filter_map(|(i, file)| probe(c, &Place::new(format!("probe.{i}"), "of `[[probe]]`"), file, names))
+        .collect()
+}
+
+fn probe(c: &mut Checker<'_, '_>, place: &Place, file: &ProbeFile, names: &Names) -> Option<Probe> {
+    let at = c.number_or(place, "at", (file.at, 1.0), &allowed(0.0..=1.0, ""));
+    let every_ms = file.every_ms.map(|ms| c.number(place, "every_ms", ms, &allowed(0.01..=1e6, "ms")));
+    let agent = match names.get(&file.object) {
+        Some(named) if named.agent().is_some() => named.agent()?,
+        Some(_) => {
+            c.wrong(
+                place,
+                "object",
+                format_args!("names `{}`, which is fixed", file.object),
+                "expected an object that moves",
+            );
+            return None;
+        }
+        None => {
+            c.reference(place, "object", &file.object, names.agents());
+            return None;
+        }
+    };
+    Some(Probe {
+        agent,
+        object: file.object.clone(),
+        at,
+        every: every_ms.and_then(|ms| SimSpan::from_secs_f64(ms * 1e-3)),
+    })
+}

@@ -1,0 +1,185 @@
+//! Reads the textures of the meshes of a scene: patterns, PNG and JPEG files, and the image inside a .glb file.
+//!
+//! In: `texture` of a mesh, any bytes. Out: a [`Texture`], equal ones shared, or what is wrong with the image. Never here: drawing.
+
+use super::glb;
+use super::object::Entry;
+use super::scenery::Parts;
+use crate::check::{Checker, allowed};
+use crate::format::MeshFile;
+use crate::source::Source;
+use glam::Vec2;
+use image::{ImageFormat, ImageReader, Limits};
+use metachron_geometry::{Model, Pattern, Texture, Wrap};
+use metachron_world::Look;
+use metachron_world::kinds::ShadingKind;
+use std::collections::BTreeMap;
+use std::io::Cursor;
+use std::sync::Arc;
+
+/// Most pixels of an image along each side.
+const SIDE_MAX: u32 = 4096;
+/// Most bytes that decoding an image may allocate.
+const BYTES_MAX: u64 = 1 << 28;
+
+/// Textures already made, by what they were made from and the bits of their size.
+pub(super) type Textures = BTreeMap<(String, u64), Option<Arc<Texture>>>;
+
+/// Applies the texture of a mesh, if it has one, to its parts.
+pub(super) fn painted(
+    c: &mut Checker<'_, '_>,
+    entry: &Entry,
+    (file, mut parts): (&MeshFile, Parts),
+    from: (&Source, &mut Textures),
+) -> Parts {
+    let (before, found) = (c.count(), texture_of(c, entry, (file, &parts), from));
+    let bare = found.is_none() && c.count() == before && !parts.is_empty();
+    if bare && entry.common.shading == Some(ShadingKind::Textured) {
+        c.wrong(&entry.place, "shading", "has nothing to draw", "expected `texture` beside it");
+    }
+    if let Some(texture) = found {
+        for (_, part) in &mut parts {
+            let colour = if entry.common.colour.is_some() { part.look.colour } else { [255; 3] };
+            let shading = entry.common.shading.unwrap_or(ShadingKind::Textured);
+            part.look = Look { colour, shading, ..part.look };
+            part.texture = Some(Arc::clone(&texture));
+        }
+    }
+    parts
+}
+
+fn texture_of(
+    c: &mut Checker<'_, '_>,
+    entry: &Entry,
+    (file, parts): (&MeshFile, &Parts),
+    (source, textures): (&Source, &mut Textures),
+) -> Option<Arc<Texture>> {
+    let place = &entry.place;
+    if file.texture_m.is_some() && file.texture.is_none() {
+        c.wrong(place, "texture_m", "has nothing to act on", "expected `texture` beside it");
+    }
+    let metres = c.number_or(place, "texture_m", (file.texture_m, 1.0), &allowed(1e-3..=1e3, "m"));
+    let (key, name) = match (&file.texture, &file.file) {
+        (Some(name), _) => ("texture", name),
+        // errors of a file that gave no mesh have been reported
+        (None, Some(name)) if !parts.is_empty() => ("file", name),
+        (None, _) => return None,
+    };
+    let wrap = match key == "file" || file.texture_m.is_none() && has_places(parts) {
+        true => Wrap::Corners,
+        false => Wrap::Sides(metres as f32),
+    };
+    let made_from = (name.clone(), if wrap == Wrap::Corners { 0 } else { metres.to_bits() });
+    if let Some(known) = textures.get(&made_from) {
+        return known.clone();
+    }
+    let made = if key == "file" { own(name, source) } else { named(name, (metres, wrap), source).map(Some) };
+    let texture = made.unwrap_or_else(|why| {
+        let patterns = Pattern::ALL.map(|pattern| format!("`{}`", pattern.name())).join(", ");
+        let what = format!("cannot be painted: {name}: {why}");
+        c.wrong(place, key, what, format!("expected {patterns} or a PNG or JPEG image beside the scene"));
+        None
+    });
+    textures.entry(made_from).or_insert(texture.map(Arc::new)).clone()
+}
+
+/// A pattern, or an image file next to the scene.
+fn named(name: &str, (metres, wrap): (f64, Wrap), source: &Source) -> Result<Texture, String> {
+    if let Some(pattern) = Pattern::ALL.into_iter().find(|pattern| pattern.name() == name) {
+        return Ok(pattern.texture(metres as f32));
+    }
+    decode(&source.sibling(name)?, wrap)
+}
+
+/// Whether the file of a mesh has texture coordinates.
+fn has_places(parts: &Parts) -> bool {
+    let says = |model: &Model| matches!(model, Model::Mesh(tom) if tom.vertices().iter().any(|v| v.uv != Vec2::ZERO));
+    parts.iter().any(|(_, part)| says(&part.model))
+}
+
+/// The image inside a mesh's .glb file. Other errors of that file are reported where its triangles are read.
+fn own(name: &str, source: &Source) -> Result<Option<Texture>, String> {
+    let Ok(bytes) = source.sibling(name) else { return Ok(None) };
+    if !bytes.starts_with(glb::MAGIC) {
+        return Ok(None);
+    }
+    glb::image(&bytes)?.map(|image| decode(image, Wrap::Corners)).transpose()
+}
+
+/// The pixels of a PNG or JPEG image.
+fn decode(bytes: &[u8], wrap: Wrap) -> Result<Texture, String> {
+    let mut reader = ImageReader::new(Cursor::new(bytes)).with_guessed_format().map_err(|why| why.to_string())?;
+    match reader.format() {
+        Some(ImageFormat::Png | ImageFormat::Jpeg) => {}
+        Some(other) => return Err(format!("its image is a {other:?}; only PNG and JPEG are understood")),
+        None => return Err("its image is of no kind that is known; only PNG and JPEG are understood".to_owned()),
+    }
+    let mut limits = Limits::default();
+    (limits.max_image_width, limits.max_image_height) = (Some(SIDE_MAX), Some(SIDE_MAX));
+    limits.max_alloc = Some(BYTES_MAX);
+    reader.limits(limits);
+    let pixels = reader.decode().map_err(|why| why.to_string())?.to_rgba8();
+    let texels = pixels.pixels().map(|pixel| pixel.0).collect();
+    Texture::new(pixels.dimensions(), texels, wrap).ok_or_else(|| "its image has no pixels".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn png(width: u32, height: u32) -> Vec<u8> {
+        let image = image::RgbaImage::from_fn(width, height, |x, y| image::Rgba([x as u8, y as u8, 7, 255]));
+        let mut bytes = Cursor::new(Vec::new());
+        image.write_to(&mut bytes, ImageFormat::Png).unwrap();
+        bytes.into_inner()
+    }
+
+    #[test]
+    fn a_png_is_read_pixel_by_pixel() {
+        let texture = decode(&png(5, 3), Wrap::Corners).unwrap();
+        assert_eq!(texture.size(), (5, 3));
+        assert_eq!(texture.texels()[2 * 5 + 4], [4, 2, 7, 255]);
+    }
+
+    #[test]
+    fn a_jpeg_is_read_up_to_what_its_kind_loses() {
+        let grey = image::RgbImage::from_fn(16, 8, |x, _| image::Rgb([16 * x as u8; 3]));
+        let mut bytes = Cursor::new(Vec::new());
+        grey.write_to(&mut bytes, ImageFormat::Jpeg).unwrap();
+        let texture = decode(&bytes.into_inner(), Wrap::Corners).unwrap();
+        assert_eq!(texture.size(), (16, 8));
+        for (i, texel) in texture.texels().iter().enumerate() {
+            assert!(texel[0].abs_diff(16 * (i % 16) as u8) <= 8, "{i}: {texel:?}");
+        }
+    }
+
+    #[test]
+    fn what_is_no_image_or_too_large_is_refused_with_its_reason() {
+        for (bytes, told) in [
+            (&b""[..], "only PNG and JPEG"),
+            (b"hello there, this is no image", "only PNG and JPEG"),
+            (b"GIF89a\x01\x00\x01\x00", "Gif"),
+            (b"\xff\xd8\xff\xe0\x00\x10JFIF\x00", ""),
+        ] {
+            let why = decode(bytes, Wrap::Corners).unwrap_err();
+            assert!(why.contains(told), "{why}");
+        }
+        assert!(decode(&png(SIDE_MAX + 1, 1), Wrap::Corners).is_err());
+        // a header that declares far more pixels than there are
+        let mut hostile = png(4, 4);
+        hostile[16..24].copy_from_slice(&[0, 0, 0x0f, 0xff, 0, 0, 0x0f, 0xff]);
+        assert!(decode(&hostile, Wrap::Corners).is_err());
+    }
+
+    proptest! {
+        #[test]
+        fn no_damage_makes_the_reader_panic(at in 0..120_usize, with in proptest::collection::vec(any::<u8>(), 0..5)) {
+            let mut bytes = png(7, 4);
+            let at = at % bytes.len();
+            let end = (at + with.len()).min(bytes.len());
+            bytes.splice(at..end, with);
+            let _ = decode(&bytes, Wrap::Corners);
+        }
+    }
+}

@@ -1,0 +1,264 @@
+//! Reads a tube of a scene file as a [`TubeSpec`].
+
+use super::POSITION_MAX_M;
+use super::object::Given;
+use crate::check::{Allowed, Checker, Place, allowed};
+use crate::format::{AttachFile, End, Integrator as Method, PeristalsisFile, TubeFile};
+use glam::DVec3;
+use metachron_core::{Resolution, ResolutionRange};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::SUBSTEPS_MAX;
+use metachron_models::rod::Tube;
+use metachron_models::rod::{Attachment, Material, Peristalsis, Section, TubeSpec};
+use std::sync::Arc;
+
+/// Most points of a path.
+const PATH_MAX: usize = 100_000;
+/// Most segments of a tube.
+const SEGMENTS_MAX: u32 = 4096;
+/// Default number of segments, where a scene gives neither ε nor their number.
+const SEGMENTS_DEFAULT: f64 = 64.0;
+/// Default finest and coarsest picture, in intervals per tube.
+const PICTURE_INTERVALS: (f64, f64) = (400.0, 8.0);
+/// Points nearer than this are the same point, metres.
+const SAME_POINT_M: f64 = 1e-9;
+/// Most attached parts of a tube (stretches of a mesentery).
+const ATTACH_MAX: usize = 1000;
+
+const RADIUS: Allowed = allowed(1e-6..=100.0, "m");
+const YOUNG: Allowed = allowed(1.0..=1e13, "Pa");
+const POISSON: Allowed = allowed(-0.999..=0.5, "");
+const DENSITY: Allowed = allowed(1e-3..=1e6, "kg/m³");
+const STIFFNESS: Allowed = allowed(1e-15..=1e15, "");
+const TWIST: Allowed = allowed(-36_000.0..=36_000.0, "°");
+const SHARE: Allowed = allowed(0.0..=1.0, "");
+
+/// A tube and the resolutions that its picture may take.
+pub(super) struct BuiltTube {
+    pub(super) spec: TubeSpec,
+    pub(super) picture: ResolutionRange,
+}
+
+/// Reads a tube.
+pub(super) fn build(c: &mut Checker<'_, '_>, file: &TubeFile, given: &Given<'_>) -> BuiltTube {
+    let place = given.place;
+    let path_m = path(c, place, &file.path_m);
+    let length_m = path_m.windows(2).map(|p| p[0].distance(p[1])).sum::<f64>().max(SAME_POINT_M);
+    let (section, mass_per_length_kg_m) = section(c, place, file);
+    let (resolution, range, picture) = resolutions(c, place, file, given.levels, length_m);
+    let (clamp, pin) = ends(c, place, file);
+    let spec = TubeSpec {
+        path_m,
+        straight: file.straight.unwrap_or(false),
+        twist_rad: c.number_or(place, "twist_deg", (file.twist_deg, 0.0), &TWIST).to_radians(),
+        section,
+        mass_per_length_kg_m,
+        resolution,
+        range,
+        segments: file.segments.map(|n| n.clamp(2, SEGMENTS_MAX) as usize),
+        integrator: file.integrator.map_or_else(Default::default, integrator),
+        substeps: c.number_or(place, "substeps", (file.substeps.map(f64::from), 1.0), &allowed(1.0..=1000.0, ""))
+            as u32,
+        damping_per_s: c.number_or(place, "damping_per_s", (file.damping_per_s, 0.0), &allowed(0.0..=1e4, "1/s")),
+        clamp,
+        pin,
+        attachments: attachments(c, place, file.attach.as_deref().unwrap_or_default()),
+        peristalsis: file.peristalsis.map(|wave| peristalsis(c, &place.table("peristalsis"), wave)),
+        pressure_pa: c.number_or(place, "pressure_pa", (file.pressure_pa, 0.0), &allowed(0.0..=1e7, "Pa")),
+        self_contact: file.self_contact.unwrap_or(true),
+        friction: c.number_or(place, "friction", (file.friction, 0.2), &allowed(0.0..=10.0, "")),
+        gravity: given.gravity,
+        obstacles: Arc::clone(given.obstacles),
+        sleep: given.sleep,
+    };
+    BuiltTube { spec, picture }
+}
+
+const fn integrator(file: Method) -> Integrator {
+    match file {
+        Method::SymplecticEuler => Integrator::SymplecticEuler,
+        Method::Xpbd => Integrator::Xpbd,
+        Method::ImplicitEuler => Integrator::ImplicitEuler,
+        Method::Bdf2 => Integrator::Bdf2,
+        Method::EnergyMomentum => Integrator::EnergyMomentum,
+    }
+}
+
+/// Reports a longest step that is too long for the tube's integrator (docs/theory/rod.md, 13).
+pub(super) fn check_step(c: &mut Checker<'_, '_>, place: &Place, tube: &Tube, longest_s: f64) {
+    let TubeSpec { integrator, substeps, .. } = tube.spec();
+    let Some(limit_s) = tube.longest_substep_s() else { return };
+    if longest_s <= limit_s * f64::from(*substeps) {
+        return;
+    }
+    let (name, segments) = (integrator.name(), tube.segments());
+    let wanted = (longest_s / limit_s).ceil();
+    let what = format!(
+        "is `{name}`, which carries substeps of {:.3} ms here, not of {:.3} ms",
+        limit_s * 1e3,
+        longest_s * 1e3 / f64::from(*substeps)
+    );
+    let more = if wanted <= f64::from(SUBSTEPS_MAX) { format!("`substeps = {wanted}`, ") } else { String::new() };
+    let expected = format!(
+        "expected {more}a step of at most {:.3} ms, fewer than {segments} segments, or an implicit integrator",
+        limit_s * 1e3 * f64::from(*substeps)
+    );
+    c.wrong(place, "integrator", what, expected);
+}
+
+fn path(c: &mut Checker<'_, '_>, place: &Place, points: &[[f64; 3]]) -> Vec<DVec3> {
+    if !(2..=PATH_MAX).contains(&points.len()) {
+        let expected = format!("expected 2 … {PATH_MAX} points");
+        c.wrong(place, "path_m", format_args!("has {} points", points.len()), expected);
+        return vec![DVec3::ZERO, DVec3::X];
+    }
+    let bad = points.iter().position(|p| p.iter().any(|x| x.is_nan() || x.abs() > POSITION_MAX_M));
+    if let Some(bad) = bad {
+        c.point(place, &format!("path_m.{bad}"), points[bad], POSITION_MAX_M);
+        return vec![DVec3::ZERO, DVec3::X];
+    }
+    let path: Vec<DVec3> = points.iter().map(|p| DVec3::from_array(*p)).collect();
+    let same = path.windows(2).position(|p| p[0].distance(p[1]) < SAME_POINT_M);
+    if let Some(same) = same {
+        let key = format!("path_m.{}", same + 1);
+        c.wrong(place, &key, "has the same point twice in a row", "expected a point away from the one before");
+    }
+    path
+}
+
+/// The section and the mass per length, kg/m, from modulus, density and dimensions; numbers that the file gives override them.
+fn section(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> (Section, f64) {
+    let radius_m = c.number(place, "radius_m", file.radius_m, &RADIUS);
+    let wall_m = file.wall_m.unwrap_or(radius_m);
+    let sound_wall = wall_m > 0.0 && wall_m <= radius_m;
+    // a wall that is too thick only because the radius is wrong is not reported: one problem, not two
+    if !sound_wall && (radius_m == file.radius_m || wall_m.is_nan() || wall_m <= 0.0) {
+        let expected = format!("expected a number above 0 and at most `radius_m`, {radius_m} m");
+        c.wrong(place, "wall_m", format_args!("is {wall_m}"), expected);
+    }
+    let wall_m = if sound_wall { wall_m } else { radius_m };
+    let unit = Material { young_pa: 1.0, poisson: 0.0, density_kg_m3: 1.0, shear_factor: 1.0 };
+    let (_, area_m2) = Section::hollow(radius_m, wall_m, unit);
+    let young_pa = modulus(c, place, file, area_m2);
+    let density_kg_m3 = density(c, place, file, area_m2);
+    let poisson = c.number_or(place, "poisson", (file.poisson, 0.45), &POISSON);
+    let shear_factor = c.number_or(place, "shear_factor", (file.shear_factor, 27.0 / 28.0), &allowed(1e-3..=2.0, ""));
+    let material = Material { young_pa, poisson, density_kg_m3, shear_factor };
+    let (mut section, mass) = Section::hollow(radius_m, wall_m, material);
+    for (key, given, into) in [
+        ("ea_n", file.ea_n, &mut section.ea_n),
+        ("ga_n", file.ga_n, &mut section.ga_n),
+        ("ei_n_m2", file.ei_n_m2, &mut section.ei_n_m2),
+        ("gj_n_m2", file.gj_n_m2, &mut section.gj_n_m2),
+    ] {
+        *into = c.number_or(place, key, (given, *into), &STIFFNESS);
+    }
+    let mass =
+        c.number_or(place, "mass_per_length_kg_m", (file.mass_per_length_kg_m, mass), &allowed(1e-9..=1e9, "kg/m"));
+    (section, mass)
+}
+
+fn modulus(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
+    match (file.young_pa, file.ea_n) {
+        (Some(young), _) => c.number(place, "young_pa", young, &YOUNG),
+        (None, Some(ea)) if ea > 0.0 => ea / area_m2,
+        (None, _) => {
+            c.wrong(
+                place,
+                "young_pa",
+                "is missing",
+                "expected `young_pa` (or `ea_n`, from which it follows) in this table",
+            );
+            1.0
+        }
+    }
+}
+
+fn density(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile, area_m2: f64) -> f64 {
+    match (file.density_kg_m3, file.mass_per_length_kg_m) {
+        (Some(density), _) => c.number(place, "density_kg_m3", density, &DENSITY),
+        (None, Some(mass)) if mass > 0.0 => mass / area_m2,
+        (None, _) => {
+            let expected = "expected `density_kg_m3` (or `mass_per_length_kg_m`, from which it follows) in this table";
+            c.wrong(place, "density_kg_m3", "is missing", expected);
+            1.0
+        }
+    }
+}
+
+/// The simulation's resolution at the start, its range, and the picture's range.
+fn resolutions(
+    c: &mut Checker<'_, '_>,
+    place: &Place,
+    file: &TubeFile,
+    levels: (u8, u8),
+    length_m: f64,
+) -> (Resolution, ResolutionRange, ResolutionRange) {
+    let finest = length_m / f64::from(SEGMENTS_MAX);
+    // an ε as long as the tube is one interval; longer ones mean the same and are accepted up to ten lengths
+    let spacing = allowed(rounded_up(finest)..=length_m * 10.0, "m (1/4096 … 10 times its length)");
+    let eps = file.eps_m.map(|eps| c.ends(place, "eps_m", eps, &spacing));
+    let picture = file.picture_eps_m.map(|eps| c.ends(place, "picture_eps_m", eps, &spacing));
+    let usual = length_m / SEGMENTS_DEFAULT;
+    let simulation = match file.segments {
+        Some(n) => {
+            let n = c.number(place, "segments", f64::from(n), &allowed(2.0..=f64::from(SEGMENTS_MAX), ""));
+            (length_m / n, length_m / n)
+        }
+        None => eps.unwrap_or((usual, usual)),
+    };
+    let picture = picture.or(eps).unwrap_or((length_m / PICTURE_INTERVALS.0, length_m / PICTURE_INTERVALS.1));
+    // starts at the finest: the controller coarsens it where the machine is too slow
+    let start = Resolution { eps_m: simulation.0, n: levels.1 };
+    (start, ResolutionRange { eps_m: simulation, n: levels }, ResolutionRange { eps_m: picture, n: levels })
+}
+
+/// The limit rounded down to four digits, so that a message can show it.
+fn rounded_up(value: f64) -> f64 {
+    let digits = 10f64.powi(3 - value.log10().floor() as i32);
+    (value * digits).floor() / digits
+}
+
+fn ends(c: &mut Checker<'_, '_>, place: &Place, file: &TubeFile) -> ([bool; 2], [bool; 2]) {
+    let has = |list: &Option<Vec<End>>, end| list.as_ref().is_some_and(|l| l.contains(&end));
+    let clamp = [has(&file.clamp, End::Start), has(&file.clamp, End::End)];
+    let pin = [has(&file.pin, End::Start), has(&file.pin, End::End)];
+    for (i, name) in ["start", "end"].into_iter().enumerate() {
+        if clamp[i] && pin[i] {
+            let what = format!("holds the {name}, which `clamp` holds already");
+            c.wrong(place, "pin", what, format!("expected \"{name}\" in `clamp` or in `pin`, not in both"));
+        }
+    }
+    (clamp, pin)
+}
+
+fn attachments(c: &mut Checker<'_, '_>, place: &Place, files: &[AttachFile]) -> Vec<Attachment> {
+    if files.len() > ATTACH_MAX {
+        c.wrong(place, "attach", format_args!("has {} entries", files.len()), format!("expected at most {ATTACH_MAX}"));
+        return Vec::new();
+    }
+    files.iter().enumerate().map(|(i, file)| attachment(c, &place.entry("attach", i), file)).collect()
+}
+
+fn attachment(c: &mut Checker<'_, '_>, place: &Place, file: &AttachFile) -> Attachment {
+    let from = c.number(place, "from", file.from, &SHARE);
+    let to = c.number(place, "to", file.to, &SHARE);
+    if from >= to {
+        c.wrong(place, "to", format_args!("is {to}"), format!("expected a number above `from`, {from}"));
+    }
+    Attachment {
+        from,
+        to,
+        stiffness_n_m2: c.number(place, "stiffness_n_m2", file.stiffness_n_m2, &allowed(0.0..=1e9, "N/m²")),
+        slack_m: c.number_or(place, "slack_m", (file.slack_m, 0.0), &allowed(0.0..=100.0, "m")),
+        damping_n_s_m2: c.number_or(place, "damping_n_s_m2", (file.damping_n_s_m2, 0.0), &allowed(0.0..=1e6, "N·s/m²")),
+    }
+}
+
+fn peristalsis(c: &mut Checker<'_, '_>, place: &Place, file: PeristalsisFile) -> Peristalsis {
+    Peristalsis {
+        amplitude: c.number(place, "amplitude", file.amplitude, &allowed(0.0..=0.95, "")),
+        wavelength_m: c.number(place, "wavelength_m", file.wavelength_m, &allowed(1e-4..=100.0, "m")),
+        speed_m_s: c.number(place, "speed_m_s", file.speed_m_s, &allowed(-100.0..=100.0, "m/s")),
+    }
+}

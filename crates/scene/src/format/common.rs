@@ -1,0 +1,106 @@
+//! The keys that objects of every model share.
+
+use super::{FaultsFile, OneOrEach, OneOrRange, Point};
+use metachron_world::kinds::{Material, ShadingKind};
+use schemars::JsonSchema;
+use serde::Deserialize;
+
+/// The keys of [`CommonFile`]: they are read apart from the keys of the model.
+pub const COMMON_KEYS: [&str; 17] = [
+    "name",
+    "rate_hz",
+    "dt_ms",
+    "hold",
+    "tolerance_m",
+    "n",
+    "importance",
+    "colour",
+    "material",
+    "shading",
+    "sleep",
+    "faults",
+    "grid",
+    "spacing_m",
+    "rise_m",
+    "scatter_m",
+    "scatter_seed",
+];
+
+/// Keys of every object, whatever its model.
+#[derive(Debug, Clone, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CommonFile {
+    /// The object's name: unique in the scene, not empty, at most 64 characters.
+    #[schemars(length(min = 1, max = 64))]
+    pub name: String,
+    /// Requested steps per second, 1 … 100000. Default: 1000 / `dt_ms` (its least value, if it is a range), or 240 without `dt_ms`.
+    /// A single `dt_ms` must agree with it.
+    #[schemars(range(min = 1.0, max = 100_000.0))]
+    pub rate_hz: Option<f64>,
+    /// Step length, milliseconds, 0.01 … 1000: one number fixes it; `[least, greatest]` is the range that the controller may use.
+    /// Default: 1000 / `rate_hz`, fixed.
+    pub dt_ms: Option<OneOrRange<f64>>,
+    /// Quantity that the controller holds within `dt_ms` and `eps_m`: `rate` (default), or `error`, which needs `tolerance_m`.
+    /// For a sheet, solid or rope `hold` lists the parts that never move; `tolerance_m` alone selects `error` there.
+    pub hold: Option<HoldKind>,
+    /// Greatest error by the object's own estimate, metres, 1e-9 … 1e3: the longest steps and the coarsest ε within its ranges that
+    /// keep it are used.
+    #[schemars(range(min = 1e-9, max = 1e3))]
+    pub tolerance_m: Option<f64>,
+    /// Level of the primitive drawn over one interval, 0 … 10: O(2ⁿ) polygons. Default: `[1, 5]`.
+    pub n: Option<OneOrRange<u8>>,
+    /// Weight of the object's picture relative to that of others, 0.001 … 1000. Default 1.
+    #[schemars(range(min = 0.001, max = 1000.0))]
+    pub importance: Option<f64>,
+    /// Colour as `#rrggbb` (sRGB). Default: by material.
+    #[schemars(regex(pattern = "^#[0-9a-fA-F]{6}$"))]
+    pub colour: Option<String>,
+    /// Material of its surface. Default: tissue for a tube, sheet or solid, metal for an instrument, plastic for the rest.
+    pub material: Option<Material>,
+    /// Shading of its surface: `flat`, `gouraud`, `per-pixel` (default), or `any`, which leaves it to the policy.
+    pub shading: Option<ShadingKind>,
+    /// Whether it stops stepping when it is at rest and nothing touches it. Default true.
+    pub sleep: Option<bool>,
+    /// Faults injected into its clock and its messages; keys that are left out take the values of the world.
+    pub faults: Option<FaultsFile>,
+    /// Repeats an object: number of copies along x, y and z, each 1 … 1000. The first is at the object's own position, the
+    /// others are `spacing_m` apart, counted along x, then y, then z; their names are `NAME-0`, `NAME-1`, ….
+    #[schemars(length(min = 3, max = 3))]
+    pub grid: Option<[u32; 3]>,
+    /// Distance of neighbours in the grid along x, y and z, metres, up to 1e4 in magnitude.
+    pub spacing_m: Option<Point>,
+    /// Rise from each copy of the grid to the next, along x and along y, metres, up to 1e4 in magnitude. Default `[0, 0]`.
+    #[schemars(length(min = 2, max = 2))]
+    pub rise_m: Option<[f64; 2]>,
+    /// Moves every copy of the grid by a random distance along each axis, uniform up to this far either way, metres, 0 … 1e4; one
+    /// number, or one per axis: `[x, y, z]`. Default 0.
+    pub scatter_m: Option<OneOrEach>,
+    /// Seed of the random distances. Default 0.
+    pub scatter_seed: Option<u32>,
+}
+
+/// Quantity that the controller of an object holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HoldKind {
+    /// The rate of its steps.
+    Rate,
+    /// The error of its result.
+    Error,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_list_of_common_keys_is_the_keys_of_the_type() {
+        let schema = schemars::schema_for!(CommonFile);
+        let mut listed = COMMON_KEYS.to_vec();
+        listed.sort_unstable();
+        let mut keys: Vec<_> =
+            schema.get("properties").unwrap().as_object().unwrap().keys().map(String::as_str).collect();
+        keys.sort_unstable();
+        assert_eq!(listed, keys);
+    }
+}

@@ -1,0 +1,33 @@
+//! The scene file as it is written: serde types, one per table, whose doc comments are the descriptions of the JSON Schema.
+//!
+//! In: TOML values. Out: the same values, typed; keys that do not exist are refused.
+//! Never here: defaults that depend on other keys, and rules between keys (see `build`).
+
+mod common;
+mod coupling;
+mod instrument;
+mod joint;
+mod rigid;
+mod scene;
+mod scenery;
+mod soft;
+mod synthetic;
+mod tube;
+mod value;
+
+pub use common::{COMMON_KEYS, CommonFile, HoldKind};
+pub use coupling::{CouplingFile, CouplingKind, CouplingLaw, FaultsFile, Spot};
+pub use instrument::{InstrumentFile, KeyframeFile};
+pub use joint::{JointFile, JointKind};
+pub use rigid::{RigidFile, Shape};
+pub use scene::{
+    CameraFile, CameraKeyFile, LoadFile, MachineFile, ModelCostFile, ProbeFile, SceneFile, TargetFile, WorldFile,
+};
+pub use scenery::{GeneratorKind, GroupFile, MeshFile, TreeFile, TreeLod};
+pub use soft::{RopeEnd, RopeFile, SheetFile, SheetSide, SoftShapeKind, SolidFile, SolidSide};
+pub use synthetic::SyntheticFile;
+pub use tube::{AttachFile, End, Integrator, PeristalsisFile, TubeFile};
+pub use value::{OneOrEach, OneOrRange, Point};
+
+/// The models an object can have, as scenes write them.
+pub const MODELS: [&str; 9] = ["tube", "rigid", "sheet", "solid", "rope", "instrument", "synthetic", "mesh", "tree"];

@@ -1,0 +1,133 @@
+//! Reads and checks scene files; the only module that reads files.
+//!
+//! In: a built-in name, a path, or bytes; overrides from the command line. Out: a [`Scene`] that can be run, or a
+//! [`SceneError`] that shows every problem at its position. Never here: running agents, drawing, the command line.
+
+mod build;
+pub mod builtin;
+mod check;
+mod diagnostic;
+mod document;
+pub mod format;
+pub mod papers;
+mod schema;
+mod snippet;
+mod source;
+
+pub use diagnostic::{SceneError, SceneProblem};
+pub use schema::json_schema;
+pub use source::{SCENE_BYTES_MAX, Source};
+
+use build::{Around, Objects};
+use check::{Checker, Place};
+use diagnostic::Problem;
+use document::Document;
+use format::{SceneFile, WorldFile};
+use glam::DVec3;
+use metachron_models::rigid::Joint;
+use metachron_world::Scene;
+use metachron_world::kinds::ExecutorKind;
+use std::sync::Arc;
+
+/// The only version of the format.
+const FORMAT: i64 = 1;
+/// Most agents that may have a thread each, as in the runtime.
+pub const THREADED_MAX: usize = 1000;
+/// Default gravity, m/s².
+const GRAVITY_DEFAULT: DVec3 = DVec3::new(0.0, 0.0, -9.81);
+/// Strongest gravity, m/s².
+const GRAVITY_MAX: f64 = 1e4;
+
+/// Reads a scene. Each override is a dotted key, such as `target.frame_hz` or `object.NAME.rate_hz`, and a TOML value
+/// (text that is not TOML is a string); of equal keys the last counts.
+///
+/// # Errors
+/// [`SceneError`] with every problem found.
+pub fn load(source: &Source, overrides: &[(String, String)]) -> Result<Scene, SceneError> {
+    let text = document::with_overrides(source.text(), overrides);
+    read(source, &text).map_err(|problems| SceneError::new(source.name(), &text, problems))
+}
+
+fn read(source: &Source, text: &str) -> Result<Scene, Vec<Problem>> {
+    let document = Document::parse(text).map_err(|problem| vec![problem])?;
+    let mut c = Checker::new(&document);
+    let file = read_stage(&mut c);
+    let world = file.as_ref().and_then(|f| f.world.as_ref());
+    let gravity = gravity(&mut c, world);
+    let faults = world.and_then(|w| w.faults.as_ref());
+    if let Some(faults) = faults {
+        build::world_faults(&mut c, faults);
+    }
+    let around = Around { source, gravity, faults };
+    let objects = build::read_objects(&mut c, document.root().get("object"), &around);
+    let scene = file.map(|file| assemble(&mut c, source, file, (gravity, objects)));
+    match (scene, c.finish()) {
+        (Some(mut scene), problems) if problems.is_empty() => {
+            scene.resolve_initial_overlaps();
+            Ok(scene)
+        }
+        (_, problems) => Err(problems),
+    }
+}
+
+/// Reads everything but the objects.
+fn read_stage(c: &mut Checker<'_, '_>) -> Option<SceneFile> {
+    let document = c.document();
+    let others = document.root().iter().filter(|(key, _)| key.get_ref() != "object");
+    let table = others.map(|(key, value)| (key.clone(), value.clone())).collect();
+    c.read(table, document.first_line(), &[])
+}
+
+fn gravity(c: &mut Checker<'_, '_>, world: Option<&WorldFile>) -> DVec3 {
+    let place = Place::new("world", "of `[world]`");
+    let given = world.and_then(|w| w.gravity_m_s2);
+    given.map_or(GRAVITY_DEFAULT, |g| c.point(&place, "gravity_m_s2", g, GRAVITY_MAX))
+}
+
+fn assemble(
+    c: &mut Checker<'_, '_>,
+    source: &Source,
+    file: SceneFile,
+    (gravity, mut objects): (DVec3, Objects),
+) -> Scene {
+    if file.format != FORMAT {
+        let what = format!("is {}, which this program does not know", file.format);
+        c.wrong(&Place::new("", ""), "format", what, format!("expected {FORMAT}"));
+    }
+    let agents = objects.agents.len();
+    if file.executor == Some(ExecutorKind::Threads) && agents > THREADED_MAX {
+        let what = format!("is `threads`, with {agents} agents");
+        let expected = format!("expected `pool` or `auto`: at most {THREADED_MAX} agents have a thread each");
+        c.wrong(&Place::new("", ""), "executor", what, expected);
+    }
+    let probes = build::probes(c, &file.probe, &objects.names);
+    // ties between objects that are wrong themselves would give spurious problems
+    let sound = c.count() == 0;
+    let joints = if sound { build::joints(c, &file.joint, &objects) } else { Vec::new() };
+    let joints: Arc<[Joint]> = joints.into();
+    objects.hold(&joints);
+    let couplings = if sound { build::couplings(c, &file.coupling, &objects) } else { Vec::new() };
+    let groups = if sound { build::groups(c, &file.group, (&mut objects, source)) } else { Vec::new() };
+    Scene {
+        name: source.name().to_owned(),
+        description: file.description.unwrap_or_default(),
+        executor: file.executor.unwrap_or_default(),
+        priority: file.priority.unwrap_or_default(),
+        states: file.states.unwrap_or_default(),
+        gravity,
+        target: build::target(c, file.target.as_ref()),
+        camera: build::camera(c, file.camera.as_ref()),
+        machine: build::machine(c, file.machine.as_ref()),
+        agents: objects.agents,
+        obstacles: objects.obstacles,
+        obstacle_looks: objects.obstacle_looks,
+        scenery: objects.scenery,
+        groups,
+        contacts: file.world.as_ref().and_then(|w| w.contacts).unwrap_or(true),
+        joints,
+        couplings,
+        probes,
+        overlaps: Vec::new(),
+        moved: Vec::new(),
+    }
+}

@@ -1,0 +1,87 @@
+//! The auditorium of (FS93, §8): 384 seats in rising rows, 16 pieces of a stage, and a walk with half a turn in six frames.
+//!
+//! In: a seed. Out: the scene's text. At ten frames a second the walk has the paper's 250: A, many seats across the view (frame 40);
+//! B, few and small ones (130); C, the sudden turn from the stage to the seats (178 … 184).
+
+use super::camera_path::{Way, stop};
+use super::{FLOOR, head};
+
+/// Triangles of a seat; the pieces of the stage have the rest of 87,565.
+const SEAT: u32 = 186;
+const SINGER: u32 = 1004;
+const WREATH: u32 = 1014;
+/// A mesh with an open border can have an odd number of triangles, as the sum has.
+const CURTAIN: u32 = 1011;
+const CURTAIN_SEED: u32 = 3;
+
+pub(super) fn text(seed: u32) -> String {
+    let head = head(
+        "384 seats in rising rows before a stage, 87,565 triangles, and a walk that turns round in six frames (FS93).",
+        "an auditorium of 384 seats, and a walk that turns round suddenly",
+        &way(),
+    );
+    format!(
+        r##"{head}
+[[object]]
+name = "seat"
+model = "mesh"
+generate = "seat"
+triangles = {SEAT}
+position_m = [2.0, -6.9, 0.0]
+rotation_deg = [0.0, 0.0, 90.0]
+grid = [16, 24, 1]
+spacing_m = [1.0, 0.6, 0.0]
+rise_m = [0.15, 0.0]
+colour = "#9c4a44"
+
+[[object]]
+name = "singer"
+model = "mesh"
+generate = "blob"
+seed = {seed}
+triangles = {SINGER}
+scale = 0.8
+position_m = [-4.0, -6.3, 1.5]
+grid = [1, 8, 1]
+spacing_m = [0.0, 1.8, 0.0]
+colour = "#c9a86a"
+
+[[object]]
+name = "wreath"
+model = "mesh"
+generate = "torus"
+triangles = {WREATH}
+scale = 0.7
+position_m = [-6.5, -5.4, 1.5]
+rotation_deg = [0.0, 90.0, 0.0]
+grid = [1, 7, 1]
+spacing_m = [0.0, 1.8, 0.0]
+colour = "#6a8f7a"
+
+[[object]]
+name = "curtain"
+model = "mesh"
+generate = "terrain"
+seed = {CURTAIN_SEED}
+triangles = {CURTAIN}
+scale = 5.0
+position_m = [-9.0, 0.0, 4.0]
+rotation_deg = [0.0, 90.0, 0.0]
+colour = "#4a4f78"
+{FLOOR}"##
+    )
+}
+
+fn way() -> Way {
+    let stops = vec![
+        stop(0.0, [-0.5, -9.0, 2.2], 42.0, -8.0),
+        stop(6.0, [0.5, -9.5, 2.2], 44.0, -8.0),
+        stop(11.5, [-13.0, -14.0, 2.4], 88.0, -4.0),
+        stop(15.0, [-14.0, -14.5, 2.4], 89.0, -4.0),
+        stop(16.0, [0.8, 0.0, 1.7], 180.0, 0.0),
+        stop(17.8, [1.0, 0.0, 1.7], 180.0, 0.0),
+        stop(18.4, [1.0, 0.0, 1.9], 0.0, 5.0),
+        stop(25.0, [-0.5, 0.0, 2.1], -8.0, 3.0),
+    ];
+    Way { stops, fov_deg: 60.0 }
+}

@@ -1,0 +1,71 @@
+//! The grove of (RH05, §6): trees of three kinds on a square, and two camera paths through it.
+//!
+//! In: the number of trees, which path, whether trees have levels, a seed. Out: the scene's text. At twenty frames a second the linear
+//! path has 1000 frames, with most trees in view in the middle; the zigzag 1680, with sudden turns at 560 and 1120.
+
+use super::camera_path::{Way, stop};
+use super::{Choices, FLOOR, head};
+
+/// Boughs (10 triangles each) and leaves (2 each) of each kind: 620 + 480, 890 + 720, 1740 + 1800 triangles.
+const KINDS: [(&str, u32, u32, &str); 3] =
+    [("birch", 62, 240, "#7fa650"), ("beech", 89, 360, "#5a8a42"), ("oak", 174, 900, "#47713c")];
+/// Side of the square for 600 trees, metres; the area grows with their number.
+const SIDE_M: f64 = 240.0;
+const TREES: f64 = 600.0;
+
+pub(super) fn text(choices: &Choices) -> String {
+    let side_m = (SIDE_M * (f64::from(choices.trees) / TREES).sqrt()).round();
+    let mut text = head(
+        &format!(
+            "{} trees of three kinds, each a trunk and leaves, from points and lines up to triangles (RH05).",
+            choices.trees
+        ),
+        &format!("a walk along a grove of {} trees", choices.trees),
+        &way(choices.zigzag, side_m),
+    );
+    for (number, kind) in (0..).zip(KINDS) {
+        text += &trees(choices, (number, kind), 0.5 * side_m);
+    }
+    text + FLOOR
+}
+
+fn trees(choices: &Choices, (number, kind): (u32, (&str, u32, u32, &str)), half_m: f64) -> String {
+    let (name, branches, leaves, colour) = kind;
+    let count = (choices.trees + 2 - number) / 3;
+    let (seed, lod) = (choices.seed + number, if choices.prefix { "prefix" } else { "levels" });
+    format!(
+        r##"
+[[object]]
+name = "{name}"
+model = "tree"
+seed = {seed}
+height_m = 8.0
+branches = {branches}
+leaves = {leaves}
+lod = "{lod}"
+position_m = [{half_m:?}, {half_m:?}, 0.0]
+grid = [{count}, 1, 1]
+spacing_m = [0.0, 0.0, 0.0]
+scatter_m = [{half_m:?}, {half_m:?}, 0.0]
+scatter_seed = {seed}
+leaves_colour = "{colour}"
+"##
+    )
+}
+
+fn way(zigzag: bool, side_m: f64) -> Way {
+    let place = |x: f64, y: f64| [x * side_m, y * side_m, 6.0];
+    let stops = if zigzag {
+        vec![
+            stop(0.0, place(0.1, 0.1), 60.0, -3.0),
+            stop(28.0, place(0.35, 0.6), 60.0, -3.0),
+            stop(28.05, place(0.35, 0.6), -70.0, -3.0),
+            stop(56.0, place(0.6, 0.2), -70.0, -3.0),
+            stop(56.05, place(0.6, 0.2), 80.0, -3.0),
+            stop(84.0, place(0.8, 0.5), 80.0, -3.0),
+        ]
+    } else {
+        vec![stop(0.0, place(-0.1, -0.1), 90.0, -3.0), stop(50.0, place(1.1, -0.1), 90.0, -3.0)]
+    };
+    Way { stops, fov_deg: 50.0 }
+}

@@ -1,0 +1,85 @@
+//! The library of (FS93, fig. 11): a textured room whose shading is chosen with its triangles.
+//!
+//! In: nothing. Out: the scene's text. 32 chairs, 8 tables, 24 shelves, 10 doors and 96 sets of books are 19,800 triangles; the paper has
+//! 19,821.
+
+use super::camera_path::{Way, stop};
+use super::{FLOOR, head};
+
+/// Position of the first, numbers along x, y, z, spacing (metres), rotation about z (degrees).
+type Row = ([f64; 3], [u32; 3], [f64; 3], f64);
+
+/// Furniture of one kind.
+struct Furniture {
+    kind: &'static str,
+    /// Triangles of each.
+    triangles: u32,
+    colour: &'static str,
+    texture: Option<&'static str>,
+    rows: &'static [Row],
+}
+
+const SEATS: &[Row] = &[
+    ([0.0, -1.75, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 0.0),
+    ([0.0, -0.45, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 180.0),
+    ([0.0, 0.45, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 0.0),
+    ([0.0, 1.75, 0.0], [8, 1, 1], [1.0, 0.0, 0.0], 180.0),
+];
+const TABLES: &[Row] = &[([0.5, -1.1, 0.0], [4, 2, 1], [2.0, 2.2, 0.0], 0.0)];
+const SHELVES: &[Row] =
+    &[([-1.4, 2.9, 0.0], [12, 1, 1], [1.0, 0.0, 0.0], 0.0), ([-1.4, -2.9, 0.0], [12, 1, 1], [1.0, 0.0, 0.0], 180.0)];
+const DOORS: &[Row] =
+    &[([10.5, -2.4, 0.0], [1, 5, 1], [0.0, 1.2, 0.0], 90.0), ([10.5, -2.4, 2.1], [1, 5, 1], [0.0, 1.2, 0.0], 90.0)];
+const BOOKS: &[Row] = &[
+    ([-1.65, 2.85, 1.015], [24, 1, 2], [0.5, 0.0, 0.7], 0.0),
+    ([-1.65, -2.85, 1.015], [24, 1, 2], [0.5, 0.0, 0.7], 180.0),
+];
+
+const FURNITURE: [Furniture; 5] = [
+    Furniture { kind: "seat", triangles: 186, colour: "#8a5a3c", texture: None, rows: SEATS },
+    Furniture { kind: "table", triangles: 240, colour: "#c9a070", texture: Some("planks"), rows: TABLES },
+    Furniture { kind: "shelf", triangles: 120, colour: "#9c7450", texture: Some("planks"), rows: SHELVES },
+    Furniture { kind: "door", triangles: 60, colour: "#ab9474", texture: Some("planks"), rows: DOORS },
+    Furniture { kind: "books", triangles: 88, colour: "#ffffff", texture: Some("books"), rows: BOOKS },
+];
+
+pub(super) fn text() -> String {
+    let mut text = head(
+        "A textured room of 19,800 triangles in which the policy chooses the shading as well (FS93, fig. 11).",
+        "a library whose triangles and shading are chosen together",
+        &way(),
+    );
+    for furniture in &FURNITURE {
+        for (number, row) in furniture.rows.iter().enumerate() {
+            text += &furniture.row(number, row);
+        }
+    }
+    text + FLOOR
+}
+
+impl Furniture {
+    fn row(&self, number: usize, (place, grid, spacing, turn): &Row) -> String {
+        let Self { kind, triangles, colour, texture, .. } = self;
+        let painted = texture.map_or(String::new(), |name| format!("\ntexture = \"{name}\""));
+        format!(
+            r##"
+[[object]]
+name = "{kind}-{number}"
+model = "mesh"
+generate = "{kind}"
+triangles = {triangles}
+position_m = {place:?}
+rotation_deg = [0.0, 0.0, {turn:?}]
+grid = {grid:?}
+spacing_m = {spacing:?}
+shading = "any"{painted}
+colour = "{colour}"
+"##
+        )
+    }
+}
+
+fn way() -> Way {
+    let stops = vec![stop(0.0, [-5.0, -0.5, 1.7], 0.0, -4.0), stop(6.0, [-4.5, 0.5, 1.7], 4.0, -4.0)];
+    Way { stops, fov_deg: 60.0 }
+}

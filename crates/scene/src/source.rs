@@ -1,0 +1,159 @@
+//! Sources of scenes: built in, or a file; and the files next to it.
+//!
+//! In: a name or a path. Out: text and bytes. Never here: their meaning. This is the only place that reads files.
+
+use super::builtin;
+use super::diagnostic::{SceneError, did_you_mean};
+use std::fs::File;
+use std::io::Read;
+use std::path::{Component, Path, PathBuf};
+
+/// Longest scene file, bytes: more than 100000 path points need.
+pub const SCENE_BYTES_MAX: u64 = 16 << 20;
+/// Longest file next to a scene, bytes.
+const SIBLING_BYTES_MAX: u64 = 64 << 20;
+
+/// A scene's text and where it comes from.
+#[derive(Debug, Clone)]
+pub struct Source {
+    name: String,
+    text: String,
+    beside: Beside,
+}
+
+/// Location of the files next to a scene.
+#[derive(Debug, Clone)]
+enum Beside {
+    BuiltIn,
+    Folder(PathBuf),
+    Nowhere,
+}
+
+impl Source {
+    /// The built-in scene called `name_or_path`, or else the file at this path.
+    ///
+    /// # Errors
+    /// [`SceneError`] when neither exists, or the file cannot be read, is too long or not UTF-8.
+    pub fn open(name_or_path: &str) -> Result<Self, SceneError> {
+        if let Some(scene) = builtin::find(name_or_path) {
+            let (name, text) = (scene.name.to_owned(), scene.text.to_owned());
+            return Ok(Self { name, text, beside: Beside::BuiltIn });
+        }
+        let path = Path::new(name_or_path);
+        let bytes = read_bounded(path, SCENE_BYTES_MAX).map_err(|why| missing(name_or_path, path, &why))?;
+        let folder = path.parent().map_or_else(PathBuf::new, Path::to_path_buf);
+        Self::from_bytes(name_or_path, bytes, Beside::Folder(folder))
+    }
+
+    /// A scene from bytes in memory, without files next to it.
+    ///
+    /// # Errors
+    /// [`SceneError`] when they are too many or not UTF-8.
+    pub fn memory(name: &str, bytes: &[u8]) -> Result<Self, SceneError> {
+        if bytes.len() as u64 > SCENE_BYTES_MAX {
+            let message = format!("it has {} bytes, more than {SCENE_BYTES_MAX}", bytes.len());
+            return Err(SceneError::unreadable(name, message, None));
+        }
+        Self::from_bytes(name, bytes.to_vec(), Beside::Nowhere)
+    }
+
+    fn from_bytes(name: &str, bytes: Vec<u8>, beside: Beside) -> Result<Self, SceneError> {
+        match String::from_utf8(bytes) {
+            Ok(text) => Ok(Self { name: name.to_owned(), text, beside }),
+            Err(error) => {
+                let valid = error.utf8_error().valid_up_to();
+                let before = &error.as_bytes()[..valid];
+                let line = before.iter().filter(|b| **b == b'\n').count() + 1;
+                let column = valid - before.iter().rposition(|b| *b == b'\n').map_or(0, |at| at + 1) + 1;
+                let message = format!("line {line}, byte {column} is not UTF-8 text");
+                Err(SceneError::unreadable(name, message, Some("expected a TOML file".to_owned())))
+            }
+        }
+    }
+
+    /// The scene's name: that of the built-in one, or the path as it was given.
+    #[must_use]
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The text.
+    #[must_use]
+    pub fn text(&self) -> &str {
+        &self.text
+    }
+
+    /// The bytes of a file next to the scene, or why there are none.
+    pub(super) fn sibling(&self, name: &str) -> Result<Vec<u8>, String> {
+        let path = Path::new(name);
+        if name.is_empty() || path.components().any(|c| matches!(c, Component::Prefix(_) | Component::RootDir)) {
+            return Err("expected a path relative to the scene".to_owned());
+        }
+        match &self.beside {
+            Beside::BuiltIn => {
+                builtin::sibling(name).map(<[u8]>::to_vec).ok_or_else(|| "no such built-in file".to_owned())
+            }
+            Beside::Folder(folder) => read_plain(&folder.join(path), SIBLING_BYTES_MAX),
+            Beside::Nowhere => Err("this scene has no folder".to_owned()),
+        }
+    }
+}
+
+/// Reads a file that a scene names, which must not be a stream: only the caller of the program may make it wait for one.
+fn read_plain(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    // checked before opening: opening a pipe waits for a writer
+    let kind = std::fs::metadata(path).map_err(|e| e.to_string())?;
+    if !(kind.is_file() || kind.is_dir()) {
+        return Err("it is a pipe, a device or a socket; expected a plain file".to_owned());
+    }
+    read_bounded(path, most)
+}
+
+fn read_bounded(path: &Path, most: u64) -> Result<Vec<u8>, String> {
+    if path.is_dir() {
+        return Err("it is a folder".to_owned());
+    }
+    let file = File::open(path).map_err(|e| e.to_string())?;
+    let mut bytes = Vec::new();
+    file.take(most + 1).read_to_end(&mut bytes).map_err(|e| e.to_string())?;
+    if bytes.len() as u64 > most {
+        return Err(format!("it has more than {most} bytes"));
+    }
+    Ok(bytes)
+}
+
+fn missing(name: &str, path: &Path, why: &str) -> SceneError {
+    let list = builtin::all().iter().map(|s| s.name).collect::<Vec<_>>().join(", ");
+    let looks_like_a_path = path.components().count() > 1 || path.extension().is_some();
+    let hint = did_you_mean(name, builtin::all().iter().map(|s| s.name)).filter(|_| !looks_like_a_path);
+    let help = match hint {
+        Some(hint) => format!("{hint} Built-in scenes: {list}; or give the path of a scene file"),
+        None => format!("built-in scenes: {list}; or give the path of a scene file"),
+    };
+    let message = if looks_like_a_path || path.exists() {
+        format!("the file cannot be read: {why}")
+    } else {
+        format!("there is no built-in scene `{name}`, and no file of that name ({why})")
+    };
+    SceneError::unreadable(name, message, Some(help))
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_no_plain_file_is_refused_and_not_waited_for() {
+        // an endless device, and a socket in place of a pipe: both are refused before they are opened
+        let folder = tempfile::tempdir().unwrap();
+        let socket = folder.path().join("socket.obj");
+        let _listens = std::os::unix::net::UnixListener::bind(&socket).unwrap();
+        for path in [Path::new("/dev/zero"), &socket] {
+            let told = read_plain(path, SIBLING_BYTES_MAX).unwrap_err();
+            assert!(told.contains("expected a plain file"), "{path:?}: {told}");
+        }
+        assert_eq!(read_plain(folder.path(), 9).unwrap_err(), "it is a folder");
+        // a scene may come from a pipe, but its length is bounded
+        assert!(read_bounded(Path::new("/dev/zero"), 9).unwrap_err().contains("more than 9 bytes"));
+    }
+}

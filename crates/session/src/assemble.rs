@@ -1,0 +1,395 @@
+//! Converts a scene into agents for the runtime and into what the compositor draws.
+//!
+//! In: a [`Scene`]. Out: spawns for the runtime, actors and props for the compositor, views for control, the declared machine.
+//! Never here: time passing.
+
+use super::cpu_budget::Tally;
+use super::error_control::Holding;
+use super::governor::{ErrorGovernor, RateGovernor};
+use glam::DVec3;
+use metachron_contact::Agent;
+use metachron_core::{AgentId, N_MAX, ResolutionRange};
+use metachron_geometry::FormKind;
+use metachron_geometry::{Primitive, Solid, ToolShape, patch};
+use metachron_lod::control;
+use metachron_lod::control::{
+    ErrorControl, ErrorLimits, Kind, Law, LevelDemand, ObjectView, PRIMITIVE_LEVELS, PictureControl, Policy, Prices,
+    RateControl, RateDemand, RateLimits, Stages, Value,
+};
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::{SoftShape, SoftSpec};
+use metachron_render;
+use metachron_render::{Actor, Camera, Form, Level, Look, Material, Prop, ROPE_LEVEL, Seen, Stage};
+use metachron_runtime::{DrawPrice, Governor, ObjectPrice};
+use metachron_world;
+use metachron_world::kinds;
+use metachron_world::kinds::{LawKind, PolicyKind, ShadingKind, ValueKind};
+use metachron_world::{Member, Scene, Scenery, Spec, machine};
+use std::sync::Arc;
+
+/// Adds the governors of rates and errors to the agents of a scene, and keeps what they share with the frame loop.
+pub(super) struct Governors {
+    share: f64,
+    /// The shared data so far.
+    pub steered: Steered,
+}
+
+impl Governors {
+    /// Of the agents of `scene`.
+    pub fn of(scene: &Scene) -> Self {
+        let share = fair_share(machine(scene).cores, scene.agents.len());
+        Self { share, steered: Steered::default() }
+    }
+
+    /// The governor of one agent; none where the scene fixes its step and its resolution.
+    pub fn governor(&mut self, member: &Member) -> Option<Box<dyn Governor>> {
+        governor(member, self.share, &mut self.steered)
+    }
+}
+
+/// Data that the agents' controllers share with the frame loop.
+#[derive(Debug, Default)]
+pub(super) struct Steered {
+    /// Controllers that keep a rate.
+    pub tallies: Vec<Arc<Tally>>,
+    /// Controllers that hold an error.
+    pub holdings: Vec<Arc<Holding>>,
+}
+
+/// The share of its period that one agent's work may take, so that all agents fit on `cores` next to the frame loop.
+fn fair_share(cores: u32, agents: usize) -> f64 {
+    (ROOM * f64::from(cores) / agents.max(1) as f64).min(SHARE_MAX)
+}
+
+/// Share of all cores that the agents together may plan with; the rest is reserved for the frame loop.
+pub(super) const ROOM: f64 = 0.75;
+/// Largest share of its period that an agent may take even if cores are idle: past it every hiccup makes the agent late.
+const SHARE_MAX: f64 = 0.6;
+
+/// The governor of the agent's dt and ε; none where the scene fixes both.
+fn governor(member: &Member, share: f64, steered: &mut Steered) -> Option<Box<dyn Governor>> {
+    let meshed = matches!(member.spec, Spec::Tube(_) | Spec::Synthetic(_));
+    if let Some(tolerance_m) = member.tolerance_m {
+        return error_governor(member, (tolerance_m, meshed), steered);
+    }
+    let limits = RateLimits {
+        dt_wanted_s: member.pace.dt.as_secs_f64(),
+        dt_max_s: member.pace.dt_range.1.as_secs_f64(),
+        eps_m: meshed.then_some(member.simulation.eps_m),
+        share,
+    };
+    let control = RateControl::new(limits, meshed.then_some(member.start.eps_m));
+    if !control.steers() {
+        return None;
+    }
+    let limits = (control.least_part(), control.share());
+    let tally = Arc::new(Tally::new(member.id, member.pace.rate_hz, limits));
+    steered.tallies.push(Arc::clone(&tally));
+    Some(Box::new(RateGovernor(control, tally)))
+}
+
+/// The governor of an agent with an error tolerance.
+fn error_governor(
+    member: &Member,
+    (tolerance_m, meshed): (f64, bool),
+    steered: &mut Steered,
+) -> Option<Box<dyn Governor>> {
+    let (least, greatest) = member.pace.dt_range;
+    let dt_s = (least.as_secs_f64(), greatest.as_secs_f64());
+    let limits = ErrorLimits { tolerance_m, dt_s, eps_m: meshed.then_some(member.simulation.eps_m) };
+    let now = RateDemand { dt_s: member.pace.dt.as_secs_f64(), eps_m: meshed.then_some(member.start.eps_m) };
+    let control = ErrorControl::new(&limits, now);
+    if !control.steers() {
+        return None;
+    }
+    let holding = Holding::new(member.id, tolerance_m);
+    steered.holdings.push(Arc::clone(&holding));
+    Some(Box::new(ErrorGovernor(control, holding)))
+}
+
+/// All drawable objects: agents, then scenery, then the proxies of groups.
+pub fn stage(scene: &Scene) -> Stage {
+    let agents =
+        scene.agents.iter().map(|member| Actor { id: member.id, form: form(&member.spec), look: look(&member.look) });
+    let still = (scene.agents.len() as u32..).zip(scenery(scene)).map(|(id, it)| {
+        let form = Form::Scenery(it.model.clone(), it.at);
+        Actor { id: AgentId(id), form, look: look(&it.look) }
+    });
+    let actors = agents.chain(still);
+    let props = scene.obstacles.iter().zip(&scene.obstacle_looks);
+    let props = props.map(|(obstacle, wish)| Prop { obstacle: obstacle.clone(), look: look(wish) });
+    let mut stage = Stage::new(actors.collect(), props.collect());
+    for (id, it) in (scene.agents.len() as u32..).zip(scenery(scene)) {
+        if let Some(texture) = &it.texture {
+            stage.paint(AgentId(id), texture);
+        }
+    }
+    stage
+}
+
+/// All scenery in the order of its actors.
+fn scenery(scene: &Scene) -> impl Iterator<Item = &Scenery> {
+    scene.scenery.iter().chain(scene.groups.iter().map(|group| &group.proxy))
+}
+
+fn form(spec: &Spec) -> Form {
+    match spec {
+        Spec::Tube(_) => Form::Tube,
+        Spec::Rigid(body) => Form::Solid(body.solid.clone()),
+        Spec::Soft(soft) => soft_form(soft),
+        Spec::Instrument(_) => Form::Tool(ToolShape::default()),
+        Spec::Synthetic(_) => Form::Unseen,
+    }
+}
+
+/// A rope is drawn as a tube, any other soft body as its skin; nothing if it cannot be built, which is reported elsewhere.
+fn soft_form(spec: &SoftSpec) -> Form {
+    if let SoftShape::Rope { radius_m, .. } = spec.shape {
+        return Form::Rope { radius_m };
+    }
+    let form = SoftBody::new(spec.clone()).ok().and_then(|body| body.form());
+    match form.as_deref().map(|form| &form.kind) {
+        Some(FormKind::Surface(skin)) => Form::Skin(skin.clone()),
+        _ => Form::Unseen,
+    }
+}
+
+const fn look(wish: &metachron_world::Look) -> Look {
+    let material = match wish.material {
+        kinds::Material::Tissue => Material::Tissue,
+        kinds::Material::Metal => Material::Metal,
+        kinds::Material::Plastic => Material::Plastic,
+        kinds::Material::Skin => Material::Skin,
+    };
+    Look { colour: wish.colour, material }
+}
+
+/// The picture controller configured by `scene`.
+pub fn picture_control(scene: &Scene) -> PictureControl {
+    let target = &scene.target;
+    let mut control = PictureControl::new(policy(target.policy), law(target), target.frame_hz);
+    control.set_value(value(target.value));
+    control.set_raise(target.raise);
+    if let Some((lag_s, share)) = target.lag {
+        control.set_lag(lag_s, share);
+    }
+    control.set_prices(prices(&machine(scene).draw));
+    if let Some(margin) = target.gains.margin {
+        control.set_margin(margin);
+    }
+    control
+}
+
+/// Control's type for a policy; scenes and control use the same names.
+pub fn policy(kind: PolicyKind) -> Policy {
+    Policy::named(kind.name()).unwrap_or_default()
+}
+
+const fn value(kind: ValueKind) -> Value {
+    match kind {
+        ValueKind::Gentle => Value::Gentle,
+        ValueKind::Plain => Value::Plain,
+        ValueKind::Steep => Value::Steep,
+        ValueKind::Focus => Value::Focus,
+        ValueKind::FocusSteep => Value::FocusSteep,
+    }
+}
+
+/// The declared drawing prices in control's units.
+pub fn prices(draw: &DrawPrice) -> Prices {
+    let object = |price: &ObjectPrice| Stages {
+        setup: price.setup_us * 1e-6,
+        polygon: price.triangle_us * 1e-6,
+        vertex: price.vertex_us * 1e-6,
+        pixel: price.pixel_ns * 1e-9,
+    };
+    Prices {
+        frame_s: draw.setup_ms * 1e-3,
+        pixel_s: draw.pixel_ns * 1e-9,
+        shading: draw.objects.each_ref().map(object),
+        areas: None,
+    }
+}
+
+/// The feedback law configured by a target.
+pub fn law(target: &metachron_world::Target) -> Law {
+    let gains = &target.gains;
+    match target.law {
+        LawKind::Printed => {
+            let Law::Printed { alpha, beta } = Law::PRINTED else { return Law::PRINTED };
+            Law::Printed { alpha: gains.alpha.unwrap_or(alpha), beta: gains.beta.unwrap_or(beta) }
+        }
+        LawKind::Corrected => {
+            let Law::Corrected { kappa, lead, margin } = Law::CORRECTED else { return Law::CORRECTED };
+            Law::Corrected {
+                kappa: gains.kappa.unwrap_or(kappa),
+                lead: gains.lead.unwrap_or(lead),
+                margin: gains.margin.unwrap_or(margin),
+            }
+        }
+    }
+}
+
+/// Updates `views`, control's description of every object on the stage in the order of its actors, for the objects in `looked`.
+pub fn renew(views: &mut Vec<ObjectView>, seen: &[Seen], looked: &[usize], scene: &Scene) {
+    if views.len() != seen.len() {
+        views.clear();
+        views.extend((0..seen.len()).map(|at| view_at(at, &seen[at], scene)));
+        return;
+    }
+    for &at in looked {
+        views[at] = view_at(at, &seen[at], scene);
+    }
+}
+
+/// Actors are agents, then scenery, then groups.
+fn view_at(at: usize, seen: &Seen, scene: &Scene) -> ObjectView {
+    let (agents, members) = (scene.agents.len(), scene.scenery.len());
+    if let Some(member) = scene.agents.get(at) {
+        return view(seen, member);
+    }
+    if let Some(it) = scene.scenery.get(at - agents) {
+        let (least, most) = it.model.range();
+        return still_view(seen, it, Kind::Counted { radius_m: seen.radius_m, least, most });
+    }
+    let group = &scene.groups[at - agents - members];
+    let members = (agents + group.members.start, group.members.len());
+    let impostors = std::array::from_fn(|n| group.levels.get(n).copied().unwrap_or(0));
+    still_view(seen, &group.proxy, Kind::Group { radius_m: seen.radius_m, members, impostors })
+}
+
+fn still_view(seen: &Seen, it: &Scenery, kind: Kind) -> ObjectView {
+    let range = ResolutionRange { eps_m: (1.0, 1.0), n: (0, N_MAX) };
+    let view = view_of(seen, (kind, range), &it.look);
+    match (it.look.shading, &it.texture) {
+        (ShadingKind::Any, Some(_)) => ObjectView { shading: (view.shading.0, control::Shading::Textured), ..view },
+        _ => view,
+    }
+}
+
+/// The cheapest and the best allowed shading of an object without a texture.
+const fn shading(kind: ShadingKind) -> (control::Shading, control::Shading) {
+    use control::Shading::{Flat, Gouraud, PerPixel, Textured};
+    match kind {
+        ShadingKind::Flat => (Flat, Flat),
+        ShadingKind::Gouraud => (Gouraud, Gouraud),
+        ShadingKind::PerPixel => (PerPixel, PerPixel),
+        ShadingKind::Textured => (Textured, Textured),
+        ShadingKind::Any => (Flat, PerPixel),
+    }
+}
+
+fn view(seen: &Seen, member: &Member) -> ObjectView {
+    let kind = match seen.tube_m {
+        Some((length_m, radius_m)) => Kind::Tube { length_m, radius_m },
+        None => Kind::Primitive { radius_m: seen.radius_m, triangles: triangles(&member.spec) },
+    };
+    view_of(seen, (kind, member.picture), &member.look)
+}
+
+fn view_of(seen: &Seen, (kind, range): (Kind, ResolutionRange), look: &metachron_world::Look) -> ObjectView {
+    ObjectView {
+        id: seen.id,
+        kind,
+        range,
+        shading: shading(look.shading),
+        pixels: seen.pixels,
+        distance_m: seen.distance_m,
+        speed_px_s: seen.speed_px_s,
+        importance: look.importance,
+        off_centre: seen.off_centre,
+        from_focus_m: seen.from_focus_m,
+        visible: seen.visible,
+    }
+}
+
+/// Converts control's demand to the compositor's type.
+pub fn level((view, demand): (&ObjectView, &LevelDemand)) -> Level {
+    let shading = match demand.shading {
+        control::Shading::Flat => metachron_render::Shading::Flat,
+        control::Shading::Gouraud => metachron_render::Shading::Gouraud,
+        control::Shading::PerPixel => metachron_render::Shading::PerPixel,
+        control::Shading::Textured => metachron_render::Shading::Textured,
+        control::Shading::Shadowed => metachron_render::Shading::Shadowed,
+    };
+    // a cast of floats saturates; the detail sets the colour of visible objects
+    let detail = if view.visible { control::detail(view, demand) as f32 } else { 0.0 };
+    Level { resolution: demand.resolution, triangles: demand.polygons as u32, shading, detail }
+}
+
+/// Triangles at every level, for an object that is one mesh per level.
+fn triangles(spec: &Spec) -> [u32; PRIMITIVE_LEVELS] {
+    let of_tool = |n: u8| ToolShape::default().parts(0.0).iter().map(|part| part.primitive.triangles(n)).sum();
+    std::array::from_fn(|n| {
+        let n = n as u8;
+        match spec {
+            Spec::Rigid(body) => solid_triangles(&body.solid, n),
+            Spec::Instrument(_) => of_tool(n),
+            Spec::Soft(body) => soft_triangles(&body.shape),
+            Spec::Tube(_) | Spec::Synthetic(_) => 0,
+        }
+    })
+}
+
+/// Triangles drawn for a soft body: a sheet has two faces and a rim, a rope is drawn as a tube.
+fn soft_triangles(shape: &SoftShape) -> u32 {
+    match *shape {
+        SoftShape::Sheet { segments: [x, y], .. } => 4 * x * y + 4 * (x + y),
+        SoftShape::Box { segments: [x, y, z], .. } => 4 * (x * y + y * z + z * x),
+        SoftShape::Ball { segments: n, .. } => 12 * n * n,
+        SoftShape::Rope { segments, .. } => segments * patch::triangles(ROPE_LEVEL),
+    }
+}
+
+fn solid_triangles(solid: &Solid, n: u8) -> u32 {
+    match (Primitive::of(solid, n), solid) {
+        (Some((primitive, _)), _) => primitive.triangles(n),
+        (None, Solid::Mesh { triangles, .. }) => triangles.len() as u32,
+        // Euler: a closed triangle mesh of p corners has 2p - 4 faces
+        (None, Solid::Hull { points_m }) => (2 * points_m.len() as u32).saturating_sub(4),
+        (None, _) => 0,
+    }
+}
+
+/// The scene's camera `seconds` after the start; if the scene has none, a camera in front that sees everything.
+pub fn camera(scene: &Scene, stage: &Stage, seconds: f64) -> Camera {
+    match &scene.camera {
+        Some(camera) => {
+            let view = camera.view_at(seconds);
+            Camera::looking(view.eye_m, view.look_at_m, view.fov_deg.to_radians())
+        }
+        None => overview(stage),
+    }
+}
+
+/// Vertical angle of view of the default camera, radians.
+const OVERVIEW_FOV_RAD: f64 = 0.7;
+
+fn overview(stage: &Stage) -> Camera {
+    let (centre, radius_m) = stage.bounds(None).unwrap_or((DVec3::ZERO, 1.0));
+    let distance = 1.1 * radius_m / libm::sin(0.5 * OVERVIEW_FOV_RAD);
+    let towards = DVec3::new(0.35, -1.0, 0.55).normalize();
+    Camera::looking(centre + towards * distance, centre, OVERVIEW_FOV_RAD)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_scene_may_ask_for_as_many_threads_as_the_runtime_gives() {
+        assert_eq!(metachron_scene::THREADED_MAX, metachron_runtime::THREADS_MAX);
+    }
+
+    #[test]
+    fn a_group_may_have_as_many_levels_as_control_chooses_among() {
+        assert_eq!(metachron_world::GROUP_LEVELS_MAX, control::IMPOSTORS_MAX);
+    }
+
+    #[test]
+    fn scenes_and_control_have_the_same_names_for_policies() {
+        let written: Vec<_> = PolicyKind::ALL.into_iter().map(PolicyKind::name).collect();
+        let known: Vec<_> = Policy::ALL.into_iter().map(Policy::name).collect();
+        assert_eq!(written, known);
+    }
+}

@@ -1,0 +1,449 @@
+//! Couplings between agents in a run, collected from the states that they publish.
+//!
+//! In: the newest states at each gathering, and which agents have new ones. Out: a [`Coupling`] for every pair and kind that ever occurred.
+//! A pair is read again only when one of its agents has a new state: a heap at rest costs nothing. Never here: forces; only the owners of
+//! the pairs know them.
+
+use glam::DVec3;
+use metachron_core::{AgentId, Body, Snapshot};
+use metachron_core::{PairKind, PairState};
+use metachron_world::Scene;
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// The interaction of two agents.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Coupling {
+    /// The grasping tool, or the owner of the pair; in an island the lower number.
+    pub a: AgentId,
+    /// The peer.
+    pub b: AgentId,
+    /// The kind of coupling: `ledger`, `penalty`, `penalty-extrapolated`, `tlm`, `island`, `grasp`, `attach`.
+    pub kind: &'static str,
+    /// Contacts or attachments at the end of the run.
+    pub contacts: u32,
+    /// Force at the end of the run, newtons; zero in an island, whose inner forces are not published.
+    pub force_n: f64,
+    /// Largest force seen by a frame, newtons.
+    pub force_max_n: f64,
+    /// Overlap at the end of the run, metres.
+    pub penetration_m: f64,
+    /// Largest overlap seen by a frame, metres.
+    pub penetration_max_m: f64,
+    /// Impulses exchanged, magnitudes summed, N·s.
+    pub impulse_n_s: f64,
+    /// Impulse given and not yet taken at the last reading, N·s.
+    pub in_flight_n_s: f64,
+    /// Largest difference between the ledgers of both sides at equal revisions, as a share of the impulse exchanged; if the revisions never
+    /// were equal, the difference of the newest ledgers beyond what the owner reports as in flight. `None` where there are no two ledgers
+    /// to compare.
+    pub momentum_error: Option<f64>,
+    /// Whether both ledgers were ever seen at the same revision.
+    pub(super) met: bool,
+    /// Inverse effective masses of `a` and `b` along the normal of the contact with the largest force, 1/kg, when they last pressed on each
+    /// other; `None` where no contact was solved between the two: in an island, which is one solve, and for links, penalties and lines.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
+    /// Energy left in the energy tank, joules; `None` where the law has none.
+    pub tank_j: Option<f64>,
+    /// Mass added by the law, kilograms.
+    pub parasitic_kg: f64,
+}
+
+/// All couplings of a run so far.
+#[derive(Debug, Default)]
+pub(super) struct Couplings {
+    /// Pairs in resting contact from the start: they share an island already, without having formed a bond.
+    resting: Vec<(AgentId, AgentId)>,
+    all: Vec<Coupling>,
+    /// Number of joints of each coupling.
+    joints: Vec<u32>,
+    known: BTreeMap<(AgentId, AgentId, &'static str), usize>,
+    /// Indices of each agent's couplings.
+    of: Vec<Vec<usize>>,
+    /// Agents with a new state, each once, and the agents coupled to them.
+    heard: Vec<AgentId>,
+    is_heard: Vec<bool>,
+}
+
+/// Rigid bodies that share a clock.
+const ISLAND: &str = "island";
+
+impl Coupling {
+    pub(super) const fn new(a: AgentId, b: AgentId, kind: &'static str) -> Self {
+        Self {
+            a,
+            b,
+            kind,
+            contacts: 0,
+            force_n: 0.0,
+            force_max_n: 0.0,
+            penetration_m: 0.0,
+            penetration_max_m: 0.0,
+            impulse_n_s: 0.0,
+            in_flight_n_s: 0.0,
+            momentum_error: None,
+            met: false,
+            inverse_mass_per_kg: None,
+            tank_j: None,
+            parasitic_kg: 0.0,
+        }
+    }
+
+    /// Whether the two share a clock.
+    #[must_use]
+    pub fn is_island(&self) -> bool {
+        self.kind == ISLAND
+    }
+
+    fn see(&mut self, state: &PairState) {
+        self.contacts = state.contacts;
+        self.force_n = state.force_n;
+        self.force_max_n = self.force_max_n.max(state.force_n);
+        self.penetration_m = state.penetration_m;
+        self.penetration_max_m = self.penetration_max_m.max(state.penetration_m);
+        self.impulse_n_s = state.impulse_n_s;
+        self.in_flight_n_s = state.in_flight_n_s;
+        self.inverse_mass_per_kg = state.inverse_mass_per_kg;
+        self.tank_j = state.tank_j;
+        self.parasitic_kg = state.parasitic_kg;
+    }
+
+    fn differ(&mut self, error: f64) {
+        self.momentum_error = Some(self.momentum_error.filter(|_| self.met).unwrap_or(0.0).max(error));
+        self.met = true;
+    }
+
+    /// Compares the ledgers of both sides, which differ by `apart_n_s`.
+    fn compare(&mut self, apart_n_s: f64, same_reading: bool) {
+        if self.impulse_n_s <= 0.0 {
+            return;
+        }
+        if same_reading {
+            self.differ(apart_n_s / self.impulse_n_s);
+        } else if !self.met {
+            self.momentum_error = Some((apart_n_s - self.in_flight_n_s).max(0.0) / self.impulse_n_s);
+        }
+    }
+}
+
+impl Couplings {
+    /// The couplings before the first step: jointed bodies share a clock from the start.
+    pub(super) fn of(scene: &Scene) -> Self {
+        let mut couplings = Self { resting: scene.resting_pairs(), ..Self::default() };
+        for (a, b) in scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?))) {
+            let at = couplings.number(a.min(b), a.max(b), ISLAND);
+            couplings.joints[at] += 1;
+            couplings.all[at].contacts = couplings.joints[at];
+        }
+        couplings
+    }
+
+    /// All couplings, in the order in which they were first seen.
+    pub(super) fn all(&self) -> &[Coupling] {
+        &self.all
+    }
+
+    /// Reports a new state of `id`.
+    pub(super) fn hear(&mut self, id: AgentId) {
+        let at = id.0 as usize;
+        if self.is_heard.len() <= at {
+            self.is_heard.resize(at + 1, false);
+        }
+        if !std::mem::replace(&mut self.is_heard[at], true) {
+            self.heard.push(id);
+        }
+    }
+
+    /// Updates the couplings of the agents reported by [`Self::hear`] from the `newest` states; `leader` gives the leader of an agent's
+    /// island.
+    pub(super) fn note(&mut self, newest: &[Arc<Snapshot>], leader: impl Fn(AgentId) -> AgentId) {
+        self.open_anew();
+        self.note_resting(&leader);
+        let heard = std::mem::take(&mut self.heard);
+        for &id in &heard {
+            let Some(snapshot) = newest.get(id.0 as usize) else { continue };
+            self.note_grasp(id, snapshot);
+            for state in &snapshot.pairs {
+                self.note_pair(id, state, newest);
+            }
+            // both sides publish the bond while they share a clock: the lower number records it
+            for other in snapshot.bonds.iter().filter(|other| **other > id) {
+                let coupling = self.at(id, *other, ISLAND);
+                coupling.contacts = coupling.contacts.max(1);
+            }
+        }
+        heard.iter().for_each(|id| self.note_led(*id, leader(*id)));
+        heard.iter().for_each(|id| self.is_heard[id.0 as usize] = false);
+        self.heard = heard;
+        self.heard.clear();
+    }
+
+    /// Clears the current contacts, force and overlap of the couplings of all reported agents, and adds their peers to the list.
+    fn open_anew(&mut self) {
+        let of = std::mem::take(&mut self.of);
+        for k in 0..self.heard.len() {
+            for &at in of.get(self.heard[k].0 as usize).into_iter().flatten() {
+                let coupling = &mut self.all[at];
+                (coupling.contacts, coupling.force_n, coupling.penetration_m) = (self.joints[at], 0.0, 0.0);
+                let (a, b) = (coupling.a, coupling.b);
+                self.hear(a);
+                self.hear(b);
+            }
+        }
+        self.of = of;
+    }
+
+    fn note_resting(&mut self, leader: &impl Fn(AgentId) -> AgentId) {
+        let mut resting = std::mem::take(&mut self.resting);
+        resting.retain(|&(a, b)| {
+            if ![a, b].iter().any(|id| self.is_heard.get(id.0 as usize) == Some(&true)) {
+                return true;
+            }
+            let together = leader(a) == leader(b);
+            if together {
+                let coupling = self.at(a, b, ISLAND);
+                coupling.contacts = coupling.contacts.max(1);
+            }
+            together
+        });
+        self.resting = resting;
+    }
+
+    /// Records an agent that shares an island without having published a bond (it joined before it touched any body) as coupled to its
+    /// leader.
+    fn note_led(&mut self, id: AgentId, leader: AgentId) {
+        let told = |at: &usize| self.all[*at].is_island() && self.all[*at].contacts > 0;
+        if leader != id && !self.of.get(id.0 as usize).is_some_and(|of| of.iter().any(told)) {
+            self.at(leader, id, ISLAND).contacts = 1;
+        }
+    }
+
+    /// Records the grasp of a tool.
+    fn note_grasp(&mut self, holder: AgentId, snapshot: &Snapshot) {
+        let Body::Tool(tool) = &snapshot.body else { return };
+        let Some(grasp) = tool.grasp else { return };
+        let coupling = self.at(holder, grasp.target, PairKind::Grasp.name());
+        coupling.contacts = 1;
+        coupling.force_n = tool.force_n;
+        coupling.force_max_n = coupling.force_max_n.max(tool.force_n);
+    }
+
+    fn note_pair(&mut self, owner: AgentId, state: &PairState, newest: &[Arc<Snapshot>]) {
+        let other = state.with;
+        let Some((mine, theirs)) = newest.get(owner.0 as usize).zip(newest.get(other.0 as usize)) else { return };
+        let held_by_tool = state.kind == PairKind::Grasp && matches!(theirs.body, Body::Tool(_));
+        let (a, b) = if held_by_tool { (other, owner) } else { (owner, other) };
+        if let Some(back) = both_sides(state, theirs, owner) {
+            // each side of a penalty force computes its own value: one coupling, and the difference of the two
+            let greatest = state.impulse_n_s.max(back.impulse_n_s);
+            let (a, b) = (a.min(b), a.max(b));
+            let coupling = self.at(a, b, state.kind.name());
+            if owner == a {
+                coupling.see(state);
+            }
+            if greatest > 0.0 {
+                coupling.differ((state.impulse_n_s - back.impulse_n_s).abs() / greatest);
+            }
+            return;
+        }
+        let coupling = self.at(a, b, state.kind.name());
+        coupling.see(state);
+        if held_by_tool {
+            coupling.inverse_mass_per_kg = state.inverse_mass_per_kg.map(|[mine, its]| [its, mine]);
+        }
+        if let Some((apart_n_s, same_reading)) = difference_n_s((mine, owner), (theirs, other)) {
+            coupling.compare(apart_n_s, same_reading);
+        }
+    }
+
+    fn at(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> &mut Coupling {
+        let at = self.number(a, b, kind);
+        &mut self.all[at]
+    }
+
+    /// The index of a coupling; a new one if it is unknown.
+    fn number(&mut self, a: AgentId, b: AgentId, kind: &'static str) -> usize {
+        if let Some(&at) = self.known.get(&(a, b, kind)) {
+            return at;
+        }
+        let at = self.all.len();
+        self.known.insert((a, b, kind), at);
+        self.all.push(Coupling::new(a, b, kind));
+        self.joints.push(0);
+        for id in [a, b].map(|id| id.0 as usize) {
+            if self.of.len() <= id {
+                self.of.resize_with(id + 1, Vec::new);
+            }
+            self.of[id].push(at);
+        }
+        at
+    }
+}
+
+/// The state of the same pair as its peer publishes it, where both sides apply forces.
+fn both_sides<'s>(state: &PairState, theirs: &'s Snapshot, owner: AgentId) -> Option<&'s PairState> {
+    theirs.pairs.iter().find(|back| state.kind.is_penalty() && back.with == owner && back.kind == state.kind)
+}
+
+/// Difference between the ledgers of what `owner` gave and `other` took, N·s, and whether both have the same revision.
+fn difference_n_s((mine, owner): (&Snapshot, AgentId), (theirs, other): (&Snapshot, AgentId)) -> Option<(f64, bool)> {
+    let given = mine.given.iter().find(|ledger| ledger.with == other)?;
+    let taken = theirs.taken.iter().find(|ledger| ledger.with == owner)?;
+    let mut apart = DVec3::ZERO;
+    // a force that is assumed to continue is given in the owner's next step: neither ledger is wrong because of it
+    given.beyond(Some(taken), mine.time, |_, sum, _| apart += sum.linear);
+    Some((apart.length(), given.revision == taken.revision && taken.coming.is_empty()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_core::{Ahead, Impulse, Ledger, Site};
+    use metachron_core::{SimTime, ToolState};
+    use metachron_scene::{Source, load};
+
+    fn two_balls() -> Scene {
+        let text = "format = 1\nobject = [\n{ name = \"a\", model = \"rigid\", shape = \"ball\", radius_m = 1 },\n\
+                    { name = \"b\", model = \"rigid\", shape = \"ball\", radius_m = 1, position_m = [9, 0, 0] },\n]\n";
+        Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
+    }
+
+    /// Reports all `states`, of agents without a shared island.
+    fn note(couplings: &mut Couplings, states: &[Arc<Snapshot>]) {
+        (0..).map(AgentId).take(states.len()).for_each(|id| couplings.hear(id));
+        couplings.note(states, |id| id);
+    }
+
+    fn pushed(x: f64) -> Impulse {
+        Impulse { linear: DVec3::X * x, angular: DVec3::ZERO }
+    }
+
+    /// The states of an owner with the ledger `given` and of a peer with the ledger `taken`.
+    fn states(given: &Ledger, taken: Ledger, state: PairState) -> Vec<Arc<Snapshot>> {
+        let owner = Snapshot { given: vec![given.clone()], pairs: vec![state], ..Snapshot::default() };
+        let other = Snapshot { taken: vec![Ledger { with: AgentId(0), ..taken }], ..Snapshot::default() };
+        vec![Arc::new(owner), Arc::new(other)]
+    }
+
+    #[test]
+    fn accounts_of_the_same_reading_are_compared_and_others_are_on_their_way() {
+        let mut given = Ledger::new(AgentId(1));
+        given.give(Site::Whole, SimTime::ZERO, 0.0, pushed(2.0));
+        let early = given.clone();
+        given.give(Site::Whole, SimTime::ZERO, 0.1, pushed(2.0));
+        let state = PairState {
+            contacts: 1,
+            impulse_n_s: 4.0,
+            in_flight_n_s: 1.5,
+            force_n: 3.0,
+            ..PairState::new(AgentId(1), PairKind::Ledger)
+        };
+        let scene = two_balls();
+        let mut couplings = Couplings::of(&scene);
+        note(&mut couplings, &states(&given, early.clone(), state));
+        // two of four newton seconds are not taken yet, and the owner reports one and a half in flight
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.125));
+        note(&mut couplings, &states(&given, given.clone(), state));
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
+        // the continuing force has been taken ahead
+        let ahead = Some(Ahead { sum: pushed(1.0), from: SimTime::ZERO, middle_s: 0.1 });
+        note(&mut couplings, &states(&given, Ledger { ahead, ..given.clone() }, state));
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.0));
+        // a peer that lost half of it without noticing
+        note(&mut couplings, &states(&given, Ledger { revision: given.revision, ..early }, state));
+        assert_eq!(couplings.all()[0].momentum_error, Some(0.5));
+        assert_eq!(
+            (couplings.all().len(), couplings.all()[0].kind, couplings.all()[0].force_max_n),
+            (1, "ledger", 3.0)
+        );
+    }
+
+    #[test]
+    fn the_two_sides_of_a_penalty_are_one_coupling_with_what_they_differ_by() {
+        for (kind, name) in [(PairKind::Penalty, "penalty"), (PairKind::PenaltyExtrapolated, "penalty-extrapolated")] {
+            let side = |with, impulse_n_s| PairState { impulse_n_s, ..PairState::new(AgentId(with), kind) };
+            let state = |pair| Arc::new(Snapshot { pairs: vec![pair], ..Snapshot::default() });
+            let scene = two_balls();
+            let mut couplings = Couplings::of(&scene);
+            note(&mut couplings, &[state(side(1, 5.0)), state(side(0, 4.0))]);
+            let [coupling] = couplings.all() else { panic!("{:?}", couplings.all()) };
+            assert_eq!((coupling.impulse_n_s, coupling.kind), (5.0, name));
+            assert!((coupling.momentum_error.unwrap() - 0.2).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn what_a_contact_weighs_is_told_in_the_order_of_the_two_names() {
+        let scene = two_balls();
+        let (tip, rotation) = (DVec3::ZERO, glam::DQuat::IDENTITY);
+        let still = DVec3::ZERO;
+        let tool = ToolState {
+            tip,
+            rotation,
+            velocity: still,
+            spin: still,
+            jaw: 0.0,
+            grasp: None,
+            lets_in: None,
+            force_n: 0.0,
+            is_left: false,
+        };
+        for (kind, body, want) in [
+            (PairKind::Ledger, Body::Nothing, (0, 1, [3.0, 2.0])),
+            (PairKind::Grasp, Body::Tool(tool), (1, 0, [2.0, 3.0])),
+        ] {
+            let pair = PairState { inverse_mass_per_kg: Some([3.0, 2.0]), ..PairState::new(AgentId(1), kind) };
+            let owner = Snapshot { pairs: vec![pair], ..Snapshot::default() };
+            let mut couplings = Couplings::of(&scene);
+            note(&mut couplings, &[Arc::new(owner), Arc::new(Snapshot { body, ..Snapshot::default() })]);
+            let told = &couplings.all()[0];
+            assert_eq!((told.a.0, told.b.0, told.inverse_mass_per_kg.unwrap()), want, "{kind:?}");
+        }
+    }
+
+    #[test]
+    fn bodies_that_share_a_clock_are_an_island_until_they_part() {
+        let bound = |with| Arc::new(Snapshot { bonds: vec![AgentId(with)], ..Snapshot::default() });
+        let scene = two_balls();
+        let mut couplings = Couplings::of(&scene);
+        note(&mut couplings, &[bound(1), bound(0)]);
+        assert_eq!(
+            couplings.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>(),
+            [(0, 1, "island", 1)]
+        );
+        assert_eq!(couplings.all()[0].inverse_mass_per_kg, None, "its contacts meet in the shared world");
+        note(&mut couplings, &[Arc::default(), Arc::default()]);
+        assert_eq!(couplings.all()[0].contacts, 0);
+    }
+
+    #[test]
+    fn who_shares_a_world_without_having_touched_is_an_island_with_its_leader() {
+        let mut couplings = Couplings::of(&two_balls());
+        let states = [Arc::default(), Arc::default()];
+        (0..2).for_each(|id| couplings.hear(AgentId(id)));
+        couplings.note(&states, |_| AgentId(0));
+        let told = |c: &Couplings| c.all().iter().map(|c| (c.a.0, c.b.0, c.kind, c.contacts)).collect::<Vec<_>>();
+        assert_eq!(told(&couplings), [(0, 1, "island", 1)]);
+        note(&mut couplings, &states);
+        assert_eq!(told(&couplings), [(0, 1, "island", 0)], "it has gone home");
+    }
+
+    #[test]
+    fn what_nobody_has_news_of_stays_and_either_side_opens_it_anew() {
+        let pair = |contacts| PairState { contacts, ..PairState::new(AgentId(1), PairKind::Ledger) };
+        let state = |pairs: Vec<PairState>| Arc::new(Snapshot { pairs, ..Snapshot::default() });
+        let mut couplings = Couplings::of(&two_balls());
+        let touching = [state(vec![pair(3)]), Arc::default()];
+        note(&mut couplings, &touching);
+        // no agent has a new state: nothing is read
+        couplings.note(&[], |id| id);
+        assert_eq!(couplings.all()[0].contacts, 3);
+        // the peer has a new state: the owner is read again
+        couplings.hear(AgentId(1));
+        couplings.note(&touching, |id| id);
+        assert_eq!(couplings.all()[0].contacts, 3);
+        couplings.hear(AgentId(0));
+        couplings.note(&[Arc::default(), Arc::default()], |id| id);
+        assert_eq!((couplings.all().len(), couplings.all()[0].contacts), (1, 0));
+    }
+}

@@ -1,0 +1,140 @@
+//! The CPU budget: shares one processor between agents' steps and the picture's levels at one price.
+//!
+//! In: the agents' load at their finest, the picture's demand and its λ. Out: a share for every agent, and the time budget of the picture.
+//! Never here: the market's law (`metachron_lod::adaptive::joint` has it), steps, drawing. Theory: `docs/theory/budget.md`, eq. 54 … 59.
+//!
+//! Agents and the frame loop exchange these numbers through atomics, without waiting.
+
+use super::assemble::ROOM;
+use metachron_core::AgentId;
+use metachron_lod::adaptive::joint::{Between, Drawing, Market, Worker, temporal_error_px};
+use metachron_lod::control::ObjectView;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Numbers exchanged between a steered agent and the frame loop.
+#[derive(Debug)]
+pub(super) struct Tally {
+    /// The agent.
+    id: AgentId,
+    /// Its requested step rate, Hz.
+    rate_hz: f64,
+    /// The least fraction of its full work that it can run with.
+    least: f64,
+    /// Its share when the budget suffices for all.
+    fair: f64,
+    /// Its load at its finest as a share of one core, and the share of its period that its work may take; bits of f64.
+    full: AtomicU64,
+    share: AtomicU64,
+    /// The finest ε that makes a visible difference, metres, +∞ out of view; bits of f64.
+    plain: AtomicU64,
+}
+
+impl Tally {
+    /// Nothing is reported yet.
+    pub fn new(id: AgentId, rate_hz: f64, (least, fair): (f64, f64)) -> Self {
+        let [full, share, plain] = [0.0, fair, 0.0].map(|x: f64| AtomicU64::new(x.to_bits()));
+        Self { id, rate_hz, least, fair, full, share, plain }
+    }
+
+    /// The agent.
+    pub fn id(&self) -> AgentId {
+        self.id
+    }
+
+    /// The frame loop sets the finest ε that makes a visible difference, metres.
+    pub fn show(&self, plain_m: f64) {
+        self.plain.store(plain_m.to_bits(), Ordering::Relaxed);
+    }
+
+    /// The finest ε that makes a visible difference, metres, +∞ out of view; 0 until it is set.
+    pub fn plain_m(&self) -> f64 {
+        f64::from_bits(self.plain.load(Ordering::Relaxed))
+    }
+
+    /// The agent reports its load at its finest, as a share of one core.
+    pub fn tell(&self, full: f64) {
+        self.full.store(full.to_bits(), Ordering::Relaxed);
+    }
+
+    /// The share of its period that the agent's work may take.
+    pub fn share(&self) -> f64 {
+        f64::from_bits(self.share.load(Ordering::Relaxed))
+    }
+
+    fn full(&self) -> f64 {
+        f64::from_bits(self.full.load(Ordering::Relaxed))
+    }
+
+    fn allow(&self, share: f64) {
+        self.share.store(share.to_bits(), Ordering::Relaxed);
+    }
+}
+
+/// The processor shared by agents and pictures.
+#[derive(Debug, Default)]
+pub(super) struct Purse {
+    tallies: Vec<Arc<Tally>>,
+    workers: Vec<Worker>,
+    market: Market,
+    open: bool,
+}
+
+/// Pixels assumed for an agent out of view: it will come into view again.
+const UNSEEN_PX: f64 = 100.0;
+/// Fraction of its pixels that an agent at its finest draws wrong, however slowly it moves.
+const ERROR_LEAST: f64 = 0.01;
+
+impl Purse {
+    /// The CPU budget of these agents.
+    pub fn new(tallies: Vec<Arc<Tally>>) -> Self {
+        Self { tallies, ..Self::default() }
+    }
+
+    /// Shares the processor for the next frame of `period_s` on so many cores; returns the seconds that the picture may take, `None` if
+    /// there is enough for all. `weight` is the weight of an object in view in the picture's value, pixels.
+    pub fn settle(
+        &mut self,
+        (cores, period_s): (u32, f64),
+        drawing: Drawing,
+        views: &[ObjectView],
+        weight: impl Fn(usize) -> f64,
+    ) -> Option<f64> {
+        self.workers.clear();
+        self.workers.extend(self.tallies.iter().map(|tally| {
+            let at = tally.id.0 as usize;
+            let loss = views.get(at).map_or(0.0, |view| loss(view, weight(at), tally.rate_hz));
+            Worker { full: period_s * tally.full(), least: tally.least, loss }
+        }));
+        // the agents' reported work includes waiting for a core: the picture's own core comes on top of their share
+        let capacity = (ROOM * f64::from(cores) + 1.0) * period_s;
+        let settled = self.market.settle(&self.workers, capacity, drawing);
+        if settled.is_some() || self.open {
+            for (tally, worker) in self.tallies.iter().zip(&self.workers) {
+                let bought = settled.map(|(lambda, _)| tally.full() * worker.part(lambda));
+                tally.allow(bought.filter(|share| *share > 0.0).unwrap_or(tally.fair));
+            }
+        }
+        self.open = settled.is_some();
+        settled.map(|(_, limit_s)| limit_s)
+    }
+
+    /// Ends the sharing: every agent returns to its fair share.
+    pub fn close(&mut self) {
+        if std::mem::take(&mut self.open) {
+            self.tallies.iter().for_each(|tally| tally.allow(tally.fair));
+        }
+        self.market = Market::default();
+    }
+}
+
+/// Pixels drawn wrong because of an agent's own error at its finest: the offset of half a step's motion, along an outline of twice the root
+/// of its area.
+fn loss(view: &ObjectView, weight: f64, rate_hz: f64) -> f64 {
+    if !view.visible || view.pixels.is_nan() || view.pixels < 1.0 {
+        return ERROR_LEAST * UNSEEN_PX * view.importance;
+    }
+    let off_px = temporal_error_px(Between::Hold, view.speed_px_s, 0.0, rate_hz);
+    let wrong = ERROR_LEAST + 2.0 * off_px / view.pixels.sqrt();
+    weight * if wrong < 1.0 { wrong } else { 1.0 }
+}

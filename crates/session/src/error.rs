@@ -1,0 +1,22 @@
+//! Errors that end a run early. Each is shown once, by the command line or the window.
+
+#[cfg(feature = "picture")]
+use metachron_render::GpuError;
+use metachron_world::WorldError;
+
+/// Reason why a scene could not be played, or not to its end.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SessionError {
+    /// The agents could not be started.
+    #[error(transparent)]
+    World(#[from] WorldError),
+    /// The adapter failed.
+    #[cfg(feature = "picture")]
+    #[error("drawing failed")]
+    Draw(#[source] GpuError),
+    /// The picture could not be written.
+    #[cfg(feature = "picture")]
+    #[error(transparent)]
+    Picture(GpuError),
+}

@@ -1,0 +1,57 @@
+//! Agents with an error tolerance: the final state of their controllers, for the report of a run.
+//!
+//! In: the range end at which a controller rests. Out: a [`Held`] per agent, which shows where the tolerance cannot be met. Never here: the
+//! law ([`metachron_lod::control::ErrorControl`]).
+
+use metachron_core::AgentId;
+use metachron_lod::Bound;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU8, Ordering};
+
+/// Published state of one agent's controller; lock-free.
+#[derive(Debug)]
+pub(super) struct Holding {
+    agent: AgentId,
+    tolerance_m: f64,
+    rests: AtomicU8,
+}
+
+/// Whether an agent meets its error tolerance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Held {
+    /// The tolerance, metres.
+    pub tolerance_m: f64,
+    /// The end of its ranges at which the controller rested; `None` between the ends.
+    pub rests: Option<Bound>,
+}
+
+impl Holding {
+    /// Of an agent whose controller rests at neither end yet.
+    pub fn new(agent: AgentId, tolerance_m: f64) -> Arc<Self> {
+        Arc::new(Self { agent, tolerance_m, rests: AtomicU8::new(0) })
+    }
+
+    /// Publishes where the controller rests.
+    pub fn tell(&self, rests: Option<Bound>) {
+        let number = match rests {
+            None => 0,
+            Some(Bound::Finest) => 1,
+            Some(Bound::Coarsest) => 2,
+        };
+        self.rests.store(number, Ordering::Relaxed);
+    }
+
+    fn held(&self) -> Held {
+        let rests = match self.rests.load(Ordering::Relaxed) {
+            1 => Some(Bound::Finest),
+            2 => Some(Bound::Coarsest),
+            _ => None,
+        };
+        Held { tolerance_m: self.tolerance_m, rests }
+    }
+}
+
+/// Whether this agent meets its tolerance; `None` for an agent without one.
+pub(super) fn held(all: &[Arc<Holding>], agent: AgentId) -> Option<Held> {
+    all.iter().find(|one| one.agent == agent).map(|one| one.held())
+}

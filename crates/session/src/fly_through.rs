@@ -1,0 +1,72 @@
+//! A scene seen along its camera's path, frame by frame: each frame at its own place, however long the previous one took.
+//!
+//! In: a scene, the means of drawing. Out: a record and a picture of every frame. Never here: what the numbers mean.
+//! Agents are paused; only the camera moves. So all policies see the same frames, on any machine.
+//! In lockstep a frame takes its declared time, and only the requested pictures are drawn.
+
+use super::error::SessionError;
+use super::headless::{Drawing, frame_seen_by};
+use super::outcome::FrameRecord;
+use super::session::Session;
+use metachron_render::{Camera, PictureFile, Size, Style};
+use metachron_runtime::Drive;
+use metachron_world::Scene;
+
+/// A walk through a scene.
+pub struct Walk {
+    session: Session,
+    drawing: Drawing,
+    size: Size,
+    length_s: f64,
+    /// Camera of the last frame.
+    camera: Camera,
+}
+
+impl Walk {
+    /// Opens `scene` for pictures of `size`, with the prices of the adapter that draws every frame.
+    ///
+    /// # Errors
+    /// As [`Session::open`].
+    pub fn open(scene: Scene, drawing: Drawing, size: Size) -> Result<Self, SessionError> {
+        let length_s = scene.camera.as_ref().and_then(metachron_world::Camera::length_s).unwrap_or(0.0);
+        let mut session = Session::open(scene)?;
+        session.drive(Drive::Pause);
+        if let Drawing::Every(screen) = &drawing {
+            let gpu = screen.gpu();
+            session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu.clone()));
+        }
+        let camera = session.camera_at(0.0);
+        Ok(Self { session, drawing, size, length_s, camera })
+    }
+
+    /// The session: to change its policy or target.
+    pub const fn session(&mut self) -> &mut Session {
+        &mut self.session
+    }
+
+    /// Plays the frame at a fraction of the path, 0 … 1; the controller learns from it.
+    ///
+    /// # Errors
+    /// [`SessionError::Draw`] where the adapter fails.
+    pub fn step(&mut self, part: f64) -> Result<FrameRecord, SessionError> {
+        self.camera = self.session.camera_at(part * self.length_s);
+        let view = (self.size, Style::default());
+        frame_seen_by(&mut self.session, &self.camera, view, (&mut self.drawing, false))
+    }
+
+    /// The picture of the last frame; `None` where nothing draws.
+    ///
+    /// # Errors
+    /// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where it cannot be read back.
+    pub fn picture(&mut self) -> Result<Option<PictureFile>, SessionError> {
+        let screen = match &mut self.drawing {
+            Drawing::Nothing => return Ok(None),
+            Drawing::Every(screen) => screen,
+            Drawing::Last(screen) => {
+                screen.render(self.session.picture(), &self.camera).map_err(SessionError::Draw)?;
+                screen
+            }
+        };
+        screen.read_back().map(Some).map_err(SessionError::Picture)
+    }
+}

@@ -1,0 +1,55 @@
+//! Adapters between the runtime, which measures an agent's turns, and control, which computes the demands.
+//!
+//! In: a turn's measure. Out: a demand on dt and on the simulation's ε. Never here: the law.
+
+use super::cpu_budget::Tally;
+use super::error_control::Holding;
+use metachron_core::{Resolution, SimSpan};
+use metachron_lod::control;
+use metachron_lod::control::{ErrorControl, ErrorMeasure, RateControl, RateDemand};
+use metachron_runtime::{Demand, Governor, TurnMeasure};
+use std::sync::Arc;
+
+/// An agent's rate control as a governor of the runtime, and the data it shares with the frame loop.
+pub(super) struct RateGovernor(pub RateControl, pub Arc<Tally>);
+
+impl Governor for RateGovernor {
+    fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
+        let Self(control, tally) = self;
+        control.set_share(tally.share());
+        control.set_plain(tally.plain_m());
+        let turn = control::TurnMeasure {
+            work_s: measure.work_s,
+            wanted_period_s: measure.wanted_period_s,
+            real_period_s: measure.real_period_s,
+            dt_s: measure.dt.as_secs_f64(),
+        };
+        let demand = control.after_turn(&turn);
+        if let Some(load) = control.full_load() {
+            tally.tell(load);
+        }
+        demanded(demand, measure)
+    }
+}
+
+/// An agent's error control as a governor of the runtime, and the data it publishes for the frame loop.
+pub(super) struct ErrorGovernor(pub ErrorControl, pub Arc<Holding>);
+
+impl Governor for ErrorGovernor {
+    fn after_step(&mut self, measure: &TurnMeasure) -> Demand {
+        let Self(control, holding) = self;
+        let TurnMeasure { residual_m, drift_m, .. } = *measure;
+        let space_m = (residual_m - drift_m).max(0.0);
+        let turn = ErrorMeasure { space_m, time_m: drift_m, dt_s: measure.dt.as_secs_f64() };
+        let demand = control.after_turn(&turn);
+        holding.tell(control.rest());
+        demanded(demand, measure)
+    }
+}
+
+/// Converts control's demand to the runtime's type; the primitive level n stays as it is.
+fn demanded(demand: Option<RateDemand>, measure: &TurnMeasure) -> Demand {
+    let Some(demand) = demand else { return Demand::default() };
+    let n = measure.resolution.map_or(0, |held| held.n);
+    Demand { dt: SimSpan::from_secs_f64(demand.dt_s), resolution: demand.eps_m.map(|eps_m| Resolution { eps_m, n }) }
+}

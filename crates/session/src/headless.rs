@@ -1,0 +1,174 @@
+//! Plays a scene without a window: for reports, pictures and tests.
+//!
+//! In: a session, an end, the means of drawing. Out: an [`Outcome`], and a picture file if one is requested.
+//! Never here: arguments, progress bars (the caller is called back at every frame).
+
+use super::error::SessionError;
+use super::outcome::{FrameRecord, Outcome};
+use super::session::{Finished, Session};
+use metachron_render::{Camera, Size, Style};
+#[cfg(feature = "picture")]
+use metachron_render::{Offscreen, RendererOptions};
+use std::path::PathBuf;
+
+/// When a run ends.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum End {
+    /// After so many frames.
+    Frames(u64),
+    /// After so many simulated seconds.
+    Seconds(f64),
+}
+
+/// What draws the frames.
+pub enum Drawing {
+    /// Nothing: a frame costs its declared time, or nothing in real time.
+    Nothing,
+    /// Every frame is drawn, in real time.
+    #[cfg(feature = "picture")]
+    Every(Box<Offscreen>),
+    #[cfg(feature = "picture")]
+    /// Only the last frame is drawn, for its picture, without a time limit; costs are declared.
+    Last(Box<Offscreen>),
+}
+
+impl Drawing {
+    /// The adapter's name and driver; `None` where nothing is drawn.
+    pub(super) fn adapter(&self) -> Option<String> {
+        match self {
+            Self::Nothing => None,
+            #[cfg(feature = "picture")]
+            Self::Every(screen) | Self::Last(screen) => Some(screen.gpu().describe()),
+        }
+    }
+}
+
+/// A run without a window.
+pub struct Headless {
+    /// When it ends.
+    pub end: End,
+    /// Size of the picture in pixels.
+    pub size: Size,
+    /// How it is drawn.
+    pub style: Style,
+    /// The means of drawing.
+    pub drawing: Drawing,
+    /// File for the picture of the last frame.
+    pub png: Option<PathBuf>,
+}
+
+/// Plays `session` to its end. `go_on` receives every frame and the share of the run that is done, 0 … 1; if it returns `false` the run
+/// ends.
+///
+/// # Errors
+/// [`SessionError::Draw`] where the adapter fails, [`SessionError::Picture`] where the picture cannot be written.
+pub fn play_headless(
+    mut session: Session,
+    mut plan: Headless,
+    go_on: &mut dyn FnMut(&FrameRecord, f64) -> bool,
+) -> Result<Outcome, SessionError> {
+    session.hold();
+    #[cfg(feature = "picture")]
+    warm_up(&mut session, &mut plan)?;
+    session.begin();
+    let period = session.period();
+    let mut due = session.now();
+    let mut interrupted = false;
+    loop {
+        session.wait_until(due);
+        let done = share_done(&session, plan.end);
+        if done >= 1.0 || interrupted {
+            break;
+        }
+        let record = one_frame(&mut session, (plan.size, plan.style), &mut plan.drawing, false)?;
+        interrupted = !go_on(&record, done);
+        due = (due + period).max(session.now());
+    }
+    // the picture shows the state at the end of the run, however long drawing takes
+    session.hold();
+    #[cfg(feature = "picture")]
+    write_picture(&mut session, &mut plan)?;
+    let adapter = plan.drawing.adapter();
+    Ok(session.end(adapter, interrupted))
+}
+
+/// Makes drawing ready while time is held: prices are known and a first picture, which creates pipelines and buffers, is finished. Virtual
+/// time does not pass meanwhile anyway.
+#[cfg(feature = "picture")]
+fn warm_up(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
+    if let Drawing::Every(screen) = &mut plan.drawing {
+        let gpu = screen.gpu().clone();
+        session.calibrate((&gpu.describe(), gpu.is_processor()), || Some(gpu));
+        let camera = session.scene_camera();
+        session.compose(&camera, plan.size, plan.style, None);
+        screen.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+        session.pass_over();
+    }
+    Ok(())
+}
+
+fn share_done(session: &Session, end: End) -> f64 {
+    match end {
+        End::Frames(frames) => session.frames() as f64 / frames as f64,
+        End::Seconds(seconds) => session.sim_now().as_secs_f64() / seconds,
+    }
+}
+
+/// Gathers, chooses, draws and updates the controller, unless it must not learn from this frame (`skip`).
+pub(super) fn one_frame(
+    session: &mut Session,
+    (size, style): (Size, Style),
+    drawing: &mut Drawing,
+    skip: bool,
+) -> Result<FrameRecord, SessionError> {
+    let camera = session.scene_camera();
+    let camera = session.ahead(camera);
+    frame_seen_by(session, &camera, (size, style), (drawing, skip))
+}
+
+/// As [`one_frame`], seen by `camera` instead of the scene's camera.
+pub(super) fn frame_seen_by(
+    session: &mut Session,
+    camera: &Camera,
+    (size, style): (Size, Style),
+    (drawing, skip): (&mut Drawing, bool),
+) -> Result<FrameRecord, SessionError> {
+    let started = session.now();
+    session.compose(camera, size, style, None);
+    let (draw, gpu) = match drawing {
+        #[cfg(feature = "picture")]
+        Drawing::Every(screen) => {
+            let composed = session.now();
+            screen.submit(session.picture(), camera).map_err(SessionError::Draw)?;
+            session.choose_beside(camera, size);
+            let gpu = screen.wait().map_err(SessionError::Draw)?;
+            (session.now().saturating_sub(composed), gpu)
+        }
+        _ => {
+            session.choose_beside(camera, size);
+            (session.spend_declared(size), None)
+        }
+    };
+    let work = session.now().saturating_sub(started);
+    Ok(session.finish(started, Finished { work, draw, gpu, skip }))
+}
+
+/// Draws the last frame once more, without a time limit.
+#[cfg(feature = "picture")]
+fn write_picture(session: &mut Session, plan: &mut Headless) -> Result<(), SessionError> {
+    let Some(path) = &plan.png else { return Ok(()) };
+    let mut fresh;
+    let still = match &mut plan.drawing {
+        Drawing::Nothing => return Ok(()),
+        Drawing::Last(still) => still,
+        Drawing::Every(screen) => {
+            let gpu = screen.gpu().clone();
+            fresh = Offscreen::new(gpu, plan.size, RendererOptions::STILL).map_err(SessionError::Draw)?;
+            &mut fresh
+        }
+    };
+    let camera = session.scene_camera();
+    session.compose(&camera, plan.size, plan.style, None);
+    still.render(session.picture(), &camera).map_err(SessionError::Draw)?;
+    still.save(path).map_err(SessionError::Picture)
+}

@@ -1,0 +1,42 @@
+//! The frame loop that connects runtime, control and compositor: gather, choose, draw, measure.
+//!
+//! In: a checked [`metachron_world::Scene`]. Out: frames on the screen or in a file, and an [`Outcome`] that summarises the run.
+//! A [`Session`] is a running scene; [`play_headless`] drives it. Never here: a control law, physics.
+mod assemble;
+#[cfg(feature = "picture")]
+pub mod calibrate;
+mod coupling_record;
+mod cpu_budget;
+mod error;
+mod error_control;
+mod experiment;
+pub mod fit;
+#[cfg(feature = "picture")]
+mod fly_through;
+mod governor;
+mod headless;
+mod integrator_cost;
+mod outcome;
+mod parameter_sweep;
+mod reference_run;
+pub mod report;
+mod session;
+mod step_response;
+mod trace;
+mod visible_resolution;
+
+pub use assemble::law;
+pub use coupling_record::Coupling;
+pub use error::SessionError;
+pub use error_control::Held;
+pub use experiment::{Design, Experiment, Experimented, experiment};
+#[cfg(feature = "picture")]
+pub use fly_through::Walk;
+pub use headless::{Drawing, End, Headless, play_headless};
+pub use integrator_cost::solve_prices;
+pub use outcome::{AgentOutcome, FrameRecord, Outcome, ProbeOutcome};
+pub use parameter_sweep::{Played, Point, apply, cells_of, method_of, play_points, setting_of, slacken};
+pub use reference_run::{Oracle, PairError, consult_oracle};
+pub use session::{Finished, Session};
+pub use step_response::{After, Pushes, median, push};
+pub use trace::Trace;

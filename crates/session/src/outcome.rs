@@ -1,0 +1,127 @@
+//! Results of a run: every frame, every agent, every probe.
+//!
+//! In: a session that has ended. Out: an [`Outcome`]. Never here: statistics (the report makes them), files.
+
+use super::coupling_record::Coupling;
+use super::error_control::Held;
+use super::trace::Trace;
+use glam::DVec3;
+use metachron_core::Resolution;
+use metachron_runtime::{AgentStats, Sample};
+use serde::Serialize;
+
+/// One frame: a row of `--frames-csv`.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct FrameRecord {
+    /// Number of the frame, from 0.
+    pub frame: u64,
+    /// Simulated time it shows, seconds.
+    pub sim_s: f64,
+    /// Work of the frame, milliseconds: gather, choose, draw, adapter; virtual in lockstep.
+    pub frame_ms: f64,
+    /// The adapter's own time for the newest frame that it has reported, milliseconds; `None` where it has no time stamps.
+    pub gpu_ms: Option<f64>,
+    /// From the start of the previous frame to the start of this one, milliseconds; the target's for the first frame.
+    pub interval_ms: f64,
+    /// Estimated time of drawing everything at its finest, milliseconds, by the declared machine's price of a triangle.
+    pub full_ms: f64,
+    /// Triangles drawn.
+    pub triangles: u64,
+    /// Objects in view.
+    pub objects: u64,
+    /// Gathering states and finding visible objects, milliseconds; declared in lockstep, as is choosing.
+    pub cull_ms: f64,
+    /// Choosing levels, milliseconds; with a bounded lag those of the next frame, during the drawing of this one.
+    pub select_ms: f64,
+    /// Making the picture and drawing it, milliseconds.
+    pub draw_ms: f64,
+    /// From where the camera was read to the finished picture, milliseconds.
+    pub lag_ms: f64,
+    /// Time of the frame as predicted by the policy, milliseconds; `None` of a policy without a prediction.
+    pub predicted_ms: Option<f64>,
+    /// Value of the choice over its upper bound; `None` of a policy without a certificate.
+    pub value_over_bound: Option<f64>,
+    /// Objects in view whose level differs from that of the previous frame.
+    pub changes: u32,
+    /// Of these, objects that are back at a level which they had two or three frames before.
+    pub reversals: u32,
+    /// Objects in view that were left out for lack of time.
+    pub holes: u32,
+    /// The loop's ε̂ = 40·ε/L of the printed law, or the corrected law's scene-wide ε in metres.
+    pub eps: f64,
+    /// Mean level n of the tubes in view, else of everything in view.
+    pub n: f64,
+}
+
+/// A probe's point at the end of the run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ProbeOutcome {
+    /// The object's name.
+    pub object: String,
+    /// Share of its rest length.
+    pub at: f64,
+    /// Position, metres.
+    pub position: DVec3,
+    /// Velocity, m/s.
+    pub velocity: DVec3,
+    /// Time and position of the first state at or after every multiple of the probe's period.
+    pub samples: Option<Vec<Sample>>,
+}
+
+/// An agent at the end of the run, with the resolution of its picture.
+#[derive(Debug, Clone)]
+pub struct AgentOutcome {
+    /// Its statistics.
+    pub stats: AgentStats,
+    /// The resolution it was last drawn at; `None` where it has no picture.
+    pub picture: Option<Resolution>,
+    /// How it meets its error tolerance; `None` without one.
+    pub held: Option<Held>,
+}
+
+/// A run that has ended.
+#[derive(Debug, Clone)]
+pub struct Outcome {
+    /// The scene's name.
+    pub scene: String,
+    /// The policy that chose levels.
+    pub policy: &'static str,
+    /// The feedback law.
+    pub law: &'static str,
+    /// The executor.
+    pub executor: &'static str,
+    /// The adapter that drew; `None` where nothing was drawn.
+    pub adapter: Option<String>,
+    /// Target time of a frame, milliseconds.
+    pub target_ms: f64,
+    /// Frames drawn in all.
+    pub finished: u64,
+    /// Every frame of a run with an end; of one without, the newest ([`crate::Session::keep_frames`]).
+    pub frames: Vec<FrameRecord>,
+    /// Warm-up frames, from which the controller does not learn (the first ones): left out of the statistics of frame times.
+    pub warm_up: usize,
+    /// Simulated time, seconds.
+    pub sim_s: f64,
+    /// Wall time before real time begins to pass, seconds: an adapter is opened and measured, a first picture drawn.
+    pub start_up_s: f64,
+    /// Wall time from then on, seconds; virtual in lockstep.
+    pub wall_s: f64,
+    /// CPU time of all agents' turns, seconds; measured, in lockstep too.
+    pub cpu_s: f64,
+    /// Hash of all final states.
+    pub state_hash: u64,
+    /// All agents.
+    pub agents: Vec<AgentOutcome>,
+    /// All couplings.
+    pub couplings: Vec<Coupling>,
+    /// States of the agents over time, if requested ([`crate::Session::keep_trace`]).
+    pub trace: Option<Trace>,
+    /// All probes.
+    pub probes: Vec<ProbeOutcome>,
+    /// Message if the controller rested on a limit at the end: which one.
+    pub clamp: Option<String>,
+    /// Whether the drawing costs of the adapter could not be measured, so that default prices were used.
+    pub unpriced: bool,
+    /// Whether the user ended the run before its end.
+    pub interrupted: bool,
+}

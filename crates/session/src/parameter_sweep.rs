@@ -1,0 +1,239 @@
+//! A scene played at chosen steps, divisions and integrators, to record the paths of its points and the cost.
+//!
+//! In: a scene, a [`Setting`] for every object. Out: the paths of its points, the declared and the measured cost of every agent.
+//! Never here: which settings are tried ([`crate::fit`] decides), words about them.
+//!
+//! Runs are in virtual time, and steps take none of it: the result depends on the settings only, not on the machine.
+
+use super::error::SessionError;
+use super::session::Session;
+use crate::fit::{Path, Setting};
+use metachron_contact::Agent;
+use metachron_core::{AgentId, Body, ResolutionRange, SimSpan, Snapshot};
+use metachron_models::rod::Integrator;
+use metachron_models::rod::Tube;
+use metachron_models::rod::TubeSpec;
+use metachron_models::soft::Side;
+use metachron_models::soft::SoftBody;
+use metachron_models::soft::{SoftMatter, SoftShape, SoftSpec};
+use metachron_runtime::AgentState;
+use metachron_scene::format::MODELS;
+use metachron_world::couplings::Faults;
+use metachron_world::kinds::ExecutorKind;
+use metachron_world::{Member, Probe, Scene, Spec};
+use std::f64::consts::PI;
+use std::time::Duration;
+
+/// A recorded point: its agent, and where on it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Point {
+    /// The agent.
+    pub agent: AgentId,
+    /// Share of its rest length.
+    pub at: f64,
+}
+
+/// A scene played to its end.
+#[derive(Debug, Clone)]
+pub struct Played {
+    /// Paths of the points, in their order.
+    pub paths: Vec<Path>,
+    /// Cost of each agent on the declared machine, seconds of one core per simulated second; solves of all integrators count alike.
+    pub costs_s: Vec<f64>,
+    /// Measured CPU time of each agent's turns, seconds per simulated second.
+    pub cpu_s: Vec<f64>,
+    /// Steps of each agent.
+    pub steps: Vec<u64>,
+    /// Pairs of agents that acted on each other.
+    pub pairs: Vec<(AgentId, AgentId)>,
+    /// The first agent that was parked, and the reason.
+    pub parked: Option<(AgentId, String)>,
+}
+
+/// Shortest sampling interval of points, seconds, and least number of samples in a run.
+const SAMPLE_MIN_S: f64 = 1e-3;
+const SAMPLES_LEAST: f64 = 100.0;
+/// Interval at which a run checks whether to stop, seconds.
+const LOOK_S: f64 = 0.02;
+
+/// The present setting of an agent.
+#[must_use]
+pub fn setting_of(member: &Member) -> Setting {
+    let (pieces, method) = match &member.spec {
+        Spec::Tube(tube) => (pieces_of(tube, member), method_of(tube.integrator)),
+        Spec::Soft(soft) => (cells(&soft.shape).iter().copied().max().unwrap_or(0), 0),
+        Spec::Rigid(_) | Spec::Instrument(_) | Spec::Synthetic(_) => (0, 0),
+    };
+    Setting { dt_s: member.pace.dt.as_secs_f64(), pieces, method }
+}
+
+/// The index of an integrator in [`Integrator::ALL`].
+#[must_use]
+pub fn method_of(integrator: Integrator) -> usize {
+    Integrator::ALL.iter().position(|one| *one == integrator).unwrap_or(0)
+}
+
+/// Applies this setting to one agent of the scene.
+pub fn apply(scene: &mut Scene, agent: AgentId, setting: &Setting) {
+    let member = &mut scene.agents[agent.0 as usize];
+    let dt = SimSpan::from_secs_f64(setting.dt_s).unwrap_or(member.pace.dt);
+    (member.pace.rate_hz, member.pace.dt, member.pace.dt_range) = (1.0 / dt.as_secs_f64(), dt, (dt, dt));
+    member.tolerance_m = None;
+    match &mut member.spec {
+        Spec::Tube(tube) if setting.pieces > 0 => {
+            let eps_m = length_m(tube) / f64::from(setting.pieces);
+            let range = ResolutionRange { eps_m: (eps_m, eps_m), ..tube.range };
+            (tube.segments, tube.range) = (Some(setting.pieces as usize), range);
+            tube.resolution.eps_m = eps_m;
+            tube.integrator = Integrator::ALL[setting.method];
+            (member.simulation, member.start) = (range, tube.resolution);
+        }
+        Spec::Soft(soft) if setting.pieces > 0 => divide(&mut soft.shape, setting.pieces),
+        _ => {}
+    }
+}
+
+/// Replaces a tube by a rope where the tube has nothing that a rope lacks; `false` where it is attached or shaped as no rope can be.
+pub fn slacken(scene: &mut Scene, agent: AgentId) -> bool {
+    let member = &mut scene.agents[agent.0 as usize];
+    let Spec::Tube(tube) = &member.spec else { return false };
+    let plain = tube.attachments.is_empty() && tube.peristalsis.is_none() && tube.pressure_pa == 0.0;
+    // a link attaches to a tube at its wall, but to a rope at a point
+    if !plain || !member.links.is_empty() {
+        return false;
+    }
+    let Some(path_m) = course(tube) else { return false };
+    let radius_m = tube.section.radius_m;
+    let area_m2 = PI * radius_m * radius_m;
+    let held = [Side::Left, Side::Right].into_iter().zip([0, 1]);
+    let spec = SoftSpec {
+        shape: SoftShape::Rope { path_m, radius_m, segments: pieces_of(tube, member) },
+        matter: SoftMatter {
+            young_pa: tube.section.ea_n / area_m2,
+            poisson: 0.3,
+            density_kg_m3: tube.mass_per_length_kg_m / area_m2,
+            damping_per_s: tube.damping_per_s,
+        },
+        position: glam::DVec3::ZERO,
+        rotation: glam::DQuat::IDENTITY,
+        velocity: glam::DVec3::ZERO,
+        held: held.filter(|(_, end)| tube.clamp[*end] || tube.pin[*end]).map(|(side, _)| side).collect(),
+        friction: tube.friction,
+        gravity: tube.gravity,
+        obstacles: tube.obstacles.clone(),
+        sleep: tube.sleep,
+    };
+    if SoftBody::new(spec.clone()).is_err() {
+        return false;
+    }
+    member.spec = Spec::Soft(spec);
+    true
+}
+
+/// The points of a tube's smooth centre line at rest.
+fn course(tube: &TubeSpec) -> Option<Vec<glam::DVec3>> {
+    let mut snapshot = Snapshot::default();
+    Tube::new(tube.clone()).ok()?.write_snapshot(&mut snapshot);
+    if let Body::Curve(curve) = snapshot.body { Some(curve.positions) } else { None }
+}
+
+fn length_m(tube: &TubeSpec) -> f64 {
+    tube.path_m.windows(2).map(|pair| pair[0].distance(pair[1])).sum()
+}
+
+fn pieces_of(tube: &TubeSpec, member: &Member) -> u32 {
+    tube.segments.map_or_else(|| (length_m(tube) / member.start.eps_m - 1e-9).ceil() as u32, |count| count as u32)
+}
+
+fn cells(shape: &SoftShape) -> Vec<u32> {
+    match shape {
+        SoftShape::Sheet { segments, .. } => segments.to_vec(),
+        SoftShape::Box { segments, .. } => segments.to_vec(),
+        SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => vec![*segments],
+    }
+}
+
+/// Divides a body into `most` cells along its most divided axis, and in proportion along the others.
+fn divide(shape: &mut SoftShape, most: u32) {
+    let greatest = cells(shape).into_iter().max().unwrap_or(1).max(1);
+    let scaled = |count: u32| (f64::from(count * most) / f64::from(greatest)).round().max(1.0) as u32;
+    match shape {
+        SoftShape::Sheet { segments, .. } => *segments = segments.map(scaled),
+        SoftShape::Box { segments, .. } => *segments = segments.map(scaled),
+        SoftShape::Ball { segments, .. } | SoftShape::Rope { segments, .. } => *segments = scaled(*segments),
+    }
+}
+
+/// Division of a soft body after [`apply`], along each of its axes; empty for other bodies.
+#[must_use]
+pub fn cells_of(member: &Member) -> Vec<u32> {
+    if let Spec::Soft(soft) = &member.spec { cells(&soft.shape) } else { Vec::new() }
+}
+
+/// Plays `scene` for so many simulated seconds; `None` if `go_on` returned `false`.
+///
+/// # Errors
+/// [`SessionError`] if a model rejects its object.
+pub fn play_points(
+    scene: &Scene,
+    points: &[Point],
+    seconds: f64,
+    go_on: &mut dyn FnMut() -> bool,
+) -> Result<Option<Played>, SessionError> {
+    let machine = metachron_world::machine(scene);
+    let mut session = Session::open(watched(scene, points, seconds))?;
+    let looks = (seconds / LOOK_S).ceil().max(1.0);
+    for look in 1..=looks as u32 {
+        session.wait_until(Duration::from_secs_f64(seconds * f64::from(look) / looks));
+        session.look();
+        if !go_on() {
+            return Ok(None);
+        }
+    }
+    let outcome = session.end(None, false);
+    let path = |samples: &[(metachron_core::SimTime, glam::DVec3)]| Path {
+        samples: samples.iter().map(|(time, place)| (time.as_secs_f64(), *place)).collect(),
+    };
+    let stats = || outcome.agents.iter().map(|agent| &agent.stats);
+    let cost = |(member, stats): (&Member, &metachron_runtime::AgentStats)| {
+        let steps = stats.steps.max(1) as f64;
+        steps * machine.step_s(member.spec.model(), stats.work / steps, 0, 0) / seconds
+    };
+    let parked = stats().zip(&scene.agents).find_map(|(stats, member)| match &stats.state {
+        AgentState::Parked(reason) => Some((member.id, reason.clone())),
+        AgentState::Running | AgentState::Resting => None,
+    });
+    Ok(Some(Played {
+        paths: outcome.probes.iter().map(|probe| path(probe.samples.as_deref().unwrap_or_default())).collect(),
+        costs_s: scene.agents.iter().zip(stats()).map(cost).collect(),
+        cpu_s: stats().map(|stats| stats.cpu_s / seconds).collect(),
+        steps: stats().map(|stats| stats.steps).collect(),
+        pairs: outcome.couplings.iter().map(|one| (one.a, one.b)).collect(),
+        parked,
+    }))
+}
+
+/// The scene in virtual time with `points` recorded, with free steps and without injected faults.
+fn watched(scene: &Scene, points: &[Point], seconds: f64) -> Scene {
+    let mut scene = scene.clone();
+    let every = |agent: AgentId| {
+        let dt_s = scene.agents[agent.0 as usize].pace.dt.as_secs_f64();
+        SimSpan::from_secs_f64((seconds / SAMPLES_LEAST).min(SAMPLE_MIN_S).max(dt_s))
+    };
+    let name = |agent: AgentId| scene.name_of(agent).to_owned();
+    let probe = |point: &Point| Probe {
+        agent: point.agent,
+        object: name(point.agent),
+        at: point.at,
+        every: every(point.agent),
+    };
+    scene.probes = points.iter().map(probe).collect();
+    for member in &mut scene.agents {
+        member.faults = Faults::default();
+    }
+    scene.executor = ExecutorKind::Lockstep;
+    let machine = &mut scene.machine;
+    machine.steps = MODELS.map(|model| (model.to_owned(), Some(0.0), Some(0.0))).to_vec();
+    machine.noise = Some(0.0);
+    scene
+}

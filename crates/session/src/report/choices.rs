@@ -1,0 +1,97 @@
+//! Summary of a run's choices of levels: predictions, certificates, changes, and the time of each stage of a frame.
+//!
+//! In: one row per frame. Out: shares, errors and spreads. Never here: measuring.
+
+use super::frames::Spread;
+use crate::FrameRecord;
+use serde::Serialize;
+
+/// Summary of the choices in a run's frames; a field is `None` where no frame has a value for it.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct ChoiceSummary {
+    /// Mean of the value of a choice over its bound; `None` for a policy without a certificate.
+    pub value_over_bound: Option<f64>,
+    /// The certificate: 19 of 20 choices are proven to lack at most this part of the best value.
+    pub certificate: Option<f64>,
+    /// Levels that changed, per object and frame in view.
+    pub level_changes: Option<f64>,
+    /// Levels that changed back within three frames, per object and frame in view.
+    pub reversals: Option<f64>,
+    /// 19 of 20 frames took the predicted time to within this part of it; `None` for a policy without predictions.
+    pub model_error: Option<f64>,
+    /// Time for gathering states and finding what is visible.
+    pub cull_ms: Option<Spread>,
+    /// Time for choosing levels.
+    pub select_ms: Option<Spread>,
+    /// Time for building the picture and drawing it.
+    pub draw_ms: Option<Spread>,
+    /// From reading the camera to the finished picture.
+    pub lag_ms: Option<Spread>,
+    /// Objects in view that were left out for lack of time, over all frames.
+    pub holes: Option<u64>,
+}
+
+/// Summarises the choices of `frames`.
+#[must_use]
+pub fn summarise_choices(frames: &[FrameRecord]) -> ChoiceSummary {
+    let spread = |of: fn(&FrameRecord) -> f64| Spread::of(frames.iter().map(of));
+    let some = |of: fn(&FrameRecord) -> Option<f64>| Spread::of(frames.iter().filter_map(of));
+    let any = !frames.is_empty();
+    let seen = frames.iter().map(|row| row.objects).sum::<u64>().max(1) as f64;
+    let total = |of: fn(&FrameRecord) -> u32| frames.iter().map(|row| u64::from(of(row))).sum::<u64>();
+    let share = |of| any.then(|| total(of) as f64 / seen);
+    ChoiceSummary {
+        value_over_bound: some(|row| row.value_over_bound).map(|s| s.mean),
+        certificate: some(|row| row.value_over_bound.map(|part| 1.0 - part)).map(|s| s.p95),
+        level_changes: share(|row| row.changes),
+        reversals: share(|row| row.reversals),
+        model_error: some(|row| row.predicted_ms.map(|told| (row.frame_ms / told - 1.0).abs())).map(|s| s.p95),
+        cull_ms: spread(|row| row.cull_ms),
+        select_ms: spread(|row| row.select_ms),
+        draw_ms: spread(|row| row.draw_ms),
+        lag_ms: spread(|row| row.lag_ms),
+        holes: any.then(|| total(|row| row.holes)),
+    }
+}
+
+impl ChoiceSummary {
+    /// The same for frames that were not drawn and have no declared cost: the fields that need drawing times are `None`.
+    #[must_use]
+    pub fn undrawn(self) -> Self {
+        Self { model_error: None, draw_ms: None, lag_ms: None, ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn choices_are_counted_by_objects_in_view_and_errors_by_what_was_promised() {
+        let frame = |k: u32| FrameRecord {
+            objects: 10,
+            frame_ms: 10.0 + f64::from(k) * 0.01,
+            predicted_ms: Some(10.0),
+            value_over_bound: Some(1.0 - 1e-4 * f64::from(k)),
+            changes: k % 2,
+            reversals: u32::from(k == 7),
+            holes: 3,
+            lag_ms: f64::from(k),
+            ..FrameRecord::default()
+        };
+        let frames: Vec<_> = (1..=100).map(frame).collect();
+        let summary = summarise_choices(&frames);
+        assert_eq!(
+            (summary.level_changes, summary.reversals, summary.holes),
+            (Some(50.0 / 1000.0), Some(1.0 / 1000.0), Some(300))
+        );
+        let near = |found: Option<f64>, wanted: f64| (found.unwrap() - wanted).abs() < 1e-9;
+        assert!(near(summary.model_error, 0.095) && near(summary.certificate, 95e-4), "{summary:?}");
+        assert!(near(summary.value_over_bound, 1.0 - 50.5e-4));
+        assert_eq!(summary.lag_ms.map(|s| (s.p99, s.max)), Some((99.0, 100.0)));
+        let none = summarise_choices(&[FrameRecord::default()]);
+        assert_eq!((none.value_over_bound, none.certificate, none.model_error), (None, None, None));
+        let none = summarise_choices(&[]);
+        assert_eq!((none.level_changes, none.holes, none.cull_ms), (None, None, None));
+    }
+}

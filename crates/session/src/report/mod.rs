@@ -1,0 +1,386 @@
+//! The output of a run: the report, statistics of frames, and goals on the report's numbers.
+//!
+//! In: measured numbers. Out: JSON, CSV rows, verdicts. Never here: measuring (the frame loop does), and where files go.
+
+mod choices;
+mod frames;
+mod goal;
+mod summary;
+
+pub use choices::{ChoiceSummary, summarise_choices};
+pub use frames::{FrameSummary, Spread, summarise, summarise_undrawn};
+pub use goal::{Goal, GoalError, Verdict};
+
+use metachron_world::{Moved, Overlap};
+use serde::Serialize;
+
+/// The report of a run.
+#[derive(Debug, Clone, Serialize)]
+pub struct Report {
+    /// The scene's name.
+    pub scene: String,
+    /// The policy that chose levels.
+    pub policy: String,
+    /// The feedback law.
+    pub law: String,
+    /// The executor of the agents.
+    pub executor: String,
+    /// The adapter that drew; `None` where nothing was drawn.
+    pub adapter: Option<String>,
+    /// Frames made.
+    pub frames: u64,
+    /// Simulated seconds.
+    pub sim_s: f64,
+    /// Wall-clock seconds from the first step on; in lockstep, seconds of the virtual clock.
+    pub wall_s: f64,
+    /// Seconds before that: opening the adapter, measuring it, a first picture.
+    pub start_up_s: f64,
+    /// CPU seconds of the agents' turns alone, as measured.
+    pub cpu_s: f64,
+    /// Hash of every agent's last state, 16 hexadecimal digits: equal hashes mean equal bits.
+    pub state_hash: String,
+    /// Target time of a frame, milliseconds.
+    pub target_ms: f64,
+    /// Work, intervals and misses of the frames.
+    #[serde(flatten)]
+    pub summary: FrameSummary,
+    /// The agents, in the scene's order.
+    pub agents: Vec<AgentReport>,
+    /// The couplings between agents.
+    pub couplings: Vec<CouplingReport>,
+    /// Agents that started inside each other or fixed solids.
+    pub overlaps: Vec<OverlapReport>,
+    /// Objects that start elsewhere than the scene puts them, because of that.
+    pub moved: Vec<MovedReport>,
+    /// The effect of different clocks, where requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub oracle: Option<OracleReport>,
+    /// How the frame budget was spent.
+    pub budget: BudgetReport,
+    /// The scene's probes.
+    pub probes: Vec<ProbeReport>,
+}
+
+/// One agent of a run.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct AgentReport {
+    /// Its name in the scene.
+    pub name: String,
+    /// Its model.
+    pub model: String,
+    /// Its state at the end: `running`, `resting` or `parked`.
+    pub state: &'static str,
+    /// Steps taken.
+    pub steps: u64,
+    /// Steps per simulated second while it was awake.
+    pub rate_hz: f64,
+    /// Requested steps per second.
+    pub wanted_hz: f64,
+    /// Last step length, milliseconds.
+    pub dt_ms: f64,
+    /// Last spacing of its simulation, metres; `None` for a model without one.
+    pub eps_m: Option<f64>,
+    /// Level of the primitive that its picture was last drawn with; `None` where it was never drawn.
+    pub n: Option<u8>,
+    /// Spacing that its picture was last drawn with, metres; `None` for a model without one.
+    pub picture_eps_m: Option<f64>,
+    /// CPU seconds of its turns, as measured.
+    pub cpu_s: f64,
+    /// Age of its state when drawn.
+    pub age_ms: Quantiles,
+    /// Lateness of the starts of its turns.
+    pub late_ms: Quantiles,
+    /// Simulated milliseconds that could not be made up.
+    pub dropped_ms: f64,
+    /// Simulated milliseconds at rest.
+    pub rested_ms: f64,
+    /// Name of the agent that led it and whose clock it shared at the end; `None` where it kept its own clock.
+    pub led_by: Option<String>,
+    /// Whether it was removed from the run after a failed step.
+    pub parked: bool,
+    /// The reason for parking.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub parked_reason: Option<String>,
+    /// Mechanical energy, joules, gravity included, zero at the origin.
+    pub energy_j: f64,
+    /// Its own estimate of its error, metres.
+    pub residual_m: f64,
+    /// The part of that error caused by its steps, metres.
+    pub drift_m: f64,
+    /// Its error tolerance, metres; `None` where it kept a rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tolerance_m: Option<f64>,
+    /// The end of its ranges at which it rested under a tolerance: `finest` (out of reach) or `coarsest`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rests: Option<&'static str>,
+}
+
+/// Median and tail of a measured time, milliseconds.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Quantiles {
+    /// Median.
+    pub p50: f64,
+    /// 99th percentile.
+    pub p99: f64,
+}
+
+/// The coupling of two agents.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct CouplingReport {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name.
+    pub b: String,
+    /// The kind of coupling: `ledger`, `tlm`, `penalty`, `penalty-extrapolated`, `island`, `grasp` or `attach`.
+    pub kind: String,
+    /// Contacts, grasps, attachments or joints at the end of the run.
+    pub contacts: u64,
+    /// Difference between both sides' records of the same impulses, as a share of the impulse exchanged, without impulses in flight;
+    /// `None` where there are no two records, as in an island.
+    pub momentum_error: Option<f64>,
+    /// Impulses exchanged, magnitudes summed, newton seconds.
+    pub impulse_n_s: f64,
+    /// Impulse that one side had given and the other not yet taken in the last states, newton seconds.
+    pub in_flight_n_s: f64,
+    /// Inverse effective masses of `a` and `b` along the normal at the contact with the greatest load, 1/kg, when they last pressed on
+    /// each other: the sum is the contact's W, its inverse the effective mass there. `None` where the two share one solve (islands), and
+    /// where no contact was solved between them.
+    pub inverse_mass_per_kg: Option<[f64; 2]>,
+    /// Energy left in the energy tank, joules; `None` where the law has none.
+    pub tank_j: Option<f64>,
+    /// Overlap at the end of the run, metres.
+    pub penetration_m: f64,
+    /// Greatest overlap found in a frame, metres.
+    pub penetration_max_m: f64,
+    /// Force at the end of the run, newtons.
+    pub force_n: f64,
+    /// Greatest force found in a frame, newtons.
+    pub force_max_n: f64,
+    /// Mass that the law added, kilograms.
+    pub parasitic_kg: f64,
+}
+
+/// Two agents that started inside each other.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OverlapReport {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name, or the fixed solid's.
+    pub b: String,
+    /// Depth, metres.
+    pub depth_m: f64,
+}
+
+/// An object that was moved from its place in the scene, to start clear of others.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct MovedReport {
+    /// Its name.
+    pub object: String,
+    /// Displacement from its place in the scene to its start, metres.
+    pub by_m: [f64; 3],
+}
+
+impl OverlapReport {
+    /// Of an overlap of the scene.
+    #[must_use]
+    pub fn of(overlap: &Overlap) -> Self {
+        Self { a: overlap.a.clone(), b: overlap.b.clone(), depth_m: overlap.depth_m }
+    }
+}
+
+impl MovedReport {
+    /// Of an agent that the scene moved.
+    #[must_use]
+    pub fn of(moved: &Moved) -> Self {
+        Self { object: moved.object.clone(), by_m: moved.by_m.to_array() }
+    }
+}
+
+/// The same scene under one very fine common clock, and the difference from its own clocks.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct OracleReport {
+    /// Step of the common clock, milliseconds.
+    pub dt_ms: f64,
+    /// Simulated seconds that both runs have played: all of the run, unless Ctrl-C ended the second one.
+    pub sim_s: f64,
+    /// Points compared.
+    pub states: u64,
+    /// Every pair that was coupled in either run.
+    pub couplings: Vec<CouplingError>,
+}
+
+/// The effect of different clocks on two coupled agents.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct CouplingError {
+    /// The first agent's name.
+    pub a: String,
+    /// The second agent's name.
+    pub b: String,
+    /// Root mean square distance of both agents from their positions under the common clock, metres.
+    pub position_rms_m: f64,
+    /// Greatest such distance, metres.
+    pub position_max_m: f64,
+    /// Greatest difference of either agent's momentum, newton seconds.
+    pub momentum_max_n_s: f64,
+    /// Impulse exchanged in the run, newton seconds; `None` where an island does not report it.
+    pub impulse_n_s: Option<f64>,
+    /// Impulse exchanged under the common clock, newton seconds.
+    pub impulse_oracle_n_s: Option<f64>,
+}
+
+/// How the frame budget was spent.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct BudgetReport {
+    /// Mean frame work as a share of the target; `None` where `frame_ms` is.
+    pub spent_share: Option<f64>,
+    /// The limit at which the control rested at the end, as text; `None` where it did not.
+    pub clamped: Option<String>,
+    /// Summary of the choices of levels.
+    #[serde(flatten)]
+    pub choices: ChoiceSummary,
+}
+
+/// The motion of a probe.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ProbeReport {
+    /// Name of the object.
+    pub object: String,
+    /// 0 start … 1 end of a tube's rest length.
+    pub at: f64,
+    /// Last position, metres.
+    pub position_m: [f64; 3],
+    /// Last velocity, m/s.
+    pub velocity_m_s: [f64; 3],
+    /// `[t, x, y, z]` in seconds and metres, where the scene requests samples.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub samples: Option<Vec<[f64; 4]>>,
+}
+
+impl Report {
+    /// A report with one of every entry, to distinguish names that exist from others.
+    #[must_use]
+    fn template() -> Self {
+        let frame = crate::FrameRecord { gpu_ms: Some(0.0), ..Default::default() };
+        let summary = summarise(&[frame], 1.0);
+        let name = String::new;
+        let oracle = OracleReport { couplings: vec![CouplingError::default()], ..OracleReport::default() };
+        Self {
+            scene: name(),
+            policy: name(),
+            law: name(),
+            executor: name(),
+            adapter: None,
+            frames: 0,
+            sim_s: 0.0,
+            wall_s: 0.0,
+            start_up_s: 0.0,
+            cpu_s: 0.0,
+            state_hash: name(),
+            target_ms: 0.0,
+            summary,
+            agents: vec![AgentReport::default()],
+            couplings: vec![CouplingReport::default()],
+            overlaps: vec![OverlapReport::default()],
+            moved: vec![MovedReport::default()],
+            oracle: Some(oracle),
+            budget: BudgetReport { choices: summarise_choices(&[frame]), ..BudgetReport::default() },
+            probes: vec![ProbeReport::default()],
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Names that other programs read.
+    const NAMES: &[&str] = &[
+        "/scene",
+        "/policy",
+        "/executor",
+        "/adapter",
+        "/frames",
+        "/sim_s",
+        "/wall_s",
+        "/start_up_s",
+        "/cpu_s",
+        "/state_hash",
+        "/target_ms",
+        "/frame_ms/mean",
+        "/frame_ms/stddev",
+        "/frame_ms/min",
+        "/frame_ms/p50",
+        "/frame_ms/p95",
+        "/frame_ms/p99",
+        "/frame_ms/max",
+        "/interval_ms/p99",
+        "/binding_stddev",
+        "/avg_err",
+        "/missed_share",
+        "/settle_frames",
+        "/agents/0/name",
+        "/agents/0/model",
+        "/agents/0/steps",
+        "/agents/0/rate_hz",
+        "/agents/0/wanted_hz",
+        "/agents/0/dt_ms",
+        "/agents/0/eps_m",
+        "/agents/0/n",
+        "/agents/0/cpu_s",
+        "/agents/0/age_ms/p50",
+        "/agents/0/age_ms/p99",
+        "/agents/0/dropped_ms",
+        "/agents/0/parked",
+        "/agents/0/energy_j",
+        "/agents/0/residual_m",
+        "/couplings/0/a",
+        "/couplings/0/b",
+        "/couplings/0/kind",
+        "/couplings/0/contacts",
+        "/couplings/0/force_n",
+        "/couplings/0/momentum_error",
+        "/couplings/0/inverse_mass_per_kg",
+        "/couplings/0/tank_j",
+        "/couplings/0/penetration_m",
+        "/overlaps/0/depth_m",
+        "/moved/0/by_m",
+        "/oracle/dt_ms",
+        "/oracle/sim_s",
+        "/oracle/couplings/0/position_rms_m",
+        "/agents/0/led_by",
+        "/budget/spent_share",
+        "/probes/0/object",
+        "/probes/0/at",
+        "/probes/0/position_m",
+        "/probes/0/velocity_m_s",
+    ];
+
+    #[test]
+    fn the_report_has_the_names_of_the_design() {
+        let json = serde_json::to_value(Report::template()).unwrap();
+        for path in NAMES {
+            assert!(json.pointer(path).is_some(), "{path} is missing");
+        }
+    }
+
+    #[test]
+    fn the_report_says_what_choices_came_to() {
+        let json = serde_json::to_value(Report::template()).unwrap();
+        for path in [
+            "/budget/value_over_bound",
+            "/budget/certificate",
+            "/budget/reversals",
+            "/budget/level_changes",
+            "/budget/model_error",
+            "/budget/select_ms/mean",
+            "/budget/select_ms/max",
+            "/budget/cull_ms/mean",
+            "/budget/draw_ms/mean",
+            "/budget/lag_ms/p99",
+            "/budget/lag_ms/max",
+            "/budget/holes",
+        ] {
+            assert!(json.pointer(path).is_some(), "{path} is missing");
+        }
+    }
+}

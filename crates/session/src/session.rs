@@ -1,0 +1,460 @@
+//! A running scene: the runtime, the controller and the stage of one run, connected.
+//!
+//! A frame is [`Session::compose`] (gather, survey, choose), drawing by the caller, and [`Session::finish`] (measure, learn).
+//! Never here: windows, files, arguments.
+
+mod ahead;
+mod choose;
+mod record;
+
+use super::assemble;
+#[cfg(feature = "picture")]
+use super::calibrate;
+use super::coupling_record::{Coupling, Couplings};
+use super::cpu_budget::Purse;
+use super::error::SessionError;
+use super::error_control;
+use super::error_control::Holding;
+use super::outcome::{AgentOutcome, FrameRecord, Outcome};
+use super::trace::Trace;
+use super::visible_resolution::Sight;
+use metachron_contact::Pull;
+use metachron_core::{AgentId, Body, SimTime};
+use metachron_lod::control::{FrameWork, Law, ObjectView, PictureControl, Policy, Prices, Status};
+#[cfg(feature = "picture")]
+use metachron_render::Gpu;
+use metachron_render::{Camera, Level, Picture, Stage, States};
+use metachron_runtime;
+use metachron_runtime::{AgentHandle, Command, Drive, Machine, Reader};
+use metachron_world::kinds::{ExecutorKind, LawKind, StatesKind};
+use metachron_world::{Scene, World, machine};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// A running scene.
+pub struct Session {
+    scene: Scene,
+    machine: Machine,
+    /// Drawing costs on the declared machine.
+    declared: Prices,
+    world: World,
+    stage: Stage,
+    control: PictureControl,
+    /// Whether pictures are drawn on the processor that agents step on.
+    shares_processor: bool,
+    purse: Purse,
+    holdings: Vec<Arc<Holding>>,
+    sight: Sight,
+    reader: Reader,
+    views: Vec<ObjectView>,
+    levels: Vec<Level>,
+    couplings: Couplings,
+    trace: Option<Trace>,
+    records: Vec<FrameRecord>,
+    chosen: Chosen,
+    last_start: Option<Duration>,
+    /// Time and position of the camera at its last reading.
+    lens: Option<(Duration, Camera)>,
+    /// Predicted camera of the next frame at the time when its picture is finished.
+    next_eye: Option<Camera>,
+    /// Time from reading the camera to the finished picture, seconds, smoothed.
+    lag_s: f64,
+    /// When real time began to pass.
+    begun: Duration,
+    warm_up: usize,
+    finished: u64,
+    keep: usize,
+    /// Whether default drawing prices replace those of the adapter.
+    unpriced: bool,
+    /// Receives a line if start-up takes long.
+    tell: fn(&str),
+}
+
+/// Times of a finished frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct Finished {
+    /// All work of the frame until its picture was finished.
+    pub work: Duration,
+    /// The part of it spent drawing the composed picture.
+    pub draw: Duration,
+    /// The adapter's own time for the newest frame that it has reported; `None` where it has no time stamps.
+    pub gpu: Option<Duration>,
+    /// Whether the controller must not learn from it.
+    pub skip: bool,
+}
+
+/// Load of the last composition on the adapter, and its times.
+#[derive(Debug, Clone, Copy, Default)]
+struct Chosen {
+    sim: SimTime,
+    triangles: u64,
+    more_triangles: f64,
+    /// Gathering states and finding visible objects.
+    cull: Duration,
+    /// Choosing levels before the picture is made.
+    select: Duration,
+    /// Choosing those of the next frame during the drawing of this one.
+    beside: Option<Duration>,
+    /// Making the picture at these levels.
+    build: Duration,
+    /// Triangles without a chosen level: fixed solids, the floor, the caps of tubes.
+    other_triangles: f64,
+    objects: u64,
+    /// Time of the chosen objects on the declared machine, seconds.
+    objects_s: f64,
+    /// Mean level.
+    n: f64,
+}
+
+/// First frames in real time, from which the controller does not learn: shaders are compiled, caches are cold.
+const WARM_UP_FRAMES: u64 = 3;
+
+/// The weight of a new measurement in the smoothed lag.
+const LAG_NEWS: f64 = 0.2;
+
+/// Frames over which meshes blend to a new level.
+const GLIDE_FRAMES: u8 = 6;
+
+impl Session {
+    /// Creates the agents of `scene`; real time is held until [`Session::begin`].
+    ///
+    /// # Errors
+    /// [`SessionError::World`]; nothing runs then.
+    pub fn open(mut scene: Scene) -> Result<Self, SessionError> {
+        let machine = machine(&scene);
+        let mut governors = assemble::Governors::of(&scene);
+        let world = World::start_governed(&scene, scene.executor, &mut |member| governors.governor(member))?;
+        scene.executor = world.executor();
+        let steered = governors.steered;
+        let mut stage = assemble::stage(&scene);
+        stage.glide_over(GLIDE_FRAMES);
+        Ok(Self {
+            control: assemble::picture_control(&scene),
+            shares_processor: scene.executor == ExecutorKind::Lockstep,
+            sight: Sight::new(&steered.tallies),
+            purse: Purse::new(steered.tallies),
+            holdings: steered.holdings,
+            reader: Reader::new(world.agents()),
+            stage,
+            declared: assemble::prices(&machine.draw),
+            machine,
+            world,
+            views: Vec::new(),
+            levels: Vec::new(),
+            couplings: Couplings::of(&scene),
+            trace: None,
+            records: Vec::new(),
+            chosen: Chosen::default(),
+            last_start: None,
+            lens: None,
+            next_eye: None,
+            lag_s: 0.0,
+            begun: Duration::ZERO,
+            warm_up: 0,
+            finished: 0,
+            keep: usize::MAX,
+            unpriced: false,
+            tell: |_| {},
+            scene,
+        })
+    }
+
+    /// The scene being played.
+    #[must_use]
+    pub const fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// Wall time since the start; virtual in lockstep.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.world.now()
+    }
+
+    /// Simulated time now.
+    #[must_use]
+    pub fn sim_now(&self) -> SimTime {
+        self.world.time()
+    }
+
+    /// Whether time is virtual and costs are declared.
+    #[must_use]
+    pub fn is_virtual(&self) -> bool {
+        self.scene.executor == ExecutorKind::Lockstep
+    }
+
+    /// Frames finished.
+    #[must_use]
+    pub fn frames(&self) -> u64 {
+        self.finished
+    }
+
+    /// The newest stored frames, at most `count`.
+    pub fn newest_frames(&self, count: usize) -> &[FrameRecord] {
+        &self.records[self.records.len().saturating_sub(count)..]
+    }
+
+    /// Cores that agents and the frame loop share.
+    pub fn cores(&self) -> u32 {
+        let real = || std::thread::available_parallelism().map_or(1, |cores| cores.get() as u32);
+        if self.is_virtual() { self.machine.cores.max(1) } else { real() }
+    }
+
+    /// Stores at least the newest `frames` frames from now on, and fewer than twice as many: for runs without an end.
+    pub const fn keep_frames(&mut self, frames: usize) {
+        self.keep = frames;
+    }
+
+    /// Target time between frames.
+    #[must_use]
+    pub fn period(&self) -> Duration {
+        Duration::from_secs_f64(1.0 / self.control.target_hz())
+    }
+
+    /// The agents.
+    #[must_use]
+    pub fn agents(&self) -> &[AgentHandle] {
+        self.world.agents()
+    }
+
+    /// The controller of the picture.
+    pub const fn control(&mut self) -> &mut PictureControl {
+        &mut self.control
+    }
+
+    /// Reports a long start-up through `tell`; without it nothing is reported.
+    pub fn tell_by(&mut self, tell: fn(&str)) {
+        self.tell = tell;
+    }
+
+    #[cfg(feature = "picture")]
+    /// Applies the prices of the adapter that draws, if they are known or can be measured; declared costs stay as they are. `on_processor`:
+    /// the adapter draws on the processor.
+    pub fn calibrate(&mut self, (adapter, on_processor): (&str, bool), open: impl FnOnce() -> Option<Gpu>) {
+        self.shares_processor |= on_processor;
+        if self.control.policy().predicts() && !self.is_virtual() {
+            let prices = calibrate::prices(adapter, open, self.tell);
+            self.unpriced = prices.is_none();
+            prices.into_iter().for_each(|prices| self.control.set_prices(prices));
+        }
+    }
+
+    /// The name of the policy that chooses levels, as written in scenes.
+    #[must_use]
+    pub fn policy_name(&self) -> &'static str {
+        self.control.policy().name()
+    }
+
+    /// Selects the policy by name; an unknown name changes nothing.
+    pub fn set_policy(&mut self, name: &str) {
+        if let Some(policy) = Policy::named(name) {
+            self.control.set_policy(policy);
+        }
+    }
+
+    /// The name of the feedback law, as written in scenes.
+    #[must_use]
+    pub fn law_name(&self) -> &'static str {
+        match self.control.law() {
+            Law::Printed { .. } => LawKind::Printed.name(),
+            Law::Corrected { .. } => LawKind::Corrected.name(),
+        }
+    }
+
+    /// Message if the controller rests on a limit: which one; `None` if it does not.
+    #[must_use]
+    pub fn clamp(&self) -> Option<String> {
+        let status = self.control.status();
+        matches!(status, Status::Clamped(_) | Status::BetweenLevels | Status::Fixed).then(|| status.to_string())
+    }
+
+    /// The force between the user spring and an agent, newtons.
+    #[must_use]
+    pub fn hand_force_n(&self, on: AgentId) -> f64 {
+        let Some(state) = self.reader.newest().get(on.0 as usize) else { return 0.0 };
+        // nothing resists the driving of a tool; the force shown is its grasp force
+        if let Body::Tool(tool) = &state.body {
+            return tool.force_n;
+        }
+        state.grips.iter().filter(|grip| grip.by.is_none()).map(|grip| grip.force_n.length()).sum()
+    }
+
+    /// All drawable objects.
+    #[must_use]
+    pub const fn stage(&self) -> &Stage {
+        &self.stage
+    }
+
+    /// The picture composed last.
+    #[must_use]
+    pub fn picture(&self) -> &Picture {
+        self.stage.picture()
+    }
+
+    /// The objects last reported to control.
+    #[must_use]
+    pub fn views(&self) -> &[ObjectView] {
+        &self.views
+    }
+
+    /// The level each agent was last drawn at, in their order.
+    #[must_use]
+    pub fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// The scene's own camera now.
+    #[must_use]
+    pub fn scene_camera(&self) -> Camera {
+        self.camera_at(self.sim_now().as_secs_f64())
+    }
+
+    /// The scene's own camera so many seconds after the start.
+    #[must_use]
+    pub fn camera_at(&self, seconds: f64) -> Camera {
+        assemble::camera(&self.scene, &self.stage, seconds)
+    }
+
+    /// Waits until the wall time `until`, while the agents run.
+    pub fn wait_until(&mut self, until: Duration) {
+        self.world.wait_until(until);
+    }
+
+    /// Pauses real time until [`Session::begin`]. Virtual time passes only while the caller waits.
+    pub fn hold(&mut self) {
+        if !self.is_virtual() {
+            self.world.drive(Drive::Pause);
+        }
+    }
+
+    /// Starts real time.
+    pub fn begin(&mut self) {
+        if !self.is_virtual() {
+            self.begun = self.now();
+            self.world.drive(Drive::Run);
+        }
+    }
+
+    /// Changes the flow of time: pause, run, speed, single step.
+    pub fn drive(&mut self, drive: Drive) {
+        self.world.drive(drive);
+    }
+
+    /// Attaches the user spring to an agent, or releases it (`None`). An agent that does not exist gives an error.
+    pub fn hand(&self, to: AgentId, pull: Option<Pull>) -> Result<(), metachron_runtime::SendError> {
+        self.world.send(to, Command::Hand(pull))
+    }
+
+    /// Ends the frame that began at `started`.
+    pub fn finish(&mut self, started: Duration, finished: Finished) -> FrameRecord {
+        let Finished { work, skip, .. } = finished;
+        let draw = finished.draw + self.chosen.build;
+        let record = self.record(started, finished);
+        let lag_s = 1e-3 * record.lag_ms;
+        self.lag_s = if self.finished == 0 { lag_s } else { self.lag_s + LAG_NEWS * (lag_s - self.lag_s) };
+        self.finished += 1;
+        self.last_start = Some(started);
+        let cold = !self.is_virtual() && self.finished <= WARM_UP_FRAMES;
+        self.warm_up += usize::from(cold);
+        self.remember(record);
+        self.control.observe(FrameWork { work, draw, skip: skip || cold });
+        record
+    }
+
+    /// Ends a frame that is not counted: it enters neither the report nor the controller.
+    pub const fn pass_over(&mut self) {
+        self.last_start = None;
+    }
+
+    fn remember(&mut self, record: FrameRecord) {
+        self.records.push(record);
+        if self.records.len() >= self.keep.saturating_mul(2) {
+            let old = self.records.len() - self.keep;
+            self.records.drain(..old);
+            self.warm_up = self.warm_up.saturating_sub(old);
+        }
+    }
+
+    /// Ends the run.
+    #[must_use]
+    pub fn end(mut self, adapter: Option<String>, interrupted: bool) -> Outcome {
+        self.gather();
+        self.reader.finish(self.world.agents());
+        let handles = self.world.agents().to_vec();
+        let clamp = self.clamp();
+        let (scene, policy, law) = (self.scene.name.clone(), self.policy_name(), self.law_name());
+        let (wall_s, sim_s) = (self.now().saturating_sub(self.begun).as_secs_f64(), self.sim_now().as_secs_f64());
+        let stats = self.world.stop();
+        let held = |at: usize| error_control::held(&self.holdings, AgentId(at as u32));
+        let drawn = |at: usize| self.levels.get(at).map(|level| level.resolution);
+        Outcome {
+            scene,
+            policy,
+            law,
+            executor: self.scene.executor.name(),
+            adapter,
+            target_ms: 1e3 / self.control.target_hz(),
+            frames: self.records,
+            finished: self.finished,
+            warm_up: self.warm_up,
+            sim_s,
+            start_up_s: self.begun.as_secs_f64(),
+            wall_s,
+            cpu_s: stats.iter().map(|s| s.cpu_s).fold(0.0, |sum, s| sum + s), // an empty sum() is -0
+            state_hash: metachron_runtime::state_hash(&handles),
+            probes: record::probes(&self.scene, &handles),
+            agents: stats
+                .into_iter()
+                .enumerate()
+                .map(|(at, stats)| AgentOutcome { picture: drawn(at), held: held(at), stats })
+                .collect(),
+            couplings: self.couplings.all().to_vec(),
+            trace: self.trace,
+            clamp,
+            unpriced: self.unpriced,
+            interrupted,
+        }
+    }
+
+    /// Reads the newest states without a frame: for their couplings.
+    pub fn look(&mut self) {
+        self.gather();
+    }
+
+    /// Couplings between agents so far.
+    #[must_use]
+    pub fn couplings(&self) -> &[Coupling] {
+        self.couplings.all()
+    }
+
+    /// Records the states of all agents from now on, for comparison with another run.
+    pub fn keep_trace(&mut self) {
+        self.trace.get_or_insert_default();
+    }
+
+    fn gather(&mut self) {
+        let now = self.world.time();
+        let (stage, couplings) = (&mut self.stage, &mut self.couplings);
+        self.reader.read(self.world.agents(), now, |agent, newest, awake| {
+            stage.see(agent.id(), newest, awake);
+            couplings.hear(agent.id());
+        });
+        self.stage.pose(now, states(self.scene.states));
+        self.chosen.sim = now;
+        let agents = self.world.agents();
+        let leader = |id: AgentId| agents.get(id.0 as usize).and_then(AgentHandle::led_by).unwrap_or(id);
+        self.couplings.note(self.reader.newest(), leader);
+        if let Some(trace) = &mut self.trace {
+            trace.note(&self.scene, self.reader.newest());
+            trace.note_couplings(now, self.couplings.all());
+        }
+    }
+}
+
+const fn states(kind: StatesKind) -> States {
+    match kind {
+        StatesKind::Interpolate => States::Interpolate,
+        StatesKind::Extrapolate => States::Extrapolate,
+        StatesKind::Latest => States::Latest,
+    }
+}

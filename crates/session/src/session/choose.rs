@@ -1,0 +1,114 @@
+//! Choice of a frame: visible objects, a level for each of them, the picture made of these, and their declared costs.
+//!
+//! In: a session, a camera. Out: the composed [`Picture`]. Never here: drawing, measuring a frame.
+
+use super::super::assemble;
+use super::{Chosen, Session};
+use metachron_lod::adaptive::is_late;
+use metachron_lod::adaptive::joint::Drawing;
+use metachron_lod::control::Backdrop;
+use metachron_render::{Camera, Hand, Picture, Size, Style};
+use std::time::Duration;
+
+impl Session {
+    /// Reads the newest states, finds the objects seen by `camera`, chooses levels and makes the picture.
+    pub fn compose(&mut self, camera: &Camera, size: Size, style: Style, hand: Option<Hand>) -> &Picture {
+        let started = self.now();
+        self.gather();
+        self.survey(camera, size);
+        self.sight.look(started, self.stage.seen(), camera, size);
+        let culled = self.now();
+        self.chosen.cull = culled.saturating_sub(started) + self.declared_cull();
+        self.choose(started, size);
+        let chosen = self.now();
+        let picture = self.stage.compose(camera, &self.levels, style, hand);
+        self.chosen.triangles = picture.triangles();
+        self.chosen.other_triangles = (self.chosen.triangles as f64 - self.control.last_plan().polygons).max(0.0);
+        self.chosen.select += chosen.saturating_sub(culled);
+        self.chosen.build = self.world.now().saturating_sub(chosen);
+        self.stage.picture()
+    }
+
+    /// Lets the declared cost of the composed frame pass, in virtual time; real time has passed by itself. Returns the part of it from the
+    /// start of the drawing to its end.
+    pub fn spend_declared(&mut self, size: Size) -> Duration {
+        let Chosen { cull, select, beside, objects_s, other_triangles, .. } = self.chosen;
+        let backdrop = Backdrop { pixels: size.pixels(), triangles: other_triangles };
+        let seconds = self.declared.backdrop_s(backdrop) + objects_s;
+        let draw = self.machine.frame_time(seconds, self.frames(), self.now());
+        let started = self.now();
+        self.world.spend(cull + select + draw.max(beside.unwrap_or_default()));
+        self.now().saturating_sub(started + cull + select)
+    }
+
+    /// Finds the objects seen by `camera`.
+    pub fn survey(&mut self, camera: &Camera, size: Size) {
+        self.stage.survey(camera, size);
+        assemble::renew(&mut self.views, self.stage.seen(), self.stage.looked(), &self.scene);
+    }
+
+    /// Sets the levels of this frame: those chosen while the previous frame was drawn, else chosen now.
+    fn choose(&mut self, started: Duration, size: Size) {
+        self.chosen.select = Duration::ZERO;
+        if !self.control.take_up(&self.views) {
+            self.bid(size);
+            self.control.plan(&self.views);
+            self.chosen.select = self.declared_choice();
+        }
+        if self.control.policy().predicts() && self.is_late(started) {
+            self.control.hurry();
+        }
+        let plan = self.control.last_plan();
+        self.levels.clear();
+        self.levels.extend(self.views.iter().zip(&plan.levels).map(assemble::level));
+        self.chosen.objects = self.stage.seen().iter().filter(|s| s.visible).count() as u64;
+        self.chosen.more_triangles = (plan.full_polygons - plan.polygons).max(0.0);
+        self.chosen.objects_s = self.declared.objects_s(self.views.iter(), &plan.levels);
+        self.chosen.n = self.mean_level();
+    }
+
+    /// Whether most of the time of the frame that began at `started` is gone; while time is paused no frame is late.
+    fn is_late(&self, started: Duration) -> bool {
+        let gone = self.now().saturating_sub(started) + self.declared_cull() + self.chosen.select;
+        let passes = self.world.timeline().runs_at(self.now());
+        passes && is_late(gone.as_secs_f64(), 1.0 / self.control.target_hz())
+    }
+
+    /// Sets the controller's inputs for the next choice.
+    pub fn bid(&mut self, size: Size) {
+        // the triangles outside the choice hardly change from one frame to the next
+        self.control.set_backdrop(Backdrop { pixels: size.pixels(), triangles: self.chosen.other_triangles });
+        self.buy();
+        self.control.set_cull(self.chosen.cull);
+    }
+
+    /// Declared time of finding visible objects; zero in real time, where it is measured.
+    pub fn declared_cull(&self) -> Duration {
+        self.declared_work(self.machine.choice_ns.0, self.views.len())
+    }
+
+    /// Declared time of choosing; zero in real time.
+    pub fn declared_choice(&self) -> Duration {
+        self.declared_work(self.machine.choice_ns.1, self.views.iter().filter(|view| view.visible).count())
+    }
+
+    fn declared_work(&self, each_ns: f64, count: usize) -> Duration {
+        let seconds = if self.is_virtual() { 1e-9 * each_ns * count as f64 } else { 0.0 };
+        Duration::try_from_secs_f64(seconds).unwrap_or_default()
+    }
+
+    /// Shares the processor between agents and the picture, if it also draws.
+    fn buy(&mut self) {
+        let wants = self.control.wants().filter(|_| self.shares_processor);
+        let Some((wants, lambda)) = wants else {
+            self.purse.close();
+            return self.control.set_reserve(0.0);
+        };
+        let period_s = 1.0 / self.control.target_hz();
+        let drawing = Drawing { wants, lambda };
+        let (cores, control) = (self.cores(), &self.control);
+        let limit_s = self.purse.settle((cores, period_s), drawing, &self.views, |at| control.weight(at));
+        let reserve_s = limit_s.map_or(0.0, |limit_s| (period_s - limit_s).max(0.0));
+        self.control.set_reserve(reserve_s);
+    }
+}

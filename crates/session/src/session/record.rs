@@ -1,0 +1,93 @@
+//! Recording of frames, and of the points that a scene probes.
+//!
+//! In: a session after a frame. Out: a [`FrameRecord`], [`ProbeOutcome`]s. Never here: a choice, the use of the records.
+
+use super::super::outcome::{FrameRecord, ProbeOutcome};
+use super::{Chosen, Finished, Session};
+use metachron_lod::control::Shading;
+use metachron_runtime::AgentHandle;
+use metachron_world::{Probe, Scene};
+use std::time::Duration;
+
+impl Session {
+    pub(super) fn record(&self, started: Duration, finished: Finished) -> FrameRecord {
+        let Chosen { sim, triangles, more_triangles, objects, cull, select, beside, build, n, .. } = self.chosen;
+        let ms = |time: Duration| time.as_secs_f64() * 1e3;
+        let plan = self.control.last_plan();
+        let promise = plan.promise;
+        let frame_ms = ms(finished.work);
+        let interval = self.last_start.map_or(self.period(), |last| started.saturating_sub(last));
+        FrameRecord {
+            frame: self.frames(),
+            sim_s: sim.as_secs_f64(),
+            frame_ms,
+            gpu_ms: finished.gpu.map(ms),
+            interval_ms: ms(interval),
+            full_ms: frame_ms + more_triangles * self.control.prices().of(Shading::PerPixel).polygon * 1e3,
+            triangles,
+            objects,
+            cull_ms: ms(cull),
+            select_ms: ms(select + beside.unwrap_or_default()),
+            draw_ms: ms(build + finished.draw),
+            lag_ms: ms(cull + select + build + finished.draw),
+            predicted_ms: (promise.predicted_s > 0.0).then_some(promise.predicted_s * 1e3),
+            value_over_bound: promise.value_over_bound(),
+            changes: plan.changes,
+            reversals: plan.reversals,
+            holes: promise.holes,
+            eps: self.control.eps_hat(),
+            n,
+        }
+    }
+
+    /// Mean n of the tubes in view, else of everything in view; zero if nothing is in view.
+    pub fn mean_level(&self) -> f64 {
+        let mean = |tubes_only: bool| {
+            let all = self.stage.seen().iter().zip(&self.levels);
+            let drawn = all.filter(|(s, _)| s.visible && (s.tube_m.is_some() || !tubes_only));
+            let (sum, count) =
+                drawn.fold((0.0, 0.0), |(sum, count), (_, l)| (sum + f64::from(l.resolution.n), count + 1.0));
+            (count > 0.0).then(|| sum / count)
+        };
+        mean(true).or_else(|| mean(false)).unwrap_or(0.0)
+    }
+}
+
+/// The position of every probe's point in the final states.
+pub fn probes(scene: &Scene, handles: &[AgentHandle]) -> Vec<ProbeOutcome> {
+    // an agent's watches are its probes with a period, in the scene's order
+    let watch = |at: usize| {
+        let probe = &scene.probes[at];
+        scene.probes[..at].iter().filter(|p| p.agent == probe.agent && p.every.is_some()).count()
+    };
+    let point = |(at, probe): (usize, &Probe)| {
+        let agent = &handles[probe.agent.0 as usize];
+        let (position, velocity) = agent.latest().body.probe(probe.at)?;
+        let samples = probe.every.map(|_| agent.samples(watch(at)));
+        Some(ProbeOutcome { object: probe.object.clone(), at: probe.at, position, velocity, samples })
+    };
+    scene.probes.iter().enumerate().filter_map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use metachron_core::SimTime;
+    use metachron_scene;
+    use metachron_scene::Source;
+
+    #[test]
+    fn what_passes_before_the_first_step_is_start_up_and_no_part_of_the_run() {
+        let text = b"format = 1\nexecutor = \"threads\"\n[[object]]\nname = \"idle\"\nmodel = \"synthetic\"\nrate_hz = 10.0\ncost_us = 10.0\n";
+        let scene = metachron_scene::load(&Source::memory("idle", text).unwrap(), &[]).unwrap();
+        let opened = std::time::Instant::now();
+        let mut session = Session::open(scene).unwrap();
+        let held = session.now() + Duration::from_millis(30);
+        session.wait_until(held);
+        assert_eq!((session.sim_now(), session.agents()[0].steps()), (SimTime::ZERO, 0));
+        session.begin();
+        let outcome = session.end(None, false);
+        let (start_up_s, wall_s) = (outcome.start_up_s, outcome.wall_s);
+        assert!(start_up_s >= 0.03 && wall_s <= opened.elapsed().as_secs_f64() - 0.03, "{start_up_s} s, {wall_s} s");
+    }
+}

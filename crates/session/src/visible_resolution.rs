@@ -1,0 +1,56 @@
+//! Resolution that an agent's simulation needs for the current view.
+//!
+//! In: what the camera sees of every actor. Out: for each steered agent, the ε below which no difference is visible. Never here: the
+//! agent's reaction to it ([`metachron_lod::control::RateControl`] does). Theory: `docs/theory/control.md`, section 5.
+
+use super::cpu_budget::Tally;
+use metachron_render::{Camera, Seen, Size};
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Visibility of the steered agents.
+#[derive(Debug)]
+pub(super) struct Sight {
+    watched: Vec<Watched>,
+}
+
+/// A steered agent, and when it was last in view.
+#[derive(Debug)]
+struct Watched {
+    tally: Arc<Tally>,
+    seen_at: Duration,
+}
+
+/// An object counts as out of sight after it has not been in view for this long: cameras turn back.
+const GONE: Duration = Duration::from_secs(1);
+
+impl Sight {
+    /// No agent has been in view yet.
+    pub fn new(tallies: &[Arc<Tally>]) -> Self {
+        let watch = |tally: &Arc<Tally>| Watched { tally: Arc::clone(tally), seen_at: Duration::ZERO };
+        Self { watched: tallies.iter().map(watch).collect() }
+    }
+
+    /// Takes the actors as `camera` sees them at the time `now`.
+    pub fn look(&mut self, now: Duration, seen: &[Seen], camera: &Camera, size: Size) {
+        if size.is_empty() {
+            return;
+        }
+        for Watched { tally, seen_at } in &mut self.watched {
+            // an agent without a shape is never drawn, so it is not out of view either
+            let Some(seen) = seen.get(tally.id().0 as usize).filter(|seen| seen.radius_m > 0.0) else { continue };
+            if seen.visible {
+                *seen_at = now;
+                tally.show(pixel_m(seen, camera, size));
+            } else if now.saturating_sub(*seen_at) >= GONE {
+                tally.show(f64::INFINITY);
+            }
+        }
+    }
+}
+
+/// Width of a pixel at the nearest point of an actor, metres.
+fn pixel_m(seen: &Seen, camera: &Camera, size: Size) -> f64 {
+    let depth_m = (seen.centre_m - camera.eye()).dot(camera.forward()) - seen.radius_m;
+    1.0 / camera.pixels_per_metre(depth_m, size)
+}

@@ -1,0 +1,117 @@
+//! The list of couplings: the pair of agents, its law, its force, and the energy left in its tank.
+//!
+//! In: the rows of a [`crate::ui::Status`]. Out: a section of the side panel. Never here: the choice of couplings.
+
+use super::protocol::CouplingRow;
+use super::text;
+use super::theme::palette;
+use egui::{Grid, RichText, Ui};
+
+/// The columns and their tooltips.
+const COLUMNS: [(&str, &str); 4] = [
+    ("Pair", "Who owns the contact, and the other"),
+    ("Law", "How the two act on each other"),
+    ("Force", "With which they press, hold or pull now"),
+    ("Tank", "Energy that the coupling may still give before it fades"),
+];
+
+/// More rows than this are counted, not listed.
+const ROWS_MAX: usize = 8;
+
+/// Draws the list, the strongest first.
+pub fn show(ui: &mut Ui, couplings: &[CouplingRow]) {
+    let palette = palette(ui);
+    let mut order: Vec<&CouplingRow> = couplings.iter().collect();
+    order.sort_by(|a, b| b.force_n.total_cmp(&a.force_n));
+    Grid::new("couplings").num_columns(COLUMNS.len()).spacing([10.0, 2.0]).show(ui, |ui| {
+        for (name, meaning) in COLUMNS {
+            ui.label(RichText::new(name).size(11.5).color(palette.weak)).on_hover_text(meaning);
+        }
+        ui.end_row();
+        for row in order.iter().take(ROWS_MAX) {
+            ui.label(RichText::new(format!("{} – {}", row.a, row.b)).size(12.0));
+            ui.label(RichText::new(row.kind).size(11.5).color(palette.weak));
+            let force = ui.label(RichText::new(format!("{} N", text::figures(row.force_n))).monospace().size(11.5));
+            if let Some(felt) = row.inverse_mass_per_kg {
+                force.on_hover_text(weighed(row, felt));
+            }
+            let low = row.tank_j.is_some_and(|tank| tank <= 0.0);
+            let tank = row.tank_j.map_or_else(|| "–".to_owned(), text::joules);
+            let color = if low { palette.warn } else { palette.weak };
+            ui.label(RichText::new(tank).monospace().size(11.5).color(color)).on_hover_text(spoken(row));
+            ui.end_row();
+        }
+    });
+    if couplings.len() > ROWS_MAX {
+        ui.label(RichText::new(format!("and {} more", couplings.len() - ROWS_MAX)).size(11.5).color(palette.weak));
+    }
+}
+
+fn spoken(row: &CouplingRow) -> String {
+    format!(
+        "{} contacts, {} deep; what the energy tank may still give before the coupling fades",
+        row.contacts,
+        text::metres(row.penetration_m)
+    )
+}
+
+/// Tooltip: the effective mass of both at the contact with the largest force.
+fn weighed(row: &CouplingRow, [a, b]: [f64; 2]) -> String {
+    let felt = |inverse_mass: f64| text::kilograms(inverse_mass.recip());
+    format!(
+        "The contact that bears most feels as heavy as {}: there {} gives way like {}, {} like {}",
+        felt(a + b),
+        row.a,
+        felt(a),
+        row.b,
+        felt(b)
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use egui_kittest::Harness;
+    use egui_kittest::kittest::Queryable;
+
+    #[test]
+    fn every_column_has_a_heading_above_it() {
+        let row = CouplingRow {
+            a: "hose".to_owned(),
+            b: "floor".to_owned(),
+            kind: "ledger",
+            contacts: 1,
+            force_n: 1.25,
+            penetration_m: 0.0,
+            inverse_mass_per_kg: None,
+            tank_j: Some(2.0),
+        };
+        let harness = Harness::new_ui(|ui| show(ui, std::slice::from_ref(&row)));
+        let cells = ["hose – floor", "ledger", "1.25 N", "2.00 J"];
+        for ((heading, _), cell) in COLUMNS.iter().zip(cells) {
+            let (above, below) = (harness.get_by_label(heading).rect(), harness.get_by_label(cell).rect());
+            assert!(above.bottom() <= below.top() && above.left() == below.left(), "{heading}: {above:?} {below:?}");
+        }
+    }
+
+    #[test]
+    fn what_a_contact_weighs_is_told_of_both_sides_and_of_both_together() {
+        let row = CouplingRow {
+            a: "hose".to_owned(),
+            b: "floor".to_owned(),
+            kind: "ledger",
+            contacts: 1,
+            force_n: 1.0,
+            penetration_m: 0.0,
+            inverse_mass_per_kg: None,
+            tank_j: None,
+        };
+        let told = |pair| weighed(&row, pair);
+        assert_eq!(
+            told([60.0, 20.0]),
+            "The contact that bears most feels as heavy as 12.5 g: there hose gives way like 16.7 g, floor like 50.0 g"
+        );
+        // a driven body has no inverse mass: it does not give way at all
+        assert!(told([0.5, 0.0]).ends_with("hose gives way like 2.00 kg, floor like what is held"));
+    }
+}

@@ -1,0 +1,454 @@
+//! The window itself: eframe around the [`Viewer`], paced at the target rate, reopened when its device is lost.
+//!
+//! In: a [`Show`] and [`WindowOptions`]. Out: how the window ended. Never here: the content of the window.
+//! eframe reconfigures an outdated surface and remakes a lost one, but does not notice a lost device; so [`run_window`] receives the loss
+//! from wgpu, closes the window and opens it again on a new device. The show keeps running.
+
+use super::present_time::Presenting;
+use super::protocol::{FrameTimes, Message, Show, Skip, Weight};
+use super::screen::GpuScreen;
+use super::{Layout, Screen, Viewer, Wishes};
+use eframe::{CreationContext, NativeOptions, egui_wgpu};
+use metachron_render::Lost;
+use std::cell::{Cell, OnceCell};
+use std::panic::{self, AssertUnwindSafe};
+use std::path::PathBuf;
+use std::rc::Rc;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+/// Start options of a window.
+#[derive(Debug, Clone)]
+pub struct WindowOptions {
+    /// Initial width and height, points; `None` restores the size at which the window was last closed.
+    pub size: Option<[f32; 2]>,
+    /// Folder for screenshots; it exists.
+    pub screenshots: PathBuf,
+    /// Destroys the device after this many pictures, once: tests that the window comes back. Never set by users.
+    pub lose_device_after: Option<u64>,
+}
+
+/// How a window ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum WindowEnd {
+    /// The user closed it.
+    Closed,
+    /// The show requested it ([`Show::wants_close`]).
+    Finished,
+}
+
+/// Reasons for having no window.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WindowError {
+    /// There is no display to open a window on; the run can go on without one.
+    #[error("there is no display: {0}")]
+    NoDisplay(String),
+    /// No adapter can draw into a window.
+    #[error("no graphics adapter can draw into a window: {0}; on Debian and Ubuntu install mesa-vulkan-drivers")]
+    NoAdapter(String),
+    /// The device was lost this many times in a row, each within a second of being made.
+    #[error("the graphics device was lost {0} times within a second of being made")]
+    DeviceUnstable(u32),
+    /// The window was open, and its display is gone.
+    #[error("the window is gone: {0}")]
+    Gone(String),
+    /// The window could not be made for another reason.
+    #[error("the window could not be opened: {0}")]
+    Failed(String),
+}
+
+/// A device that is lost sooner than this counts against [`LOSSES_MAX`].
+const YOUNG: Duration = Duration::from_secs(1);
+/// Early losses in a row after which the window gives up.
+const LOSSES_MAX: u32 = 5;
+/// While the window is hidden, [`Show::wants_close`] is polled at this interval.
+const HIDDEN_POLL: Duration = Duration::from_millis(200);
+/// Interval between pictures while the simulation is paused and there is no input.
+const STILL_PERIOD: Duration = Duration::from_millis(250);
+/// Seconds without input before a paused picture counts as still: by then a single step and mesh morphs have ended.
+const CALM: f64 = 0.5;
+/// First pictures of a new device that are excluded from statistics: shaders are compiled, buffers grow.
+const WARM_UP: u64 = 3;
+/// A picture due within this time is drawn now instead of waiting.
+const EARLY: Duration = Duration::from_micros(500);
+/// A picture later than this was delayed by the one before.
+const LATE: Duration = Duration::from_millis(1);
+
+/// Opens the window and shows `show` in it until the user or the show closes it.
+///
+/// To be called on the main thread. A lost device is replaced; the show is not notified and need not react.
+///
+/// # Errors
+/// [`WindowError::NoDisplay`] where a run should go on without a window, [`WindowError::Gone`] where it should end, as its display is gone;
+/// the others where graphics fail. The show is left unchanged.
+pub fn run_window(show: &mut dyn Show, options: &WindowOptions) -> Result<WindowEnd, WindowError> {
+    find_display()?;
+    let mut viewer = Viewer::default();
+    let mut options = options.clone();
+    let (mut losses, mut first) = (0, true);
+    loop {
+        let opened = Instant::now();
+        match open(show, &mut viewer, &options, first)? {
+            Fate::Open | Fate::Closed => return Ok(WindowEnd::Closed),
+            Fate::Finished => return Ok(WindowEnd::Finished),
+            Fate::DeviceLost => {}
+        }
+        losses = if opened.elapsed() < YOUNG { losses + 1 } else { 0 };
+        if losses >= LOSSES_MAX {
+            return Err(WindowError::DeviceUnstable(losses));
+        }
+        (options.lose_device_after, first) = (None, false);
+        let text = "The graphics device was lost and made anew.".to_owned();
+        viewer.note(0.0, Message { weight: Weight::Warning, text });
+    }
+}
+
+/// Environment variables that name a display, in the order in which they are tried.
+const DISPLAYS: [&str; 3] = ["WAYLAND_DISPLAY", "WAYLAND_SOCKET", "DISPLAY"];
+
+/// Fails if this system names no display: the error of winit is hard to read in that case.
+fn find_display() -> Result<(), WindowError> {
+    let unix_desktop = cfg!(unix) && !cfg!(target_os = "macos");
+    let named = DISPLAYS.into_iter().any(|name| std::env::var_os(name).is_some_and(|value| !value.is_empty()));
+    if unix_desktop && !named {
+        return Err(WindowError::NoDisplay("neither DISPLAY nor WAYLAND_DISPLAY is set".to_owned()));
+    }
+    Ok(())
+}
+
+/// State of a window.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Fate {
+    Open,
+    Closed,
+    Finished,
+    DeviceLost,
+}
+
+/// One window on one device, until either ends.
+fn open(show: &mut dyn Show, viewer: &mut Viewer, options: &WindowOptions, first: bool) -> Result<Fate, WindowError> {
+    let (fate, device) = (Rc::new(Cell::new(Fate::Open)), Rc::new(OnceCell::<Lost>::new()));
+    let (told, watched) = (Rc::clone(&fate), Rc::clone(&device));
+    let native = native_options(&show.status().scene, options.size);
+    let creator = move |cc: &CreationContext<'_>| -> Result<Box<dyn eframe::App + '_>, _> {
+        Viewer::install(&cc.egui_ctx);
+        if let Some(layout) = cc.storage.filter(|_| first).and_then(|s| eframe::get_value::<Layout>(s, LAYOUT)) {
+            viewer.layout = layout;
+        }
+        let state = cc.wgpu_render_state.as_ref().ok_or("eframe was built without wgpu")?;
+        let screen = GpuScreen::new(state, options.lose_device_after)?;
+        let _ = watched.set(screen.lost().clone());
+        show.drawn_by(screen.adapter(), screen.is_software());
+        Ok(Box::new(Shell::new(show, viewer, screen, (told, options.screenshots.clone()))))
+    };
+    let run = || eframe::run_native("metachron", native, Box::new(creator));
+    let lost = || device.get().is_some_and(|lost| lost.reason().is_some());
+    let opened = || device.get().is_some();
+    // egui panics if a device is lost between its own calls, and winit if the display is lost; neither the show nor the viewer is being
+    // modified at that point
+    match hearing_winit(|| panic::catch_unwind(AssertUnwindSafe(run))) {
+        (_, true) => return Err(no_answer(opened())),
+        (Ok(ended), _) => ended.map_err(|error| named_error(error, opened()))?,
+        (Err(_), _) if lost() => return Ok(Fate::DeviceLost),
+        (Err(bug), _) => panic::resume_unwind(bug),
+    }
+    Ok(fate.get())
+}
+
+/// Returns the result of `run`, and whether winit panicked meanwhile, as it does where the display does not answer; that panic is not
+/// printed.
+fn hearing_winit<T>(run: impl FnOnce() -> T) -> (T, bool) {
+    let (before, heard) = (Arc::new(panic::take_hook()), Arc::new(AtomicBool::new(false)));
+    let (others, hears) = (Arc::clone(&before), Arc::clone(&heard));
+    panic::set_hook(Box::new(move |panic| match panic.location() {
+        Some(place) if place.file().split(['/', '\\']).any(|part| part.starts_with("winit-")) => {
+            hears.store(true, Ordering::Relaxed)
+        }
+        _ => others(panic),
+    }));
+    let given = run();
+    drop(panic::take_hook());
+    if let Ok(before) = Arc::try_unwrap(before) {
+        panic::set_hook(before);
+    }
+    (given, heard.load(Ordering::Relaxed))
+}
+
+const LAYOUT: &str = "metachron layout";
+
+fn named_error(error: eframe::Error, opened: bool) -> WindowError {
+    match error {
+        eframe::Error::Winit(_) | eframe::Error::WinitEventLoop(_) => no_answer(opened),
+        eframe::Error::Wgpu(error) => WindowError::NoAdapter(error.to_string()),
+        other => WindowError::Failed(other.to_string()),
+    }
+}
+
+/// The error for a display that does not answer, or no longer answers if the window was already `opened`.
+fn no_answer(opened: bool) -> WindowError {
+    let read = |key: &str| std::env::var(key).ok();
+    if opened {
+        return WindowError::Gone(unanswered(read, "no longer answers"));
+    }
+    let why = unanswered(read, "does not answer");
+    WindowError::NoDisplay(format!("{why}; name one that does, or run with --headless"))
+}
+
+/// Message: the requested display and that it `fails`; the message of winit itself only names a line of its source.
+fn unanswered(read: impl Fn(&str) -> Option<String>, fails: &str) -> String {
+    let named = |key: &'static str| read(key).filter(|value| !value.is_empty()).map(|value| (key, value));
+    let Some((key, value)) = DISPLAYS.into_iter().find_map(named) else {
+        return "the system gives no window".to_owned();
+    };
+    format!("`{value}`, which {key} names, {fails}")
+}
+
+fn native_options(scene: &str, size: Option<[f32; 2]>) -> NativeOptions {
+    let viewport = egui::ViewportBuilder::default()
+        .with_title(format!("metachron – {scene}"))
+        .with_app_id("metachron")
+        .with_inner_size(size.unwrap_or([1440.0, 900.0]))
+        .with_min_inner_size([640.0, 420.0])
+        .with_drag_and_drop(true)
+        .with_icon(super::icons::window_icon());
+    let mut wgpu_options = egui_wgpu::WgpuConfiguration::default();
+    if let egui_wgpu::WgpuSetup::CreateNew(setup) = &mut wgpu_options.wgpu_setup {
+        setup.device_descriptor = Arc::new(metachron_render::offscreen::device_descriptor);
+    }
+    let renderer = eframe::Renderer::Wgpu;
+    // an explicit size overrides the stored one, which eframe restores before this hook runs
+    let sized = move |size: [f32; 2]| -> eframe::WindowBuilderHook {
+        Box::new(move |builder| builder.with_inner_size(size).with_maximized(false).with_fullscreen(false))
+    };
+    NativeOptions {
+        viewport,
+        wgpu_options,
+        renderer,
+        persist_window: size.is_none(),
+        window_builder: size.map(sized),
+        ..NativeOptions::default()
+    }
+}
+
+/// The application inside eframe.
+struct Shell<'a> {
+    show: &'a mut dyn Show,
+    viewer: &'a mut Viewer,
+    screen: GpuScreen,
+    fate: Rc<Cell<Fate>>,
+    screenshots: PathBuf,
+    pace: Pace,
+    presenting: Presenting,
+    /// Time that [`Viewer::ui`] spent on the picture in the previous frame.
+    drawing: Duration,
+    hidden: bool,
+    /// Time of the last user input, in egui's time.
+    touched_s: f64,
+}
+
+/// Schedule of the pictures.
+struct Pace {
+    due: Instant,
+    started: Option<Instant>,
+    pictures: u64,
+}
+
+impl Pace {
+    fn is_due(&self, now: Instant, still: bool) -> bool {
+        now + EARLY >= self.next(still)
+    }
+
+    /// Due time of the next picture; `still` allows a long interval.
+    fn next(&self, still: bool) -> Instant {
+        let calm = self.started.filter(|_| still).map(|started| started + STILL_PERIOD);
+        calm.map_or(self.due, |calm| calm.max(self.due))
+    }
+
+    /// Counts a picture that starts now; returns the time since the one before.
+    fn start(&mut self, now: Instant, period: Duration) -> Duration {
+        // a late picture keeps the schedule if possible, and restarts it if a whole period late
+        self.due = if self.due + period > now { self.due + period } else { now + period };
+        self.pictures += 1;
+        let before = self.started.replace(now);
+        before.map_or(period, |before| now - before)
+    }
+}
+
+impl<'a> Shell<'a> {
+    fn new(
+        show: &'a mut dyn Show,
+        viewer: &'a mut Viewer,
+        screen: GpuScreen,
+        (fate, screenshots): (Rc<Cell<Fate>>, PathBuf),
+    ) -> Self {
+        let pace = Pace { due: Instant::now(), started: None, pictures: 0 };
+        Self {
+            show,
+            viewer,
+            screen,
+            fate,
+            screenshots,
+            pace,
+            presenting: Presenting::default(),
+            drawing: Duration::ZERO,
+            hidden: false,
+            touched_s: 0.0,
+        }
+    }
+
+    /// Whether pictures may come slowly: the simulation is paused and there is no user input.
+    fn is_still(&mut self, ctx: &egui::Context) -> bool {
+        let (now_s, touched) = ctx.input(|input| {
+            let held = input.pointer.any_down() || !input.keys_down.is_empty();
+            (input.time, held || !input.raw.events.is_empty() || !input.raw.dropped_files.is_empty())
+        });
+        if touched || self.show.status().running {
+            self.touched_s = now_s;
+        }
+        now_s - self.touched_s > CALM
+    }
+
+    fn close(&self, ctx: &egui::Context, fate: Fate) {
+        self.fate.set(fate);
+        ctx.send_viewport_cmd(egui::ViewportCommand::Close);
+    }
+
+    /// Collects the times of the picture just drawn, and passes them to the show and the plots.
+    fn account(&mut self, interval: Duration, panels: Duration) {
+        let Some(drawn) = self.screen.take_times() else { return };
+        // a GPU presents on its own: waiting for it is not work
+        let present = if self.screen.is_software() { self.presenting.time() } else { Duration::ZERO };
+        let skip = if self.pace.pictures <= WARM_UP {
+            Some(Skip::WarmUp)
+        } else if std::mem::take(&mut self.hidden) {
+            Some(Skip::Hidden)
+        } else if drawn.resized {
+            Some(Skip::Resized)
+        } else if !self.show.status().running {
+            Some(Skip::Still)
+        } else {
+            None
+        };
+        let times = FrameTimes {
+            compose: drawn.compose,
+            draw: drawn.draw,
+            draw_gpu: drawn.gpu,
+            panels,
+            present,
+            work: drawn.compose + drawn.draw + panels + present,
+            interval,
+            skip,
+        };
+        self.presenting.worked(drawn.compose + drawn.draw + panels, skip.is_none());
+        self.show.measured(&times);
+        self.viewer.measured(&times);
+    }
+
+    fn fulfil(&mut self, ctx: &egui::Context, wishes: Wishes) {
+        if wishes.quit {
+            self.close(ctx, Fate::Closed);
+        }
+        if wishes.screenshot {
+            let scene = self.show.status().scene.clone();
+            let message = match self.screen.save(&self.screenshots, &scene) {
+                Ok(path) => Message { weight: Weight::Note, text: format!("Picture written to {}", path.display()) },
+                Err(text) => Message { weight: Weight::Failure, text },
+            };
+            self.viewer.note(ctx.time(), message);
+        }
+    }
+}
+
+impl eframe::App for Shell<'_> {
+    fn logic(&mut self, ctx: &egui::Context, _frame: &mut eframe::Frame) {
+        if self.fate.get() != Fate::Open {
+            return;
+        }
+        if self.screen.lost().reason().is_some() {
+            self.close(ctx, Fate::DeviceLost);
+        } else if self.show.wants_close() {
+            self.close(ctx, Fate::Finished);
+        }
+        if ctx.input(|input| input.viewport().visible()) == Some(false) {
+            self.hidden = true;
+            ctx.request_repaint_after(HIDDEN_POLL);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut egui::Ui, frame: &mut eframe::Frame) {
+        if self.fate.get() != Fate::Open {
+            return;
+        }
+        let (now, first_pass) = (Instant::now(), ui.ctx().current_pass_index() == 0);
+        let panels = frame.info().cpu_usage.map_or(Duration::ZERO, |s| Duration::from_secs_f32(s.max(0.0)));
+        let panels = panels.saturating_sub(self.drawing);
+        let period = Duration::from_secs_f64(1.0 / self.show.status().target_hz.clamp(0.1, 1000.0));
+        let still = self.is_still(ui.ctx());
+        let due = first_pass && self.pace.is_due(now, still);
+        let late = now.saturating_duration_since(self.pace.next(still)) > LATE;
+        let interval = if due { self.pace.start(now, period) } else { Duration::ZERO };
+        if due {
+            self.presenting.started(interval, late);
+        }
+        self.screen.set_due(due);
+        let (wishes, drawing) = self.viewer.ui(ui, self.show, &mut self.screen);
+        self.drawing = if first_pass { drawing } else { self.drawing + drawing };
+        self.account(interval, panels);
+        if let Some(error) = self.screen.take_failure() {
+            let text = format!("The picture could not be drawn: {error}");
+            self.viewer.note(ui.ctx().time(), Message { weight: Weight::Failure, text });
+        }
+        self.fulfil(ui.ctx(), wishes);
+        if self.screen.lost().reason().is_some() {
+            // egui must not draw on a lost device: its vertex buffer would be missing, and it would panic
+            ui.ctx().graphics_mut(|layers| *layers = egui::layers::GraphicLayers::default());
+        }
+        ui.ctx().request_repaint_after(self.pace.next(still).saturating_duration_since(Instant::now()));
+    }
+
+    fn save(&mut self, storage: &mut dyn eframe::Storage) {
+        eframe::set_value(storage, LAYOUT, &self.viewer.layout);
+    }
+
+    fn clear_color(&self, visuals: &egui::Visuals) -> [f32; 4] {
+        visuals.panel_fill.to_normalized_gamma_f32()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_display_that_does_not_answer_is_named() {
+        let told = unanswered(|key| (key == "DISPLAY").then(|| ":77".to_owned()), "does not answer");
+        assert_eq!(told, "`:77`, which DISPLAY names, does not answer");
+        assert_eq!(unanswered(|_| None, "does not answer"), "the system gives no window");
+    }
+
+    #[test]
+    fn a_size_that_is_given_wins_over_the_one_that_is_restored() {
+        let restored = || egui::ViewportBuilder::default().with_inner_size([1000.0, 700.0]).with_maximized(true);
+        let built = native_options("tube", Some([800.0, 600.0])).window_builder.unwrap()(restored());
+        assert_eq!((built.inner_size, built.maximized), (Some([800.0, 600.0].into()), Some(false)));
+        assert!(native_options("tube", None).window_builder.is_none());
+    }
+
+    #[test]
+    fn pictures_keep_their_beat_and_a_stall_starts_a_new_one() {
+        let begin = Instant::now();
+        let period = Duration::from_millis(20);
+        let mut pace = Pace { due: begin, started: None, pictures: 0 };
+        assert_eq!(pace.start(begin, period), period);
+        let late = begin + Duration::from_millis(23);
+        assert!(pace.is_due(late, false) && !pace.is_due(begin + Duration::from_millis(19), false));
+        assert!(!pace.is_due(late, true) && pace.is_due(begin + STILL_PERIOD, true));
+        assert_eq!(pace.start(late, period), Duration::from_millis(23));
+        assert_eq!(pace.due, begin + 2 * period);
+        let stalled = begin + Duration::from_millis(500);
+        pace.start(stalled, period);
+        assert_eq!(pace.due, stalled + period);
+    }
+}

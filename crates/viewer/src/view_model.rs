@@ -1,0 +1,206 @@
+//! Fills the viewer's panels with the numbers of a session.
+//!
+//! In: a [`Session`]. Out: a [`Status`]. Never here: how panels look.
+
+use crate::ui::{AgentRow, AgentState, CouplingRow, Law, Shares, Status};
+use metachron_core::{Body, SimTime, Snapshot};
+use metachron_lod::control;
+use metachron_lod::control::Policy;
+use metachron_runtime;
+use metachron_runtime::AgentStats;
+use metachron_session::FrameRecord;
+use metachron_session::Session;
+use metachron_world::Spec;
+use metachron_world::kinds::PolicyKind;
+use std::time::Duration;
+
+/// Mass assumed for the user spring on an object without a mass of its own, kilograms.
+const HAND_MASS_KG: f64 = 0.1;
+/// Frames over which the budget bar is smoothed.
+const SHARES_FRAMES: usize = 30;
+/// The user spring moves a part of a tube, not all of it: at most this mass of it, kilograms.
+const STRETCH_MASS_KG: f64 = 0.1;
+
+/// The panels of a session that has just begun.
+pub(super) fn first(session: &Session) -> Status {
+    let scene = session.scene();
+    let own = viewer_law(metachron_session::law(&scene.target));
+    let others = [control::Law::CORRECTED, control::Law::PRINTED].map(viewer_law).into_iter();
+    let laws = std::iter::once(own).chain(others.filter(|law| !law.is_same_law(&own))).collect();
+    Status {
+        scene: scene.name.clone(),
+        executor: scene.executor.name().to_owned(),
+        policies: PolicyKind::ALL.iter().map(|kind| kind.name().to_owned()).collect(),
+        laws,
+        running: true,
+        speed: 1.0,
+        agents: scene.agents.iter().map(|m| AgentRow::new(m.id, m.name.clone(), m.spec.model())).collect(),
+        ..Status::default()
+    }
+}
+
+/// Values derived from differences of counters, over windows long enough to be meaningful.
+pub(super) struct Meter {
+    since: (Duration, SimTime),
+    cpu_s: Vec<f64>,
+    shares: Vec<f64>,
+    dropped_s: Vec<f64>,
+    real_time: f64,
+}
+
+/// Window over which CPU shares and the flow of time are measured: an agent's CPU time is updated about this often.
+const METER_EVERY: Duration = Duration::from_millis(500);
+
+impl Meter {
+    /// A meter that starts now.
+    pub fn new(session: &Session) -> Self {
+        let agents = session.agents().len();
+        let since = (session.now(), session.sim_now());
+        Self {
+            since,
+            cpu_s: vec![0.0; agents],
+            shares: vec![0.0; agents],
+            dropped_s: vec![0.0; agents],
+            real_time: 0.0,
+        }
+    }
+
+    fn read(&mut self, session: &Session) {
+        let (now, sim) = (session.now(), session.sim_now());
+        let wall_s = now.saturating_sub(self.since.0).as_secs_f64();
+        if wall_s < METER_EVERY.as_secs_f64() {
+            return;
+        }
+        let mut most_s = 0.0_f64;
+        for (at, agent) in session.agents().iter().enumerate() {
+            let (cpu_s, dropped_s) = (agent.cpu_s(), agent.stats().dropped.as_secs_f64());
+            most_s = most_s.max(dropped_s - self.dropped_s[at]);
+            self.dropped_s[at] = dropped_s;
+            self.shares[at] = ((cpu_s - self.cpu_s[at]) / wall_s).clamp(0.0, 1.0);
+            self.cpu_s[at] = cpu_s;
+        }
+        // dropped time passes on the scene's clock but is not simulated
+        self.real_time = (sim.since(self.since.1).as_secs_f64() - most_s).max(0.0) / wall_s;
+        self.since = (now, sim);
+    }
+}
+
+/// Updates the numbers; returns a line for each agent that was parked since the last call.
+pub(super) fn fill(status: &mut Status, session: &mut Session, meter: &mut Meter) -> Vec<String> {
+    meter.read(session);
+    status.real_time_factor = meter.real_time;
+    let mut news = Vec::new();
+    let control = session.control();
+    status.target_hz = control.target_hz();
+    let policy = control.policy();
+    status.law = (policy == Policy::Feedback).then(|| viewer_law(control.law()));
+    status.sliders = policy.predicts().then(|| control.sliders());
+    status.damped = policy == Policy::Adaptive;
+    status.frozen = control.is_frozen();
+    status.loop_value = Some(control.eps_hat());
+    status.policy = session.policy_name().to_owned();
+    status.clamp = session.clamp();
+    status.triangles = session.picture().triangles();
+    status.shares = shares(session, meter);
+    fill_couplings(status, session);
+    status.energy_j = 0.0;
+    for (at, agent) in session.agents().iter().enumerate() {
+        let (stats, newest) = (agent.stats(), agent.latest());
+        let row = &mut status.agents[at];
+        let was_parked = matches!(row.state, AgentState::Parked(_));
+        fill_row(row, &stats, &newest);
+        row.led_by = stats.led_by.map(|leader| session.agents()[leader.0 as usize].name().to_owned());
+        row.cpu_share = meter.shares[at];
+        if let AgentState::Parked(reason) = &row.state
+            && !was_parked
+        {
+            news.push(format!("{} is parked: {reason}", row.name));
+        }
+        row.picture = session.levels().get(at).map(|level| level.resolution);
+        row.age_s = session.stage().age_s(agent.id()).unwrap_or(0.0);
+        status.energy_j += stats.energy_j;
+    }
+    news
+}
+
+/// Shares of the frame time over the newest frames.
+fn shares(session: &Session, meter: &Meter) -> Shares {
+    let newest = session.newest_frames(SHARES_FRAMES);
+    let target_ms = session.period().as_secs_f64() * 1e3;
+    let mean =
+        |of: fn(&FrameRecord) -> f64| newest.iter().map(of).sum::<f64>() / (newest.len().max(1) as f64 * target_ms);
+    Shares {
+        // starts at 0.0, because an empty sum is −0
+        simulation: meter.shares.iter().fold(0.0, |sum, share| sum + share) / f64::from(session.cores()),
+        cull: mean(|row| row.cull_ms),
+        select: mean(|row| row.select_ms),
+        draw: mean(|row| row.draw_ms),
+        rest: mean(|row| (row.frame_ms - row.cull_ms - row.select_ms - row.draw_ms).max(0.0)),
+    }
+}
+
+/// The couplings of all agents, each reported by the agent that owns it.
+fn fill_couplings(status: &mut Status, session: &Session) {
+    let Status { couplings, agents, .. } = status;
+    couplings.clear();
+    for (owner, agent) in session.agents().iter().enumerate() {
+        couplings.extend(agent.latest().pairs.iter().filter(|pair| pair.contacts > 0).map(|pair| CouplingRow {
+            a: agents[owner].name.clone(),
+            b: agents[pair.with.0 as usize].name.clone(),
+            kind: pair.kind.name(),
+            contacts: pair.contacts,
+            force_n: pair.force_n,
+            penetration_m: pair.penetration_m,
+            inverse_mass_per_kg: pair.inverse_mass_per_kg,
+            tank_j: pair.tank_j,
+        }));
+    }
+}
+
+fn fill_row(row: &mut AgentRow, stats: &AgentStats, newest: &Snapshot) {
+    row.wanted_hz = stats.wanted_hz;
+    row.rate_hz = stats.rate_hz;
+    row.dt_s = stats.dt.as_secs_f64();
+    row.simulation = stats.resolution;
+    row.step_s = stats.work_s;
+    row.dropped_s = stats.dropped.as_secs_f64();
+    row.residual_m = stats.residual_m;
+    row.force_n = match &newest.body {
+        Body::Tool(tool) => Some(tool.force_n),
+        _ => None,
+    };
+    row.state = match &stats.state {
+        metachron_runtime::AgentState::Running => AgentState::Running,
+        metachron_runtime::AgentState::Resting => AgentState::Resting,
+        metachron_runtime::AgentState::Parked(reason) => AgentState::Parked(reason.clone()),
+    };
+}
+
+/// The mass for which the user spring is scaled, kilograms.
+pub(super) fn mass_kg(spec: &Spec) -> f64 {
+    match spec {
+        Spec::Tube(tube) => {
+            let length: f64 = tube.path_m.windows(2).map(|ends| ends[0].distance(ends[1])).sum();
+            (tube.mass_per_length_kg_m * length).min(STRETCH_MASS_KG)
+        }
+        Spec::Rigid(body) => body.mass_kg,
+        Spec::Soft(_) => STRETCH_MASS_KG,
+        Spec::Instrument(_) | Spec::Synthetic(_) => HAND_MASS_KG,
+    }
+}
+
+/// The viewer's type for a law.
+const fn viewer_law(law: control::Law) -> Law {
+    match law {
+        control::Law::Printed { alpha, beta } => Law::Printed { alpha, beta },
+        control::Law::Corrected { kappa, lead, margin } => Law::Corrected { kappa, lead, margin },
+    }
+}
+
+/// Control's type for a law.
+pub(super) const fn control_law(law: Law) -> control::Law {
+    match law {
+        Law::Printed { alpha, beta } => control::Law::Printed { alpha, beta },
+        Law::Corrected { kappa, lead, margin } => control::Law::Corrected { kappa, lead, margin },
+    }
+}

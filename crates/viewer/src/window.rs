@@ -1,0 +1,451 @@
+//! A session in a window: passes the viewer's actions to the session, and its state to the viewer.
+//!
+//! In: a session and where its scene came from. Out: an [`Outcome`] when the window closes. Never here: egui, panels.
+
+use super::live_tuning;
+use super::live_tuning::{Tuned, Tuning};
+use super::view_model;
+use super::view_model::Meter;
+use crate::ui;
+use crate::ui::{
+    Action, Bounds, FrameTimes, Held, Message, Show, Skip, Status, ViewRequest, Weight, WindowError, WindowOptions,
+    run_window,
+};
+use glam::DVec3;
+use metachron_contact::Pull;
+use metachron_core::{AgentId, SimSpan};
+use metachron_lod::control::Policy;
+use metachron_render::{Camera, Gpu, Hand, Hit, Picture, Ray};
+use metachron_runtime::Drive;
+use metachron_scene;
+use metachron_scene::{SceneError, Source};
+use metachron_session::SessionError;
+use metachron_session::{Finished, Session};
+use metachron_session::{FrameRecord, Outcome};
+use metachron_world::Scene;
+use std::path::PathBuf;
+use std::time::{Duration, Instant};
+
+/// A run in a window.
+pub struct WindowPlan {
+    /// The source of the scene, so that it can be read again.
+    pub source: Source,
+    /// Values that override those of the scene.
+    pub overrides: Vec<(String, String)>,
+    /// Width and height of the window, points; `None` restores the size at its last closing.
+    pub size: Option<[f32; 2]>,
+    /// Folder for screenshots.
+    pub screenshots: PathBuf,
+    /// Simulated seconds after which the window closes by itself.
+    pub seconds: Option<f64>,
+    /// Frames after which the window closes by itself.
+    pub frames: Option<u64>,
+}
+
+/// Reason why a window could not be shown; the session is returned if it can continue without one.
+pub enum WindowFailure {
+    /// There is no display or no adapter for one.
+    NoWindow(Box<Session>, WindowError),
+    /// The window was open, and its display is gone: the outcome of the run until then.
+    Gone(Box<Outcome>, WindowError),
+    /// A scene could not be restarted.
+    Session(SessionError),
+}
+
+/// Shows `session` in a window until it is closed, or until `go_on`, called many times a second whether or not anything is drawn, returns
+/// `false`. `go_on` receives the last frame, and the share of the run that is done if the run has an end.
+///
+/// The outcome is that of the last start: a reset begins a new run. Frames drawn while time is paused or the window is hidden are left out,
+/// and of a run without an end at least the newest [`FRAMES_KEPT`] are included.
+///
+/// # Errors
+/// [`WindowFailure::NoWindow`] returns the session with its time paused, [`WindowFailure::Gone`] the outcome.
+pub fn play_in_window(session: Session, plan: WindowPlan, go_on: GoOn<'_>) -> Result<Outcome, WindowFailure> {
+    let options = WindowOptions { size: plan.size, screenshots: plan.screenshots.clone(), lose_device_after: None };
+    let mut show = WindowShow::new(session, plan, go_on);
+    match run_window(&mut show, &options) {
+        Ok(_) => Ok(show.session.end(show.adapter, show.stopped)),
+        Err(error @ WindowError::Gone(_)) => {
+            Err(WindowFailure::Gone(Box::new(show.session.end(show.adapter, true)), error))
+        }
+        Err(error) => Err(WindowFailure::NoWindow(Box::new(show.session), error)),
+    }
+}
+
+/// Receives the last frame and the share that is done, 0 … 1, of a run that has an end; returns whether to continue.
+pub type GoOn<'a> = &'a mut dyn FnMut(&FrameRecord, Option<f64>) -> bool;
+
+/// A session as the viewer sees it.
+struct WindowShow<'a> {
+    go_on: GoOn<'a>,
+    adapter: Option<String>,
+    stopped: bool,
+    session: Session,
+    plan: WindowPlan,
+    status: Status,
+    meter: Meter,
+    notices: Vec<(Instant, Message)>,
+    hand: Option<Hand>,
+    tuning: Option<Tuning>,
+    started: Duration,
+    /// Drawing time within the declared frame.
+    declared_draw: Duration,
+    refreshed: Option<Duration>,
+    last: FrameRecord,
+    pictures: u64,
+    speed: f64,
+    running: bool,
+}
+
+/// Frames stored of a run without an end: an hour at 30 frames a second, some 10 MB.
+pub const FRAMES_KEPT: usize = 108_000;
+/// Update period of the panels: faster is not readable.
+const PANELS_EVERY: Duration = Duration::from_millis(100);
+/// How long a message stays: time to read a long line twice.
+const MESSAGE_STAYS: Duration = Duration::from_secs(12);
+/// Angular frequency of a body on the user spring, rad/s: firm, and slow enough for every agent's step.
+const HAND_RAD_S: f64 = 25.0;
+/// Fraction of critical damping of the user spring.
+const HAND_DAMPING: f64 = 0.7;
+
+impl<'a> WindowShow<'a> {
+    fn new(mut session: Session, plan: WindowPlan, go_on: GoOn<'a>) -> Self {
+        session.keep_frames(kept(&plan));
+        // time is paused until the window shows the scene
+        session.drive(Drive::Pause);
+        let mut show = Self {
+            go_on,
+            adapter: None,
+            stopped: false,
+            status: view_model::first(&session),
+            meter: Meter::new(&session),
+            notices: Vec::new(),
+            session,
+            plan,
+            hand: None,
+            tuning: None,
+            started: Duration::ZERO,
+            declared_draw: Duration::ZERO,
+            refreshed: None,
+            last: FrameRecord::default(),
+            pictures: 0,
+            speed: 1.0,
+            running: true,
+        };
+        show.refresh();
+        show
+    }
+
+    /// Restarts with `scene`; speed and pause are kept.
+    fn restart(&mut self, scene: Scene) {
+        match Session::open(scene) {
+            Ok(session) => self.replace(session),
+            Err(error) => self.say(Weight::Failure, error.to_string()),
+        }
+    }
+
+    fn replace(&mut self, mut session: Session) {
+        self.stop_tuning();
+        session.keep_frames(kept(&self.plan));
+        session.drive(Drive::Speed(self.speed));
+        if self.running {
+            session.begin();
+        } else {
+            session.drive(Drive::Pause);
+        }
+        let prices = *self.session.control().prices();
+        if !session.is_virtual() {
+            session.control().set_prices(prices);
+        }
+        let selected = self.status.selected.filter(|_| session.scene().name == self.session.scene().name);
+        drop(std::mem::replace(&mut self.session, session));
+        self.status = Status { selected, ..view_model::first(&self.session) };
+        self.meter = Meter::new(&self.session);
+        self.notices.clear();
+        (self.hand, self.refreshed) = (None, None);
+        self.refresh();
+    }
+
+    /// Restarts the same scene, under the target, policy, law and sliders set by the user.
+    fn reset(&mut self) {
+        let policy = self.session.policy_name();
+        let control = self.session.control();
+        let (hz, law, sliders) = (control.target_hz(), control.law(), control.sliders());
+        self.restart(self.session.scene().clone());
+        self.session.set_policy(policy);
+        let control = self.session.control();
+        control.set_law(law);
+        control.set_sliders(sliders);
+        control.set_target_hz(hz);
+        self.refreshed = None;
+        self.refresh();
+    }
+
+    /// Starts time, unless the user has paused it.
+    fn begin(&mut self) {
+        match (self.running, self.session.is_virtual()) {
+            (true, true) => self.session.drive(Drive::Run),
+            (true, false) => self.session.begin(),
+            (false, _) => {}
+        }
+    }
+
+    fn reload(&mut self) {
+        match Source::open(self.plan.source.name()).and_then(|source| self.load(source)) {
+            Ok(scene) => self.restart(scene),
+            Err(error) => self.say(Weight::Failure, format!("not reloaded: {}", first_problem(&error))),
+        }
+    }
+
+    fn open(&mut self, path: &std::path::Path) {
+        self.plan.overrides.clear();
+        match Source::open(&path.to_string_lossy()).and_then(|source| self.load(source)) {
+            Ok(scene) => self.restart(scene),
+            Err(error) => self.say(Weight::Failure, format!("not opened: {}", first_problem(&error))),
+        }
+    }
+
+    fn load(&mut self, source: Source) -> Result<Scene, SceneError> {
+        let scene = metachron_scene::load(&source, &self.plan.overrides)?;
+        self.plan.source = source;
+        Ok(scene)
+    }
+
+    fn say(&mut self, weight: Weight, text: String) {
+        let message = Message { weight, text };
+        self.notices.retain(|(_, old)| *old != message);
+        self.notices.push((Instant::now() + MESSAGE_STAYS, message));
+    }
+
+    fn drive(&mut self, drive: Drive) {
+        match drive {
+            Drive::Run => self.running = true,
+            Drive::Pause | Drive::Step(_) => self.running = false,
+            Drive::Speed(speed) => self.speed = speed,
+        }
+        self.session.drive(drive);
+    }
+
+    fn pull(&mut self, hand: Option<Hand>) {
+        if let Some(left) = self.hand.filter(|old| hand.is_none_or(|new| new.object != old.object)) {
+            self.tell(left.object, None);
+        }
+        self.hand = hand;
+        if let Some(hand) = hand {
+            let mass_kg = view_model::mass_kg(&self.session.scene().agents[hand.object.0 as usize].spec);
+            let pull = Pull {
+                by: None,
+                anchor: hand.anchor,
+                target: hand.target,
+                target_velocity: DVec3::ZERO,
+                stiffness_n_m: mass_kg * HAND_RAD_S * HAND_RAD_S,
+                damping_n_s_m: 2.0 * HAND_DAMPING * mass_kg * HAND_RAD_S,
+            };
+            self.tell(hand.object, Some(pull));
+        }
+    }
+
+    fn tell(&mut self, to: AgentId, pull: Option<Pull>) {
+        if let Err(error) = self.session.hand(to, pull) {
+            self.say(Weight::Warning, error.to_string());
+        }
+    }
+
+    fn tune(&mut self) {
+        self.stop_tuning();
+        self.tuning = Some(Tuning::begin(self.session.control()));
+    }
+
+    /// Stops a tuning in progress: policy and law are restored.
+    fn stop_tuning(&mut self) {
+        if let Some(tuning) = self.tuning.take() {
+            tuning.stop(self.session.control());
+        }
+    }
+
+    /// Applies the gains of a search that has ended.
+    fn take_gains(&mut self) {
+        let Some(tuning) = self.tuning.take_if(|tuning| tuning.is_over()) else { return };
+        match tuning.end() {
+            Tuned::Found(verdict) => {
+                if let metachron_lod::tune::Contender::Feedback(law) = verdict.contender {
+                    self.session.control().set_policy(Policy::Feedback);
+                    self.session.control().set_law(law);
+                }
+                self.say(Weight::Note, format!("tuned: {}", live_tuning::told(&verdict)));
+            }
+            Tuned::Refused(why) => self.say(Weight::Warning, format!("not tuned: {why}")),
+        }
+    }
+
+    /// Passes the frame to the experiment.
+    fn note_frame(&mut self) {
+        let Some(tuning) = &mut self.tuning else { return };
+        if let Err(error) = tuning.note(&mut self.session, 1e-3 * self.last.frame_ms) {
+            self.stop_tuning();
+            self.say(Weight::Failure, format!("not tuned: {error}"));
+        }
+    }
+
+    /// The share that is done of a run that ends by itself, 0 … 1.
+    fn share_done(&self) -> Option<f64> {
+        let frames = self.plan.frames.map(|all| self.session.frames() as f64 / all as f64);
+        let seconds = self.plan.seconds.map(|all| self.session.sim_now().as_secs_f64() / all);
+        frames.or(seconds)
+    }
+
+    /// Updates the panels when they are due.
+    fn refresh(&mut self) {
+        let now = self.session.now();
+        if self.refreshed.is_some_and(|last| now < last + PANELS_EVERY) {
+            return;
+        }
+        let news = view_model::fill(&mut self.status, &mut self.session, &mut self.meter);
+        news.into_iter().for_each(|text| self.say(Weight::Failure, text));
+        self.refreshed = Some(now);
+    }
+
+    /// Lets virtual time pass by one frame; real time passes by itself.
+    fn pass_time(&mut self) {
+        let now = self.session.now();
+        let next = self.started + self.session.period();
+        self.started = if self.session.is_virtual() && now > Duration::ZERO { next.max(now) } else { now };
+        self.session.wait_until(self.started);
+    }
+}
+
+/// The problems of a scene in one line: the first one, and how many more there are.
+fn first_problem(error: &SceneError) -> String {
+    let Some(first) = error.problems.first() else { return error.to_string() };
+    let line = if first.line == 0 { String::new() } else { format!(", line {}", first.line) };
+    let more = match error.problems.len() + error.hidden - 1 {
+        0 => String::new(),
+        more => format!(" (and {more} more)"),
+    };
+    format!("{}{line}: {first}{more}", error.name)
+}
+
+/// Frames stored in a run of this plan: all if it ends by itself.
+const fn kept(plan: &WindowPlan) -> usize {
+    if plan.frames.is_some() || plan.seconds.is_some() { usize::MAX } else { FRAMES_KEPT }
+}
+
+impl Show for WindowShow<'_> {
+    fn apply(&mut self, action: Action) {
+        if matches!(action, Action::TargetFps(_) | Action::Policy(_) | Action::Law(_) | Action::Freeze(true)) {
+            self.stop_tuning();
+        }
+        match action {
+            Action::Run => self.drive(Drive::Run),
+            Action::Pause => self.drive(Drive::Pause),
+            Action::SingleStep => {
+                let frame = SimSpan::from_secs_f64(self.session.period().as_secs_f64()).unwrap_or(SimSpan::ZERO);
+                self.drive(Drive::Step(frame));
+            }
+            Action::Reset => self.reset(),
+            Action::Reload => self.reload(),
+            Action::Speed(speed) => self.drive(Drive::Speed(speed)),
+            Action::TargetFps(hz) => self.session.control().set_target_hz(hz),
+            Action::Policy(name) => self.session.set_policy(&name),
+            Action::Law(law) => self.session.control().set_law(view_model::control_law(law)),
+            Action::Sliders(sliders) => self.session.control().set_sliders(sliders),
+            Action::Freeze(frozen) => self.session.control().freeze(frozen),
+            Action::Tune => self.tune(),
+            Action::StopTuning => self.stop_tuning(),
+            Action::DragStart(hit) => {
+                self.pull(Some(Hand { object: hit.object, anchor: hit.anchor, target: hit.point_m }));
+            }
+            Action::DragMove(target) => self.pull(self.hand.map(|hand| Hand { target, ..hand })),
+            Action::DragEnd => self.pull(None),
+            Action::Select(agent) => self.status.selected = agent,
+            Action::OpenScene(path) => self.open(&path),
+        }
+    }
+
+    fn compose(&mut self, view: &ViewRequest) -> &Picture {
+        self.pictures += 1;
+        if self.pictures == 2 {
+            self.begin();
+        }
+        self.pass_time();
+        self.take_gains();
+        self.refresh();
+        let now = Instant::now();
+        self.notices.retain(|(until, _)| now < *until);
+        self.status.messages.clear();
+        self.status.messages.extend(self.notices.iter().map(|(_, message)| message.clone()));
+        self.status.sim_time = self.session.sim_now();
+        (self.status.running, self.status.speed) = (self.running, self.speed);
+        self.status.held =
+            self.hand.map(|hand| Held { target: hand.target, force_n: self.session.hand_force_n(hand.object) });
+        self.status.tuning = self.tuning.as_ref().map(|tuning| {
+            let (done, words) = tuning.progress();
+            ui::Tuning { done, words }
+        });
+        if let Some(tuning) = &mut self.tuning {
+            tuning.choose(self.session.control());
+        }
+        self.session.compose(&view.camera, view.size, view.style, self.hand);
+        if self.session.is_virtual() {
+            self.session.choose_beside(&view.camera, view.size);
+            self.declared_draw = self.session.spend_declared(view.size);
+        }
+        self.session.picture()
+    }
+
+    fn while_drawn(&mut self, view: &ViewRequest) {
+        if !self.session.is_virtual() {
+            self.session.choose_beside(&view.camera, view.size);
+        }
+    }
+
+    fn measured(&mut self, times: &FrameTimes) {
+        if matches!(times.skip, Some(Skip::Hidden | Skip::Still)) {
+            self.session.pass_over();
+            return;
+        }
+        let declared = || (self.session.now().saturating_sub(self.started), self.declared_draw);
+        let (work, draw) = if self.session.is_virtual() { declared() } else { (times.work, times.draw) };
+        let unlike = times.skip.is_some();
+        let skip = unlike || self.tuning.as_ref().is_some_and(Tuning::draws);
+        self.last = self.session.finish(self.started, Finished { work, draw, gpu: times.draw_gpu, skip });
+        if !unlike {
+            self.note_frame();
+        }
+    }
+
+    fn status(&self) -> &Status {
+        &self.status
+    }
+
+    fn drawn_by(&mut self, adapter: &str, on_processor: bool) {
+        self.adapter = Some(adapter.to_owned());
+        // the same adapter without a window: the benchmark needs a device of its own
+        self.session.calibrate((adapter, on_processor), || Gpu::headless().ok());
+    }
+
+    fn ahead(&mut self, camera: Camera) -> Camera {
+        self.session.ahead(camera)
+    }
+
+    fn scene_camera(&self) -> Camera {
+        self.session.scene_camera()
+    }
+
+    fn pick(&self, ray: Ray) -> Option<Hit> {
+        self.session.stage().pick(ray)
+    }
+
+    fn bounds(&self, of: Option<AgentId>) -> Option<Bounds> {
+        self.session.stage().bounds(of).map(|(centre, radius_m)| Bounds { centre, radius_m })
+    }
+
+    fn wants_close(&mut self) -> bool {
+        let done = self.share_done();
+        self.stopped = self.stopped || !(self.go_on)(&self.last, done);
+        self.stopped || done.is_some_and(|share| share >= 1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests;

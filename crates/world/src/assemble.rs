@@ -1,0 +1,121 @@
+//! From a scene to agents that can run: models built, laws and links given to both sides, the declared machine.
+//!
+//! In: a [`Scene`]. Out: spawns for the runtime. Never here: time passing, a law of control.
+
+use super::contact_laws::{Ties, faults};
+use super::kinds::{ExecutorKind, PriorityKind};
+use super::world::WorldError;
+use super::{Member, Scene, Spec};
+use metachron_contact::Agent;
+use metachron_models::rigid::RigidBody;
+use metachron_models::rod::Tube;
+use metachron_models::soft::SoftBody;
+use metachron_models::synthetic::Synthetic;
+use metachron_models::tool::Instrument;
+use metachron_runtime::{AUTO_THREADS_MAX, AgentSpawn, Governor, Machine, Priority, StepPrice, Watch};
+use std::borrow::Cow;
+
+/// Chooses the governor of an agent's step and resolution; `None` for an agent that keeps what it has.
+pub type Govern<'a> = &'a mut dyn FnMut(&Member) -> Option<Box<dyn Governor>>;
+
+/// The agents of `scene`, ready to run.
+///
+/// # Errors
+/// [`WorldError::Build`] if a model rejects its object.
+pub(super) fn spawns(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Vec<AgentSpawn>, WorldError> {
+    let mut ties = Ties::of(scene);
+    scene.agents.iter().map(|member| spawn(scene, member, (executor, &mut *govern), &mut ties)).collect()
+}
+
+/// The executor asked for; where that is left open, chosen by the number of agents.
+pub(super) fn executor(asked: ExecutorKind, agents: usize) -> ExecutorKind {
+    match asked {
+        ExecutorKind::Auto if agents <= AUTO_THREADS_MAX => ExecutorKind::Threads,
+        ExecutorKind::Auto => ExecutorKind::Pool,
+        asked => asked,
+    }
+}
+
+/// The scheduling priority of the agents' threads.
+pub(super) const fn priority(scene: &Scene) -> Priority {
+    match scene.priority {
+        PriorityKind::Normal => Priority::Normal,
+        PriorityKind::Realtime => Priority::Realtime,
+    }
+}
+
+fn spawn(
+    scene: &Scene,
+    member: &Member,
+    (executor, govern): (ExecutorKind, Govern<'_>),
+    ties: &mut Ties,
+) -> Result<AgentSpawn, WorldError> {
+    let agent = build(member, executor)
+        .map_err(|reason| WorldError::Build { name: member.name.clone(), reason: reason.to_string() })?;
+    let watches = scene.probes.iter().filter(|probe| probe.agent == member.id);
+    let watches = watches.filter_map(|probe| Some(Watch { at: probe.at, every: probe.every? }));
+    Ok(AgentSpawn {
+        name: member.name.clone(),
+        agent,
+        rate_hz: member.pace.rate_hz,
+        dt: member.pace.dt,
+        dt_range: member.pace.dt_range,
+        range: Some(member.simulation),
+        links: member.links.clone(),
+        laws: ties.laws(member.id),
+        attached: ties.attached(member.id),
+        together: ties.together(member.id),
+        faults: faults(member.faults),
+        watches: watches.collect(),
+        governor: govern(member),
+    })
+}
+
+fn build(member: &Member, executor: ExecutorKind) -> Result<Box<dyn Agent>, Box<dyn std::error::Error>> {
+    Ok(match member.spec.clone() {
+        Spec::Tube(tube) => Box::new(Tube::new(tube)?),
+        Spec::Rigid(body) => Box::new(RigidBody::new(body)?),
+        Spec::Soft(soft) => Box::new(SoftBody::new(soft)?),
+        Spec::Instrument(tool) => Box::new(Instrument::new(tool)?),
+        Spec::Synthetic(synthetic) => {
+            let agent = Synthetic::new(synthetic, member.simulation, member.start)?;
+            // lockstep charges declared costs, so no CPU time has to be burnt
+            Box::new(if executor == ExecutorKind::Lockstep { agent.declared_only() } else { agent })
+        }
+    })
+}
+
+/// The machine declared by `scene`.
+#[must_use]
+pub fn machine(scene: &Scene) -> Machine {
+    let wish = &scene.machine;
+    let mut machine = Machine::preset(&wish.preset).unwrap_or_else(Machine::two_cores_software);
+    machine.cores = wish.cores.unwrap_or(machine.cores);
+    for (model, base_us, unit_us) in &wish.steps {
+        let known = machine.steps.iter().position(|price| price.model == *model);
+        let at = known.unwrap_or_else(|| {
+            machine.steps.push(StepPrice { model: Cow::Owned(model.clone()), base_us: 0.0, unit_us: 0.0 });
+            machine.steps.len() - 1
+        });
+        let price = &mut machine.steps[at];
+        price.base_us = base_us.unwrap_or(price.base_us);
+        price.unit_us = unit_us.unwrap_or(price.unit_us);
+    }
+    let draw = &mut machine.draw;
+    draw.setup_ms = wish.draw_setup_ms.unwrap_or(draw.setup_ms);
+    draw.pixel_ns = wish.draw_pixel_ns.unwrap_or(draw.pixel_ns);
+    for (price, own) in draw.objects.iter_mut().zip(&wish.shading) {
+        price.setup_us = own.object_us.or(wish.draw_object_us).unwrap_or(price.setup_us);
+        price.triangle_us = own.triangle_us.or(wish.draw_triangle_us).unwrap_or(price.triangle_us);
+        price.vertex_us = own.vertex_us.unwrap_or(price.vertex_us);
+        price.pixel_ns = own.pixel_ns.unwrap_or(price.pixel_ns);
+    }
+    machine.choice_ns = (wish.cull_object_ns.unwrap_or(0.0), wish.choose_object_ns.unwrap_or(0.0));
+    machine.noise_sd = wish.noise.unwrap_or(machine.noise_sd);
+    machine.wander_sd = wish.wander.unwrap_or(machine.wander_sd);
+    machine.spikes = wish.spikes.unwrap_or(machine.spikes);
+    machine.load.clone_from(&wish.load);
+    machine.step_load.clone_from(&wish.step_load);
+    machine.seed = wish.seed.unwrap_or(machine.seed);
+    machine
+}

@@ -1,0 +1,172 @@
+//! Finds agents that start in contact with or inside each other or static solids.
+//!
+//! In: a scene. Out: all pairs that overlap although they collide, and how deep; every pair of rigid bodies in contact at rest; every
+//! pair of rigid bodies so near that rotation could bring them into contact.
+//! Never here: the response to it.
+
+use super::couplings::{Coupling, CouplingKind};
+use super::initial_shape::{Figure, figure};
+use super::scene::{Scene, Spec};
+use glam::DVec3;
+use metachron_contact::Law;
+use metachron_core::AgentId;
+use metachron_geometry::narrow_phase::{TouchRoom, touches};
+use metachron_geometry::{FormKind, Place, Touch};
+use std::collections::BTreeSet;
+
+/// Less than this is rounding, not overlap, metres: shapes are in single precision.
+pub(super) const OVERLAP_MIN_M: f64 = 2e-5;
+/// Bodies no farther apart than this count as in contact, metres.
+const TOUCH_MAX_M: f64 = 1e-4;
+
+/// An agent that starts inside another agent or inside a static solid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Overlap {
+    /// Name of the agent; of two agents the one with the lower id.
+    pub a: String,
+    /// Name of the other.
+    pub b: String,
+    /// Depth at the deepest point, metres.
+    pub depth_m: f64,
+}
+
+/// The object that an agent starts inside of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+pub(super) enum Inside {
+    /// Another agent.
+    Agent(AgentId),
+    /// A static solid, by its index in [`Scene::obstacles`].
+    Fixed(usize),
+}
+
+impl Scene {
+    /// The overlaps, with names.
+    pub(super) fn name_overlaps(&self, inside: &[(AgentId, Inside, f64)]) -> Vec<Overlap> {
+        let name = |b: Inside| match b {
+            Inside::Agent(id) => self.name_of(id).to_owned(),
+            Inside::Fixed(at) => self.obstacles[at].name.clone(),
+        };
+        let named = |&(a, b, depth_m): &_| Overlap { a: name(Inside::Agent(a)), b: name(b), depth_m };
+        inside.iter().map(named).collect()
+    }
+
+    /// All overlaps at the poses that the scene gives, and their depths, metres: pairs of agents in the order of their ids, then agents
+    /// inside static solids.
+    pub(super) fn inside_each_other(&self) -> Vec<(AgentId, Inside, f64)> {
+        let mut pairs = Vec::new();
+        self.pairs_within(0.0, |one, two, gap_m| {
+            if gap_m <= -OVERLAP_MIN_M {
+                pairs.push((one.id.min(two.id), Inside::Agent(one.id.max(two.id)), -gap_m));
+            }
+        });
+        pairs.sort_by_key(|&(a, b, _)| (a, b));
+        self.inside_fixed(&mut pairs);
+        pairs
+    }
+
+    /// Appends the agents that start inside static solids. A tube that is held may be held to the wall of one: it is reported only where
+    /// its axis is inside.
+    fn inside_fixed(&self, pairs: &mut Vec<(AgentId, Inside, f64)>) {
+        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        let unled = self.agents.iter().filter(|member| !matches!(member.spec, Spec::Instrument(_)));
+        for figure in unled.filter_map(figure) {
+            let held = !(self.is_loose(figure.id) || matches!(self.agents[figure.id.0 as usize].spec, Spec::Rigid(_)));
+            for (at, obstacle) in self.obstacles.iter().enumerate() {
+                let Some(fixed) = figure.over(obstacle) else { continue };
+                touches(&figure.placed(), &fixed.placed(), 0.0, &mut room, &mut found);
+                let told = |touch: &&Touch| match touch.on_a {
+                    Place::Chain { radius_m, .. } if held => touch.gap_m < -radius_m - OVERLAP_MIN_M,
+                    _ => true,
+                };
+                let depth_m = found.iter().filter(told).map(|touch| -touch.gap_m).fold(0.0, f64::max);
+                if depth_m >= OVERLAP_MIN_M {
+                    pairs.push((figure.id, Inside::Fixed(at), depth_m));
+                }
+            }
+        }
+    }
+
+    /// Every pair of rigid agents that starts at rest, in contact with each other by the ledger.
+    #[must_use]
+    pub fn resting_pairs(&self) -> Vec<(AgentId, AgentId)> {
+        let still = |id: AgentId| match self.agents.get(id.0 as usize).map(|member| &member.spec) {
+            Some(Spec::Rigid(body)) => body.velocity == DVec3::ZERO && body.spin == DVec3::ZERO,
+            _ => false,
+        };
+        let other = self.pairs_by_other_laws();
+        let mut pairs = Vec::new();
+        self.pairs_within(TOUCH_MAX_M, |one, two, _| {
+            let pair = (one.id.min(two.id), one.id.max(two.id));
+            if still(pair.0) && still(pair.1) && !other.contains(&pair) {
+                pairs.push(pair);
+            }
+        });
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// Every pair of rigid agents of equal rate that collides by the ledger and whose bounding spheres overlap.
+    #[must_use]
+    pub fn near_pairs(&self) -> Vec<(AgentId, AgentId)> {
+        let rate = |id: AgentId| self.agents.get(id.0 as usize).map(|member| member.pace.rate_hz);
+        let other = self.pairs_by_other_laws();
+        let rigid = self.agents.iter().filter(|member| matches!(member.spec, Spec::Rigid(_)));
+        let mut pairs = Vec::new();
+        self.met(rigid.filter_map(figure).collect(), 0.0, |one, two| {
+            let pair = (one.id.min(two.id), one.id.max(two.id));
+            let apart_m = (one.low + one.high).distance(two.low + two.high) / 2.0;
+            let reach_m = (one.high.x - one.low.x + two.high.x - two.low.x) / 2.0;
+            if apart_m < reach_m && rate(pair.0) == rate(pair.1) && !other.contains(&pair) {
+                pairs.push(pair);
+            }
+        });
+        pairs.sort_unstable();
+        pairs
+    }
+
+    /// Pairs with a contact law other than the ledger.
+    fn pairs_by_other_laws(&self) -> BTreeSet<(AgentId, AgentId)> {
+        let other_law = |c: &&Coupling| c.kind == CouplingKind::Contact && c.law != Law::Ledger;
+        self.couplings.iter().filter(other_law).map(|c| (c.a.min(c.b), c.a.max(c.b))).collect()
+    }
+
+    /// Calls `visit` with every pair that collides and starts no farther apart than `reach_m`, and with its least gap, metres.
+    fn pairs_within(&self, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure, f64)) {
+        let (mut room, mut found) = (TouchRoom::default(), Vec::new());
+        self.met(self.agents.iter().filter_map(figure).collect(), reach_m, |one, two| {
+            touches(&one.placed(), &two.placed(), reach_m, &mut room, &mut found);
+            if let Some(gap_m) = found.iter().map(|touch: &Touch| touch.gap_m).reduce(f64::min) {
+                visit(one, two, gap_m);
+            }
+        });
+    }
+
+    /// Calls `visit` with every pair of `figures` that can collide and whose boxes are no farther apart than `reach_m`.
+    fn met(&self, mut figures: Vec<Figure>, reach_m: f64, mut visit: impl FnMut(&Figure, &Figure)) {
+        figures.sort_by(|a, b| a.low.x.total_cmp(&b.low.x));
+        let apart = self.pairs_apart();
+        for (at, one) in figures.iter().enumerate() {
+            for two in figures[at + 1..].iter().take_while(|two| two.low.x <= one.high.x + reach_m) {
+                if one.meets(two, reach_m) && self.touch(one, two, &apart) {
+                    visit(one, two);
+                }
+            }
+        }
+    }
+
+    /// Pairs whose contact differs from the scene's `contacts`: where that is true those that do not collide, else those that do.
+    pub(super) fn pairs_apart(&self) -> BTreeSet<(AgentId, AgentId)> {
+        let contact =
+            |c: &&super::couplings::Coupling| c.kind == CouplingKind::Contact && (c.law == Law::Off) == self.contacts;
+        let coupled = self.couplings.iter().filter(contact).map(|c| (c.a, c.b));
+        let jointed = self.joints.iter().filter(|j| !j.collide && self.contacts).filter_map(|j| Some((j.a, j.b?)));
+        coupled.chain(jointed).map(|(a, b)| (a.min(b), a.max(b))).collect()
+    }
+
+    /// Whether two agents collide; two tools never do.
+    pub(super) fn touch(&self, one: &Figure, two: &Figure, apart: &BTreeSet<(AgentId, AgentId)>) -> bool {
+        let led = |figure: &Figure| matches!(figure.form.kind, FormKind::Tool(_));
+        let named = apart.contains(&(one.id.min(two.id), one.id.max(two.id)));
+        named != self.contacts && !(led(one) && led(two))
+    }
+}

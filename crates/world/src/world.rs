@@ -1,0 +1,234 @@
+//! A scene in play: agents that run, read and driven from any thread.
+//!
+//! In: a [`Scene`] and an executor. Out: each object's latest state, the world's time and its hash.
+//! Never here: a file, a picture, a law of control.
+
+use super::Scene;
+use super::assemble;
+use super::assemble::Govern;
+use super::kinds::ExecutorKind;
+use metachron_core::{AgentId, SimSpan, SimTime, Snapshot};
+use metachron_runtime::{
+    AgentHandle, AgentState, AgentStats, Command, Drive, Lockstep, Pool, Run, RunError, SendError, SystemClock,
+    Threads, Timeline, state_hash, wait_until,
+};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
+
+/// An object of a world; valid for the world that named it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+pub struct Object(AgentId);
+
+impl Object {
+    /// The number of its agent: its place in the scene.
+    #[must_use]
+    pub const fn id(self) -> AgentId {
+        self.0
+    }
+}
+
+/// Why a world could not be started, or has no such object.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum WorldError {
+    /// A model rejected its object.
+    #[error("object \"{name}\": {reason}")]
+    Build {
+        /// The object's name.
+        name: String,
+        /// The model's message.
+        reason: String,
+    },
+    /// The agents could not be started.
+    #[error(transparent)]
+    Run(#[from] RunError),
+    /// The world has no moving object of that name.
+    #[error("the world has no moving object \"{name}\"; it has {known}")]
+    NoObject {
+        /// The name asked for.
+        name: String,
+        /// The names that there are.
+        known: String,
+    },
+}
+
+/// A running world. Clones are the same world; every method takes `&self`.
+///
+/// Its time stands until [`World::advance`] or [`World::drive`] lets it pass.
+#[derive(Clone)]
+pub struct World {
+    shared: Arc<Shared>,
+}
+
+struct Shared {
+    run: Mutex<Box<dyn Run>>,
+    agents: Vec<AgentHandle>,
+    executor: ExecutorKind,
+    /// The clock of executors in real time.
+    clock: Arc<SystemClock>,
+    stopped: AtomicBool,
+}
+
+/// How often a real-time world looks whether all agents have arrived.
+const LOOK_EVERY: Duration = Duration::from_micros(500);
+
+impl World {
+    /// Starts the agents of `scene` on `executor`, each with the step and the resolution that the scene gives it.
+    ///
+    /// # Errors
+    /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
+    pub fn start(scene: &Scene, executor: ExecutorKind) -> Result<Self, WorldError> {
+        Self::start_governed(scene, executor, &mut |_| None)
+    }
+
+    /// As [`World::start`], with governors that choose steps and resolutions while the world runs.
+    ///
+    /// # Errors
+    /// [`WorldError::Build`] and [`WorldError::Run`]; nothing runs then.
+    pub fn start_governed(scene: &Scene, executor: ExecutorKind, govern: Govern<'_>) -> Result<Self, WorldError> {
+        let executor = assemble::executor(executor, scene.agents.len());
+        let spawns = assemble::spawns(scene, executor, govern)?;
+        let clock = Arc::new(SystemClock::new());
+        let priority = assemble::priority(scene);
+        let mut run: Box<dyn Run> = match executor {
+            ExecutorKind::Threads => Box::new(Threads::start(spawns, clock.clone(), priority)?),
+            ExecutorKind::Auto | ExecutorKind::Pool => Box::new(Pool::start(spawns, clock.clone(), priority)?),
+            ExecutorKind::Lockstep => Box::new(Lockstep::start(spawns, assemble::machine(scene))?),
+        };
+        if executor != ExecutorKind::Lockstep {
+            run.drive(Drive::Pause);
+        }
+        let agents = run.agents().to_vec();
+        Ok(Self {
+            shared: Arc::new(Shared { run: Mutex::new(run), agents, executor, clock, stopped: AtomicBool::new(false) }),
+        })
+    }
+
+    /// The object of that name.
+    ///
+    /// # Errors
+    /// [`WorldError::NoObject`].
+    pub fn object(&self, name: &str) -> Result<Object, WorldError> {
+        let found = self.shared.agents.iter().find(|agent| agent.name() == name);
+        found.map(|agent| Object(agent.id())).ok_or_else(|| {
+            let known: Vec<_> = self.shared.agents.iter().take(20).map(AgentHandle::name).collect();
+            WorldError::NoObject { name: name.to_owned(), known: known.join(", ") }
+        })
+    }
+
+    /// The newest state of an object. Reading never blocks the object.
+    ///
+    /// # Panics
+    /// For an object of another world whose number this one does not have.
+    #[must_use]
+    pub fn latest(&self, object: Object) -> Arc<Snapshot> {
+        self.shared.agents[object.0.0 as usize].latest()
+    }
+
+    /// Simulated time now.
+    #[must_use]
+    pub fn time(&self) -> SimTime {
+        self.run().sim_now()
+    }
+
+    /// Hash of the newest states of all objects: equal numbers mean bit-identical states.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        state_hash(&self.shared.agents)
+    }
+
+    /// Lets the world live for `span`, then stops its time.
+    ///
+    /// In lockstep every step that is due by then has been made. On threads and in the pool time passes in real time, and each object that
+    /// neither rests nor has failed has lived to the end at least; one may be a step ahead.
+    /// A world that was stopped stays as it is.
+    pub fn advance(&self, span: SimSpan) {
+        if self.executor() == ExecutorKind::Lockstep {
+            return self.wait_until(self.now() + Duration::from_nanos(span.as_nanos()));
+        }
+        let end = self.time() + span;
+        self.drive(Drive::Run);
+        while !self.has_stopped() {
+            let now = self.now();
+            self.wait_until(now + LOOK_EVERY);
+            if self.time() >= end && self.shared.agents.iter().all(|agent| has_lived_to(agent, end)) {
+                return self.drive(Drive::Pause);
+            }
+        }
+    }
+
+    /// The executor that runs the agents.
+    #[must_use]
+    pub fn executor(&self) -> ExecutorKind {
+        self.shared.executor
+    }
+
+    /// The running agents, in the order of their numbers.
+    #[must_use]
+    pub fn agents(&self) -> &[AgentHandle] {
+        &self.shared.agents
+    }
+
+    /// Wall time since the start; virtual in lockstep.
+    #[must_use]
+    pub fn now(&self) -> Duration {
+        self.run().now()
+    }
+
+    /// Waits until the wall time `until`, while the agents run; returns at once if that has passed.
+    pub fn wait_until(&self, until: Duration) {
+        match self.executor() {
+            ExecutorKind::Lockstep if !self.has_stopped() => self.run().wait_until(until),
+            ExecutorKind::Lockstep => {}
+            _ => wait_until(&*self.shared.clock, until),
+        }
+    }
+
+    /// Lets a frame's own `work` pass: it occupies a core of the declared machine in lockstep, and has passed by itself elsewhere.
+    pub fn spend(&self, work: Duration) {
+        if !self.has_stopped() {
+            self.run().spend(work);
+        }
+    }
+
+    /// The timeline in force.
+    #[must_use]
+    pub fn timeline(&self) -> Timeline {
+        self.run().timeline()
+    }
+
+    /// Changes the flow of time: pause, run, speed, single step.
+    pub fn drive(&self, drive: Drive) {
+        self.run().drive(drive);
+    }
+
+    /// Sends a command to an agent.
+    ///
+    /// # Errors
+    /// [`SendError`]: nothing was delivered.
+    pub fn send(&self, to: AgentId, command: Command) -> Result<(), SendError> {
+        self.shared.agents.get(to.0 as usize).ok_or(SendError::NoAgent(to))?.send(command)
+    }
+
+    /// Ends the run for all clones: waits for the turns in progress (boundedly) and returns the metrics of every agent.
+    /// Latest states stay readable.
+    pub fn stop(&self) -> Vec<AgentStats> {
+        self.shared.stopped.store(true, Ordering::Relaxed);
+        self.run().shutdown()
+    }
+
+    fn has_stopped(&self) -> bool {
+        self.shared.stopped.load(Ordering::Relaxed)
+    }
+
+    fn run(&self) -> MutexGuard<'_, Box<dyn Run>> {
+        self.shared.run.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+/// Whether nothing more is to be waited for: the agent has reached `end`, rests, or has failed.
+fn has_lived_to(agent: &AgentHandle, end: SimTime) -> bool {
+    let newest = agent.latest();
+    newest.at_rest || !matches!(agent.state(), AgentState::Running) || newest.moment() >= end
+}
