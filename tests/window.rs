@@ -14,7 +14,7 @@ use metachron_session::Session;
 use metachron_viewer::ui::{
     Action, Bounds, FrameTimes, Show, Skip, Status, ViewRequest, WindowEnd, WindowError, WindowOptions, run_window,
 };
-use metachron_viewer::window::{WindowFailure, WindowPlan, play_in_window};
+use metachron_viewer::{WindowFailure, WindowPlan, play_in_window};
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
 use std::process::{Child, Command, ExitCode, Stdio};
@@ -116,6 +116,7 @@ fn without_a_display_the_error_says_so() {
 const FRAMES: u64 = 8;
 
 fn the_tube_plays_in_a_window() {
+    metachron::scenes::provide();
     let source = Source::open("tube").unwrap();
     let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();
@@ -134,6 +135,7 @@ fn the_tube_plays_in_a_window() {
 }
 
 fn a_display_that_goes_away_ends_the_run_with_its_outcome() {
+    metachron::scenes::provide();
     let source = Source::open("pendulum").unwrap();
     let session = Session::open(metachron_scene::load(&source, &[]).unwrap()).unwrap();
     let screenshots = std::env::temp_dir();

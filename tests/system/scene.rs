@@ -2,7 +2,7 @@
 
 use metachron_world::Scene;
 
-use metachron_scene::{SceneError, Source, builtin, json_schema, load};
+use metachron_scene::{SceneError, Source, json_schema, load};
 use proptest::prelude::*;
 
 /// The least scene with a tube, for the tests to change.
@@ -51,7 +51,8 @@ fn refused(find: &str, put: &str, text: &str, words: &[&str]) {
 
 #[test]
 fn every_built_in_scene_loads_and_says_what_it_shows() {
-    for scene in &builtin::ALL {
+    for scene in &metachron::scenes::ALL {
+        metachron::scenes::provide();
         let loaded = scene.source().and_then(|s| load(&s, &[])).unwrap_or_else(|e| panic!("{e:?}"));
         assert!(!loaded.description.is_empty() && loaded.camera.is_some(), "{}", scene.name);
     }
@@ -365,6 +366,7 @@ fn a_mesh_that_no_scene_can_hold_is_refused_by_name_whether_it_is_touched_or_see
 
 #[test]
 fn a_scene_that_does_not_exist_lists_the_built_in_ones() {
+    metachron::scenes::provide();
     let error = Source::open("tubee").unwrap_err();
     let help = error.problems[0].help.clone().unwrap();
     assert!(help.contains("did you mean `tube`?") && help.contains("overload"), "{help}");
@@ -432,7 +434,7 @@ fn keeps(schema: &serde_json::Value, root: &serde_json::Value, value: &serde_jso
 #[test]
 fn the_schema_accepts_every_built_in_scene_and_refuses_what_the_program_refuses() {
     let schema = json_schema();
-    for scene in &builtin::ALL {
+    for scene in &metachron::scenes::ALL {
         let value: serde_json::Value = toml::from_str(scene.text).unwrap();
         keeps(&schema, &schema, &value).unwrap_or_else(|e| panic!("{}: {e}", scene.name));
     }
@@ -467,7 +469,7 @@ proptest! {
     #[test]
     fn no_damaged_scene_makes_the_loader_panic(
         // a damaged count may be a mesh of a million triangles; the walk is full of them, and its text has nothing else
-        scene in prop::sample::select(builtin::ALL.iter().filter(|s| s.name != "walkthrough").collect::<Vec<_>>()),
+        scene in prop::sample::select(metachron::scenes::ALL.iter().filter(|s| s.name != "walkthrough").collect::<Vec<_>>()),
         cuts in proptest::collection::vec((any::<prop::sample::Index>(), 0..30_usize, "[ -~\nλ\\[\\]{}=\"'.]{0,8}"), 1..4),
     ) {
         let mut text: Vec<char> = scene.text.chars().collect();

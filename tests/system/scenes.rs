@@ -15,6 +15,7 @@ use metachron_scene::{builtin, load};
 use std::sync::Arc;
 
 fn scene(name: &str) -> Scene {
+    metachron::scenes::provide();
     builtin::find(name).unwrap().source().and_then(|source| load(&source, &[])).unwrap()
 }
 
@@ -81,7 +82,7 @@ fn millis(ms: f64) -> SimSpan {
 
 #[test]
 fn every_agent_of_every_built_in_scene_can_be_built_and_stays_finite() {
-    for built_in in &builtin::ALL {
+    for built_in in &metachron::scenes::ALL {
         let mut play = Play::of(&scene(built_in.name), &metachron_scene::format::MODELS);
         for _ in 0..20 {
             play.step(millis(5.0));

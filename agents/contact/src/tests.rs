@@ -2,6 +2,7 @@
 
 use super::*;
 use glam::DVec3;
+use metachron_core::Slots;
 
 /// Deterministic numbers in −1 … 1.
 struct Noise(u64);

@@ -8,7 +8,7 @@ use metachron_lod::share::{Share, water_level};
 use proptest::prelude::*;
 use serde_json::Value;
 
-const CASES: &str = include_str!("../../tests/reference/grisoni.json");
+const CASES: &str = include_str!("../../../tests/reference/grisoni.json");
 
 fn number(of: &Value, key: &str) -> f64 {
     of[key].as_f64().unwrap_or_else(|| panic!("{key} in {of}"))

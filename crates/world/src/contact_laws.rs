@@ -10,7 +10,7 @@ use metachron_runtime::Faults;
 use std::collections::BTreeMap;
 
 /// The ties of all agents of a scene.
-pub(super) struct Ties {
+pub struct Ties {
     laws: BTreeMap<AgentId, Vec<(AgentId, Law)>>,
     attached: BTreeMap<AgentId, Vec<Link>>,
     leaders: Vec<AgentId>,
@@ -18,7 +18,7 @@ pub(super) struct Ties {
 
 impl Ties {
     /// Reads the ties of `scene`.
-    pub(super) fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &Scene) -> Self {
         let mut laws: BTreeMap<AgentId, Vec<_>> = BTreeMap::new();
         for (a, b, law) in contact_laws(scene) {
             laws.entry(a).or_default().push((b, law));
@@ -31,29 +31,30 @@ impl Ties {
     }
 
     /// The contact laws between `id` and its peers that are not the ledger; returned for one side of a pair.
-    pub(super) fn laws(&mut self, id: AgentId) -> Vec<(AgentId, Law)> {
+    pub fn laws(&mut self, id: AgentId) -> Vec<(AgentId, Law)> {
         self.laws.remove(&id).unwrap_or_default()
     }
 
     /// The permanent links of `id`; returned for one side of a pair.
-    pub(super) fn attached(&mut self, id: AgentId) -> Vec<Link> {
+    pub fn attached(&mut self, id: AgentId) -> Vec<Link> {
         self.attached.remove(&id).unwrap_or_default()
     }
 
     /// The leader of the island in which `id` begins, if joints or resting contact connect it to others: the lowest number among them.
-    pub(super) fn together(&self, id: AgentId) -> Option<AgentId> {
+    pub fn together(&self, id: AgentId) -> Option<AgentId> {
         self.leaders.get(id.0 as usize).copied().filter(|leader| *leader != id)
     }
 }
 
 /// Converts injected faults to the runtime's type.
-pub(super) const fn faults(faults: super::couplings::Faults) -> Faults {
+pub const fn faults(faults: super::couplings::Faults) -> Faults {
     let super::couplings::Faults { jitter, loss, seed } = faults;
     Faults { jitter, loss, seed }
 }
 
 /// Every pair with a law of its own; in a scene without contacts that is every pair of material objects.
-fn contact_laws(scene: &Scene) -> Vec<(AgentId, AgentId, Law)> {
+#[must_use]
+pub fn contact_laws(scene: &Scene) -> Vec<(AgentId, AgentId, Law)> {
     let contacts = scene.couplings.iter().filter(|c| c.kind == CouplingKind::Contact);
     let named: BTreeMap<_, _> = contacts.map(|c| ((c.a.min(c.b), c.a.max(c.b)), c.law)).collect();
     if scene.contacts {
@@ -77,7 +78,8 @@ const HEAP_MIN: usize = 128;
 /// For each agent the lowest number among those that are connected to it by joints, by resting contact or as a heap: its own if there are
 /// none. A stack that starts at rest must not first be dropped on itself, and a thousand bodies about to touch must not first detect each
 /// other one by one.
-fn leaders(scene: &Scene) -> Vec<AgentId> {
+#[must_use]
+pub fn leaders(scene: &Scene) -> Vec<AgentId> {
     let mut above: Vec<usize> = (0..scene.agents.len()).collect();
     let jointed = scene.joints.iter().filter_map(|joint| Some((joint.a, joint.b?)));
     jointed.chain(scene.resting_pairs()).chain(heaps(scene)).for_each(|pair| join(&mut above, pair));
@@ -108,71 +110,4 @@ fn root(above: &mut [usize], mut at: usize) -> usize {
         at = above[at];
     }
     at
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use metachron_scene::{Source, load};
-
-    fn balls(ties: &str) -> Scene {
-        let text = format!(
-            "format = 1\n{ties}\n[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"ball\"\nradius_m = 0.1\ngrid = [6, 1, 1]\nspacing_m = [1, 1, 1]\n"
-        );
-        Source::memory("balls", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap()
-    }
-
-    #[test]
-    fn agents_that_joints_hold_together_begin_in_the_world_of_the_lowest() {
-        let joint = |a, b| format!("{{ kind = \"fixed\", a = \"b-{a}\", b = \"b-{b}\" }}");
-        let scene = balls(&format!("joint = [{}, {}, {}]", joint(5, 3), joint(2, 1), joint(3, 2)));
-        let ties = Ties::of(&scene);
-        let together: Vec<_> = (0..6).map(|id| ties.together(AgentId(id)).map(|leader| leader.0)).collect();
-        assert_eq!(together, [None, None, Some(1), Some(1), None, Some(1)]);
-    }
-
-    #[test]
-    fn bodies_that_lie_against_each_other_begin_in_one_world_unless_their_law_is_another() {
-        let row = |x: f64, more: &str| {
-            format!(
-                "{{ name = \"{x}\", model = \"rigid\", shape = \"ball\", radius_m = 0.5, position_m = [{x}, 0, 0]{more} }},\n"
-            )
-        };
-        let still = [row(0.0, ""), row(1.0, ""), row(2.01, ""), row(3.01, ""), row(4.01, ", velocity_m_s = [1, 0, 0]")]
-            .concat();
-        let leaders = |ties: &str| {
-            let text = format!("format = 1\n{ties}\nobject = [\n{still}]\n");
-            let scene = Source::memory("row", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
-            leaders(&scene).iter().map(|id| id.0).collect::<Vec<_>>()
-        };
-        assert_eq!(leaders(""), [0, 0, 2, 2, 4]);
-        assert_eq!(leaders("coupling = [{ a = \"0\", b = \"1\", law = \"off\" }]"), [0, 1, 2, 2, 4]);
-        assert_eq!(leaders("world = { contacts = false }"), [0, 1, 2, 3, 4]);
-    }
-
-    #[test]
-    fn a_heap_begins_in_one_world_and_what_is_smaller_or_sparser_does_not() {
-        let worlds = |grid: &str, spacing: &str, more: &str| {
-            let text = format!(
-                "format = 1\n{more}\n[[object]]\nname = \"b\"\nmodel = \"rigid\"\nshape = \"box\"\nhalf_extents_m = [0.1, 0.1, 0.1]\nrate_hz = 60.0\ngrid = {grid}\nspacing_m = {spacing}\n"
-            );
-            let scene = Source::memory("heap", text.as_bytes()).and_then(|source| load(&source, &[])).unwrap();
-            leaders(&scene).into_iter().collect::<std::collections::BTreeSet<_>>().len()
-        };
-        let near = "[0.3, 0.4, 0.4]"; // rows along x: the ball around a box is 0.35 m thick
-        assert_eq!(worlds("[129, 2, 1]", near, ""), 2);
-        assert_eq!(worlds("[128, 2, 1]", near, ""), 256, "too small");
-        assert_eq!(worlds("[129, 2, 1]", "[0.4, 0.4, 0.4]", ""), 258, "too sparse");
-        assert_eq!(worlds("[129, 2, 1]", near, "[world]\ncontacts = false"), 258, "nothing touches");
-    }
-
-    #[test]
-    fn a_world_without_contacts_turns_every_pair_off_but_those_it_names() {
-        let coupling = "coupling = [{ a = \"b-4\", b = \"b-1\", law = \"ledger\" }]\n[world]\ncontacts = false";
-        let laws = contact_laws(&balls(coupling));
-        assert_eq!(laws.len(), 15);
-        let on: Vec<_> = laws.iter().filter(|(.., law)| *law != Law::Off).map(|(a, b, _)| (a.0, b.0)).collect();
-        assert_eq!(on, [(1, 4)]);
-        assert!(contact_laws(&balls("")).is_empty());
-    }
 }

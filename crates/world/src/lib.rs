@@ -4,7 +4,7 @@
 //! Never here: TOML, a file, the GPU, a law of control.
 
 mod assemble;
-mod contact_laws;
+pub mod contact_laws;
 pub mod couplings;
 mod initial_overlap;
 mod initial_shape;

@@ -29,6 +29,7 @@ impl Play {
         let mut overrides: Vec<_> = changes.iter().map(|(k, v)| ((*k).to_owned(), (*v).to_owned())).collect();
         overrides.push(("executor".to_owned(), "\"lockstep\"".to_owned()));
         overrides.push(("target.frame_hz".to_owned(), target_hz.to_string()));
+        metachron::scenes::provide();
         let source = builtin::find(scene).unwrap().source().unwrap();
         let session = Session::open(load(&source, &overrides).unwrap()).unwrap();
         Self { session, due: Duration::ZERO }

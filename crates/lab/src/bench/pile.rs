@@ -255,7 +255,8 @@ mod tests {
 
     #[test]
     fn the_plain_world_holds_the_boxes_of_the_scene_and_they_fall() {
-        let scene = load(&Source::open("pile").unwrap(), &[]).unwrap();
+        let scene =
+            load(&Source::open(concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenes/pile.toml")).unwrap(), &[]).unwrap();
         for settings in [Settings::Own, Settings::Island] {
             let mut spent = Spent::new();
             let row = plain(&scene, 0.02, settings, &mut spent).unwrap();

@@ -8,7 +8,8 @@ use std::path::Path;
 
 fn plan(scene: &str) -> WindowPlan {
     let overrides = vec![("executor".to_owned(), "\"lockstep\"".to_owned())];
-    let source = Source::open(scene).unwrap();
+    let file = format!("{}/../../scenes/{scene}.toml", env!("CARGO_MANIFEST_DIR"));
+    let source = Source::open(&file).unwrap();
     WindowPlan { source, overrides, size: None, screenshots: PathBuf::from("."), seconds: None, frames: None }
 }
 
@@ -23,7 +24,7 @@ fn with_tube(check: impl FnOnce(&mut WindowShow<'_>)) {
 
 fn with_scene(scene: &str, check: impl FnOnce(&mut WindowShow<'_>)) {
     let plan = plan(scene);
-    let session = Session::open(scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     check(&mut WindowShow::new(session, plan, &mut go_on));
 }
@@ -184,7 +185,7 @@ fn time_that_an_agent_drops_is_no_real_time() {
     let mut plan = plan("pendulum");
     // a step that becomes 50 ms long at most takes 100
     plan.overrides.push(("machine.step.tube.base_us".to_owned(), "100000".to_owned()));
-    let session = Session::open(scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
+    let session = Session::open(metachron_scene::load(&plan.source, &plan.overrides).unwrap()).unwrap();
     let mut go_on = |_: &FrameRecord, _: Option<f64>| true;
     let show = &mut WindowShow::new(session, plan, &mut go_on);
     (0..240).for_each(|_| frame(show, None));

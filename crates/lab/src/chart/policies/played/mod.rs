@@ -101,9 +101,7 @@ mod tests {
     fn a_policy_plays_a_scene_to_the_bit_and_every_number_is_there() {
         let policies = ["robin-hood", "adaptive"];
         let rows = policies.map(|policy| row("library", policy));
-        for (row, again) in
-            rows.iter().zip(policies.map(|policy| crate::chart::policies::played::row("library", policy)))
-        {
+        for (row, again) in rows.iter().zip(policies.map(|policy| self::row("library", policy))) {
             // NaN is not equal to itself, so the rows are compared as text
             assert_eq!(format!("{row:?}"), format!("{again:?}"));
             assert_eq!((row.frames, row::times(row).len(), row.setting.as_str()), (6, 6, "library"));
