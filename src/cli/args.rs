@@ -111,7 +111,7 @@ pub enum Command {
     /// Measure where methods fail, and draw it: CSV, SVG and PNG into a folder, a table here
     #[command(after_help = CHART_EXAMPLES)]
     Chart(ChartArgs),
-    /// Measure how much this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
+    /// Measure how much load this machine carries: CSV, JSON, SVG and PNG into a folder, a table here
     #[command(after_help = BENCH_EXAMPLES)]
     Bench(BenchArgs),
     /// Write a scene of the papers' experiments as a scene file, with a seed and options
@@ -330,7 +330,7 @@ pub struct FitArgs {
 /// `chart`.
 #[derive(Debug, Args)]
 pub struct ChartArgs {
-    /// What to chart
+    /// Subject to chart
     pub subject: Subject,
     /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "charts", value_hint = ValueHint::DirPath)]
@@ -355,7 +355,7 @@ pub struct ChartArgs {
 /// `bench`.
 #[derive(Debug, Args)]
 pub struct BenchArgs {
-    /// What to measure
+    /// Subject to measure
     pub subject: BenchSubject,
     /// Write the files here; the folder is created where it does not exist
     #[arg(long, value_name = "FOLDER", default_value = "bench", value_hint = ValueHint::DirPath)]
@@ -403,7 +403,7 @@ pub enum BenchSubject {
 pub enum Subject {
     /// Error of each method against an independent answer, and its cost, next to the points of other engines
     Accuracy,
-    /// How cost grows with segments, contacts and agents, and how far it is from what the machine could do
+    /// How cost grows with segments, contacts and agents, and how far it is from the limit of the machine
     Scaling,
     /// Where integrators and couplings blow up, and where they are bounded but wrong
     Stability,
