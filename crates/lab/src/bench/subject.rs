@@ -1,4 +1,4 @@
-//! What every benchmark has in common: rows, the table and the figure of them, and the files they are written to.
+//! The common form of a benchmark: rows, their table and figure, and the files to which they are written.
 //!
 //! In: a subject. Out: CSV, JSON, SVG and PNG in a folder, a table on standard output. Never here: what is measured.
 
@@ -23,7 +23,7 @@ pub(super) trait Subject {
     /// Its name on the command line; the files are called after it.
     const NAME: &'static str;
 
-    /// Measures what is asked for, case by case as long as `watch` says to go on: the rows that are finished.
+    /// Measures the requested cases one by one while `watch` says to go on; returns the finished rows.
     fn measure(args: &BenchArgs, watch: &Watch) -> anyhow::Result<Vec<Self::Row>>;
 
     /// The table that is printed.

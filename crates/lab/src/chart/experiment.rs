@@ -32,7 +32,7 @@ pub trait Experiment: Sync {
     /// The case that a row is of.
     fn case_of(row: &Self::Row) -> Self::Case;
 
-    /// The picture of the rows there are.
+    /// The picture of the rows so far.
     fn figure(rows: &[Self::Row]) -> Figure;
 
     /// Further pictures, each with the ending of its file's name.
@@ -55,7 +55,7 @@ pub trait Experiment: Sync {
 pub struct Finding {
     /// The claim, as a sentence with its limit.
     pub(super) claim: String,
-    /// What was measured.
+    /// The measured value.
     pub(super) measured: f64,
     /// The limit.
     pub(super) limit: f64,

@@ -3,7 +3,6 @@
 //! The middle is pushed sideways and released. Once only the slowest motion is left, the rate at which that grows or decays gives
 //! its stiffness, which passes through zero where the tube buckles. Runs on one side approach that twist step by step; a run that
 //! turns out to be on the other side is a failure. Theory: docs/theory/rod.md, eq. 50–53.
-//! belongs to the other side is a failure. Theory: docs/theory/rod.md, eq. 50–53.
 
 use super::super::stability::common::dead_load;
 use super::diagram::{Benchmark, Case, Goal};

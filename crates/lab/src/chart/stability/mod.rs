@@ -1,4 +1,4 @@
-//! `chart stability`: where methods fail, and whether this one does.
+//! `chart stability`: where methods fail, and whether this program's methods do.
 
 pub(super) mod capstan;
 pub(super) mod closed;
